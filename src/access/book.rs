@@ -54,7 +54,7 @@ pub struct Entry {
     /// Value before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub old: Option<Arc<str>>,
-    /// Value wished.
+    /// Value requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub new: Option<Arc<str>>,
     /// How it ended.

@@ -26,7 +26,7 @@ use self::{
     work::Errand,
 };
 use super::{
-    CommandRequest, Secret, Who, Wish, right,
+    CommandRequest, Secret, SessionRequest, Who, right,
     tries::Tries,
     user::{Change, Users},
 };
@@ -67,7 +67,7 @@ pub enum Effect {
     Command(Command),
     /// Put this into the book.
     Record(ActionRecord),
-    /// Answer a wish.
+    /// Answer a request.
     Reply(u64, Result<(), String>),
     /// The standing of this terminal has changed.
     Standing(u32),
@@ -77,7 +77,7 @@ pub enum Effect {
     Save(Users),
     /// End the station.
     Stop,
-    /// Take up the plant file anew; the wish is answered when that is done.
+    /// Take up the plant file anew; the request is answered when that is done.
     Reload(u64),
     /// This terminal may not stay.
     HangUp(u32, String),
@@ -311,58 +311,59 @@ impl AccessControl {
         }
     }
 
-    /// A terminal wishes; the answer goes to the ticket.
-    pub fn wish(&mut self, terminal: u32, ticket: u64, wish: Wish, at: Timestamp) -> Vec<Effect> {
+    /// Handles a request; the reply goes to the ticket.
+    pub fn on_request(&mut self, terminal: u32, ticket: u64, request: SessionRequest, at: Timestamp) -> Vec<Effect> {
         if !self.within_rate(terminal, at) {
             return vec![Effect::Reply(ticket, Err(TOO_MANY.to_owned()))];
         }
-        let needed = right::needs_for_wish(&wish);
+        let needed = right::needs_for_request(&request);
         if let (Some(_), Err(why)) = (needed, self.may(terminal, needed))
-            && !self.could_anyway(terminal, &wish)
+            && !self.could_anyway(terminal, &request)
         {
-            return self.refuse_wish(terminal, ticket, &wish, why, at);
+            return self.refuse_request(terminal, ticket, &request, why, at);
         }
         if let Some(session) = self.sessions.get_mut(&terminal).filter(|session| !session.locked) {
             session.active = at;
         }
-        match wish {
-            Wish::Login { user, password } => self.login(terminal, ticket, &user, password, at),
-            Wish::Logout => self.logout(terminal, ticket, at),
-            Wish::Lock => self.lock(terminal, ticket, at),
-            Wish::Unlock(password) => self.unlock(terminal, ticket, password, at),
-            Wish::Active => vec![Effect::Reply(ticket, Ok(())), Effect::Standing(terminal)],
-            Wish::Exported { file, sha256 } => {
+        match request {
+            SessionRequest::Login { user, password } => self.login(terminal, ticket, &user, password, at),
+            SessionRequest::Logout => self.logout(terminal, ticket, at),
+            SessionRequest::Lock => self.lock(terminal, ticket, at),
+            SessionRequest::Unlock(password) => self.unlock(terminal, ticket, password, at),
+            SessionRequest::Active => vec![Effect::Reply(ticket, Ok(())), Effect::Standing(terminal)],
+            SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
                 self.granted(terminal, ticket, "export", &file, new, at)
             }
-            Wish::Stop => {
+            SessionRequest::Stop => {
                 let mut effects = self.granted(terminal, ticket, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
                 effects
             }
-            Wish::Reload => {
+            SessionRequest::Reload => {
                 let mut effects = self.granted(terminal, ticket, "reload", &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket));
                 effects
             }
-            wish @ (Wish::FirstSupervisor { .. }
-            | Wish::ChangePassword { .. }
-            | Wish::AddUser { .. }
-            | Wish::SetRole { .. }
-            | Wish::Disable { .. }
-            | Wish::DeleteUser { .. }
-            | Wish::ResetPassword { .. }) => self.wish_of_people(terminal, ticket, wish, at),
+            request @ (SessionRequest::FirstSupervisor { .. }
+            | SessionRequest::ChangePassword { .. }
+            | SessionRequest::AddUser { .. }
+            | SessionRequest::SetRole { .. }
+            | SessionRequest::Disable { .. }
+            | SessionRequest::DeleteUser { .. }
+            | SessionRequest::ResetPassword { .. }) => self.user_admin_request(terminal, ticket, request, at),
         }
     }
 
     /// Stopping the station or reloading its plant file needs no login of those who can do so with the means of the operating
     /// system (its init system, for one), whatever role they have here without a password. Who logged in acts as that user.
-    fn could_anyway(&self, terminal: u32, wish: &Wish) -> bool {
+    fn could_anyway(&self, terminal: u32, request: &SessionRequest) -> bool {
         let without_login = |session: &&SessionState| (session.who.is_none() || session.trusted) && !session.peer.own;
         let session = self.sessions.get(&terminal).filter(without_login);
-        matches!(wish, Wish::Stop | Wish::Reload) && session.is_some_and(|session| self.is_host(&session.peer))
+        matches!(request, SessionRequest::Stop | SessionRequest::Reload)
+            && session.is_some_and(|session| self.is_host(&session.peer))
     }
 
     fn plant_name(&self) -> Arc<str> {
@@ -386,9 +387,16 @@ impl AccessControl {
         vec![Effect::Record(record), Effect::Reply(ticket, Ok(()))]
     }
 
-    fn refuse_wish(&mut self, terminal: u32, ticket: u64, wish: &Wish, why: String, at: Timestamp) -> Vec<Effect> {
+    fn refuse_request(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        request: &SessionRequest,
+        why: String,
+        at: Timestamp,
+    ) -> Vec<Effect> {
         let Some(session) = self.sessions.remove(&terminal) else { return vec![Effect::Reply(ticket, Err(why))] };
-        let (action, target) = words(wish);
+        let (action, target) = words(request);
         let mut effects = self.refused(&session, action, &target, &why, at);
         self.sessions.insert(terminal, session);
         effects.push(Effect::Reply(ticket, Err(why)));

@@ -1,7 +1,7 @@
 //! Who may: users and their passwords, sessions, rights, lock-out, and the chained book of all that was done.
 
 pub mod right;
-pub mod wish;
+pub mod session_request;
 pub mod password;
 pub mod user;
 pub mod tries;
@@ -11,5 +11,7 @@ pub mod sealing;
 pub mod io;
 
 pub use control::{AccessControl, Effect, Peer};
+pub use session_request::{
+    CommandRequest, Durability, Secret, SessionRequest, SessionRow, Signature, Standing, UserRow, Who,
+};
 pub use user::Users;
-pub use wish::{CommandRequest, Durability, Secret, SessionRow, Signature, Standing, UserRow, Who, Wish};

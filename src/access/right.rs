@@ -1,6 +1,6 @@
 //! The table of rights: what may be asked of a station, and the least role that may ask it.
 
-use super::Wish;
+use super::SessionRequest;
 use crate::{
     history::Query,
     plant::{alarm::AlarmCommand, command::CommandKind, diagnostics::Diagnostic, role::Role},
@@ -99,23 +99,23 @@ pub fn needs_for_question(query: &Query) -> Role {
     right.role()
 }
 
-/// The least role that may have a wish; `None` where it is about oneself, so that access control decides by who one is.
-pub fn needs_for_wish(wish: &Wish) -> Option<Role> {
-    let right = match wish {
-        Wish::Login { .. }
-        | Wish::Logout
-        | Wish::Lock
-        | Wish::Unlock(_)
-        | Wish::Active
-        | Wish::FirstSupervisor { .. }
-        | Wish::ChangePassword { .. } => return None,
-        Wish::AddUser { .. }
-        | Wish::SetRole { .. }
-        | Wish::Disable { .. }
-        | Wish::DeleteUser { .. }
-        | Wish::ResetPassword { .. } => Right::People,
-        Wish::Exported { .. } => Right::Export,
-        Wish::Stop | Wish::Reload => Right::Station,
+/// The least role that may make a request; `None` where it is about oneself, so that access control decides by who one is.
+pub fn needs_for_request(request: &SessionRequest) -> Option<Role> {
+    let right = match request {
+        SessionRequest::Login { .. }
+        | SessionRequest::Logout
+        | SessionRequest::Lock
+        | SessionRequest::Unlock(_)
+        | SessionRequest::Active
+        | SessionRequest::FirstSupervisor { .. }
+        | SessionRequest::ChangePassword { .. } => return None,
+        SessionRequest::AddUser { .. }
+        | SessionRequest::SetRole { .. }
+        | SessionRequest::Disable { .. }
+        | SessionRequest::DeleteUser { .. }
+        | SessionRequest::ResetPassword { .. } => Right::People,
+        SessionRequest::Exported { .. } => Right::Export,
+        SessionRequest::Stop | SessionRequest::Reload => Right::Station,
     };
     Some(right.role())
 }
@@ -171,30 +171,30 @@ mod tests {
     }
 
     #[test]
-    fn each_wish_is_for_the_role_that_the_manual_names() {
+    fn each_request_needs_the_role_of_the_manual() {
         let (user, password) = (String::new(), super::super::Secret::default());
         let own = [
-            Wish::Login { user: user.clone(), password: password.clone() },
-            Wish::Logout,
-            Wish::Lock,
-            Wish::Unlock(password.clone()),
-            Wish::Active,
-            Wish::FirstSupervisor { user: user.clone(), password: password.clone() },
-            Wish::ChangePassword { old: password.clone(), new: password.clone() },
+            SessionRequest::Login { user: user.clone(), password: password.clone() },
+            SessionRequest::Logout,
+            SessionRequest::Lock,
+            SessionRequest::Unlock(password.clone()),
+            SessionRequest::Active,
+            SessionRequest::FirstSupervisor { user: user.clone(), password: password.clone() },
+            SessionRequest::ChangePassword { old: password.clone(), new: password.clone() },
         ];
         let supervisor = [
-            Wish::AddUser { user: user.clone(), role: Role::Viewer, password: password.clone() },
-            Wish::SetRole { user: user.clone(), role: Role::Viewer },
-            Wish::Disable { user: user.clone(), disabled: true },
-            Wish::DeleteUser { user: user.clone() },
-            Wish::ResetPassword { user: user.clone(), password },
-            Wish::Stop,
-            Wish::Reload,
+            SessionRequest::AddUser { user: user.clone(), role: Role::Viewer, password: password.clone() },
+            SessionRequest::SetRole { user: user.clone(), role: Role::Viewer },
+            SessionRequest::Disable { user: user.clone(), disabled: true },
+            SessionRequest::DeleteUser { user: user.clone() },
+            SessionRequest::ResetPassword { user: user.clone(), password },
+            SessionRequest::Stop,
+            SessionRequest::Reload,
         ];
-        let exported = Wish::Exported { file: user.clone(), sha256: user };
-        assert!(own.iter().all(|wish| needs_for_wish(wish).is_none()));
-        assert!(supervisor.iter().all(|wish| needs_for_wish(wish) == Some(Role::Supervisor)));
-        assert_eq!(needs_for_wish(&exported), Some(Role::Technician));
+        let exported = SessionRequest::Exported { file: user.clone(), sha256: user };
+        assert!(own.iter().all(|request| needs_for_request(request).is_none()));
+        assert!(supervisor.iter().all(|request| needs_for_request(request) == Some(Role::Supervisor)));
+        assert_eq!(needs_for_request(&exported), Some(Role::Technician));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::delta::Delta;
 use crate::{
-    access::{CommandRequest, Durability, Standing, Wish},
+    access::{CommandRequest, Durability, SessionRequest, Standing},
     history::{Answer, HistoryError, Query},
     plant::{PlantDef, command::CommandId, visible::acts},
 };
@@ -82,12 +82,12 @@ pub enum Asked {
         /// Of the query.
         ticket: u64,
     },
-    /// A wish about people or the station.
-    Wish {
+    /// A request about people or the station.
+    SessionRequest {
         /// Comes back with the answer.
         ticket: u64,
-        /// The wish.
-        wish: Wish,
+        /// The request.
+        request: SessionRequest,
     },
 }
 
@@ -105,9 +105,9 @@ pub enum Told {
         /// The answer.
         answer: Result<Answer, HistoryError>,
     },
-    /// What became of a wish.
+    /// What became of a request.
     Granted {
-        /// Of the wish.
+        /// Of the request.
         ticket: u64,
         /// Done, or why not.
         answer: Result<Durability, String>,

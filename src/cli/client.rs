@@ -3,7 +3,7 @@
 use std::{io::IsTerminal, time::Duration};
 
 use crate::{
-    access::{Durability, Signature, Wish, control::sign, wish::Secret},
+    access::{Durability, SessionRequest, Signature, control::sign, session_request::Secret},
     attach::io::{connect, find},
     plant::{
         Snapshot,
@@ -67,7 +67,8 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
     let mut session = open(plant).await?;
     let Some(user) = login.user.clone() else { return Ok((session, None)) };
     let password = Secret(password(&user)?);
-    let granted = session.wish(Wish::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
+    let granted =
+        session.request(SessionRequest::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
     warn_not_recorded("logged in", granted);
     let settled = async {
         // The answer may come before the standing, and the standing before the snapshot that belongs to it.

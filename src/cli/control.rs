@@ -1,9 +1,9 @@
-//! `sightglass stop` and `sightglass reload`: wishes for a running station as a whole.
+//! `sightglass stop` and `sightglass reload`: requests for a running station as a whole.
 
 use std::time::Duration;
 
 use crate::{
-    access::{Durability, Wish},
+    access::{Durability, SessionRequest},
     attach::io::find::{self, Found},
 };
 
@@ -28,7 +28,7 @@ pub fn stop(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let place = client::place(args.plant.as_deref()).await?;
         let mut session = client::attach(Some(&place.name), &args.login).await?;
-        let granted = session.wish(Wish::Stop).await;
+        let granted = session.request(SessionRequest::Stop).await;
         // It tells that it goes by going, sometimes before its answer has left.
         if granted.is_ok() || session.standing.borrow().gone.is_some() {
             let _ = session.standing.wait_for(|standing| standing.gone.is_some()).await;
@@ -58,7 +58,7 @@ async fn gone(place: &Found) -> Result<(), CliError> {
 pub fn reload(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let session = client::attach(args.plant.as_deref(), &args.login).await?;
-        let durability = session.wish(Wish::Reload).await.map_err(CliError::Usage)?;
+        let durability = session.request(SessionRequest::Reload).await.map_err(CliError::Usage)?;
         say(&format!("reloaded{}", client::recorded_words(durability == Durability::Recorded)));
         Ok(())
     })

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use tokio::sync::oneshot;
 
 use crate::{
-    access::{Wish, book::sha256},
+    access::{SessionRequest, book::sha256},
     history::{
         Answer, HistoryError, Query,
         io::{QueryRequest, store::Store},
@@ -93,7 +93,8 @@ impl Source {
         if let Source::Station(session) = self {
             let (file, sha256) = (path.display().to_string(), sha256(bytes));
             let exported = format!("exported to {file}");
-            let durability = session.wish(Wish::Exported { file, sha256 }).await.map_err(CliError::Failed)?;
+            let durability =
+                session.request(SessionRequest::Exported { file, sha256 }).await.map_err(CliError::Failed)?;
             client::warn_not_recorded(&exported, durability);
         }
         let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };

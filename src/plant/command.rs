@@ -14,12 +14,12 @@ use super::{
     restore::RestoreRequest,
 };
 
-/// One wish of one operator.
+/// What one operator asks, once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Command {
     /// Chosen by the terminal, so that it finds the outcome in a later snapshot.
     pub id: CommandId,
-    /// Who wishes.
+    /// Who asks.
     pub by: Arc<str>,
     /// From where: `pts/3 from 10.0.0.5, user panel`; empty for the station itself.
     pub from: Arc<str>,
@@ -127,7 +127,7 @@ pub struct CommandStatus {
     pub from: Arc<str>,
     /// Why, in his words.
     pub note: Option<Arc<str>>,
-    /// What was wished.
+    /// What was requested.
     pub kind: CommandKind,
     /// When it was taken.
     pub at: Timestamp,
@@ -237,7 +237,7 @@ pub enum Refusal {
     /// Settings or a test that a line cannot have.
     #[error("{0}")]
     NotValid(String),
-    /// What was wished of an alarm makes no sense or is not allowed.
+    /// What was requested of an alarm makes no sense or is not allowed.
     #[error("{0}")]
     Alarm(AlarmRefusal),
 }
@@ -293,7 +293,7 @@ pub enum BusRequest {
     Refresh {
         /// Which.
         device: DeviceId,
-        /// The command it comes by; `None` for one that the plant itself wishes.
+        /// The command it comes by; `None` for one of the plant itself.
         command: Option<CommandId>,
     },
     /// Open or close the port.

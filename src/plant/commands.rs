@@ -99,10 +99,10 @@ impl CommandTracker {
         self.close(id, outcome, image)
     }
 
-    /// A line is open (or trying to be) or closed: commands that wished so are done.
+    /// A line is open (or trying to be) or closed: commands that asked for it are done.
     pub fn connected(&mut self, line: LineId, open: bool, image: &ProcessImage) -> Option<ActionRecord> {
-        let wished = CommandKind::Connect(line, open);
-        let waits = |status: &&CommandStatus| status.kind == wished && status.outcome == Outcome::Pending;
+        let requested = CommandKind::Connect(line, open);
+        let waits = |status: &&CommandStatus| status.kind == requested && status.outcome == Outcome::Pending;
         let id = self.commands.iter().find(waits)?.id;
         self.close(id, Outcome::Verified, image)
     }
@@ -196,7 +196,7 @@ impl CommandTracker {
     fn of_line(&self, line: LineId, request: &BusRequest) -> Option<CommandId> {
         let asks = |status: &&CommandStatus| match (request, &status.kind) {
             (BusRequest::Test { id, .. }, _) => status.id == *id,
-            (BusRequest::Configure(wished), CommandKind::Configure(settings)) => wished == settings,
+            (BusRequest::Configure(requested), CommandKind::Configure(settings)) => requested == settings,
             (BusRequest::StopTest, CommandKind::StopTest(tested)) => *tested == line,
             _ => false,
         };
@@ -204,7 +204,7 @@ impl CommandTracker {
         under_way.find(asks).map(|status| status.id)
     }
 
-    /// The line had no room for a request: nothing was sent, and whoever wished it is told.
+    /// The line had no room for a request: nothing was sent, and the command is refused.
     pub fn undeliverable(&mut self, line: LineId, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
         let busy = Outcome::Refused(Refusal::Busy);
         match request {
@@ -214,8 +214,8 @@ impl CommandTracker {
                 self.close(command, busy, image)
             }
             BusRequest::Connect(open) => {
-                let wished = CommandKind::Connect(line, *open);
-                let id = self.commands.iter().find(|status| status.kind == wished)?.id;
+                let requested = CommandKind::Connect(line, *open);
+                let id = self.commands.iter().find(|status| status.kind == requested)?.id;
                 self.close(id, busy, image)
             }
             // One that nobody requested is nobody's: the device is read again in its turn.

@@ -163,7 +163,7 @@ pub struct ActionRecord {
     pub target: Arc<str>,
     /// Value before, as text with unit.
     pub old: Option<Arc<str>>,
-    /// Value wished, as text with unit.
+    /// Value requested, as text with unit.
     pub new: Option<Arc<str>>,
     /// `verified`, `refused: …`, `not confirmed: …`, `failed: …`.
     pub outcome: Arc<str>,

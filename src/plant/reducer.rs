@@ -42,7 +42,7 @@ pub struct Effects {
     pub bus: Vec<(LineId, BusRequest)>,
     /// Lines of the history.
     pub records: Vec<Record>,
-    /// Settings of a line for the plant file, and the command that wishes it.
+    /// Settings of a line for the plant file, and the command that requests it.
     pub save: Option<(CommandId, LineDef)>,
     /// Work with the folder of parameter sets.
     pub sets: Option<SetWork>,
@@ -165,7 +165,7 @@ impl Plant {
         effects
     }
 
-    /// Takes a wish of an operator.
+    /// Accepts a command of an operator.
     pub fn on_command(&mut self, command: Command, at: Timestamp) -> Effects {
         let mut effects = Effects::default();
         if let Some(why) = &command.refused {
@@ -375,7 +375,7 @@ impl Plant {
             status.since = Some(at);
         }
         let open = state != LineState::Disconnected;
-        // A closed line is the operator's wish: its devices are not asked, so their silence is no fault.
+        // A closed line is a command of the operator: its devices are not asked, so their silence is no fault.
         let gone = match &state {
             LineState::Waiting { .. } => Some(DeviceState::Down { since: at }),
             LineState::Disconnected | LineState::Testing => Some(DeviceState::Unknown),

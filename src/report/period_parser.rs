@@ -55,7 +55,7 @@ pub enum PeriodError {
     Both,
 }
 
-/// The period that was asked for; without any wish the last shift that is over.
+/// The period that was asked for; by default the last shift that is over.
 ///
 /// `shift` is `last`, `current`, `NAME` (the latest of that name that has begun) or `NAME@YYYY-MM-DD` (the local date of
 /// its start). `from` and `to` are local times of the plant or RFC 3339; without `to` the period ends now. A local time
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_wish_is_answered_with_what_was_found_and_expected() {
+    fn a_wrong_period_is_answered_with_what_was_expected() {
         for (typed, words) in [
             ((Some("nite"), None, None), "no shift `nite`: expected last, current, morning, afternoon, night"),
             ((Some("night@20.11."), None, None), "`20.11.` is not a date: expected YYYY-MM-DD"),
@@ -201,7 +201,7 @@ mod tests {
             ((None, None, Some("2026-11-22")), "--to needs --from"),
             ((Some("last"), Some("2026-11-22"), None), "either --shift or --from"),
         ] {
-            let error = ask(typed).expect_err("a wrong wish").to_string();
+            let error = ask(typed).expect_err("a wrong period").to_string();
             assert!(error.contains(words), "{error}");
         }
         let none = period(&plant("Asia/Bangkok", &[]), None, None, None, at(NOW));

@@ -10,7 +10,7 @@ use super::slave::Slave;
 use super::tank::{AMBIENT_C, Actuators, Readings, Tank};
 use crate::plant::{PlantDef, def::DeviceId};
 
-/// The name by which a plant wishes the rig.
+/// The name by which a plant selects the rig.
 pub const SIMULATION: &str = "tank";
 
 /// Time that a device takes between a request and its answer.

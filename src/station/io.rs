@@ -64,7 +64,7 @@ pub struct Station {
     acceptor: SessionAcceptor,
     /// Bypasses access control: for the scripted operator of a drill.
     pub commands: mpsc::Sender<Command>,
-    /// What terminals wish of the station as a whole.
+    /// What terminals request of the station as a whole.
     pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,

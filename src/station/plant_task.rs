@@ -305,7 +305,7 @@ impl PlantTask {
             (Some(_), Some(_)) => "another set is just being saved, try again",
             (None, _) => "this station keeps nothing",
         };
-        // What is being done ends with the folder read, so a wish to read is granted already.
+        // What is being done ends with the folder read, so a request to read is granted already.
         if let SetWork::Write { command, .. } = work {
             let effects = self.plant.on_set_written(command, Err(refused.to_owned()));
             self.keep(effects.records);

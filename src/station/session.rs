@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
-    access::{CommandRequest, Durability, Standing, Wish},
+    access::{CommandRequest, Durability, SessionRequest, Standing},
     history::io::QueryRequest,
     plant::{
         Snapshot,
@@ -39,8 +39,8 @@ pub enum Request {
     Command(CommandRequest),
     /// A query to the history.
     Ask(QueryRequest),
-    /// A wish about people or the station.
-    Wish(Wish, oneshot::Sender<Result<Durability, String>>),
+    /// A request about people or the station.
+    SessionRequest(SessionRequest, oneshot::Sender<Result<Durability, String>>),
 }
 
 impl Session {
@@ -68,10 +68,10 @@ impl Session {
         self.send(Request::Ask(query))
     }
 
-    /// Wishes, and waits for the answer.
-    pub async fn wish(&self, wish: Wish) -> Result<Durability, String> {
+    /// Sends a request and waits for the reply.
+    pub async fn request(&self, request: SessionRequest) -> Result<Durability, String> {
         let (reply, answer) = oneshot::channel();
-        self.send(Request::Wish(wish, reply))?;
+        self.send(Request::SessionRequest(request, reply))?;
         answer.await.unwrap_or_else(|_| Err("the station has ended".to_owned()))
     }
 }

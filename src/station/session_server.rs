@@ -32,7 +32,7 @@ use crate::{
 const REQUESTS: usize = 256;
 /// Attach requests that may wait.
 const ATTACH_QUEUE_MAX: usize = 16;
-/// Wishes for the station as a whole that may wait.
+/// Requests for the station as a whole that may wait.
 pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
 /// Real time between two looks at the clock: idle terminals, ends of lock-outs, terminals that have gone.
 const TICK: Duration = Duration::from_millis(500);
@@ -48,7 +48,7 @@ pub struct AttachRequest {
     pub standing: watch::Sender<Arc<Standing>>,
 }
 
-/// What a terminal has wished of the station as a whole.
+/// What a terminal has requested of the station as a whole.
 #[derive(Debug)]
 pub enum LifecycleRequest {
     /// To end.
@@ -218,10 +218,10 @@ impl SessionServer {
                     let _ = query.reply.send(Err(HistoryError::Engine(why)));
                 }
             },
-            Request::Wish(wish, reply) => {
+            Request::SessionRequest(request, reply) => {
                 self.last_ticket += 1;
                 self.tickets.insert(self.last_ticket, reply);
-                let effects = self.access.wish(terminal, self.last_ticket, wish, now);
+                let effects = self.access.on_request(terminal, self.last_ticket, request, now);
                 self.carry_out(effects);
             }
         }
@@ -302,7 +302,7 @@ impl SessionServer {
 
     fn send_lifecycle(&mut self, request: LifecycleRequest) {
         if let Err(error) = self.outputs.lifecycle.try_send(request) {
-            tracing::error!(%error, "nobody carries out the wish for the station");
+            tracing::error!(%error, "a lifecycle request was lost");
         }
     }
 }

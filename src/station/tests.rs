@@ -6,7 +6,7 @@ use std::{path::Path, sync::Arc};
 use super::io::{Options, start_guarded};
 use crate::{
     access::{
-        Wish,
+        SessionRequest,
         io::{book, users_beside},
     },
     bus::io::{clock::Clock, transport::Connector},
@@ -45,13 +45,13 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     let mut station = start_guarded(options(&history)).unwrap();
     let mut session = station.session("whoever");
     session.standing.wait_for(|standing| standing.first).await.unwrap();
-    assert!(session.wish(Wish::Stop).await.is_err(), "nobody is logged in");
+    assert!(session.request(SessionRequest::Stop).await.is_err(), "nobody is logged in");
     let password = "four wet horses in a tank";
-    session.wish(Wish::FirstSupervisor { user: "anna".into(), password: password.into() }).await.unwrap();
-    session.wish(Wish::Lock).await.unwrap();
-    assert!(session.wish(Wish::Unlock("four wet horses".into())).await.is_err());
-    session.wish(Wish::Unlock(password.into())).await.unwrap();
-    session.wish(Wish::Logout).await.unwrap();
+    session.request(SessionRequest::FirstSupervisor { user: "anna".into(), password: password.into() }).await.unwrap();
+    session.request(SessionRequest::Lock).await.unwrap();
+    assert!(session.request(SessionRequest::Unlock("four wet horses".into())).await.is_err());
+    session.request(SessionRequest::Unlock(password.into())).await.unwrap();
+    session.request(SessionRequest::Logout).await.unwrap();
     let mut other = station.session("whoever");
     other.standing.wait_for(|standing| !standing.first && standing.password_chars_min > 0).await.unwrap();
     let command = other.send_command(1, CommandKind::Alarm(crate::plant::alarm::AlarmCommand::Silence)).unwrap();
@@ -61,9 +61,9 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     assert!(line.contains("refused: log in first"), "what a snapshot shows is in the book");
     assert_eq!(snapshot.history.trouble, None);
     // What was typed wrong at one terminal is held against that terminal only.
-    other.wish(Wish::Login { user: "ANNA".into(), password: password.into() }).await.unwrap();
+    other.request(SessionRequest::Login { user: "ANNA".into(), password: password.into() }).await.unwrap();
     let rows = actions_of(&other, "unlock failed").await;
-    other.wish(Wish::Stop).await.unwrap();
+    other.request(SessionRequest::Stop).await.unwrap();
     assert!(matches!(station.lifecycle.recv().await, Some(super::LifecycleRequest::Stop)));
     drop((session, other));
     station.stop().await;
@@ -90,9 +90,12 @@ async fn without_users(history: &Path) -> (bool, Result<(), String>, Result<(), 
     options.def = Arc::new(def);
     let station = start_guarded(options).unwrap();
     let mut session = station.session("whoever");
-    let login = session.wish(Wish::Login { user: "anna".into(), password: "four wet horses in a tank".into() }).await;
-    let second: Wish = Wish::FirstSupervisor { user: "eve".into(), password: "eight wet horses in a tank".into() };
-    let first = session.wish(second).await;
+    let login = session
+        .request(SessionRequest::Login { user: "anna".into(), password: "four wet horses in a tank".into() })
+        .await;
+    let second: SessionRequest =
+        SessionRequest::FirstSupervisor { user: "eve".into(), password: "eight wet horses in a tank".into() };
+    let first = session.request(second).await;
     // A tick judges the alarms, whatever they are.
     let at = session.snapshots.borrow().at;
     let ticked = session.snapshots.wait_for(|snapshot| at < snapshot.at).await.unwrap().clone();

@@ -47,7 +47,7 @@ impl Toil {
         self.begin();
     }
 
-    /// Writes the users down. Access control never wishes it while it is being done.
+    /// Writes the users down. Access control never requests it while it is being done.
     pub fn save(&mut self, people: Users) {
         let path = self.path.clone();
         self.saving = Some(tokio::task::spawn_blocking(move || match path {

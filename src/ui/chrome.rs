@@ -361,7 +361,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
     }
 }
 
-/// What was wished, in words: `TIC-1.SV 60.0 → 70.0 °C`.
+/// What was requested, in words: `TIC-1.SV 60.0 → 70.0 °C`.
 pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> String {
     match kind {
         CommandKind::Write { tag, value } => {

@@ -22,7 +22,7 @@ use tokio::{
 
 use super::{Effect, Leaving, Model, Msg, QueryId, tabs::Tab, theme::Theme, update, view};
 use crate::{
-    access::Wish,
+    access::SessionRequest,
     history::{HistoryError, Query, io::QueryRequest},
     profile::io::atomic::write_for_user,
     sim::{drill, io::Port},
@@ -187,11 +187,11 @@ impl Loop {
                         own(|| update(&mut self.model, Msg::Undelivered(id, why)));
                     }
                 }
-                Effect::Wish(id, wish) => self.wish(id, wish),
+                Effect::SessionRequest(id, request) => self.send_request(id, request),
                 Effect::Query(id, query) => self.ask(id, query),
                 Effect::Drill(command) => {
                     if let Some(port) = &self.session.drill {
-                        // What is in force is seen in the next status; a wish that was lost changes nothing there.
+                        // What is in force is seen in the next status; a request that was lost changes nothing there.
                         let _ = port.commands.try_send(command);
                     }
                 }
@@ -226,10 +226,10 @@ impl Loop {
         self.asked.push((id, waiting.abort_handle()));
     }
 
-    fn wish(&self, id: QueryId, wish: Wish) {
+    fn send_request(&self, id: QueryId, request: SessionRequest) {
         let (session, outbox, plants) = (self.session.clone(), self.outbox.clone(), self.model.plants);
         tokio::spawn(async move {
-            let answer = session.wish(wish).await;
+            let answer = session.request(request).await;
             // A terminal that has left needs no answer.
             let _ = outbox.send((plants, Msg::Granted(id, answer))).await;
         });

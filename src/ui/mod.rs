@@ -65,7 +65,7 @@ pub struct Model {
     pub terminal: u32,
     /// Who sits here and what he may.
     pub standing: Arc<Standing>,
-    /// The lock, its warning, and wishes on their way.
+    /// The lock, its warning, and requests on their way.
     pub session_lock: SessionLock,
     /// The window with work in it that waits for an unlock, and the tab that it stood on.
     pub kept: Option<(Tab, Modal)>,
@@ -411,14 +411,14 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
             }
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into())),
             UiAction::Confirmed(confirmed) => effects.extend(model.send_command(confirmed)),
-            UiAction::Wish(tab, wish) => {
+            UiAction::SessionRequest(tab, request) => {
                 // Nought is nobody's: whoever waits has a number.
-                model.session_lock.wished = model.session_lock.wished.checked_add(1).unwrap_or(1);
-                let number = model.session_lock.wished;
+                model.session_lock.last_request = model.session_lock.last_request.checked_add(1).unwrap_or(1);
+                let number = model.session_lock.last_request;
                 if let Some(Modal::UserForm(form)) = &mut model.modal {
                     form.sent(number);
                 }
-                effects.push(Effect::Wish(QueryId { tab, number }, wish));
+                effects.push(Effect::SessionRequest(QueryId { tab, number }, request));
             }
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
@@ -442,7 +442,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowOnTrends(..)
         | UiAction::Command(_)
         | UiAction::Confirmed(_)
-        | UiAction::Wish(..) => None,
+        | UiAction::SessionRequest(..) => None,
     });
     effects.collect()
 }

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 
 use super::{Confirmed, modal::Modal, tabs::Tab};
 use crate::{
-    access::{CommandRequest, Durability, Standing, Wish},
+    access::{CommandRequest, Durability, SessionRequest, Standing},
     history::{Answer, HistoryError, Query},
     plant::{
         command::{CommandId, CommandKind},
@@ -30,7 +30,7 @@ pub enum Msg {
     Snapshot(Arc<Snapshot>),
     /// News of who sits here.
     Standing(Arc<Standing>),
-    /// A wish was granted, or why not.
+    /// A request was granted, or why not.
     Granted(QueryId, Result<Durability, String>),
     /// News of the simulation.
     Drill(Arc<drill::Status>),
@@ -54,8 +54,8 @@ pub enum Msg {
 pub enum Effect {
     /// Give the station a command.
     Command(CommandRequest),
-    /// Wish something of the station; answered by [`Msg::Granted`].
-    Wish(QueryId, Wish),
+    /// Send the station a request; answered by [`Msg::Granted`].
+    SessionRequest(QueryId, SessionRequest),
     /// Ask the history.
     Query(QueryId, Query),
     /// Inject or clear a fault of the simulation.
@@ -105,8 +105,8 @@ pub enum UiAction {
     Command(CommandKind),
     /// The same with what its operator has seen and signed.
     Confirmed(Confirmed),
-    /// Wish something of the station; the answer goes to the window that waits for one, else to this tab.
-    Wish(Tab, Wish),
+    /// Send the station a request; the answer goes to the window that waits for one, else to this tab.
+    SessionRequest(Tab, SessionRequest),
     /// Ask whether to leave.
     Leave,
     /// Pass on an effect as it is.

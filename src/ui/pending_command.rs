@@ -36,7 +36,7 @@ impl From<CommandKind> for Confirmed {
 pub struct PendingCommand {
     /// Which.
     pub id: CommandId,
-    /// What was wished.
+    /// What was requested.
     pub kind: CommandKind,
     /// As last seen in a snapshot.
     pub status: Option<CommandStatus>,
@@ -53,7 +53,7 @@ impl PendingCommand {
         self.undelivered.is_some() || outcome.is_some_and(|outcome| chrome::outcome_words(outcome).1)
     }
 
-    /// Has it ended as wished? Such an outcome leaves the screen by itself; trouble stays, with its time, until it is
+    /// Has it ended well? Such an outcome leaves the screen by itself; trouble stays, with its time, until it is
     /// dismissed.
     fn is_done(&self) -> bool {
         let outcome = self.status.as_ref().map(|status| &status.outcome);

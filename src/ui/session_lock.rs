@@ -12,7 +12,7 @@ use super::{
     with_tabs,
 };
 use crate::{
-    access::{Durability, Standing, Wish},
+    access::{Durability, SessionRequest, Standing},
     plant::snapshot::Snapshot,
 };
 
@@ -27,8 +27,8 @@ const NOT_RECORDED: &str = "Done, but NOT RECORDED: the disk of the station does
 /// Times of the session and the lock, in ticks, and the number of the last request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SessionLock {
-    /// Number of the last wish; only its answer counts.
-    pub wished: u32,
+    /// Number of the last request; only its answer counts.
+    pub last_request: u32,
     /// When the present session status came.
     status_at: u32,
     /// When the last activity message was sent.
@@ -138,7 +138,7 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
 /// Locks at once, if there is somebody to lock it.
 pub(super) fn lock(model: &Model) -> Vec<UiAction> {
     let may = model.standing.who.is_some() && !model.standing.locked;
-    if may { vec![UiAction::Wish(Tab::Login, Wish::Lock)] } else { Vec::new() }
+    if may { vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)] } else { Vec::new() }
 }
 
 /// A key on a locked terminal that is meant for a window with work in it, as a faceplate opens one: the password is asked
@@ -166,7 +166,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             UiAction::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
             UiAction::Command(_)
             | UiAction::Confirmed(_)
-            | UiAction::Wish(_, Wish::Exported { .. })
+            | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
             | UiAction::Do(Effect::SaveReport { .. } | Effect::Drill(_)) => held = held.or(Some(None)),
             UiAction::Open(_)
             | UiAction::Leave
@@ -175,7 +175,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             | UiAction::ShowParameter(_)
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
-            | UiAction::Wish(..)
+            | UiAction::SessionRequest(..)
             | UiAction::Do(_) => rest.push(action),
         }
     }
@@ -202,7 +202,7 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
         return None;
     }
     model.session_lock.active_at = Some(model.clock.phase);
-    Some(Effect::Wish(QueryId { tab: Tab::Login, number: 0 }, Wish::Active))
+    Some(Effect::SessionRequest(QueryId { tab: Tab::Login, number: 0 }, SessionRequest::Active))
 }
 
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
@@ -213,7 +213,7 @@ pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durabili
     }
     let answer = answer.map(drop);
     if matches!(id.tab, Tab::Reports | Tab::Bus) {
-        // A file that waits to be written waits for its own answer, whatever was wished since.
+        // A file that waits to be written waits for its own answer, whatever was requested since.
         return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
     }
     let waits = |modal: &Modal| matches!(modal, Modal::UserForm(form) if form.waits_for(id.number));
@@ -224,7 +224,7 @@ pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durabili
         (_, Some((tab, Modal::UserForm(form)))) => {
             model.kept = answered(model, form, answer).map(|modal| (tab, modal));
         }
-        _ if id.number != 0 && id.number == model.session_lock.wished => {
+        _ if id.number != 0 && id.number == model.session_lock.last_request => {
             return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
         }
         _ => {}

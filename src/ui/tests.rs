@@ -9,7 +9,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
 
 use super::{Effect, Model, Msg, fixture::Fixture, theme::Theme, update, view};
-use crate::{access::Wish, plant::command::CommandKind};
+use crate::{access::SessionRequest, plant::command::CommandKind};
 
 pub fn model(fixture: &Fixture, theme: Theme) -> Model {
     let mut model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::standing());
@@ -50,7 +50,7 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
     };
     let press = |c| update(model, Msg::Key(KeyEvent::new(code(c), KeyModifiers::NONE)));
     // That a key was pressed at all is told to the station now and then.
-    let told = |effect: &Effect| !matches!(effect, Effect::Wish(_, Wish::Active));
+    let told = |effect: &Effect| !matches!(effect, Effect::SessionRequest(_, SessionRequest::Active));
     keys.chars().flat_map(press).filter(told).collect()
 }
 
@@ -68,7 +68,7 @@ pub fn acts_only_on_what_was_drawn(model: &mut Model, change: impl FnOnce(&mut M
 pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
     effects.iter().find_map(|effect| match effect {
         Effect::Command(command) => Some(&command.kind),
-        Effect::Wish(..) => None,
+        Effect::SessionRequest(..) => None,
         Effect::Query(..)
         | Effect::Drill(_)
         | Effect::SaveReport { .. }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use sightglass::{
-    access::{CommandRequest, Durability, Standing, Wish},
+    access::{CommandRequest, Durability, SessionRequest, Standing},
     attach::{
         callers::TERMINALS_MAX,
         io::{
@@ -154,8 +154,8 @@ fn answer(request: Request, commands: &watch::Sender<Arc<Snapshot>>) {
             snapshot.commands.truncate(32);
         }),
         Request::Ask(query) => drop(query.reply.send(Err(HistoryError::EmptyPeriod))),
-        Request::Wish(Wish::Stop, reply) => drop(reply.send(Ok(Durability::Recorded))),
-        Request::Wish(_, reply) => drop(reply.send(Err("not yet".into()))),
+        Request::SessionRequest(SessionRequest::Stop, reply) => drop(reply.send(Ok(Durability::Recorded))),
+        Request::SessionRequest(_, reply) => drop(reply.send(Err("not yet".into()))),
     }
 }
 
@@ -221,8 +221,8 @@ async fn a_terminal_sees_the_plant_and_sends_commands() {
     session.send_command(7, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     until(&mut session, "the command has an outcome", |snapshot| !snapshot.commands.is_empty()).await;
     assert_eq!(of(&session, 7), Some(Outcome::Verified));
-    assert_eq!(session.wish(Wish::Stop).await, Ok(Durability::Recorded));
-    assert_eq!(session.wish(Wish::Logout).await, Err("not yet".to_owned()));
+    assert_eq!(session.request(SessionRequest::Stop).await, Ok(Durability::Recorded));
+    assert_eq!(session.request(SessionRequest::Logout).await, Err("not yet".to_owned()));
     let (reply, answer) = oneshot::channel();
     let at = session.snapshots.borrow().at;
     session.ask(QueryRequest { query: Query::Journal { from: at, to: at, limit: 1 }, reply }).unwrap();
@@ -279,7 +279,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     let folder = stand.end().await;
     until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
     assert_eq!(session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)), Err("station has gone"));
-    assert_eq!(session.wish(Wish::Stop).await, Err("station has gone".to_owned()));
+    assert_eq!(session.request(SessionRequest::Stop).await, Err("station has gone".to_owned()));
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last snapshot stays");
 
     let mut stand = Stand::start_in(folder);
@@ -383,7 +383,7 @@ async fn hostile_connections_are_closed_and_the_others_see_the_plant_go_on() {
     let mut session = stand.session().await;
     let mut long = hello();
     long[..4].copy_from_slice(&u32::MAX.to_le_bytes());
-    let command = asked(&Asked::Wish { ticket: 1, wish: Wish::Stop });
+    let command = asked(&Asked::SessionRequest { ticket: 1, request: SessionRequest::Stop });
     let hostile: Vec<(&str, Vec<u8>)> = vec![
         ("nothing at all", Vec::new()),
         ("random bytes", (0..4_000u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()),

@@ -8,7 +8,7 @@ use std::{
 
 use sightglass::{
     access::{
-        CommandRequest, Peer, Users, Wish,
+        CommandRequest, Peer, SessionRequest, Users,
         book::{Check, Entry, Summary},
         io::{book, users, users_beside},
         password::{SALT_BYTES, hash},
@@ -196,7 +196,7 @@ fn everybody() -> Users {
 }
 
 pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), String> {
-    session.wish(Wish::Login { user: user.into(), password: password.into() }).await.map(drop)
+    session.request(SessionRequest::Login { user: user.into(), password: password.into() }).await.map(drop)
 }
 
 /// A command of this terminal.

@@ -19,7 +19,7 @@ use tokio::{
 
 use sightglass::{
     access::{
-        CommandRequest, Durability, Users, Wish,
+        CommandRequest, Durability, SessionRequest, Users,
         book::{Check, Entry},
         io::{book, sealing, users, users_beside},
         sealing::VerificationKey,
@@ -292,10 +292,10 @@ async fn log_in_on(session: Session) -> Reported {
     let mut reported = Reported::default();
     while session.standing.borrow().gone.is_none() {
         // Refused while the password of the other terminal is looked at.
-        let enter = Wish::Login { user: "sue".into(), password: PASSWORD.into() };
-        if let Ok(durability) = session.wish(enter).await {
+        let enter = SessionRequest::Login { user: "sue".into(), password: PASSWORD.into() };
+        if let Ok(durability) = session.request(enter).await {
             reported.logins += u64::from(durability == Durability::Recorded);
-            reported.logouts += u64::from(session.wish(Wish::Logout).await == Ok(Durability::Recorded));
+            reported.logouts += u64::from(session.request(SessionRequest::Logout).await == Ok(Durability::Recorded));
         }
         tokio::task::yield_now().await;
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use sightglass::{
-    access::{CommandRequest, Signature, Wish},
+    access::{CommandRequest, SessionRequest, Signature},
     plant::{
         PlantDef,
         command::{CommandKind, Outcome, Refusal},
@@ -68,9 +68,9 @@ async fn a_script_with_wrong_passwords_waits_longer_each_time_is_locked_out_as_c
     // For another user of the system nothing is shut, and for this one no other name is.
     let far = guarded.far("panel");
     login(&far, "tom", PASSWORD).await.unwrap();
-    far.wish(Wish::Logout).await.unwrap();
+    far.request(SessionRequest::Logout).await.unwrap();
     login(&script, "tina", PASSWORD).await.unwrap();
-    script.wish(Wish::Logout).await.unwrap();
+    script.request(SessionRequest::Logout).await.unwrap();
 
     // The devices fall silent while the script is locked out: it is told, though no value of the process is.
     assert!(looks.snapshots.borrow().alarms.is_empty());
@@ -101,7 +101,7 @@ async fn a_system_user_who_tries_every_name_is_shut_though_no_account_is() {
     assert!(login(&script, "tina", PASSWORD).await.unwrap_err().starts_with(NOT_CHECKED));
     for user in ["vera", "tom", "sue"] {
         let elsewhere = guarded.person(user).await;
-        elsewhere.wish(Wish::Logout).await.unwrap();
+        elsewhere.request(SessionRequest::Logout).await.unwrap();
     }
     guarded.end().await;
 }
@@ -110,7 +110,7 @@ async fn a_system_user_who_tries_every_name_is_shut_though_no_account_is() {
 async fn an_unknown_name_a_wrong_password_and_a_disabled_user_are_told_the_same() {
     let guarded = Guarded::start(strict).await;
     let sue = guarded.person("sue").await;
-    sue.wish(Wish::Disable { user: "vera".into(), disabled: true }).await.unwrap();
+    sue.request(SessionRequest::Disable { user: "vera".into(), disabled: true }).await.unwrap();
     let tries = [
         ("nobody-of-this-name", PASSWORD, "unknown user", "unknown user"),
         ("tom", "wrong", "tom", "wrong password"),
@@ -138,7 +138,7 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
     let locked = async { standing.wait_for(|standing| standing.locked).await.map(drop) };
     let touching = async {
         loop {
-            touched.wish(Wish::Active).await.unwrap();
+            touched.request(SessionRequest::Active).await.unwrap();
             guarded.pass(Duration::from_secs(10)).await;
         }
     };
@@ -154,8 +154,8 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
     let acknowledge = request(&idle, 1, alarmed.alarms[0].acknowledge());
     let status = guarded.send_command(&idle, acknowledge.clone()).await;
     assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted("this terminal is locked".into())));
-    assert_eq!(idle.wish(Wish::Unlock("wrong".into())).await, Err(wait(1)));
-    while idle.wish(Wish::Unlock(PASSWORD.into())).await.is_err() {
+    assert_eq!(idle.request(SessionRequest::Unlock("wrong".into())).await, Err(wait(1)));
+    while idle.request(SessionRequest::Unlock(PASSWORD.into())).await.is_err() {
         guarded.pass(Duration::from_secs(1)).await;
     }
     let again = request(&idle, 2, acknowledge.kind);

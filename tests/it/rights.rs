@@ -1,11 +1,11 @@
-//! Every command, wish and query through the socket, by everybody who may be at a terminal: what is let through, what
+//! Every command, request and query through the socket, by everybody who may be at a terminal: what is let through, what
 //! is refused, and that the book has it. The tables below are written by hand; the program has its own.
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use sightglass::{
-    access::{Peer, Wish, book::Entry},
+    access::{Peer, SessionRequest, book::Entry},
     history::{Query, io::QueryRequest},
     plant::{
         PlantDef,
@@ -156,7 +156,7 @@ async fn sits(guarded: &Guarded, person: usize) -> Session {
     }
     let session = guarded.person(PEOPLE[person]).await;
     if PEOPLE[person] == "lena" {
-        session.wish(Wish::Lock).await.unwrap();
+        session.request(SessionRequest::Lock).await.unwrap();
     }
     session
 }
@@ -205,7 +205,7 @@ async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_r
     guarded.end().await;
 }
 
-/// What comes of a wish: done, or words that its answer holds, for each column.
+/// What comes of a request: done, or words that its answer holds, for each column.
 type Answers = [&'static str; 6];
 
 const DONE: &str = "";
@@ -218,60 +218,60 @@ const SUPERVISOR: Answers = [LOG_IN, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, C
 /// Whoever has started the station can end it anyway, logged in or not: these tests run as the same user.
 const HOST: Answers = [DONE, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, CHANGE];
 
-/// A new wish does not compile until it has a row here; put it into [`wishes`] as well. The word is that of the book; an
+/// A new request does not compile until it has a row here; put it into [`requests`] as well. The word is that of the book; an
 /// empty one is not put on record by itself.
-fn of_wish(wish: &Wish) -> (&'static str, Answers) {
+fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
     const SHORT: &str = "has 5 characters";
-    match wish {
-        Wish::Login { .. } => ("login", [DONE; 6]),
-        Wish::Logout => ("logout", ["nobody is logged in here", DONE, DONE, DONE, DONE, DONE]),
-        Wish::Lock => ("lock terminal", [LOG_IN, DONE, DONE, DONE, "locked already", DONE]),
-        Wish::Unlock(_) => {
+    match request {
+        SessionRequest::Login { .. } => ("login", [DONE; 6]),
+        SessionRequest::Logout => ("logout", ["nobody is logged in here", DONE, DONE, DONE, DONE, DONE]),
+        SessionRequest::Lock => ("lock terminal", [LOG_IN, DONE, DONE, DONE, "locked already", DONE]),
+        SessionRequest::Unlock(_) => {
             ("unlock terminal", ["not locked", "not locked", "not locked", "not locked", DONE, "not locked"])
         }
-        Wish::Active => ("", [DONE; 6]),
-        Wish::FirstSupervisor { .. } => ("add user", ["there are users already"; 6]),
-        Wish::ChangePassword { .. } => ("change password", ["log in", SHORT, SHORT, SHORT, "unlock", SHORT]),
-        Wish::AddUser { .. } => ("add user", SUPERVISOR),
-        Wish::SetRole { .. } => ("set role", SUPERVISOR),
-        Wish::Disable { disabled: true, .. } => ("disable user", SUPERVISOR),
-        Wish::Disable { disabled: false, .. } => ("enable user", SUPERVISOR),
-        Wish::DeleteUser { .. } => ("delete user", SUPERVISOR),
-        Wish::ResetPassword { .. } => ("reset password", SUPERVISOR),
-        Wish::Exported { .. } => ("export", [LOG_IN, NOT_VIEWER, DONE, DONE, LOCKED, CHANGE]),
-        Wish::Stop => ("stop station", HOST),
-        Wish::Reload => ("reload", HOST),
+        SessionRequest::Active => ("", [DONE; 6]),
+        SessionRequest::FirstSupervisor { .. } => ("add user", ["there are users already"; 6]),
+        SessionRequest::ChangePassword { .. } => ("change password", ["log in", SHORT, SHORT, SHORT, "unlock", SHORT]),
+        SessionRequest::AddUser { .. } => ("add user", SUPERVISOR),
+        SessionRequest::SetRole { .. } => ("set role", SUPERVISOR),
+        SessionRequest::Disable { disabled: true, .. } => ("disable user", SUPERVISOR),
+        SessionRequest::Disable { disabled: false, .. } => ("enable user", SUPERVISOR),
+        SessionRequest::DeleteUser { .. } => ("delete user", SUPERVISOR),
+        SessionRequest::ResetPassword { .. } => ("reset password", SUPERVISOR),
+        SessionRequest::Exported { .. } => ("export", [LOG_IN, NOT_VIEWER, DONE, DONE, LOCKED, CHANGE]),
+        SessionRequest::Stop => ("stop station", HOST),
+        SessionRequest::Reload => ("reload", HOST),
     }
 }
 
-fn wishes() -> Vec<Wish> {
+fn requests() -> Vec<SessionRequest> {
     let (user, password) = (|name: &str| name.to_owned(), || PASSWORD.into());
     let other = || "five dry horses on a hill".into();
     vec![
-        Wish::Login { user: user("vera"), password: password() },
-        Wish::Logout,
-        Wish::Lock,
-        Wish::Unlock(password()),
-        Wish::Active,
-        Wish::FirstSupervisor { user: user("eve"), password: other() },
-        Wish::ChangePassword { old: password(), new: "short".into() },
-        Wish::AddUser { user: user("paul"), role: Role::Viewer, password: other() },
-        Wish::SetRole { user: user("paul"), role: Role::Technician },
-        Wish::Disable { user: user("paul"), disabled: true },
-        Wish::Disable { user: user("paul"), disabled: false },
-        Wish::ResetPassword { user: user("paul"), password: other() },
-        Wish::DeleteUser { user: user("paul") },
-        Wish::Exported { file: user("shift.csv"), sha256: user("00") },
-        Wish::Reload,
-        Wish::Stop,
+        SessionRequest::Login { user: user("vera"), password: password() },
+        SessionRequest::Logout,
+        SessionRequest::Lock,
+        SessionRequest::Unlock(password()),
+        SessionRequest::Active,
+        SessionRequest::FirstSupervisor { user: user("eve"), password: other() },
+        SessionRequest::ChangePassword { old: password(), new: "short".into() },
+        SessionRequest::AddUser { user: user("paul"), role: Role::Viewer, password: other() },
+        SessionRequest::SetRole { user: user("paul"), role: Role::Technician },
+        SessionRequest::Disable { user: user("paul"), disabled: true },
+        SessionRequest::Disable { user: user("paul"), disabled: false },
+        SessionRequest::ResetPassword { user: user("paul"), password: other() },
+        SessionRequest::DeleteUser { user: user("paul") },
+        SessionRequest::Exported { file: user("shift.csv"), sha256: user("00") },
+        SessionRequest::Reload,
+        SessionRequest::Stop,
     ]
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
+async fn every_request_is_granted_or_refused_as_the_table_says() {
     let mut guarded = Guarded::start(|_| {}).await;
     let mut asked = std::mem::replace(&mut guarded.station.lifecycle, mpsc::channel(1).1);
-    // What the command line does when a terminal wishes something of the station as a whole, but for the doing.
+    // What the command line does on a lifecycle request, without carrying it out.
     let heard = tokio::spawn(async move {
         let mut heard = Vec::new();
         while let Some(request) = asked.recv().await {
@@ -285,21 +285,21 @@ async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
         }
         heard
     });
-    for wish in wishes() {
-        let (action, answers) = of_wish(&wish);
+    for request in requests() {
+        let (action, answers) = of_request(&request);
         for person in 0..PEOPLE.len() {
             let session = sits(&guarded, person).await;
             guarded.pass(Duration::from_secs(8)).await;
             let written = guarded.entries().len();
-            let said = format!("{wish:?} by {}", PEOPLE[person]);
-            let answer = session.wish(wish.clone()).await.map(drop);
+            let said = format!("{request:?} by {}", PEOPLE[person]);
+            let answer = session.request(request.clone()).await.map(drop);
             match (&answer, answers[person]) {
                 (Ok(()), DONE) => {}
                 (Err(why), expected) if expected != DONE && why.contains(expected) => {}
                 (_, expected) => panic!("{said}: {answer:?}, expected {expected:?}"),
             }
             // Who is not there cannot leave, and what is not locked is not unlocked: that is no refusal of a right.
-            let is_own = matches!(wish, Wish::Logout | Wish::Lock | Wish::Unlock(_));
+            let is_own = matches!(request, SessionRequest::Logout | SessionRequest::Lock | SessionRequest::Unlock(_));
             if action.is_empty() || is_own && answer.is_err() {
                 continue;
             }
@@ -316,8 +316,8 @@ async fn every_wish_is_granted_or_refused_as_the_table_says_and_is_on_record() {
     let from = "pts/7, user stranger, process 1".into();
     let peer = Peer { from, unix_user: Some("stranger".into()), own: false };
     let stranger = guarded.station.acceptor().attach(peer);
-    for wish in [Wish::Reload, Wish::Stop] {
-        assert_eq!(stranger.wish(wish).await, Err(LOG_IN.to_owned()));
+    for request in [SessionRequest::Reload, SessionRequest::Stop] {
+        assert_eq!(stranger.request(request).await, Err(LOG_IN.to_owned()));
         let line = guarded.entries().pop().unwrap();
         assert_eq!(
             (&*line.who, &*line.outcome),

@@ -9,7 +9,7 @@ use super::{
     session::{Refusals, SessionState},
 };
 use crate::{
-    access::{Wish, user},
+    access::{SessionRequest, user},
     plant::{record::ActionRecord, visible::acts},
 };
 
@@ -86,27 +86,27 @@ impl AccessControl {
     }
 }
 
-/// What a wish is called on record, and whom or what it is about.
-pub(super) fn words(wish: &Wish) -> (&'static str, Arc<str>) {
+/// What a request is called on record, and whom or what it is about.
+pub(super) fn words(request: &SessionRequest) -> (&'static str, Arc<str>) {
     // What is typed in the wrong field may be a password.
     let name = |user: &str| if user::check_name(user).is_ok() { user.into() } else { "unknown user".into() };
-    match wish {
-        Wish::Login { .. } => ("login", "unknown user".into()),
-        Wish::Logout => ("logout", "".into()),
-        Wish::Lock => ("lock terminal", "".into()),
-        Wish::Unlock(_) => ("unlock terminal", "".into()),
-        Wish::Active => ("active", "".into()),
-        Wish::FirstSupervisor { user, .. } => ("add user", name(user)),
-        Wish::ChangePassword { .. } => ("change password", "".into()),
-        Wish::AddUser { user, .. } => ("add user", name(user)),
-        Wish::SetRole { user, .. } => ("set role", name(user)),
-        Wish::Disable { user, disabled: true } => ("disable user", name(user)),
-        Wish::Disable { user, disabled: false } => ("enable user", name(user)),
-        Wish::DeleteUser { user } => ("delete user", name(user)),
-        Wish::ResetPassword { user, .. } => ("reset password", name(user)),
-        Wish::Exported { file, .. } => ("export", clean(file).into()),
-        Wish::Stop => ("stop station", "".into()),
-        Wish::Reload => ("reload", "".into()),
+    match request {
+        SessionRequest::Login { .. } => ("login", "unknown user".into()),
+        SessionRequest::Logout => ("logout", "".into()),
+        SessionRequest::Lock => ("lock terminal", "".into()),
+        SessionRequest::Unlock(_) => ("unlock terminal", "".into()),
+        SessionRequest::Active => ("active", "".into()),
+        SessionRequest::FirstSupervisor { user, .. } => ("add user", name(user)),
+        SessionRequest::ChangePassword { .. } => ("change password", "".into()),
+        SessionRequest::AddUser { user, .. } => ("add user", name(user)),
+        SessionRequest::SetRole { user, .. } => ("set role", name(user)),
+        SessionRequest::Disable { user, disabled: true } => ("disable user", name(user)),
+        SessionRequest::Disable { user, disabled: false } => ("enable user", name(user)),
+        SessionRequest::DeleteUser { user } => ("delete user", name(user)),
+        SessionRequest::ResetPassword { user, .. } => ("reset password", name(user)),
+        SessionRequest::Exported { file, .. } => ("export", clean(file).into()),
+        SessionRequest::Stop => ("stop station", "".into()),
+        SessionRequest::Reload => ("reload", "".into()),
     }
 }
 

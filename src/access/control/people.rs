@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     access::{
-        Secret, Users, Who, Wish,
+        Secret, SessionRequest, Users, Who,
         book::USERS_FILE,
         password,
         user::{self, Change},
@@ -36,43 +36,51 @@ pub(super) enum Hashing {
 pub(super) struct Saving {
     terminal: u32,
     /// `None` where only last logins are written.
-    wish: Option<(u64, Change, Box<ActionRecord>)>,
+    request: Option<(u64, Change, Box<ActionRecord>)>,
 }
 
 impl AccessControl {
-    pub(super) fn wish_of_people(&mut self, terminal: u32, ticket: u64, wish: Wish, at: Timestamp) -> Vec<Effect> {
+    pub(super) fn user_admin_request(
+        &mut self,
+        terminal: u32,
+        ticket: u64,
+        request: SessionRequest,
+        at: Timestamp,
+    ) -> Vec<Effect> {
         if self.people.is_none() {
             return reply(ticket, "this station keeps no users");
         }
-        let (action, target) = words(&wish);
+        let (action, target) = words(&request);
         if let Some(why) = self.closed.clone() {
             // What is in the damaged file is not to be written over.
             return self.not_changed(terminal, ticket, action, &target, &why, at);
         }
-        let result = match wish {
-            Wish::FirstSupervisor { user, password } => self.first(terminal, ticket, user.into(), password),
-            Wish::ChangePassword { old, new } => self.change_own(terminal, ticket, old, new, at),
-            Wish::AddUser { user, role, password } => {
+        let result = match request {
+            SessionRequest::FirstSupervisor { user, password } => self.first(terminal, ticket, user.into(), password),
+            SessionRequest::ChangePassword { old, new } => self.change_own(terminal, ticket, old, new, at),
+            SessionRequest::AddUser { user, role, password } => {
                 let user: Arc<str> = user.into();
                 self.new_password(terminal, ticket, password, Hashing::Add(user, role))
             }
-            Wish::ResetPassword { user, password } => {
+            SessionRequest::ResetPassword { user, password } => {
                 let user: Arc<str> = user.into();
                 self.new_password(terminal, ticket, password, Hashing::Reset(user))
             }
-            Wish::SetRole { user, role } => self.change(terminal, ticket, Change::Role(user.into(), role), at),
-            Wish::Disable { user, disabled } => {
+            SessionRequest::SetRole { user, role } => {
+                self.change(terminal, ticket, Change::Role(user.into(), role), at)
+            }
+            SessionRequest::Disable { user, disabled } => {
                 self.change(terminal, ticket, Change::Disable(user.into(), disabled), at)
             }
-            Wish::DeleteUser { user } => self.change(terminal, ticket, Change::Delete(user.into()), at),
-            Wish::Login { .. }
-            | Wish::Logout
-            | Wish::Lock
-            | Wish::Unlock(_)
-            | Wish::Active
-            | Wish::Exported { .. }
-            | Wish::Stop
-            | Wish::Reload => return Vec::new(),
+            SessionRequest::DeleteUser { user } => self.change(terminal, ticket, Change::Delete(user.into()), at),
+            SessionRequest::Login { .. }
+            | SessionRequest::Logout
+            | SessionRequest::Lock
+            | SessionRequest::Unlock(_)
+            | SessionRequest::Active
+            | SessionRequest::Exported { .. }
+            | SessionRequest::Stop
+            | SessionRequest::Reload => return Vec::new(),
         };
         result.unwrap_or_else(|why| self.not_changed(terminal, ticket, action, &target, &why, at))
     }
@@ -201,7 +209,7 @@ impl AccessControl {
             }
         }
         match &self.saving {
-            Some(Saving { wish: None, .. }) if self.next.is_none() => {
+            Some(Saving { request: None, .. }) if self.next.is_none() => {
                 self.next = Some((terminal, ticket, change));
                 return Ok(Vec::new());
             }
@@ -213,7 +221,7 @@ impl AccessControl {
         let name = self.people.as_ref().and_then(|people| people.get(change.user())).map(|user| user.name.clone());
         let target = name.unwrap_or_else(|| change.user().clone());
         let record = ActionRecord { old, new, ..record(session, action, &target, "done", at) };
-        self.saving = Some(Saving { terminal, wish: Some((ticket, change, Box::new(record))) });
+        self.saving = Some(Saving { terminal, request: Some((ticket, change, Box::new(record))) });
         Ok(vec![Effect::Save(after)])
     }
 
@@ -240,13 +248,13 @@ impl AccessControl {
     pub(super) fn save_logins(&mut self) -> Option<Effect> {
         self.unsaved = false;
         let people = self.people.clone()?;
-        self.saving = Some(Saving { terminal: 0, wish: None });
+        self.saving = Some(Saving { terminal: 0, request: None });
         Some(Effect::Save(people))
     }
 
     /// The people were written down, or not: `Err` says why.
     pub fn saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
-        let Some(Saving { terminal, wish: Some((ticket, change, record)) }) = self.saving.take() else {
+        let Some(Saving { terminal, request: Some((ticket, change, record)) }) = self.saving.take() else {
             return self.go_on(at);
         };
         let after = result.and_then(|()| self.check_change(&change));

@@ -124,8 +124,8 @@ pub fn needed(def: &PlantDef, kind: &CommandKind) -> Option<Sign> {
     };
     match kind {
         CommandKind::Write { tag, value } => asks(*tag, *value),
-        CommandKind::Restore(wish) => {
-            wish.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest)
+        CommandKind::Restore(request) => {
+            request.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest)
         }
         CommandKind::Alarm(_)
         | CommandKind::Refresh(_)

@@ -66,7 +66,7 @@ impl Bench {
         self.work(effects)
     }
 
-    /// Does what is wished beside, and gives what is left.
+    /// Does what is requested beside, and gives what is left.
     fn work(&mut self, effects: Vec<Effect>) -> Vec<Effect> {
         let (mut left, mut to_do) = (Vec::new(), effects);
         while !to_do.is_empty() {
@@ -95,21 +95,21 @@ impl Bench {
         left
     }
 
-    fn wish(&mut self, terminal: u32, wish: Wish) -> Result<(), String> {
+    fn request(&mut self, terminal: u32, request: SessionRequest) -> Result<(), String> {
         self.last_ticket += 1;
-        let effects = self.access.wish(terminal, self.last_ticket, wish, self.now);
+        let effects = self.access.on_request(terminal, self.last_ticket, request, self.now);
         let effects = self.work(effects);
         let answers = effects.into_iter().filter_map(|effect| match effect {
             Effect::Reply(ticket, answer) if ticket == self.last_ticket => Some(answer),
             _ => None,
         });
         let answers: Vec<_> = answers.collect();
-        assert_eq!(answers.len(), 1, "each wish is answered once");
+        assert_eq!(answers.len(), 1, "each request is answered once");
         answers.into_iter().next().unwrap()
     }
 
     fn login(&mut self, terminal: u32, user: &str, password: &str) -> Result<(), String> {
-        self.wish(terminal, Wish::Login { user: user.into(), password: password.into() })
+        self.request(terminal, SessionRequest::Login { user: user.into(), password: password.into() })
     }
 
     /// `None`: nothing reached the plant. `Some(None)`: permitted.
@@ -155,7 +155,7 @@ fn wrong_user_wrong_password_and_locked_out_look_the_same_and_the_book_knows_whi
         let told = bench.login(terminal, user, password).unwrap_err();
         assert_eq!(told, "wrong name or password; wait 1 s");
     }
-    bench.wish(2, Wish::Logout).unwrap_err();
+    bench.request(2, SessionRequest::Logout).unwrap_err();
     let why: Vec<_> =
         bench.records.iter().filter(|record| record.0.ends_with("failed")).map(|r| (&*r.1, &*r.2)).collect();
     assert_eq!(
@@ -186,8 +186,8 @@ fn five_wrong_passwords_lock_the_name_out_for_that_system_user_and_who_is_in_sta
     assert!(bench.access.standing(1, bench.now).view, "alarms and process stay to be seen");
     assert_eq!(bench.who(2).as_deref(), Some("tech"));
     assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None, "who is in goes on working");
-    bench.wish(2, Wish::Lock).unwrap();
-    bench.wish(2, Wish::Unlock(TECH.into())).unwrap();
+    bench.request(2, SessionRequest::Lock).unwrap();
+    bench.request(2, SessionRequest::Unlock(TECH.into())).unwrap();
     bench.later(300);
     bench.login(1, "tech", TECH).unwrap();
 }
@@ -202,7 +202,7 @@ fn a_supervisor_ends_a_lock_out() {
     bench.login(1, "tech", "guess").unwrap_err();
     let rows = bench.access.standing(2, bench.now).users;
     assert!(rows.iter().any(|row| &*row.user == "tech" && row.locked_until.is_some()));
-    bench.wish(2, Wish::Disable { user: "tech".into(), disabled: false }).unwrap();
+    bench.request(2, SessionRequest::Disable { user: "tech".into(), disabled: false }).unwrap();
     bench.login(3, "tech", TECH).unwrap();
 }
 
@@ -223,7 +223,7 @@ fn refused_commands_reach_the_plant_as_refused() {
         assert_eq!(why.is_some(), refused, "{login:?} {why:?}");
         assert_eq!(&*command.by, login.map_or("not logged in (panel)", |login| login.0));
         assert_eq!(&*command.from, "pts/1 from 10.0.0.1, user panel");
-        let stop = bench.wish(1, Wish::Stop);
+        let stop = bench.request(1, SessionRequest::Stop);
         assert!(stop.is_err());
         assert!(bench.last().0.ends_with("stop station") && bench.last().2.starts_with("refused: "));
     }
@@ -253,7 +253,7 @@ fn the_audit_trail_is_for_a_supervisor_at_an_unlocked_terminal_and_who_else_asks
     assert!(matches!(&effects[..], [Effect::Record(entry)] if &*entry.by == "tech" && entry.outcome.ends_with(&why)));
     bench.login(1, "boss", BOSS).unwrap();
     assert_eq!(bench.access.may_ask(1, &query, bench.now), Ok(()));
-    bench.wish(1, Wish::Lock).unwrap();
+    bench.request(1, SessionRequest::Lock).unwrap();
     assert!(bench.access.may_ask(1, &query, bench.now).unwrap_err().0.contains("locked"));
 }
 
@@ -272,11 +272,11 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
     let standing = bench.access.standing(1, bench.now);
     assert!(standing.locked && standing.view);
     assert!(bench.send_command(1, RUN, None).unwrap().1.is_some());
-    assert!(bench.wish(1, Wish::Unlock("guess".into())).is_err());
+    assert!(bench.request(1, SessionRequest::Unlock("guess".into())).is_err());
     bench.later(1);
-    bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
+    bench.request(1, SessionRequest::Unlock(TECH.into())).unwrap();
     assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
-    bench.wish(1, Wish::Lock).unwrap();
+    bench.request(1, SessionRequest::Lock).unwrap();
     bench.login(1, "boss", BOSS).unwrap();
     assert_eq!(bench.who(1).as_deref(), Some("boss"), "somebody else may sit down at a locked terminal");
 }
@@ -285,20 +285,26 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
 fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station() {
     let mut bench =
         Bench::of(AccessControl::with_people(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
-    let first = || Wish::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
+    let first =
+        || SessionRequest::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
     bench.open(1, "10.0.0.1");
     assert!(!bench.access.standing(1, bench.now).first);
-    bench.wish(1, first()).unwrap_err();
+    bench.request(1, first()).unwrap_err();
     bench.login(1, "anna", "").unwrap_err();
     let peer = Peer { from: "pts/0".into(), unix_user: Some("sight".into()), own: false };
     bench.access.open(2, peer, bench.now);
     assert!(bench.access.standing(2, bench.now).first);
-    assert!(bench.wish(2, Wish::FirstSupervisor { user: "anna".into(), password: "short".into() }).is_err());
-    bench.wish(2, first()).unwrap();
+    assert!(
+        bench.request(2, SessionRequest::FirstSupervisor { user: "anna".into(), password: "short".into() }).is_err()
+    );
+    bench.request(2, first()).unwrap();
     assert_eq!(bench.who(2).as_deref(), Some("anna"));
     assert!(
         bench
-            .wish(2, Wish::FirstSupervisor { user: "bert".into(), password: "a horse in a tank of water".into() })
+            .request(
+                2,
+                SessionRequest::FirstSupervisor { user: "bert".into(), password: "a horse in a tank of water".into() }
+            )
             .is_err()
     );
     assert!(!bench.access.standing(2, bench.now).first);
@@ -311,12 +317,14 @@ fn whoever_got_a_password_from_somebody_must_first_choose_his_own() {
     bench.open(2, "10.0.0.2");
     bench.login(1, "boss", BOSS).unwrap();
     let (given, own) = ("given by the boss", "chosen by dora herself");
-    bench.wish(1, Wish::AddUser { user: "dora".into(), role: Role::Supervisor, password: given.into() }).unwrap();
+    bench
+        .request(1, SessionRequest::AddUser { user: "dora".into(), role: Role::Supervisor, password: given.into() })
+        .unwrap();
     bench.login(2, "dora", given).unwrap();
     assert!(bench.send_command(2, RUN, None).unwrap().1.is_some());
-    assert!(bench.wish(2, Wish::Stop).is_err());
-    bench.wish(2, Wish::ChangePassword { old: given.into(), new: given.into() }).unwrap_err();
-    bench.wish(2, Wish::ChangePassword { old: given.into(), new: own.into() }).unwrap();
+    assert!(bench.request(2, SessionRequest::Stop).is_err());
+    bench.request(2, SessionRequest::ChangePassword { old: given.into(), new: given.into() }).unwrap_err();
+    bench.request(2, SessionRequest::ChangePassword { old: given.into(), new: own.into() }).unwrap();
     assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None);
     assert_eq!(&*bench.kept.as_ref().unwrap().get("dora").unwrap().hash, own);
 }
@@ -327,24 +335,27 @@ fn a_change_acts_on_those_who_are_in_at_once_and_one_that_was_not_saved_is_none(
     bench.open(1, "10.0.0.1");
     bench.login(1, "boss", BOSS).unwrap();
     let changes = [
-        Wish::SetRole { user: "tech".into(), role: Role::Viewer },
-        Wish::SetRole { user: "tech".into(), role: Role::Technician },
-        Wish::Disable { user: "tech".into(), disabled: true },
-        Wish::Disable { user: "tech".into(), disabled: false },
-        Wish::DeleteUser { user: "tech".into() },
+        SessionRequest::SetRole { user: "tech".into(), role: Role::Viewer },
+        SessionRequest::SetRole { user: "tech".into(), role: Role::Technician },
+        SessionRequest::Disable { user: "tech".into(), disabled: true },
+        SessionRequest::Disable { user: "tech".into(), disabled: false },
+        SessionRequest::DeleteUser { user: "tech".into() },
     ];
     for (terminal, change) in changes.into_iter().enumerate() {
         let terminal = terminal as u32 + 2;
         bench.open(terminal, &format!("10.0.0.{terminal}"));
         let came_in = bench.login(terminal, "tech", TECH).is_ok();
         bench.disk_full = true;
-        assert!(bench.wish(1, change.clone()).is_err());
+        assert!(bench.request(1, change.clone()).is_err());
         assert_eq!(bench.who(terminal).is_some(), came_in, "nothing was changed");
         bench.disk_full = false;
-        bench.wish(1, change).unwrap();
+        bench.request(1, change).unwrap();
         assert_eq!(bench.who(terminal), None);
     }
-    assert!(bench.wish(1, Wish::DeleteUser { user: "boss".into() }).is_err(), "the last supervisor remains");
+    assert!(
+        bench.request(1, SessionRequest::DeleteUser { user: "boss".into() }).is_err(),
+        "the last supervisor remains"
+    );
     assert_eq!(
         bench.last(),
         ("boss delete user", "boss", "refused: at least one supervisor who is not disabled must remain")
@@ -358,9 +369,9 @@ fn a_change_that_comes_while_last_logins_are_written_waits_for_them() {
     bench.login(1, "boss", BOSS).unwrap();
     let writing = bench.access.tick(bench.now);
     assert!(matches!(&writing[..], [Effect::Save(users)] if users.get("boss").unwrap().last_login.is_some()));
-    let wish = |user: &str| Wish::DeleteUser { user: user.into() };
-    assert_eq!(bench.access.wish(1, 71, wish("view"), bench.now), [], "not answered yet");
-    assert!(bench.wish(1, wish("tech")).is_err(), "one at a time");
+    let request = |user: &str| SessionRequest::DeleteUser { user: user.into() };
+    assert_eq!(bench.access.on_request(1, 71, request("view"), bench.now), [], "not answered yet");
+    assert!(bench.request(1, request("tech")).is_err(), "one at a time");
     let effects = bench.access.saved(Ok(()), bench.now);
     let effects = bench.work(effects);
     assert!(effects.contains(&Effect::Reply(71, Ok(()))));
@@ -403,7 +414,7 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
     assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     bench.later(5000);
     assert!(!bench.access.standing(1, bench.now).locked, "he would have no password to unlock it with");
-    assert!(bench.wish(1, Wish::Lock).is_err());
+    assert!(bench.request(1, SessionRequest::Lock).is_err());
 }
 
 #[test]
@@ -413,8 +424,8 @@ fn the_stations_own_user_stops_it_also_where_a_lesser_role_is_given_without_a_pa
     bench.open(1, "10.0.0.1");
     let own = Peer { from: "here".into(), unix_user: Some("sight".into()), own: false };
     bench.access.open(2, own, bench.now);
-    assert!(bench.wish(1, Wish::Stop).is_err());
-    assert_eq!(bench.wish(2, Wish::Stop), Ok(()));
+    assert!(bench.request(1, SessionRequest::Stop).is_err());
+    assert_eq!(bench.request(2, SessionRequest::Stop), Ok(()));
 }
 
 #[test]
@@ -462,8 +473,8 @@ fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
     let mut bench = Bench::new(AccessDef { tries_max: 2, ..AccessDef::default() });
     for terminal in 1..=2 {
         bench.open(terminal, "evil");
-        let wish = Wish::Login { user: "tech".into(), password: "guess".into() };
-        let effects = bench.access.wish(terminal, 1, wish, bench.now);
+        let request = SessionRequest::Login { user: "tech".into(), password: "guess".into() };
+        let effects = bench.access.on_request(terminal, 1, request, bench.now);
         bench.access.close(terminal, bench.now);
         bench.work(effects);
         bench.later(2);

@@ -14,7 +14,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::{CommandRequest, Standing, Wish},
+    access::{CommandRequest, SessionRequest, Standing},
     attach::{
         check,
         delta::Delta,
@@ -32,7 +32,7 @@ pub const SNAPSHOT_EVERY: Duration = Duration::from_millis(250);
 pub const STUCK_MAX: Duration = Duration::from_secs(300);
 /// A terminal that does not take the answer to its own query is let go after so long: answers may be large.
 pub const ANSWER_STUCK_MAX: Duration = Duration::from_secs(30);
-/// Queries and wishes of one terminal that may wait for their answers.
+/// Queries and requests of one terminal that may wait for their answers.
 const IN_FLIGHT_MAX: usize = 16;
 /// Queries of one terminal that are before the history, or answered and not taken yet.
 const ANSWERS_MAX: usize = 4;
@@ -110,7 +110,7 @@ impl Asking {
                 Asked::Command(command) => self.send_command(*command).await,
                 Asked::Ask { ticket, query } => self.ask(ticket, query).await,
                 Asked::Cancel { ticket } => self.cancel(ticket),
-                Asked::Wish { ticket, wish } => self.wish(ticket, wish).await,
+                Asked::SessionRequest { ticket, request } => self.send_request(ticket, request).await,
             }
         }
     }
@@ -160,10 +160,10 @@ impl Asking {
         }
     }
 
-    async fn wish(&self, ticket: u64, wish: Wish) {
+    async fn send_request(&self, ticket: u64, request: SessionRequest) {
         let Ok(place) = self.in_flight.clone().acquire_owned().await else { return };
         let (reply, answer) = oneshot::channel();
-        let sent = self.session.send(Request::Wish(wish, reply)).map_err(str::to_owned);
+        let sent = self.session.send(Request::SessionRequest(request, reply)).map_err(str::to_owned);
         let replies = self.replies.clone();
         tokio::spawn(async move {
             let answer = match sent {

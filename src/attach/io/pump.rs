@@ -32,10 +32,10 @@ const OUT: usize = 64;
 /// Messages that may wait to be taken in; more wait in the socket.
 const IN: usize = 4;
 
-/// A query or wish that waits for its answer.
+/// A query or request that waits for its answer.
 enum Waiting {
     Ask(oneshot::Sender<Result<Answer, HistoryError>>),
-    Wish(oneshot::Sender<Result<Durability, String>>),
+    SessionRequest(oneshot::Sender<Result<Durability, String>>),
 }
 
 impl Waiting {
@@ -43,7 +43,7 @@ impl Waiting {
     fn refuse(self, why: &str) {
         match self {
             Waiting::Ask(reply) => drop(reply.send(Err(HistoryError::Engine(why.to_owned())))),
-            Waiting::Wish(reply) => drop(reply.send(Err(why.to_owned()))),
+            Waiting::SessionRequest(reply) => drop(reply.send(Err(why.to_owned()))),
         }
     }
 }
@@ -155,7 +155,7 @@ impl Pump {
                 }
             }
             Told::Granted { ticket, answer } => {
-                if let Some(Waiting::Wish(reply)) = self.waiting.remove(&ticket) {
+                if let Some(Waiting::SessionRequest(reply)) = self.waiting.remove(&ticket) {
                     // Whoever has left needs no answer.
                     let _ = reply.send(answer);
                 }
@@ -190,9 +190,14 @@ impl Pump {
                 let ticket = self.ticket();
                 self.await_answer(ticket, Waiting::Ask(reply), &Asked::Ask { ticket, query }, out);
             }
-            Request::Wish(wish, reply) => {
+            Request::SessionRequest(request, reply) => {
                 let ticket = self.ticket();
-                self.await_answer(ticket, Waiting::Wish(reply), &Asked::Wish { ticket, wish }, out);
+                self.await_answer(
+                    ticket,
+                    Waiting::SessionRequest(reply),
+                    &Asked::SessionRequest { ticket, request },
+                    out,
+                );
             }
         }
     }
@@ -263,7 +268,7 @@ impl Pump {
                 self.show();
             }
             Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),
-            Request::Wish(_, reply) => Waiting::Wish(reply).refuse(GONE),
+            Request::SessionRequest(_, reply) => Waiting::SessionRequest(reply).refuse(GONE),
         }
     }
 

@@ -85,8 +85,14 @@ fn requests_and_news_survive_the_way() {
         Asked::Command(Box::new(command)),
         Asked::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
         Asked::Cancel { ticket: 1 },
-        Asked::Wish { ticket: 2, wish: Wish::Login { user: "anna".into(), password: "long and secret".into() } },
-        Asked::Wish { ticket: 3, wish: Wish::SetRole { user: "anna".into(), role: Role::Technician } },
+        Asked::SessionRequest {
+            ticket: 2,
+            request: SessionRequest::Login { user: "anna".into(), password: "long and secret".into() },
+        },
+        Asked::SessionRequest {
+            ticket: 3,
+            request: SessionRequest::SetRole { user: "anna".into(), role: Role::Technician },
+        },
     ];
     for asked in asked {
         assert_eq!(decode(&body(encode(&asked, REQUEST_BYTES_MAX).unwrap()), "message"), Ok(asked));
@@ -112,7 +118,7 @@ fn a_message_is_neither_longer_nor_shorter_than_it_says() {
     bytes.push(0);
     assert!(decode::<Told>(&bytes, "message").is_err(), "something is left over");
     assert!(decode::<Told>(&bytes[..2], "message").is_err(), "something is missing");
-    let long = Asked::Wish { ticket: 1, wish: Wish::Unlock("x".repeat(70_000).as_str().into()) };
+    let long = Asked::SessionRequest { ticket: 1, request: SessionRequest::Unlock("x".repeat(70_000).as_str().into()) };
     assert!(matches!(encode(&long, REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { .. })));
 }
 

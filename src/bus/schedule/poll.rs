@@ -71,7 +71,7 @@ pub(super) struct Pending {
     pub period: Option<Duration>,
     /// Next point of its grid; `None` for a block that is read once and has been.
     pub release: Option<Timestamp>,
-    /// Asked for out of turn (device came back, operator's wish, retry) at this time.
+    /// Asked for out of turn (device came back, refresh command, retry) at this time.
     pub urgent: Option<Timestamp>,
     /// Put off until then.
     pub not_before: Timestamp,

@@ -99,7 +99,7 @@ fn verdict(framing: Framing, request: &[u8], bytes: &[u8]) -> Result<String, Str
     }
 }
 
-/// What is wrong with a request stops it, unless it is wished all the same.
+/// What is wrong with a request stops it, unless forced.
 fn refuse(message: &[u8], framing: Framing, args: &Args) -> Result<(), CliError> {
     // Bytes that are to go out as they are may be anything.
     if args.as_is && message.is_empty() {

@@ -14,7 +14,7 @@ use crate::plant::{
 /// Most characters of a note or reason.
 pub const WORDS_MAX: usize = 500;
 
-/// A wish of an operator about alarms. The note of its command is the note of an acknowledgement, and the reason without which
+/// An alarm command. The note of its command is the note of an acknowledgement, and the reason without which
 /// nothing is shelved or put out of service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum AlarmCommand {
@@ -49,7 +49,7 @@ pub enum AlarmCommand {
     InService(AlarmId),
 }
 
-/// Why a wish about an alarm was refused.
+/// Why a request about an alarm was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum AlarmRefusal {
     /// The plant has no such alarm.

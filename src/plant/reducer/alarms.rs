@@ -151,7 +151,7 @@ fn is_overloaded(line: &LineStatus) -> Option<bool> {
     report.map(|report| report.strain.is_some())
 }
 
-/// What came of several wishes at once: the steps, and an outcome that hides none that was refused.
+/// What came of several requests at once: the steps, and an outcome that hides none that was refused.
 fn together(each: impl Iterator<Item = Result<AlarmRecord, AlarmRefusal>>) -> (Vec<AlarmRecord>, Outcome) {
     let (mut steps, mut refused, mut count) = (Vec::new(), Vec::new(), 0);
     for done in each {

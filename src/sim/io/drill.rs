@@ -1,4 +1,4 @@
-//! The task of a trainer: lets things go wrong when somebody wishes or a scenario says so, watches, and judges.
+//! The task of a trainer: lets things go wrong on request or by a scenario, watches, and judges.
 
 use std::{
     sync::{
@@ -28,7 +28,7 @@ use crate::{
     },
 };
 
-/// Wishes that may wait; more are not heard, and what is in force tells so.
+/// Commands that may wait; more are dropped, as `in_force` shows.
 const COMMANDS_MAX: usize = 32;
 /// Steps that may wait for the judge, counted as they were told.
 const STEPS_MAX: usize = 4096;

@@ -24,7 +24,7 @@ pub struct Form {
     fields: Vec<Field>,
     /// The one that is typed into.
     at: usize,
-    /// Passwords are readable, because somebody wished it.
+    /// Passwords are readable, on request.
     shown: bool,
 }
 

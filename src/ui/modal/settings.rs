@@ -307,7 +307,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
     }
 }
 
-/// Why the last wish to save the settings of a line was refused, in full.
+/// Why the last request to save the settings of a line was refused, in full.
 fn not_saved(cx: &ViewContext, line: LineId) -> Option<String> {
     let saved = cx.snapshot.commands.iter().find(|command| command.kind == CommandKind::SaveSettings(line))?;
     match &saved.outcome {

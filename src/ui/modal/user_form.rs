@@ -1,4 +1,4 @@
-//! A form about people: logging in, a password, a user. It carries a wish to the station and waits for the answer.
+//! A form about people: logging in, a password, a user. It carries a request to the station and waits for the answer.
 
 use std::sync::Arc;
 
@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{
     access::{
-        Wish,
-        wish::{Secret, UserRow},
+        SessionRequest,
+        session_request::{Secret, UserRow},
     },
     plant::role::Role,
     ui::{
@@ -47,13 +47,13 @@ pub enum Purpose {
     Delete(Arc<str>),
 }
 
-/// A form and how its wish stands.
+/// A form and how its request stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UserForm {
     /// What for.
     pub purpose: Purpose,
     form: Form,
-    /// The wish is on its way.
+    /// The request is on its way.
     waiting: bool,
     /// The number of that request; 0 before it has one.
     number: u32,
@@ -119,18 +119,18 @@ impl UserForm {
         self.waiting && self.number == number
     }
 
-    /// A key: the wish, once the form is finished and nothing is wrong with it.
-    pub fn press(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<Wish> {
+    /// A key: the request, once the form is finished and nothing is wrong with it.
+    pub fn press(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<SessionRequest> {
         if self.waiting {
             return None;
         }
         let enter = self.form.rows() == 0 && keys::code(crossterm::event::KeyCode::Enter).is(event);
         let turn = if enter { Turn::Finished } else { self.form.on_key(event) };
         match turn {
-            Turn::Finished if self.wait(cx) == 0 => match self.wish(cx) {
-                Ok(wish) => {
+            Turn::Finished if self.wait(cx) == 0 => match self.request(cx) {
+                Ok(request) => {
                     (self.waiting, self.problem) = (true, None);
-                    return Some(wish);
+                    return Some(request);
                 }
                 Err(problem) => self.problem = Some((problem, cx.phase)),
             },
@@ -159,29 +159,35 @@ impl UserForm {
         false
     }
 
-    /// What is wished, or what is wrong with the form.
-    fn wish(&mut self, cx: &ViewContext) -> Result<Wish, String> {
+    /// What is requested, or what is wrong with the form.
+    fn request(&mut self, cx: &ViewContext) -> Result<SessionRequest, String> {
         if let Some(why) = self.form.lacking() {
             return Err(why);
         }
         let name = self.form.name(0);
         Ok(match &self.purpose {
-            Purpose::First => Wish::FirstSupervisor { user: name, password: self.new_password(cx, 1)? },
-            Purpose::Login => Wish::Login { user: name, password: self.form.secret(1) },
-            Purpose::Change(Some(old)) => Wish::ChangePassword { old: old.clone(), new: self.new_password(cx, 0)? },
-            Purpose::Change(None) => Wish::ChangePassword { old: self.form.secret(0), new: self.new_password(cx, 1)? },
-            Purpose::Unlock(_) => Wish::Unlock(self.form.secret(0)),
-            Purpose::Add => Wish::AddUser {
+            Purpose::First => SessionRequest::FirstSupervisor { user: name, password: self.new_password(cx, 1)? },
+            Purpose::Login => SessionRequest::Login { user: name, password: self.form.secret(1) },
+            Purpose::Change(Some(old)) => {
+                SessionRequest::ChangePassword { old: old.clone(), new: self.new_password(cx, 0)? }
+            }
+            Purpose::Change(None) => {
+                SessionRequest::ChangePassword { old: self.form.secret(0), new: self.new_password(cx, 1)? }
+            }
+            Purpose::Unlock(_) => SessionRequest::Unlock(self.form.secret(0)),
+            Purpose::Add => SessionRequest::AddUser {
                 user: name,
                 role: self.form.role().unwrap_or(Role::Viewer),
                 password: self.new_password(cx, 2)?,
             },
-            Purpose::Reset(user) => Wish::ResetPassword { user: user.to_string(), password: self.new_password(cx, 0)? },
-            Purpose::Role(user) => {
-                Wish::SetRole { user: user.to_string(), role: self.form.role().unwrap_or(Role::Viewer) }
+            Purpose::Reset(user) => {
+                SessionRequest::ResetPassword { user: user.to_string(), password: self.new_password(cx, 0)? }
             }
-            Purpose::Disable(user, disabled) => Wish::Disable { user: user.to_string(), disabled: *disabled },
-            Purpose::Delete(user) if name == **user => Wish::DeleteUser { user: name },
+            Purpose::Role(user) => {
+                SessionRequest::SetRole { user: user.to_string(), role: self.form.role().unwrap_or(Role::Viewer) }
+            }
+            Purpose::Disable(user, disabled) => SessionRequest::Disable { user: user.to_string(), disabled: *disabled },
+            Purpose::Delete(user) if name == **user => SessionRequest::DeleteUser { user: name },
             Purpose::Delete(user) => return Err(format!("\"{name}\" is not \"{user}\"")),
         })
     }
@@ -204,9 +210,9 @@ impl UserForm {
             return Next::Do(vec![UiAction::Show(Tab::Login)]);
         }
         match self.press(cx, event) {
-            Some(wish) => {
+            Some(request) => {
                 let tab = self.tab();
-                Next::Both(Modal::UserForm(Box::new(self)), vec![UiAction::Wish(tab, wish)])
+                Next::Both(Modal::UserForm(Box::new(self)), vec![UiAction::SessionRequest(tab, request)])
             }
             None => Next::Stay(Modal::UserForm(Box::new(self))),
         }

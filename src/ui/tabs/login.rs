@@ -10,7 +10,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::Tab;
 use crate::{
-    access::{Standing, Wish, wish::Secret},
+    access::{SessionRequest, Standing, session_request::Secret},
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char},
@@ -48,11 +48,11 @@ pub struct Login {
     form: Option<UserForm>,
     /// The password with which somebody has just logged in, as long as he may have to change it.
     given: Option<Secret>,
-    /// He wishes another password.
+    /// The password is being changed.
     changing: bool,
     /// Who is in, and since when as far as this terminal knows.
     since: Option<(Arc<str>, Timestamp)>,
-    /// What came of the last wish that had no form.
+    /// What came of the last request that had no form.
     told: Option<Result<&'static str, String>>,
 }
 
@@ -62,11 +62,11 @@ impl Login {
         let Some(form) = &mut self.form else {
             return keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default();
         };
-        let Some(wish) = form.press(cx, event) else { return Vec::new() };
-        if let Wish::Login { password, .. } = &wish {
+        let Some(request) = form.press(cx, event) else { return Vec::new() };
+        if let SessionRequest::Login { password, .. } = &request {
             self.given = Some(password.clone());
         }
-        vec![UiAction::Wish(Tab::Login, wish)]
+        vec![UiAction::SessionRequest(Tab::Login, request)]
     }
 
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
@@ -80,8 +80,8 @@ impl Login {
                 self.fit(cx.standing);
                 Vec::new()
             }
-            Action::Lock => vec![UiAction::Wish(Tab::Login, Wish::Lock)],
-            Action::Leave => vec![UiAction::Wish(Tab::Login, Wish::Logout)],
+            Action::Lock => vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)],
+            Action::Leave => vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Logout)],
         }
     }
 
@@ -135,7 +135,7 @@ impl Login {
         }
     }
 
-    /// The station's answer to the last wish.
+    /// The station's answer to the last request.
     pub fn on_granted(&mut self, cx: &ViewContext, answer: Result<(), String>) {
         match &mut self.form {
             Some(form) if form.is_waiting() => {

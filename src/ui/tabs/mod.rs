@@ -26,7 +26,7 @@ use super::{
     session_lock,
 };
 use crate::{
-    access::{Wish, book::sha256},
+    access::{SessionRequest, book::sha256},
     history::{Answer, HistoryError},
     plant::{role::Role, snapshot::Snapshot},
 };
@@ -41,9 +41,9 @@ struct Outgoing {
 
 impl Outgoing {
     /// Asks for it.
-    fn wish(&self) -> UiAction {
+    fn export_request(&self) -> UiAction {
         let file = self.path.display().to_string();
-        UiAction::Wish(self.tab, Wish::Exported { file, sha256: sha256(&self.bytes) })
+        UiAction::SessionRequest(self.tab, SessionRequest::Exported { file, sha256: sha256(&self.bytes) })
     }
     /// Writes it.
     fn write(self) -> UiAction {
@@ -288,7 +288,7 @@ impl Tabs {
         }
     }
 
-    /// A wish goes to the tab that wished, shown or not.
+    /// A reply goes to the tab that asked, shown or not.
     pub fn on_granted(&mut self, cx: &ViewContext, id: QueryId, answer: Result<(), String>) -> Vec<UiAction> {
         match id.tab {
             Tab::Login => self.login.on_granted(cx, answer),

@@ -284,9 +284,9 @@ impl Reports {
         }
         let bytes = shift_csv(report, cx.def(), self.dialect);
         let outgoing = Outgoing { tab: Tab::Reports, path: self.path(cx, report), bytes };
-        let wish = outgoing.wish();
+        let request = outgoing.export_request();
         (self.export, self.outgoing) = (Export::Writing, Some(outgoing));
-        vec![wish]
+        vec![request]
     }
 
     fn path(&self, cx: &ViewContext, report: &ShiftReport) -> PathBuf {

@@ -7,8 +7,8 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use super::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys};
 use crate::{
     access::{
-        CommandRequest, Durability, Standing, Who, Wish,
-        wish::{SessionRow, UserRow},
+        CommandRequest, Durability, SessionRequest, Standing, Who,
+        session_request::{SessionRow, UserRow},
     },
     history::{Answer, Query},
     plant::{
@@ -57,15 +57,15 @@ fn ctrl(model: &mut Model, c: char) -> Vec<Effect> {
     update(model, Msg::Key(KeyEvent::new(KeyCode::Char(c), KeyModifiers::CONTROL)))
 }
 
-fn wish(effects: &[Effect]) -> Option<&Wish> {
+fn sent_request(effects: &[Effect]) -> Option<&SessionRequest> {
     effects.iter().find_map(|effect| match effect {
-        Effect::Wish(_, wish) if *wish != Wish::Active => Some(wish),
+        Effect::SessionRequest(_, request) if *request != SessionRequest::Active => Some(request),
         _ => None,
     })
 }
 
 fn answer(model: &mut Model, answer: Result<(), &str>) {
-    let id = QueryId { tab: Tab::Login, number: model.session_lock.wished };
+    let id = QueryId { tab: Tab::Login, number: model.session_lock.last_request };
     update(model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
 }
 
@@ -101,7 +101,7 @@ fn the_login_page_in_every_mood() {
 #[test]
 fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Supervisor));
-    let id = QueryId { tab: Tab::Users, number: model.session_lock.wished };
+    let id = QueryId { tab: Tab::Users, number: model.session_lock.last_request };
     update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
     assert!(!screen(&mut model, 80, 24).contains("RECORDED"));
     update(&mut model, Msg::Granted(id, Ok(Durability::NotRecorded)));
@@ -112,8 +112,8 @@ fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
 fn a_password_is_sent_and_never_seen_and_a_wrong_one_is_told_with_its_wait() {
     let mut model = with(&Fixture::normal(), closed());
     let effects = type_keys(&mut model, "anna⏎horse 1q?⏎");
-    let expect = Wish::Login { user: "anna".to_owned(), password: "horse 1q?".into() };
-    assert_eq!(wish(&effects), Some(&expect));
+    let expect = SessionRequest::Login { user: "anna".to_owned(), password: "horse 1q?".into() };
+    assert_eq!(sent_request(&effects), Some(&expect));
     shows(&mut model, "asking the station");
     assert_eq!(type_keys(&mut model, "⏎⏎"), [], "while the answer is awaited");
     assert!(!screen(&mut model, 80, 24).contains("horse") && !format!("{model:?}").contains("horse"));
@@ -129,8 +129,8 @@ fn a_password_is_sent_and_never_seen_and_a_wrong_one_is_told_with_its_wait() {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
     }
     shows(&mut model, "try again now");
-    let expect = Wish::Login { user: "anna".to_owned(), password: "battery".into() };
-    assert_eq!(wish(&type_keys(&mut model, "⏎")), Some(&expect));
+    let expect = SessionRequest::Login { user: "anna".to_owned(), password: "battery".into() };
+    assert_eq!(sent_request(&type_keys(&mut model, "⏎")), Some(&expect));
     ctrl(&mut model, 'r');
     assert!(!screen(&mut model, 80, 24).contains("battery"));
 }
@@ -143,8 +143,9 @@ fn a_password_can_be_shown_and_pasted() {
     assert!(screen(&mut model, 80, 24).contains("•••"));
     ctrl(&mut model, 'r');
     shows(&mut model, "ยาวพอ");
-    let expect = Wish::Login { user: "anna".to_owned(), password: "รหัสผ่าน ยาวพอ".into() };
-    assert_eq!(wish(&type_keys(&mut model, "⏎")), Some(&expect));
+    let expect =
+        SessionRequest::Login { user: "anna".to_owned(), password: "รหัสผ่าน ยาวพอ".into() };
+    assert_eq!(sent_request(&type_keys(&mut model, "⏎")), Some(&expect));
 }
 
 #[test]
@@ -183,11 +184,11 @@ fn the_first_supervisor_types_his_password_twice() {
         let effects = type_keys(&mut model, keys);
         match expect {
             Ok(password) => {
-                let expect = Wish::FirstSupervisor { user: "anna".to_owned(), password: password.into() };
-                assert_eq!(wish(&effects), Some(&expect), "{keys}");
+                let expect = SessionRequest::FirstSupervisor { user: "anna".to_owned(), password: password.into() };
+                assert_eq!(sent_request(&effects), Some(&expect), "{keys}");
             }
             Err(words) => {
-                assert_eq!(wish(&effects), None, "{keys}");
+                assert_eq!(sent_request(&effects), None, "{keys}");
                 shows(&mut model, words);
             }
         }
@@ -211,8 +212,8 @@ fn a_password_given_by_somebody_else_is_changed_before_anything() {
     assert_eq!(model.tabs.shown, Tab::Login);
     type_keys(&mut model, "\u{8}");
     let effects = type_keys(&mut model, "correct horse battery⏎correct horse battery⏎");
-    let expect = Wish::ChangePassword { old: "given by boris".into(), new: "correct horse battery".into() };
-    assert_eq!(wish(&effects), Some(&expect));
+    let expect = SessionRequest::ChangePassword { old: "given by boris".into(), new: "correct horse battery".into() };
+    assert_eq!(sent_request(&effects), Some(&expect));
     answer(&mut model, Ok(()));
     stand(&mut model, |standing| standing.who = person("anna", Role::Technician).who);
     assert_eq!(model.tabs.shown, Tab::Mimic);
@@ -223,13 +224,13 @@ fn work_waits_while_the_terminal_is_locked() {
     let fixture = Fixture::alarm();
     let mut model = with(&fixture, person("anna", Role::Technician));
     type_keys(&mut model, "s65");
-    assert_eq!(wish(&ctrl(&mut model, 'k')), Some(&Wish::Lock));
+    assert_eq!(sent_request(&ctrl(&mut model, 'k')), Some(&SessionRequest::Lock));
     stand(&mut model, |standing| standing.locked = true);
     shows(&mut model, "LOCKED by anna");
     assert_eq!(model.modal, None, "nothing hides the process");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎⎋3a")), None);
     insta::assert_snapshot!("locked_80x24", screen(&mut model, 80, 24));
-    assert_eq!(wish(&type_keys(&mut model, "horse⏎")), Some(&Wish::Unlock("horse".into())));
+    assert_eq!(sent_request(&type_keys(&mut model, "horse⏎")), Some(&SessionRequest::Unlock("horse".into())));
     answer(&mut model, Err("wrong password; wait 2 s"));
     shows(&mut model, "wrong password; wait 2 s");
     stand(&mut model, |standing| standing.locked = false);
@@ -246,7 +247,9 @@ fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
     {
         let mut model = with(&Fixture::normal(), supervisor());
         let effects = type_keys(&mut model, "7↓r ⏎");
-        let Some(Effect::Wish(id, Wish::SetRole { .. })) = effects.last().cloned() else { panic!("{effects:?}") };
+        let Some(Effect::SessionRequest(id, SessionRequest::SetRole { .. })) = effects.last().cloned() else {
+            panic!("{effects:?}")
+        };
         ctrl(&mut model, 'k');
         stand(&mut model, |standing| standing.locked = true);
         update(&mut model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
@@ -276,7 +279,7 @@ fn a_locked_terminal_looks_and_does_nothing() {
     stand(&mut model, |standing| standing.locked = true);
     for keys in ["a", "A", "s", "r", "4⏎f", "4⏎↓⏎"] {
         let effects = type_keys(&mut model, keys);
-        assert!(sent_kind(&effects).is_none() && wish(&effects).is_none(), "{keys}: {effects:?}");
+        assert!(sent_kind(&effects).is_none() && sent_request(&effects).is_none(), "{keys}: {effects:?}");
         assert!(model.modal.as_ref().is_some_and(Modal::is_unlock), "{keys}: {:?}", model.modal);
         type_keys(&mut model, "⎋⎋⎋1");
         assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None), "{keys}");
@@ -300,7 +303,10 @@ fn a_locked_terminal_looks_and_does_nothing() {
     ctrl(&mut model, 'o');
     shows(&mut model, "log in as another person than anna");
     let effects = type_keys(&mut model, "boris⏎battery⏎");
-    assert_eq!(wish(&effects), Some(&Wish::Login { user: "boris".to_owned(), password: "battery".into() }));
+    assert_eq!(
+        sent_request(&effects),
+        Some(&SessionRequest::Login { user: "boris".to_owned(), password: "battery".into() })
+    );
     update(&mut model, Msg::Standing(Arc::new(person("boris", Role::Viewer))));
     assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None));
 }
@@ -308,7 +314,7 @@ fn a_locked_terminal_looks_and_does_nothing() {
 #[test]
 fn a_terminal_that_is_locked_on_the_login_page_still_shows_the_process() {
     let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
-    assert_eq!(wish(&type_keys(&mut model, "0k")), Some(&Wish::Lock));
+    assert_eq!(sent_request(&type_keys(&mut model, "0k")), Some(&SessionRequest::Lock));
     stand(&mut model, |standing| standing.locked = true);
     assert_eq!(model.tabs.shown, Tab::Mimic);
     type_keys(&mut model, "3");
@@ -318,8 +324,9 @@ fn a_terminal_that_is_locked_on_the_login_page_still_shows_the_process() {
 #[test]
 fn the_lock_is_told_beforehand_and_a_key_puts_it_off() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
-    let active =
-        |effects: &[Effect]| effects.iter().filter(|effect| matches!(effect, Effect::Wish(_, Wish::Active))).count();
+    let active = |effects: &[Effect]| {
+        effects.iter().filter(|effect| matches!(effect, Effect::SessionRequest(_, SessionRequest::Active))).count()
+    };
     let press = |model: &mut Model| update(model, Msg::Key(KeyEvent::new(KeyCode::Right, KeyModifiers::NONE)));
     assert_eq!(active(&press(&mut model)), 1);
     assert_eq!((0..100).map(|_| active(&press(&mut model))).sum::<usize>(), 0, "twice a minute at most");
@@ -504,31 +511,31 @@ fn the_users_and_what_can_be_done_with_them() {
     for (width, height) in [(80, 24), (120, 40)] {
         insta::assert_snapshot!(format!("users_{width}x{height}"), screen(&mut model, width, height));
     }
-    let check = |keys: &str, expect: Wish| {
+    let check = |keys: &str, expect: SessionRequest| {
         let mut model = with(&Fixture::normal(), supervisor());
         let effects = type_keys(&mut model, keys);
-        assert_eq!(wish(&effects), Some(&expect), "{keys}");
-        let id = QueryId { tab: Tab::Users, number: model.session_lock.wished };
+        assert_eq!(sent_request(&effects), Some(&expect), "{keys}");
+        let id = QueryId { tab: Tab::Users, number: model.session_lock.last_request };
         update(&mut model, Msg::Granted(id, Err("at least one Supervisor must remain".to_owned())));
         shows(&mut model, "at least one Supervisor must remain");
         update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
     };
     let user = "boris".to_owned();
     let password = || "correct horse battery".into();
-    check("7↓r ⏎", Wish::SetRole { user: user.clone(), role: Role::Supervisor });
-    check("7↓d⏎", Wish::Disable { user: user.clone(), disabled: false });
-    check("7↓↓d⏎", Wish::Disable { user: "สมชาย".to_owned(), disabled: true });
-    check("7↓xboris⏎", Wish::DeleteUser { user: user.clone() });
+    check("7↓r ⏎", SessionRequest::SetRole { user: user.clone(), role: Role::Supervisor });
+    check("7↓d⏎", SessionRequest::Disable { user: user.clone(), disabled: false });
+    check("7↓↓d⏎", SessionRequest::Disable { user: "สมชาย".to_owned(), disabled: true });
+    check("7↓xboris⏎", SessionRequest::DeleteUser { user: user.clone() });
     check(
         "7↓pcorrect horse battery⏎correct horse battery⏎",
-        Wish::ResetPassword { user: user.clone(), password: password() },
+        SessionRequest::ResetPassword { user: user.clone(), password: password() },
     );
     check(
         "7njane⏎→⏎correct horse battery⏎correct horse battery⏎",
-        Wish::AddUser { user: "jane".to_owned(), role: Role::Supervisor, password: password() },
+        SessionRequest::AddUser { user: "jane".to_owned(), role: Role::Supervisor, password: password() },
     );
     let mut model = with(&Fixture::normal(), supervisor());
-    assert_eq!(wish(&type_keys(&mut model, "7↓xboriss⏎")), None, "another name deletes nobody");
+    assert_eq!(sent_request(&type_keys(&mut model, "7↓xboriss⏎")), None, "another name deletes nobody");
     for (keys, own) in [("7d", true), ("7x", true), ("7↓↓d", false), ("7↓x", false)] {
         let mut model = with(&Fixture::normal(), supervisor());
         type_keys(&mut model, keys);

@@ -13,7 +13,7 @@ fn each_change_of_the_users_is_tied_to_the_one_before_and_a_login_changes_nothin
     assert_eq!(bench.access.people_digest().unwrap(), start);
     let mut last = start;
     for role in [Role::Technician, Role::Viewer] {
-        let effects = bench.access.wish(1, 99, Wish::SetRole { user: "tech".into(), role }, bench.now);
+        let effects = bench.access.on_request(1, 99, SessionRequest::SetRole { user: "tech".into(), role }, bench.now);
         let effects = bench.work(effects);
         let file = effects.iter().find_map(|effect| match effect {
             Effect::Record(record) if &*record.action == USERS_FILE => Some(record),

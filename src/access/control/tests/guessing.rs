@@ -12,8 +12,8 @@ impl Bench {
 
     /// The answer to a login, if there is one yet.
     fn answer(&mut self, terminal: u32, ticket: u64, user: &str, password: &str) -> Option<Result<(), String>> {
-        let wish = Wish::Login { user: user.into(), password: password.into() };
-        let effects = self.access.wish(terminal, ticket, wish, self.now);
+        let request = SessionRequest::Login { user: user.into(), password: password.into() };
+        let effects = self.access.on_request(terminal, ticket, request, self.now);
         let effects = self.work(effects);
         answer_in(&effects, ticket)
     }
@@ -40,7 +40,7 @@ fn wrong_passwords_of_one_system_user_lock_no_other_out() {
     assert!(told.starts_with("password not checked after wrong ones; wait"), "{told}");
     let rows = bench.access.standing(2, bench.now).users;
     assert!(rows.iter().any(|row| &*row.user == "boss" && row.locked_until.is_some()), "a supervisor sees it");
-    bench.wish(2, Wish::Disable { user: "boss".into(), disabled: false }).unwrap();
+    bench.request(2, SessionRequest::Disable { user: "boss".into(), disabled: false }).unwrap();
     bench.login(1, "boss", BOSS).unwrap();
 }
 
@@ -67,8 +67,8 @@ fn six_right_logins_at_once_all_succeed() {
     let mut begun = Vec::new();
     for terminal in 1..=6 {
         bench.open_as(terminal, "panel");
-        let login = Wish::Login { user: "tech".into(), password: TECH.into() };
-        begun.extend(bench.access.wish(terminal, u64::from(terminal), login, bench.now));
+        let login = SessionRequest::Login { user: "tech".into(), password: TECH.into() };
+        begun.extend(bench.access.on_request(terminal, u64::from(terminal), login, bench.now));
     }
     bench.work(begun);
     assert!((1..=6).all(|terminal| bench.who(terminal).as_deref() == Some("tech")));
@@ -81,9 +81,9 @@ fn too_many_logins_at_once_are_refused_as_busy() {
     for terminal in 1..=20 {
         bench.open_as(terminal, "eve");
         for ticket in 0..4 {
-            let login = Wish::Login { user: "tech".into(), password: "guess".into() };
+            let login = SessionRequest::Login { user: "tech".into(), password: "guess".into() };
             let ticket = u64::from(terminal) * 4 + ticket;
-            told.extend(answer_in(&bench.access.wish(terminal, ticket, login, bench.now), ticket));
+            told.extend(answer_in(&bench.access.on_request(terminal, ticket, login, bench.now), ticket));
         }
     }
     assert_eq!(told.len(), 80 - JOBS_OF_USER_MAX);

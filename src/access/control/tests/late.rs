@@ -23,9 +23,11 @@ fn two_at_work() -> Bench {
 #[test]
 fn a_change_of_password_under_way_does_not_undo_a_reset() {
     let mut bench = two_at_work();
-    let change = Wish::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
-    let job = under_way(&bench.access.wish(2, 9_000, change, bench.now));
-    bench.wish(1, Wish::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() }).unwrap();
+    let change = SessionRequest::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
+    let job = under_way(&bench.access.on_request(2, 9_000, change, bench.now));
+    bench
+        .request(1, SessionRequest::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() })
+        .unwrap();
     assert_eq!(bench.who(2), None, "the reset has ended the session");
     // The old password was right when it was checked.
     let effects = bench.access.done(job, Outcome::Verified(true), bench.now);
@@ -38,10 +40,12 @@ fn a_change_of_password_under_way_does_not_undo_a_reset() {
 #[test]
 fn a_new_password_being_hashed_does_not_undo_a_reset() {
     let mut bench = two_at_work();
-    let change = Wish::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
-    let verifying = under_way(&bench.access.wish(2, 9_000, change, bench.now));
+    let change = SessionRequest::ChangePassword { old: TECH.into(), new: "mine for ever and ever".into() };
+    let verifying = under_way(&bench.access.on_request(2, 9_000, change, bench.now));
     let hashing = under_way(&bench.access.done(verifying, Outcome::Verified(true), bench.now));
-    bench.wish(1, Wish::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() }).unwrap();
+    bench
+        .request(1, SessionRequest::ResetPassword { user: "tech".into(), password: "fresh horse for tech".into() })
+        .unwrap();
     // Logged in again with the password of the reset: the same person, another session.
     bench.login(2, "tech", "fresh horse for tech").unwrap();
     let effects = bench.access.done(hashing, Outcome::Hashed(Ok("mine for ever and ever".to_owned())), bench.now);
@@ -54,9 +58,9 @@ fn a_new_password_being_hashed_does_not_undo_a_reset() {
 fn a_login_with_a_password_changed_meanwhile_fails_and_is_no_guess() {
     let mut bench = two_at_work();
     bench.open(3, "10.0.0.3");
-    let login = Wish::Login { user: "tech".into(), password: TECH.into() };
-    let job = under_way(&bench.access.wish(3, 9_000, login, bench.now));
-    bench.wish(2, Wish::ChangePassword { old: TECH.into(), new: "a new horse for tech".into() }).unwrap();
+    let login = SessionRequest::Login { user: "tech".into(), password: TECH.into() };
+    let job = under_way(&bench.access.on_request(3, 9_000, login, bench.now));
+    bench.request(2, SessionRequest::ChangePassword { old: TECH.into(), new: "a new horse for tech".into() }).unwrap();
     let effects = bench.access.done(job, Outcome::Verified(true), bench.now);
     bench.work(effects);
     assert_eq!(bench.who(3), None);
@@ -67,10 +71,10 @@ fn a_login_with_a_password_changed_meanwhile_fails_and_is_no_guess() {
 #[test]
 fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
     let mut bench = two_at_work();
-    bench.wish(2, Wish::Lock).unwrap();
-    let unlock = under_way(&bench.access.wish(2, 9_000, Wish::Unlock(TECH.into()), bench.now));
+    bench.request(2, SessionRequest::Lock).unwrap();
+    let unlock = under_way(&bench.access.on_request(2, 9_000, SessionRequest::Unlock(TECH.into()), bench.now));
     bench.login(2, "tech", TECH).unwrap();
-    bench.wish(2, Wish::Lock).unwrap();
+    bench.request(2, SessionRequest::Lock).unwrap();
     let effects = bench.access.done(unlock, Outcome::Verified(true), bench.now);
     bench.work(effects);
     assert!(bench.access.standing(2, bench.now).locked, "the unlock belonged to the session before");
@@ -79,7 +83,7 @@ fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
     let sign = Some(Signature { user: Some("boss".to_owned()), password: BOSS.into() });
     let id = CommandId { terminal: 2, number: 50 };
     let effects = bench.access.on_command(2, CommandRequest { sign, ..CommandRequest::new(0, id, SV) }, bench.now);
-    bench.wish(2, Wish::Logout).unwrap();
+    bench.request(2, SessionRequest::Logout).unwrap();
     let effects = bench.access.done(under_way(&effects), Outcome::Verified(true), bench.now);
     let given = effects.iter().any(|effect| matches!(effect, Effect::Command(Command { refused: None, .. })));
     assert!(!given, "{effects:?}");

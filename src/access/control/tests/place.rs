@@ -16,10 +16,10 @@ fn wrong_names_at_a_place_do_not_keep_those_who_are_in_from_their_work() {
     }
     assert!(bench.login(3, "nobody", "guess").unwrap_err().contains("not checked"), "only that name is locked out");
     bench.login(3, "boss", BOSS).unwrap();
-    bench.wish(1, Wish::Lock).unwrap();
-    bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
-    let change = Wish::ChangePassword { old: TECH.into(), new: "another wet horse".into() };
-    bench.wish(1, change).unwrap();
+    bench.request(1, SessionRequest::Lock).unwrap();
+    bench.request(1, SessionRequest::Unlock(TECH.into())).unwrap();
+    let change = SessionRequest::ChangePassword { old: TECH.into(), new: "another wet horse".into() };
+    bench.request(1, change).unwrap();
 }
 
 #[test]
@@ -28,16 +28,16 @@ fn who_guesses_at_a_locked_terminal_waits_as_long_as_anywhere_else() {
     bench.open(1, "10.0.0.5");
     bench.open(2, "10.0.0.5");
     bench.login(1, "tech", TECH).unwrap();
-    bench.wish(1, Wish::Lock).unwrap();
+    bench.request(1, SessionRequest::Lock).unwrap();
     for wait in [1, 2, 300] {
-        let told = bench.wish(1, Wish::Unlock("guess".into())).unwrap_err();
+        let told = bench.request(1, SessionRequest::Unlock("guess".into())).unwrap_err();
         assert!(told.ends_with(&format!("wait {wait} s")), "{told}");
         bench.later(wait.min(2));
     }
-    assert!(bench.wish(1, Wish::Unlock(TECH.into())).is_err());
+    assert!(bench.request(1, SessionRequest::Unlock(TECH.into())).is_err());
     bench.login(2, "boss", BOSS).unwrap();
     bench.later(300);
-    bench.wish(1, Wish::Unlock(TECH.into())).unwrap();
+    bench.request(1, SessionRequest::Unlock(TECH.into())).unwrap();
 }
 
 #[test]

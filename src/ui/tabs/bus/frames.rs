@@ -152,7 +152,7 @@ impl Ring {
         let outgoing = |path, bytes| Outgoing { tab: Tab::Bus, path, bytes };
         let text = outgoing(name("txt"), capture::text(&frames).into_bytes());
         self.outgoing = VecDeque::from([text, outgoing(name("pcapng"), capture::pcapng(&frames))]);
-        self.outgoing.front().map(Outgoing::wish).into_iter().collect()
+        self.outgoing.front().map(Outgoing::export_request).into_iter().collect()
     }
 
     /// The station has put a file on record, which is then written, and the next one is asked for; or it refuses.
@@ -163,7 +163,7 @@ impl Ring {
             return Vec::new();
         }
         let written = self.outgoing.pop_front().map(Outgoing::write);
-        let next = self.outgoing.front().map(Outgoing::wish);
+        let next = self.outgoing.front().map(Outgoing::export_request);
         written.into_iter().chain(next).collect()
     }
 

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::{
-    access::{Durability, Wish},
+    access::{Durability, SessionRequest},
     bus::frame::with_crc,
     history::{Answer, Query},
     plant::{
@@ -228,7 +228,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "F");
     let mut effects = type_keys(&mut model, "x");
     let mut saved = Vec::new();
-    while let Some(Effect::Wish(id, Wish::Exported { file, sha256 })) = effects.last() {
+    while let Some(Effect::SessionRequest(id, SessionRequest::Exported { file, sha256 })) = effects.last() {
         assert_eq!((file.starts_with("reports/L1-"), sha256.len()), (true, 64), "told before it is written");
         let id = *id;
         saved.extend(std::mem::take(&mut effects));
@@ -240,7 +240,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
         .filter_map(|effect| match effect {
             Effect::SaveReport { tab, path, bytes } => Some((tab, path, bytes)),
             Effect::Command(..)
-            | Effect::Wish(..)
+            | Effect::SessionRequest(..)
             | Effect::Query(..)
             | Effect::Drill(_)
             | Effect::Bell

@@ -7,7 +7,7 @@ use ratatui::{Terminal, backend::TestBackend};
 
 use super::*;
 use crate::{
-    access::{Durability, Wish},
+    access::{Durability, SessionRequest},
     plant::{
         def::Priority,
         record::{ActionRecord, AlarmRecord, AlarmStep, Seal},
@@ -43,13 +43,13 @@ impl Stand {
             match effect {
                 Effect::Query(id, query) if id.tab == Tab::Reports => self.asked.push((id, query)),
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
-                Effect::Wish(id, Wish::Exported { file, sha256 }) => {
+                Effect::SessionRequest(id, SessionRequest::Exported { file, sha256 }) => {
                     assert_eq!((file.ends_with(".csv"), sha256.len()), (true, 64));
                     self.send(Msg::Granted(id, self.granted.clone()));
                 }
                 Effect::Query(..)
                 | Effect::Command(..)
-                | Effect::Wish(..)
+                | Effect::SessionRequest(..)
                 | Effect::Drill(_)
                 | Effect::Bell
                 | Effect::Redraw

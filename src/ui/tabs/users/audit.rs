@@ -70,7 +70,7 @@ pub const KEYS: &[Key<Action>] = &[
 
 /// Rows of one answer; more are said to be left out.
 const ROWS: usize = 1_000;
-/// Without another wish the list reaches back so far.
+/// By default the list reaches back so far.
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 7);
 /// How often the list is read anew, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 10.0;

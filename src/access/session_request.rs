@@ -1,4 +1,4 @@
-//! What a terminal can wish about people and the station, and how it stands there.
+//! What a terminal can ask about users and the station, and its session status.
 
 use std::{fmt, sync::Arc, time::Duration};
 
@@ -27,9 +27,9 @@ impl From<&str> for Secret {
     }
 }
 
-/// A wish that is not about the plant. Each is answered: done, or why not in words for the operator.
+/// A request that is not about the plant. Each gets a reply: done, or the reason for the operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Wish {
+pub enum SessionRequest {
     /// Somebody sits down here.
     Login {
         /// His name.
