@@ -334,15 +334,15 @@ impl AccessControl {
             SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
-                self.granted(terminal, ticket, "export", &file, new, at)
+                self.record_and_reply(terminal, ticket, "export", &file, new, at)
             }
             SessionRequest::Stop => {
-                let mut effects = self.granted(terminal, ticket, "stop station", &self.plant_name(), None, at);
+                let mut effects = self.record_and_reply(terminal, ticket, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
                 effects
             }
             SessionRequest::Reload => {
-                let mut effects = self.granted(terminal, ticket, "reload", &self.plant_name(), None, at);
+                let mut effects = self.record_and_reply(terminal, ticket, "reload", &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket));
                 effects
@@ -370,8 +370,8 @@ impl AccessControl {
         self.def.name.as_str().into()
     }
 
-    /// Granted, on record, answered.
-    fn granted(
+    /// Records the action and replies once it is durable.
+    fn record_and_reply(
         &self,
         terminal: u32,
         ticket: u64,

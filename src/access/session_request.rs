@@ -107,7 +107,7 @@ pub enum SessionRequest {
     Reload,
 }
 
-/// Whether what was granted is in the audit log, on disk.
+/// Whether the audit entry of a granted request is on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Durability {
     /// It is, or nothing had to be recorded.

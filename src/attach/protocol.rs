@@ -106,7 +106,7 @@ pub enum Told {
         answer: Result<Answer, HistoryError>,
     },
     /// What became of a request.
-    Granted {
+    RequestDone {
         /// Of the request.
         ticket: u64,
         /// Done, or why not.

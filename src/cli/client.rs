@@ -67,9 +67,9 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
     let mut session = open(plant).await?;
     let Some(user) = login.user.clone() else { return Ok((session, None)) };
     let password = Secret(password(&user)?);
-    let granted =
+    let reply =
         session.request(SessionRequest::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
-    warn_not_recorded("logged in", granted);
+    warn_not_recorded("logged in", reply);
     let settled = async {
         // The answer may come before the standing, and the standing before the snapshot that belongs to it.
         let _ = session.standing.wait_for(|standing| standing.who.is_some()).await;
@@ -102,7 +102,7 @@ pub fn recorded_words(recorded: bool) -> &'static str {
     if recorded { "" } else { " (not recorded: the disk of the station does not take it)" }
 }
 
-/// Warns of what the station has granted and its disk has not taken.
+/// Warns of what the station has reply and its disk has not taken.
 pub fn warn_not_recorded(what: &str, durability: Durability) {
     if durability == Durability::NotRecorded {
         super::say_error(&format!("{what}{}", recorded_words(false)));

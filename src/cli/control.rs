@@ -28,14 +28,14 @@ pub fn stop(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let place = client::place(args.plant.as_deref()).await?;
         let mut session = client::attach(Some(&place.name), &args.login).await?;
-        let granted = session.request(SessionRequest::Stop).await;
+        let reply = session.request(SessionRequest::Stop).await;
         // It tells that it goes by going, sometimes before its answer has left.
-        if granted.is_ok() || session.standing.borrow().gone.is_some() {
+        if reply.is_ok() || session.standing.borrow().gone.is_some() {
             let _ = session.standing.wait_for(|standing| standing.gone.is_some()).await;
             drop(session);
             gone(&place).await?;
         } else {
-            granted.map_err(CliError::Failed)?;
+            reply.map_err(CliError::Failed)?;
         }
         say("stopped");
         Ok(())

@@ -146,7 +146,7 @@ impl Loop {
                 Some(status) = drilled(&mut self.session.drill) => self.take(Msg::Drill(status), FRAME)?,
                 Some((plants, msg)) = inbox.recv() => {
                     // Ids of one plant mean something else in another.
-                    let fits = plants == self.model.plants || matches!(msg, Msg::Granted(..));
+                    let fits = plants == self.model.plants || matches!(msg, Msg::RequestDone(..));
                     if fits { self.take(msg, FRAME)? } else { false }
                 }
                 _ = ticks.tick() => {
@@ -231,7 +231,7 @@ impl Loop {
         tokio::spawn(async move {
             let answer = session.request(request).await;
             // A terminal that has left needs no answer.
-            let _ = outbox.send((plants, Msg::Granted(id, answer))).await;
+            let _ = outbox.send((plants, Msg::RequestDone(id, answer))).await;
         });
     }
 

@@ -210,7 +210,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
         Msg::Standing(standing) => session_lock::on_standing(model, standing),
-        Msg::Granted(id, answer) => session_lock::on_granted(model, id, answer),
+        Msg::RequestDone(id, answer) => session_lock::on_request_done(model, id, answer),
         Msg::Drill(status) => {
             model.drill = Some(status);
             Vec::new()

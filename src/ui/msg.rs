@@ -30,8 +30,8 @@ pub enum Msg {
     Snapshot(Arc<Snapshot>),
     /// News of who sits here.
     Standing(Arc<Standing>),
-    /// A request was granted, or why not.
-    Granted(QueryId, Result<Durability, String>),
+    /// The reply to a request, or why it failed.
+    RequestDone(QueryId, Result<Durability, String>),
     /// News of the simulation.
     Drill(Arc<drill::Status>),
     /// The history answered.
@@ -54,7 +54,7 @@ pub enum Msg {
 pub enum Effect {
     /// Give the station a command.
     Command(CommandRequest),
-    /// Send the station a request; answered by [`Msg::Granted`].
+    /// Send the station a request; answered by [`Msg::RequestDone`].
     SessionRequest(QueryId, SessionRequest),
     /// Ask the history.
     Query(QueryId, Query),

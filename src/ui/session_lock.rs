@@ -207,14 +207,14 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
 /// which waits for its last request only.
-pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durability, String>) -> Vec<UiAction> {
+pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Durability, String>) -> Vec<UiAction> {
     if answer == Ok(Durability::NotRecorded) {
         model.note = Some(NOT_RECORDED);
     }
     let answer = answer.map(drop);
     if matches!(id.tab, Tab::Reports | Tab::Bus) {
         // A file that waits to be written waits for its own answer, whatever was requested since.
-        return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
+        return with_tabs(model, |tabs, cx| tabs.on_request_done(cx, id, answer));
     }
     let waits = |modal: &Modal| matches!(modal, Modal::UserForm(form) if form.waits_for(id.number));
     let shown = model.modal.take_if(|modal| waits(modal));
@@ -225,7 +225,7 @@ pub(super) fn on_granted(model: &mut Model, id: QueryId, answer: Result<Durabili
             model.kept = answered(model, form, answer).map(|modal| (tab, modal));
         }
         _ if id.number != 0 && id.number == model.session_lock.last_request => {
-            return with_tabs(model, |tabs, cx| tabs.on_granted(cx, id, answer));
+            return with_tabs(model, |tabs, cx| tabs.on_request_done(cx, id, answer));
         }
         _ => {}
     }

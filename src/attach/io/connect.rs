@@ -109,7 +109,7 @@ async fn first(line: &mut Line) -> Result<(Standing, Arc<Snapshot>), AttachError
                 return Ok((standing, Arc::new(snapshot)));
             }
             // Nothing was asked yet.
-            Told::Answer { .. } | Told::Granted { .. } | Told::Undelivered { .. } => {}
+            Told::Answer { .. } | Told::RequestDone { .. } | Told::Undelivered { .. } => {}
         }
     }
 }

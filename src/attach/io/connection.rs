@@ -171,7 +171,7 @@ impl Asking {
                 Err(why) => Err(why),
             };
             // Only a terminal that has ended does not hear it.
-            let _ = replies.send((Told::Granted { ticket, answer }, vec![place])).await;
+            let _ = replies.send((Told::RequestDone { ticket, answer }, vec![place])).await;
         });
     }
 }

@@ -154,7 +154,7 @@ impl Pump {
                     let _ = reply.send(answer);
                 }
             }
-            Told::Granted { ticket, answer } => {
+            Told::RequestDone { ticket, answer } => {
                 if let Some(Waiting::SessionRequest(reply)) = self.waiting.remove(&ticket) {
                     // Whoever has left needs no answer.
                     let _ = reply.send(answer);

@@ -101,7 +101,7 @@ fn requests_and_news_survive_the_way() {
         Told::Standing(Box::default()),
         Told::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
         Told::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
-        Told::Granted { ticket: 2, answer: Err("no".into()) },
+        Told::RequestDone { ticket: 2, answer: Err("no".into()) },
         Told::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: "busy".into() },
     ];
     for told in told {
@@ -114,7 +114,7 @@ fn a_message_is_neither_longer_nor_shorter_than_it_says() {
     assert_eq!(length([0, 0, 1, 0], REQUEST_BYTES_MAX), Ok(65_536));
     assert_eq!(length([1, 0, 1, 0], REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { bytes: 65_537, max: 65_536 }));
     assert!(length([0xFF; 4], NEWS_BYTES_MAX).is_err());
-    let mut bytes = body(encode(&Told::Granted { ticket: 2, answer: Ok(Durability::Recorded) }, 100).unwrap());
+    let mut bytes = body(encode(&Told::RequestDone { ticket: 2, answer: Ok(Durability::Recorded) }, 100).unwrap());
     bytes.push(0);
     assert!(decode::<Told>(&bytes, "message").is_err(), "something is left over");
     assert!(decode::<Told>(&bytes[..2], "message").is_err(), "something is missing");

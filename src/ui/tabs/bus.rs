@@ -289,8 +289,8 @@ impl Bus {
     }
 
     /// The station has put a capture on record, or refuses it.
-    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
-        self.frames.on_granted(answer)
+    pub fn on_request_done(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
+        self.frames.on_request_done(answer)
     }
 
     /// A capture was written, or why not.

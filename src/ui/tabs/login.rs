@@ -136,7 +136,7 @@ impl Login {
     }
 
     /// The station's answer to the last request.
-    pub fn on_granted(&mut self, cx: &ViewContext, answer: Result<(), String>) {
+    pub fn on_request_done(&mut self, cx: &ViewContext, answer: Result<(), String>) {
         match &mut self.form {
             Some(form) if form.is_waiting() => {
                 if answer.is_err() {

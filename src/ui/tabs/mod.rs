@@ -289,11 +289,11 @@ impl Tabs {
     }
 
     /// A reply goes to the tab that asked, shown or not.
-    pub fn on_granted(&mut self, cx: &ViewContext, id: QueryId, answer: Result<(), String>) -> Vec<UiAction> {
+    pub fn on_request_done(&mut self, cx: &ViewContext, id: QueryId, answer: Result<(), String>) -> Vec<UiAction> {
         match id.tab {
-            Tab::Login => self.login.on_granted(cx, answer),
-            Tab::Reports => return self.reports.on_granted(answer),
-            Tab::Bus => return self.bus.on_granted(answer),
+            Tab::Login => self.login.on_request_done(cx, answer),
+            Tab::Reports => return self.reports.on_request_done(answer),
+            Tab::Bus => return self.bus.on_request_done(answer),
             Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Users | Tab::Faults => {}
         }
         Vec::new()

@@ -208,7 +208,7 @@ impl Reports {
     }
 
     /// The station has put the export on record, or refuses it: without that nothing is written.
-    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
+    pub fn on_request_done(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
         let Some(outgoing) = self.outgoing.take() else { return Vec::new() };
         match answer {
             Ok(()) => vec![outgoing.write()],

@@ -66,7 +66,7 @@ fn sent_request(effects: &[Effect]) -> Option<&SessionRequest> {
 
 fn answer(model: &mut Model, answer: Result<(), &str>) {
     let id = QueryId { tab: Tab::Login, number: model.session_lock.last_request };
-    update(model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
+    update(model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
 }
 
 fn shows(model: &mut Model, words: &str) {
@@ -102,9 +102,9 @@ fn the_login_page_in_every_mood() {
 fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Supervisor));
     let id = QueryId { tab: Tab::Users, number: model.session_lock.last_request };
-    update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
+    update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
     assert!(!screen(&mut model, 80, 24).contains("RECORDED"));
-    update(&mut model, Msg::Granted(id, Ok(Durability::NotRecorded)));
+    update(&mut model, Msg::RequestDone(id, Ok(Durability::NotRecorded)));
     shows(&mut model, "Done, but NOT RECORDED: the disk of the station does not take it");
 }
 
@@ -252,7 +252,7 @@ fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
         };
         ctrl(&mut model, 'k');
         stand(&mut model, |standing| standing.locked = true);
-        update(&mut model, Msg::Granted(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
+        update(&mut model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
         stand(&mut model, |standing| standing.locked = false);
         match left {
             Some(words) => shows(&mut model, words),
@@ -516,9 +516,9 @@ fn the_users_and_what_can_be_done_with_them() {
         let effects = type_keys(&mut model, keys);
         assert_eq!(sent_request(&effects), Some(&expect), "{keys}");
         let id = QueryId { tab: Tab::Users, number: model.session_lock.last_request };
-        update(&mut model, Msg::Granted(id, Err("at least one Supervisor must remain".to_owned())));
+        update(&mut model, Msg::RequestDone(id, Err("at least one Supervisor must remain".to_owned())));
         shows(&mut model, "at least one Supervisor must remain");
-        update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
+        update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
     };
     let user = "boris".to_owned();
     let password = || "correct horse battery".into();

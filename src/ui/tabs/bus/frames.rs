@@ -156,7 +156,7 @@ impl Ring {
     }
 
     /// The station has put a file on record, which is then written, and the next one is asked for; or it refuses.
-    pub fn on_granted(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
+    pub fn on_request_done(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
         if let Err(why) = answer {
             self.outgoing.clear();
             self.saved.push(Err(why));

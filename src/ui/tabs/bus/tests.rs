@@ -232,7 +232,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
         assert_eq!((file.starts_with("reports/L1-"), sha256.len()), (true, 64), "told before it is written");
         let id = *id;
         saved.extend(std::mem::take(&mut effects));
-        effects = update(&mut model, Msg::Granted(id, Ok(Durability::Recorded)));
+        effects = update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
     }
     saved.extend(effects);
     let saved: Vec<_> = saved

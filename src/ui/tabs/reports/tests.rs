@@ -26,13 +26,13 @@ struct Stand {
     asked: Vec<(QueryId, Query)>,
     saved: Vec<(PathBuf, Vec<u8>)>,
     /// What the station says to an export.
-    granted: Result<Durability, String>,
+    reply: Result<Durability, String>,
 }
 
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
         let model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::standing());
-        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), granted: Ok(Durability::Recorded) };
+        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), reply: Ok(Durability::Recorded) };
         stand.send(Msg::Resize(width, height));
         stand.press("5");
         stand
@@ -45,7 +45,7 @@ impl Stand {
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
                 Effect::SessionRequest(id, SessionRequest::Exported { file, sha256 }) => {
                     assert_eq!((file.ends_with(".csv"), sha256.len()), (true, 64));
-                    self.send(Msg::Granted(id, self.granted.clone()));
+                    self.send(Msg::RequestDone(id, self.reply.clone()));
                 }
                 Effect::Query(..)
                 | Effect::Command(..)
@@ -211,7 +211,7 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     assert!(bytes.starts_with(b"\xef\xbb\xbf"), "the other dialect is for spreadsheets");
     stand.send(Msg::Saved(Tab::Reports, Err("disk full".to_owned())));
     assert!(stand.screen().contains("not written: disk full"));
-    stand.granted = Err("needs Technician; tom is Viewer".to_owned());
+    stand.reply = Err("needs Technician; tom is Viewer".to_owned());
     stand.press("e");
     assert!(stand.saved.is_empty(), "what the station does not have on record is not written");
     assert!(stand.screen().contains("not written: needs Technician"));
