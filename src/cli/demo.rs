@@ -74,8 +74,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let history = scratch.history.clone();
         let options = station::Options { def: def.clone(), clock, history, connectors, file: None };
-        let (listener, journal) = sim::io::journal();
-        let station = station::start_told(options, Some(listener))?;
+        let (observer, journal) = sim::io::journal();
+        let station = station::start_observed(options, Some(Box::new(observer)))?;
         let mut session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
         let trainer = sim::io::Trainer {
             def: def.clone(),

@@ -103,8 +103,8 @@ fn rehearse(
     runtime.block_on(async {
         let time = Clock::starting_at(morning(&def), 1.0);
         let simulator = SimulatorHandle::spawn_for(&def, simulator(&def, Some(&scenario))?, time);
-        let (listener, journal) = journal();
-        let station = station::rehearse(def.clone(), time, in_memory(&def, &simulator), listener);
+        let (observer, journal) = journal();
+        let station = station::rehearse(def.clone(), time, in_memory(&def, &simulator), Box::new(observer));
         let session = station.session("drill");
         // Without an operator his commands lead nowhere.
         let commands = if with_operator { station.commands.clone() } else { mpsc::channel(1).0 };

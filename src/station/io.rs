@@ -25,13 +25,12 @@ use crate::{
         station::{FaultState, StationFault},
     },
     profile::PlantFile,
-    sim::io::Listener,
 };
 
 use super::{
     audit_queue::AuditQueue,
     past::Past,
-    plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask},
+    plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask, RecordObserver},
     session::Session,
     session_server::{self, Outputs, SessionAcceptor, SessionServer},
     sets, supervisor,
@@ -62,7 +61,7 @@ pub struct Options {
 #[derive(Debug)]
 pub struct Station {
     acceptor: SessionAcceptor,
-    /// Bypasses access control: for the scripted operator of a drill.
+    /// Bypasses access control: for a scripted operator.
     pub commands: mpsc::Sender<Command>,
     /// What terminals request of the station as a whole.
     pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
@@ -79,12 +78,12 @@ pub struct Station {
 /// Starts history, links and plant; lines are polled whether or not the store opens. Nobody is asked who he
 /// is: whoever has started the station, or could, may everything. For demonstrations and drills.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
-    start_told(options, None)
+    start_observed(options, None)
 }
 
-/// The same, where the steps of alarms are also told to a listener.
-pub fn start_told(options: Options, listener: Option<Listener>) -> Result<Station, HistoryError> {
-    begin(options, listener, None)
+/// The same, with an observer of all records.
+pub fn start_observed(options: Options, observer: Option<RecordObserver>) -> Result<Station, HistoryError> {
+    begin(options, observer, None)
 }
 
 /// The same for a plant whose people are kept beside its history: everybody must log in.
@@ -112,7 +111,7 @@ pub enum StartError {
 
 fn begin(
     options: Options,
-    listener: Option<Listener>,
+    observer: Option<RecordObserver>,
     guarded: Option<(AccessControl, PathBuf)>,
 ) -> Result<Station, HistoryError> {
     let Options { def, clock, history: path, connectors, file } = options;
@@ -132,7 +131,7 @@ fn begin(
     }
     audit_queue.started(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
-    let keeping = Keeping { records: Some(records), store, past, book: Some(audit_queue), sets: Some(sets), listener };
+    let keeping = Keeping { records: Some(records), store, past, book: Some(audit_queue), sets: Some(sets), observer };
     let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
 }
@@ -148,13 +147,13 @@ fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
     (had_users && access.people_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
 }
 
-/// A station that keeps nothing, for drills in virtual time, where no other thread may take part. Queries to the history
+/// A station that keeps nothing, for virtual time, where no other thread may take part. Queries to the history
 /// are refused.
-pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, listener: Listener) -> Station {
+pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, observer: RecordObserver) -> Station {
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, past: None, book: None, sets: None, listener: Some(listener) };
+    let keeping = Keeping { records: None, store, past: None, book: None, sets: None, observer: Some(observer) };
     let threads = Threads { queries, history: None, book: None };
     assemble(def, clock, connectors, plant, None, keeping, threads, None)
 }

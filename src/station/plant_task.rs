@@ -28,7 +28,6 @@ use crate::{
         station::{FaultState, StationFault},
     },
     profile::PlantFile,
-    sim::io::Listener,
 };
 
 /// Places of that queue that only a stop may take.
@@ -44,6 +43,9 @@ const FILES_MAX: Duration = Duration::from_secs(2);
 /// Real time between two ticks at the least; one second of plant time otherwise.
 const TICK_MIN: Duration = Duration::from_millis(20);
 
+/// Gets every record of the plant, in the task of the plant: it must not block.
+pub type RecordObserver = Box<dyn Fn(&[Record]) + Send>;
+
 /// Where the journal and the parameter sets go.
 pub(super) struct Keeping {
     pub records: Option<mpsc::Sender<Vec<Record>>>,
@@ -54,7 +56,7 @@ pub(super) struct Keeping {
     pub book: Option<AuditQueue>,
     /// The folder of parameter sets.
     pub sets: Option<PathBuf>,
-    pub listener: Option<Listener>,
+    pub observer: Option<RecordObserver>,
 }
 
 /// Said where there is nothing to save into.
@@ -385,8 +387,8 @@ impl PlantTask {
         }
         let behind = self.clock.behind_utc();
         records.iter_mut().for_each(|record| record.shift(behind));
-        if let Some(listener) = &self.keeping.listener {
-            listener.tell(&records);
+        if let Some(observer) = &self.keeping.observer {
+            observer(&records);
         }
         let (mut actions, mut steps, mut others) = (Vec::new(), Vec::new(), Vec::new());
         for record in records {

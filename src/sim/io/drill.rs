@@ -35,44 +35,34 @@ const STEPS_MAX: usize = 4096;
 /// The number of the terminal by which the operator of a scenario gives commands; real terminals count from 1.
 const OPERATOR: u32 = u32::MAX;
 
-/// Where a station tells the steps of its alarms to a judge.
-#[derive(Debug, Clone)]
-pub struct Listener {
-    steps: mpsc::Sender<Vec<Record>>,
-    lost: Arc<AtomicU64>,
-}
-
-/// What a judge hears of a station, and how much he has missed.
+/// The alarm events of a station for the judge, and a count of those that were lost.
 #[derive(Debug)]
 pub struct Journal {
     steps: mpsc::Receiver<Vec<Record>>,
     lost: Arc<AtomicU64>,
 }
 
-/// The way from a station to its judge.
-pub fn journal() -> (Listener, Journal) {
+/// An observer of a station's records, and the journal that it fills. It never waits: events beyond the bound are counted
+/// as lost.
+pub fn journal() -> (impl Fn(&[Record]) + Send + use<>, Journal) {
     journal_for(STEPS_MAX)
 }
 
-fn journal_for(room: usize) -> (Listener, Journal) {
+fn journal_for(room: usize) -> (impl Fn(&[Record]) + Send + use<>, Journal) {
     let (sender, receiver) = mpsc::channel(room);
     let lost = Arc::<AtomicU64>::default();
-    (Listener { steps: sender, lost: lost.clone() }, Journal { steps: receiver, lost })
-}
-
-impl Listener {
-    /// Tells the steps of alarms among some records. A judge who has gone needs nothing; one who is slower than they come
-    /// has missed some, which are counted.
-    pub fn tell(&self, records: &[Record]) {
+    let journal = Journal { steps: receiver, lost: lost.clone() };
+    let observe = move |records: &[Record]| {
         let steps: Vec<Record> = records.iter().filter(|record| matches!(record, Record::Alarm(_))).cloned().collect();
         if steps.is_empty() {
             return;
         }
-        if let Err(mpsc::error::TrySendError::Full(steps)) = self.steps.try_send(steps) {
-            tracing::error!("steps of alarms were not judged: too many at once");
-            self.lost.fetch_add(steps.len() as u64, Ordering::Relaxed);
+        if let Err(mpsc::error::TrySendError::Full(steps)) = sender.try_send(steps) {
+            tracing::error!("alarm events were not evaluated: too many at once");
+            lost.fetch_add(steps.len() as u64, Ordering::Relaxed);
         }
-    }
+    };
+    (observe, journal)
 }
 
 /// What a terminal holds of a simulation.
@@ -244,7 +234,7 @@ mod tests {
 
     #[test]
     fn only_steps_of_alarms_take_room_and_those_without_are_counted() {
-        let (listener, mut journal) = journal_for(1);
+        let (observe, mut journal) = journal_for(1);
         let mut plant = crate::plant::Plant::new(fixture::shared(), Timestamp::UNIX_EPOCH, 1.0);
         let tags = vec![fixture::PV];
         let down = crate::plant::event::Event::Failed {
@@ -257,9 +247,9 @@ mod tests {
         let raised = plant.on_event(down).records;
         let is_step = |record: &&Record| matches!(record, Record::Alarm(step) if step.step == AlarmStep::Raised);
         assert_eq!(raised.iter().filter(is_step).count(), 1, "{raised:?}");
-        listener.tell(&[]);
-        listener.tell(&raised);
-        listener.tell(&raised);
+        observe(&[]);
+        observe(&raised);
+        observe(&raised);
         assert_eq!(journal.steps.try_recv().map(|steps| steps.len()), Ok(1));
         assert!(journal.steps.try_recv().is_err(), "nothing empty was sent");
         assert_eq!(journal.lost.load(Ordering::Relaxed), 1);

@@ -8,7 +8,7 @@ mod pty;
 mod serving;
 mod tcp;
 
-pub use drill::{Journal, Listener, Port, Trainer, journal};
+pub use drill::{Journal, Port, Trainer, journal};
 pub use line::{Wire, serve_line};
 pub use memory::in_memory;
 pub use owner::{LineHandle, Report, SimulatorHandle};

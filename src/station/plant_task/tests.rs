@@ -47,7 +47,7 @@ impl Station {
         let recorder = recorder::start(history, clock, records.clone()).unwrap();
         let (_, store) = watch::channel(HistoryStatus::default());
         let book = Some(AuditQueue::new(&recorder));
-        let keeping = Keeping { records: Some(records), store, past: None, book, sets: None, listener: None };
+        let keeping = Keeping { records: Some(records), store, past: None, book, sets: None, observer: None };
         let (request, requests) = mpsc::channel(8);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (events, event_queue) = mpsc::channel(8);
