@@ -231,8 +231,8 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
         return Some((format!("{} not {commanded}", theme.pick("≠", "!=")), theme.trouble()));
     }
     let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
-    let mut standings = logic.interlocks.iter().filter(blocks).map(|lock| lock.status(cx.snapshot.sample(lock.of)));
-    let blocked = standings.any(|standing| standing == InterlockStatus::Blocked);
+    let mut statuses = logic.interlocks.iter().filter(blocks).map(|lock| lock.status(cx.snapshot.sample(lock.of)));
+    let blocked = statuses.any(|status| status == InterlockStatus::Blocked);
     match news(cx, actuator.command) {
         Some((_, None)) => return Some((theme.pick("… sent", ".. sent").to_owned(), theme.strong())),
         Some((outcome, Some(false))) => {

@@ -45,7 +45,7 @@ struct Mark {
 
 /// How one expectation stands.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Standing {
+pub enum ExpectationStatus {
     /// Its time has not come, or is not over.
     Open,
     /// Fulfilled, at this time.
@@ -62,7 +62,7 @@ pub struct Row {
     /// What it is worth.
     pub points: u32,
     /// How it stands.
-    pub standing: Standing,
+    pub status: ExpectationStatus,
 }
 
 /// How a drill stands or ended.
@@ -174,14 +174,10 @@ impl Judge {
             .map(|(expect, mark)| Row {
                 text: expect.text.clone(),
                 points: expect.points,
-                standing: mark.standing(
-                    expect.expectation,
-                    over || self.now > expect.until,
-                    self.now.min(expect.until),
-                ),
+                status: mark.status(expect.expectation, over || self.now > expect.until, self.now.min(expect.until)),
             })
             .collect();
-        let met = rows.iter().filter(|row| matches!(row.standing, Standing::Met(_)));
+        let met = rows.iter().filter(|row| matches!(row.status, ExpectationStatus::Met(_)));
         Verdict {
             title: self.scenario.title.clone(),
             points: met.map(|row| row.points).sum(),
@@ -238,35 +234,35 @@ impl Mark {
         }
     }
 
-    fn standing(&self, expectation: Expectation, over: bool, now: Duration) -> Standing {
+    fn status(&self, expectation: Expectation, over: bool, now: Duration) -> ExpectationStatus {
         let value = |value: Option<f64>| value.map_or(String::new(), |value| format!(": {value:.1}"));
         match (expectation, self.met, self.broken) {
             (
                 Expectation::Alarm(..) | Expectation::Written(..) | Expectation::NotGood(_) | Expectation::Good(_),
                 Some(at),
                 _,
-            ) => Standing::Met(at),
+            ) => ExpectationStatus::Met(at),
             (
                 Expectation::Alarm(..) | Expectation::Written(..) | Expectation::NotGood(_) | Expectation::Good(_),
                 None,
                 _,
-            ) if over => Standing::Missed("did not happen in time".to_owned()),
+            ) if over => ExpectationStatus::Missed("did not happen in time".to_owned()),
             (Expectation::NoAlarm(_), _, Some((at, number))) => {
-                Standing::Missed(format!("raised at {}{}", clock(at), value(number)))
+                ExpectationStatus::Missed(format!("raised at {}{}", clock(at), value(number)))
             }
             (Expectation::Within { .. }, _, Some((at, number))) => {
-                Standing::Missed(format!("left at {}{}", clock(at), value(number)))
+                ExpectationStatus::Missed(format!("left at {}{}", clock(at), value(number)))
             }
             (Expectation::True(..), _, Some((at, number))) => {
-                Standing::Missed(format!("shown as good and wrong from {}{}", clock(at), value(number)))
+                ExpectationStatus::Missed(format!("shown as good and wrong from {}{}", clock(at), value(number)))
             }
             (Expectation::Within { .. } | Expectation::True(..), _, None) if over && !self.seen => {
-                Standing::Missed("could not be judged: the simulation does not know it".to_owned())
+                ExpectationStatus::Missed("could not be judged: the simulation does not know it".to_owned())
             }
             (Expectation::NoAlarm(_) | Expectation::Within { .. } | Expectation::True(..), _, None) if over => {
-                Standing::Met(now)
+                ExpectationStatus::Met(now)
             }
-            _ => Standing::Open,
+            _ => ExpectationStatus::Open,
         }
     }
 }
@@ -296,10 +292,10 @@ impl Verdict {
     pub fn lines(&self) -> Vec<String> {
         let width = self.rows.iter().map(|row| row.text.chars().count()).max().unwrap_or(0);
         let row = |row: &Row| {
-            let (word, points, rest) = match &row.standing {
-                Standing::Open => ("open", 0, String::new()),
-                Standing::Met(at) => ("met", row.points, clock(*at)),
-                Standing::Missed(why) => ("MISSED", 0, why.clone()),
+            let (word, points, rest) = match &row.status {
+                ExpectationStatus::Open => ("open", 0, String::new()),
+                ExpectationStatus::Met(at) => ("met", row.points, clock(*at)),
+                ExpectationStatus::Missed(why) => ("MISSED", 0, why.clone()),
             };
             format!("{word:<6}  {points:>3}/{:<3}  {:<width$}  {rest}", row.points, row.text).trim_end().to_owned()
         };

@@ -52,26 +52,26 @@ fn good(value: f64) -> Sample {
     Sample::good(value, BEGAN)
 }
 
-fn standing(judge: &Judge) -> Standing {
-    judge.verdict().rows[0].standing.clone()
+fn status(judge: &Judge) -> ExpectationStatus {
+    judge.verdict().rows[0].status.clone()
 }
 
-fn is_over(judge: &mut Judge) -> Standing {
+fn is_over(judge: &mut Judge) -> ExpectationStatus {
     judge.on_values(&shown(100, good(0.0), Vec::new()), &ActualValues::new());
-    standing(judge)
+    status(judge)
 }
 
-fn met(second: u64) -> Standing {
-    Standing::Met(Duration::from_secs(second))
+fn met(second: u64) -> ExpectationStatus {
+    ExpectationStatus::Met(Duration::from_secs(second))
 }
 
-fn late() -> Standing {
-    Standing::Missed("did not happen in time".to_owned())
+fn late() -> ExpectationStatus {
+    ExpectationStatus::Missed("did not happen in time".to_owned())
 }
 
 #[test]
 fn an_alarm_counts_in_its_time_and_in_its_step_only() {
-    let check = |expectation: Expectation, steps: &[(u64, AlarmStep, &str)], expect: Standing| {
+    let check = |expectation: Expectation, steps: &[(u64, AlarmStep, &str)], expect: ExpectationStatus| {
         let mut judge = judge(expectation);
         let text = judge.def.alarm(HIGH).text.clone();
         let subject: Arc<str> = judge.def.tag(PV).name.as_str().into();
@@ -103,13 +103,13 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
     check(
         Expectation::NoAlarm(HIGH),
         &[(12, AlarmStep::Raised, "")],
-        Standing::Missed("raised at 00:12: 76.0".to_owned()),
+        ExpectationStatus::Missed("raised at 00:12: 76.0".to_owned()),
     );
 }
 
 #[test]
 fn only_a_verified_write_of_the_right_value_counts() {
-    let check = |second: u64, value: f64, outcome: Outcome, expect: Standing| {
+    let check = |second: u64, value: f64, outcome: Outcome, expect: ExpectationStatus| {
         let mut judge = judge(Expectation::Written(SV, 60.0));
         let command = CommandStatus {
             from: "".into(),
@@ -134,7 +134,7 @@ fn only_a_verified_write_of_the_right_value_counts() {
 
 #[test]
 fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
-    let check = |expectation: Expectation, seconds: &[(u64, Sample, f64)], expect: Standing| {
+    let check = |expectation: Expectation, seconds: &[(u64, Sample, f64)], expect: ExpectationStatus| {
         let mut judge = judge(expectation);
         for (second, sample, truth) in seconds {
             judge.on_values(&shown(*second, *sample, Vec::new()), &ActualValues::from([(PV, *truth)]));
@@ -147,8 +147,8 @@ fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
     check(Expectation::NotGood(PV), &[(12, good(50.0), 50.0)], late());
     check(Expectation::Good(PV), &[(12, bad, 50.0), (13, good(50.0), 50.0)], met(13));
     check(within, &[(12, bad, 89.0)], met(20));
-    check(within, &[(12, good(70.0), 91.0)], Standing::Missed("left at 00:12: 91.0".to_owned()));
-    let unknown = Standing::Missed("could not be judged: the simulation does not know it".to_owned());
+    check(within, &[(12, good(70.0), 91.0)], ExpectationStatus::Missed("left at 00:12: 91.0".to_owned()));
+    let unknown = ExpectationStatus::Missed("could not be judged: the simulation does not know it".to_owned());
     check(within, &[], unknown);
     // A moment's difference is the way from probe to screen; a lasting one is a wrong value shown as a right one.
     let wrong = |second| (second, good(50.0), 60.0);
@@ -156,7 +156,7 @@ fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
     check(
         Expectation::True(PV, 2.0),
         &[wrong(11), wrong(14), wrong(18)],
-        Standing::Missed("shown as good and wrong from 00:11: 50.0".to_owned()),
+        ExpectationStatus::Missed("shown as good and wrong from 00:11: 50.0".to_owned()),
     );
     check(Expectation::True(PV, 2.0), &[(11, bad, 60.0), (18, bad, 60.0)], met(20));
 }
@@ -165,10 +165,10 @@ fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
 fn a_verdict_is_open_until_its_time_is_over_and_then_a_sum() {
     let mut judge = judge(Expectation::NotGood(PV));
     judge.on_values(&shown(15, good(50.0), Vec::new()), &ActualValues::new());
-    assert_eq!(standing(&judge), Standing::Open);
+    assert_eq!(status(&judge), ExpectationStatus::Open);
     assert_eq!(judge.verdict().summary(), "so far 0 of 10 points, 100 % needed");
     judge.on_values(&shown(21, good(50.0), Vec::new()), &ActualValues::new());
-    assert_eq!(standing(&judge), late());
+    assert_eq!(status(&judge), late());
     assert!(!judge.verdict().over);
     assert_eq!(is_over(&mut judge), late());
     assert_eq!(

@@ -9,7 +9,7 @@ use crate::{
     sim::{
         drill::{Progress, SimCommand, Status},
         faults::{ActiveFault, AvailableFaults, Fault, FaultTarget, TargetKind},
-        scenario::judge::{Row, Standing, Verdict},
+        scenario::judge::{ExpectationStatus, Row, Verdict},
     },
     ui::{
         Effect, Model, Msg,
@@ -45,16 +45,16 @@ fn status(fixture: &Fixture) -> Status {
 }
 
 fn drill(over: bool) -> Progress {
-    let row = |text: &str, standing| Row { text: text.to_owned(), points: 20, standing };
+    let row = |text: &str, status| Row { text: text.to_owned(), points: 20, status };
     let rows = vec![
-        row("TIC-1.PV shown as not good by 02:05", Standing::Met(Duration::from_secs(121))),
+        row("TIC-1.PV shown as not good by 02:05", ExpectationStatus::Met(Duration::from_secs(121))),
         row(
             "alarm TIC-1.FAULT sensor or controller fault acknowledged by 03:00",
-            Standing::Missed("did not happen in time".to_owned()),
+            ExpectationStatus::Missed("did not happen in time".to_owned()),
         ),
         row(
             "TIC-1.PV really never above 90 °C",
-            if over { Standing::Met(Duration::from_secs(480)) } else { Standing::Open },
+            if over { ExpectationStatus::Met(Duration::from_secs(480)) } else { ExpectationStatus::Open },
         ),
     ];
     let points = if over { 40 } else { 20 };

@@ -8,7 +8,7 @@ use crate::{
     sim::{
         drill::{Progress, Status},
         faults::{Fault, FaultTarget, target::device_at},
-        scenario::judge::Standing,
+        scenario::judge::ExpectationStatus,
     },
     ui::{
         ViewContext,
@@ -219,10 +219,12 @@ fn verdict(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
     let mut y = 1;
     for row in &progress.verdict.rows {
-        let (mark, points, note, style) = match &row.standing {
-            Standing::Open => (theme.pick("○", "o"), 0, "open".to_owned(), theme.dim()),
-            Standing::Met(at) => (theme.pick("●", "+"), row.points, format!("met {}", running(*at)), theme.normal()),
-            Standing::Missed(why) => (theme.pick("✗", "x"), 0, format!("MISSED {why}"), theme.trouble()),
+        let (mark, points, note, style) = match &row.status {
+            ExpectationStatus::Open => (theme.pick("○", "o"), 0, "open".to_owned(), theme.dim()),
+            ExpectationStatus::Met(at) => {
+                (theme.pick("●", "+"), row.points, format!("met {}", running(*at)), theme.normal())
+            }
+            ExpectationStatus::Missed(why) => (theme.pick("✗", "x"), 0, format!("MISSED {why}"), theme.trouble()),
         };
         canvas.text(0, y, mark, style);
         canvas.text(2, y, &format!("{points:>3}/{:<3}", row.points), theme.normal());
