@@ -6,7 +6,7 @@ mod people;
 mod session_limit;
 mod session;
 pub mod sign;
-mod standing;
+mod session_status;
 #[cfg(test)]
 mod tests;
 mod work;
@@ -69,8 +69,8 @@ pub enum Effect {
     Record(ActionRecord),
     /// Answer a request.
     Reply(u64, Result<(), String>),
-    /// The standing of this terminal has changed.
-    Standing(u32),
+    /// The session status of this terminal has changed.
+    SessionStatus(u32),
     /// Do this beside, and tell [`AccessControl::done`]. At most `JOBS_MAX` are under way or wait.
     Work(Job, Work),
     /// Write the people down, and tell [`AccessControl::saved`]. Never two at a time.
@@ -185,7 +185,7 @@ impl AccessControl {
             effects.push(audit(&session, "login", &who.user, "done: known to the operating system", at));
         }
         self.sessions.insert(terminal, session);
-        self.tell(terminal, &mut effects);
+        self.publish_status(terminal, &mut effects);
         effects
     }
 
@@ -210,7 +210,7 @@ impl AccessControl {
         if !session.peer.own && self.may_record(&session.origin, at) {
             effects.push(audit(&session, "detach", "", "done", at));
         }
-        self.tell(terminal, &mut effects);
+        self.publish_status(terminal, &mut effects);
         effects
     }
 
@@ -261,7 +261,7 @@ impl AccessControl {
     pub fn undelivered(&mut self, id: CommandId, why: &str) -> Vec<Effect> {
         let Some(session) = self.sessions.get_mut(&id.terminal) else { return Vec::new() };
         session.undelivered(id, why);
-        vec![Effect::Standing(id.terminal)]
+        vec![Effect::SessionStatus(id.terminal)]
     }
 
     /// The plant puts it on record and into the snapshot, so that whoever gave the command sees what became of it. Too many of
@@ -330,7 +330,7 @@ impl AccessControl {
             SessionRequest::Logout => self.logout(terminal, ticket, at),
             SessionRequest::Lock => self.lock(terminal, ticket, at),
             SessionRequest::Unlock(password) => self.unlock(terminal, ticket, password, at),
-            SessionRequest::Active => vec![Effect::Reply(ticket, Ok(())), Effect::Standing(terminal)],
+            SessionRequest::Active => vec![Effect::Reply(ticket, Ok(())), Effect::SessionStatus(terminal)],
             SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
@@ -420,7 +420,7 @@ impl AccessControl {
             return Vec::new();
         }
         self.behind_utc = behind_utc;
-        self.sessions.keys().copied().map(Effect::Standing).collect()
+        self.sessions.keys().copied().map(Effect::SessionStatus).collect()
     }
 
     fn utc(&self, at: Timestamp) -> Timestamp {

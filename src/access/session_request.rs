@@ -166,9 +166,9 @@ pub struct Who {
     pub must_change: bool,
 }
 
-/// How a terminal stands with its station. All that a login or users page draws.
+/// The session of a terminal as the station publishes it: all that the login and users pages draw.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Standing {
+pub struct SessionStatus {
     /// Who sits here; `None` before a login.
     pub who: Option<Who>,
     /// Locked: only looking, until the password is given.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::delta::Delta;
 use crate::{
-    access::{CommandRequest, Durability, SessionRequest, Standing},
+    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
     plant::{PlantDef, command::CommandId, visible::acts},
 };
@@ -96,8 +96,8 @@ pub enum Asked {
 pub enum Told {
     /// The plant has changed.
     Delta(Box<Delta>),
-    /// How the terminal stands.
-    Standing(Box<Standing>),
+    /// The session status has changed.
+    SessionStatus(Box<SessionStatus>),
     /// What the history says.
     Answer {
         /// Of the query.

@@ -71,9 +71,9 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
         session.request(SessionRequest::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
     warn_not_recorded("logged in", reply);
     let settled = async {
-        // The answer may come before the standing, and the standing before the snapshot that belongs to it.
-        let _ = session.standing.wait_for(|standing| standing.who.is_some()).await;
-        let view = session.standing.borrow().view;
+        // The answer may come before the status, and the status before the snapshot that belongs to it.
+        let _ = session.status.wait_for(|status| status.who.is_some()).await;
+        let view = session.status.borrow().view;
         if view {
             let _ = session.snapshots.wait_for(|snapshot| !is_withheld(snapshot)).await;
         }
@@ -91,7 +91,7 @@ pub fn is_withheld(snapshot: &Snapshot) -> bool {
 /// The same for somebody who wants to act: nobody may without a login.
 pub async fn attach_to_act(plant: Option<&str>, login: &Login) -> Result<(Session, Option<Secret>), CliError> {
     let (session, password) = attach_with_password(plant, login).await?;
-    if session.standing.borrow().who.is_none() {
+    if session.status.borrow().who.is_none() {
         return Err(CliError::Failed("log in to act: --user NAME asks for the password".to_owned()));
     }
     Ok((session, password))

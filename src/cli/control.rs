@@ -30,8 +30,8 @@ pub fn stop(args: Args) -> Result<(), CliError> {
         let mut session = client::attach(Some(&place.name), &args.login).await?;
         let reply = session.request(SessionRequest::Stop).await;
         // It tells that it goes by going, sometimes before its answer has left.
-        if reply.is_ok() || session.standing.borrow().gone.is_some() {
-            let _ = session.standing.wait_for(|standing| standing.gone.is_some()).await;
+        if reply.is_ok() || session.status.borrow().gone.is_some() {
+            let _ = session.status.wait_for(|status| status.gone.is_some()).await;
             drop(session);
             gone(&place).await?;
         } else {

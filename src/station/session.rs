@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
-    access::{CommandRequest, Durability, SessionRequest, Standing},
+    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
     history::io::QueryRequest,
     plant::{
         Snapshot,
@@ -23,7 +23,7 @@ pub struct Session {
     /// The latest snapshot only.
     pub snapshots: watch::Receiver<Arc<Snapshot>>,
     /// Who sits here and what he may.
-    pub standing: watch::Receiver<Arc<Standing>>,
+    pub status: watch::Receiver<Arc<SessionStatus>>,
     /// Requests; a full queue is a refusal.
     pub requests: mpsc::Sender<(u32, Request)>,
     /// Number of this terminal, the first part of its command ids.
@@ -46,7 +46,7 @@ pub enum Request {
 impl Session {
     /// Hands a request to the station; `Err` says why not.
     pub fn send(&self, request: Request) -> Result<(), &'static str> {
-        if self.standing.borrow().gone.is_some() {
+        if self.status.borrow().gone.is_some() {
             return Err("station has gone");
         }
         self.requests.try_send((self.terminal, request)).map_err(|error| match error {

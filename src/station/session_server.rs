@@ -22,7 +22,7 @@ use super::{
     toil::{Done, Toil},
 };
 use crate::{
-    access::{AccessControl, Durability, Effect, Peer, Standing},
+    access::{AccessControl, Durability, Effect, Peer, SessionStatus},
     bus::io::clock::Clock,
     history::{HistoryError, io::QueryRequest},
     plant::{Snapshot, command::Command},
@@ -44,8 +44,8 @@ pub struct AttachRequest {
     pub terminal: u32,
     /// Where it is.
     pub peer: Peer,
-    /// Where it hears how it stands. When nobody listens there any more it has gone.
-    pub standing: watch::Sender<Arc<Standing>>,
+    /// Receives its session status; closed when the terminal has gone.
+    pub status: watch::Sender<Arc<SessionStatus>>,
 }
 
 /// What a terminal has requested of the station as a whole.
@@ -90,15 +90,15 @@ impl SessionAcceptor {
         (SessionAcceptor { snapshots, attach_requests, requests, terminals: Arc::default() }, attach_queue, requested)
     }
 
-    /// Attaches a terminal. Until it hears how it stands it may nothing; where too many come at once it never will.
+    /// Attaches a terminal. It has no rights until its first status arrives, which never happens while the attach queue is full.
     pub fn attach(&self, peer: Peer) -> Session {
         let terminal = self.terminals.fetch_add(1, Ordering::Relaxed) + 1;
-        let (told, standing) = watch::channel(Arc::new(Standing::default()));
-        if let Err(error) = self.attach_requests.try_send(AttachRequest { terminal, peer, standing: told }) {
+        let (status_sender, status) = watch::channel(Arc::new(SessionStatus::default()));
+        if let Err(error) = self.attach_requests.try_send(AttachRequest { terminal, peer, status: status_sender }) {
             tracing::error!(%error, "a terminal was not let in");
         }
         let (snapshots, requests) = (self.snapshots.clone(), self.requests.clone());
-        Session { snapshots, standing, requests, terminal, drill: None }
+        Session { snapshots, status, requests, terminal, drill: None }
     }
 }
 
@@ -118,7 +118,7 @@ pub struct SessionServer {
     access: AccessControl,
     clock: Clock,
     outputs: Outputs,
-    terminals: BTreeMap<u32, watch::Sender<Arc<Standing>>>,
+    terminals: BTreeMap<u32, watch::Sender<Arc<SessionStatus>>>,
     tickets: BTreeMap<u64, oneshot::Sender<Result<Durability, String>>>,
     /// Reloads whose outcome is awaited, with their tickets.
     reloads: JoinSet<(u64, Result<(), String>)>,
@@ -158,7 +158,7 @@ impl SessionServer {
                 biased;
                 _ = stopped.wait_for(|stopped| *stopped) => break,
                 Some(request) = attach_requests.recv() => {
-                    self.terminals.insert(request.terminal, request.standing);
+                    self.terminals.insert(request.terminal, request.status);
                     let effects = self.access.open(request.terminal, request.peer, self.clock.now());
                     self.carry_out(effects);
                 }
@@ -251,9 +251,9 @@ impl SessionServer {
                     record = if sent.is_ok() && record != Record::Lost { Record::Sent } else { Record::Lost };
                 }
                 Effect::Reply(ticket, answer) => answers.push((ticket, answer)),
-                Effect::Standing(terminal) => {
+                Effect::SessionStatus(terminal) => {
                     if let Some(end) = self.terminals.get(&terminal) {
-                        end.send_replace(Arc::new(self.access.standing(terminal, self.clock.now())));
+                        end.send_replace(Arc::new(self.access.session_status(terminal, self.clock.now())));
                     }
                 }
                 Effect::Work(job, work) => self.toil.put(job, work),
@@ -269,7 +269,10 @@ impl SessionServer {
                     // The audit log holds it, in bounded rate; attempts without end must not fill this one.
                     tracing::debug!(terminal, why, "a terminal was sent away");
                     if let Some(end) = self.terminals.remove(&terminal) {
-                        end.send_replace(Arc::new(Standing { gone: Some(why.into()), ..Standing::default() }));
+                        end.send_replace(Arc::new(SessionStatus {
+                            gone: Some(why.into()),
+                            ..SessionStatus::default()
+                        }));
                     }
                 }
             }

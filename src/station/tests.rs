@@ -44,7 +44,7 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     let history = folder.path().join("fixture.duckdb");
     let mut station = start_guarded(options(&history)).unwrap();
     let mut session = station.session("whoever");
-    session.standing.wait_for(|standing| standing.first).await.unwrap();
+    session.status.wait_for(|status| status.first).await.unwrap();
     assert!(session.request(SessionRequest::Stop).await.is_err(), "nobody is logged in");
     let password = "four wet horses in a tank";
     session.request(SessionRequest::FirstSupervisor { user: "anna".into(), password: password.into() }).await.unwrap();
@@ -53,7 +53,7 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     session.request(SessionRequest::Unlock(password.into())).await.unwrap();
     session.request(SessionRequest::Logout).await.unwrap();
     let mut other = station.session("whoever");
-    other.standing.wait_for(|standing| !standing.first && standing.password_chars_min > 0).await.unwrap();
+    other.status.wait_for(|status| !status.first && status.password_chars_min > 0).await.unwrap();
     let command = other.send_command(1, CommandKind::Alarm(crate::plant::alarm::AlarmCommand::Silence)).unwrap();
     let shown = |snapshot: &Arc<crate::plant::Snapshot>| snapshot.commands.iter().any(|status| status.id == command);
     let snapshot = other.snapshots.wait_for(shown).await.unwrap().clone();

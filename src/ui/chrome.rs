@@ -188,10 +188,10 @@ fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, Stri
 /// Who sits here: `tech1 TECHNICIAN`, `LOCKED by anna`, and when it will be locked.
 fn who_words(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Style) {
     let theme = cx.theme;
-    let Some(who) = &model.standing.who else { return (9, "not logged in".to_owned(), theme.strong()) };
+    let Some(who) = &model.session.who else { return (9, "not logged in".to_owned(), theme.strong()) };
     let user = fit(&who.user, 12);
     match model.locks_in() {
-        _ if model.standing.locked => (2, format!("LOCKED by {user}"), theme.trouble()),
+        _ if model.session.locked => (2, format!("LOCKED by {user}"), theme.trouble()),
         Some(left) => (1, format!("locks in {} s: press a key", left.as_secs()), theme.trouble()),
         None if role => (9, format!("{user} {}", who.role.word().to_uppercase()), theme.dim()),
         None => (9, user, theme.dim()),

@@ -205,7 +205,7 @@ pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&ViewContext) -> T) -> 
         phase: 0,
         area,
         drill: None,
-        standing: &standing(),
+        session: &session(),
     })
 }
 
@@ -230,11 +230,11 @@ fn start(tag: &str) -> f64 {
 }
 
 /// `tech1`, who may do everything.
-pub fn standing() -> Arc<crate::access::Standing> {
+pub fn session() -> Arc<crate::access::SessionStatus> {
     use crate::{
-        access::{Standing, Who},
+        access::{SessionStatus, Who},
         plant::role::Role,
     };
     let who = Who { user: "tech1".into(), role: Role::Supervisor, must_change: false };
-    Arc::new(Standing { who: Some(who), view: true, password_chars_min: 15, ..Standing::default() })
+    Arc::new(SessionStatus { who: Some(who), view: true, password_chars_min: 15, ..SessionStatus::default() })
 }

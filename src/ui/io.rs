@@ -81,8 +81,8 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let (outbox, inbox) = mpsc::channel(INBOX);
     let mut session = session;
     let snapshot = session.snapshots.borrow_and_update().clone();
-    let standing = session.standing.borrow_and_update().clone();
-    let mut model = Model::new(snapshot, options.theme, session.terminal, standing);
+    let status = session.status.borrow_and_update().clone();
+    let mut model = Model::new(snapshot, options.theme, session.terminal, status);
     model.leaving = options.leaving;
     model.drill = session.drill.as_mut().map(|port| port.status.borrow_and_update().clone());
     let screen = Screen::raise()?;
@@ -139,9 +139,9 @@ impl Loop {
                     let snapshot = self.session.snapshots.borrow_and_update().clone();
                     self.take(Msg::Snapshot(snapshot), FRAME)?
                 }
-                Ok(()) = self.session.standing.changed() => {
-                    let standing = self.session.standing.borrow_and_update().clone();
-                    self.take(Msg::Standing(standing), ECHO)?
+                Ok(()) = self.session.status.changed() => {
+                    let status = self.session.status.borrow_and_update().clone();
+                    self.take(Msg::SessionStatus(status), ECHO)?
                 }
                 Some(status) = drilled(&mut self.session.drill) => self.take(Msg::Drill(status), FRAME)?,
                 Some((plants, msg)) = inbox.recv() => {

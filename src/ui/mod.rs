@@ -28,7 +28,7 @@ use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
-    access::Standing,
+    access::SessionStatus,
     plant::{alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot},
     sim::drill,
 };
@@ -64,7 +64,7 @@ pub struct Model {
     /// Number of this terminal.
     pub terminal: u32,
     /// Who sits here and what he may.
-    pub standing: Arc<Standing>,
+    pub session: Arc<SessionStatus>,
     /// The lock, its warning, and requests on their way.
     pub session_lock: SessionLock,
     /// The window with work in it that waits for an unlock, and the tab that it stood on.
@@ -108,7 +108,7 @@ pub struct ViewContext<'a> {
     /// The simulation behind the plant; `None` at a real one.
     pub drill: Option<&'a drill::Status>,
     /// Who sits here and what he may.
-    pub standing: &'a Standing,
+    pub session: &'a SessionStatus,
 }
 
 impl<'a> ViewContext<'a> {
@@ -132,7 +132,7 @@ impl<'a> ViewContext<'a> {
 
 impl Model {
     /// A terminal that has just attached.
-    pub fn new(snapshot: Arc<Snapshot>, theme: Theme, terminal: u32, standing: Arc<Standing>) -> Model {
+    pub fn new(snapshot: Arc<Snapshot>, theme: Theme, terminal: u32, session: Arc<SessionStatus>) -> Model {
         let tabs = Tabs::new(&snapshot);
         let mut model = Model {
             snapshot,
@@ -143,7 +143,7 @@ impl Model {
             clock: Clock::default(),
             pending_command: None,
             terminal,
-            standing: Arc::default(),
+            session: Arc::default(),
             session_lock: SessionLock::default(),
             kept: None,
             commands_sent: 0,
@@ -153,7 +153,7 @@ impl Model {
             note: None,
             leaving: Leaving::default(),
         };
-        update(&mut model, Msg::Standing(standing));
+        update(&mut model, Msg::SessionStatus(session));
         model
     }
 
@@ -181,7 +181,7 @@ impl Model {
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let keyed = matches!(msg, Msg::Key(_)) && model.is_as_drawn();
-    if matches!(msg, Msg::Snapshot(_) | Msg::Standing(_) | Msg::Answer(..) | Msg::Drill(_) | Msg::Tick { .. }) {
+    if matches!(msg, Msg::Snapshot(_) | Msg::SessionStatus(_) | Msg::Answer(..) | Msg::Drill(_) | Msg::Tick { .. }) {
         model.note_news();
     }
     let actions = match msg {
@@ -193,7 +193,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Paste(text) => {
             match &mut model.modal {
-                Some(modal) if model.standing.locked && !modal.is_unlock() => {}
+                Some(modal) if model.session.locked && !modal.is_unlock() => {}
                 Some(modal) => modal.on_paste(&text),
                 None if model.tabs.shown == Tab::Login => model.tabs.login.on_paste(&text),
                 None => {}
@@ -209,7 +209,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
-        Msg::Standing(standing) => session_lock::on_standing(model, standing),
+        Msg::SessionStatus(session) => session_lock::on_session_status(model, session),
         Msg::RequestDone(id, answer) => session_lock::on_request_done(model, id, answer),
         Msg::Drill(status) => {
             model.drill = Some(status);
@@ -247,8 +247,8 @@ pub fn view(model: &Model, frame: &mut Frame) {
 
 /// What the parts of a terminal of this size may read.
 fn context(model: &Model, screen: Rect) -> ViewContext<'_> {
-    let Model { snapshot, theme, clock, drill, standing, .. } = model;
-    view_context(snapshot, theme, *clock, screen, drill, standing)
+    let Model { snapshot, theme, clock, drill, session, .. } = model;
+    view_context(snapshot, theme, *clock, screen, drill, session)
 }
 
 /// The same of parts of a model, while others of it change.
@@ -258,18 +258,18 @@ fn view_context<'a>(
     clock: Clock,
     screen: Rect,
     drill: &'a Option<Arc<drill::Status>>,
-    standing: &'a Standing,
+    session: &'a SessionStatus,
 ) -> ViewContext<'a> {
     let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
     let area = chrome::layout(screen).body;
-    ViewContext { snapshot, theme, now, phase: clock.phase, area, drill: drill.as_deref(), standing }
+    ViewContext { snapshot, theme, now, phase: clock.phase, area, drill: drill.as_deref(), session }
 }
 
 /// Lets the tabs change while they read the rest of the model.
 fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>) -> Vec<UiAction> {
-    let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
-    change(tabs, &view_context(snapshot, theme, *clock, *screen, drill, standing))
+    let Model { snapshot, theme, clock, drill, session, screen, tabs, .. } = model;
+    change(tabs, &view_context(snapshot, theme, *clock, *screen, drill, session))
 }
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
@@ -290,8 +290,8 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return on_global(model, show);
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
-        let Model { snapshot, theme, clock, drill, standing, screen, tabs, .. } = model;
-        let cx = view_context(snapshot, theme, *clock, *screen, drill, standing);
+        let Model { snapshot, theme, clock, drill, session, screen, tabs, .. } = model;
+        let cx = view_context(snapshot, theme, *clock, *screen, drill, session);
         let (rest, actions) = modal.on_key(&cx, tabs, event);
         model.modal = rest;
         return actions;
@@ -359,7 +359,7 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
     let rings = model.tabs.alarms.bell && bell::rings(&model.snapshot, &snapshot);
     model.snapshot = snapshot;
     model.follow();
-    if model.standing.gone.is_some() {
+    if model.session.gone.is_some() {
         // What still came through is as old as all the rest.
         model.doubt();
     }

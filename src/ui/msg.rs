@@ -7,7 +7,7 @@ use jiff::Timestamp;
 
 use super::{Confirmed, modal::Modal, tabs::Tab};
 use crate::{
-    access::{CommandRequest, Durability, SessionRequest, Standing},
+    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
     plant::{
         command::{CommandId, CommandKind},
@@ -29,7 +29,7 @@ pub enum Msg {
     /// News of the plant.
     Snapshot(Arc<Snapshot>),
     /// News of who sits here.
-    Standing(Arc<Standing>),
+    SessionStatus(Arc<SessionStatus>),
     /// The reply to a request, or why it failed.
     RequestDone(QueryId, Result<Durability, String>),
     /// News of the simulation.

@@ -72,7 +72,7 @@ impl Model {
         let Confirmed { kind, expected, sign, note } = confirmed;
         self.commands_sent = self.commands_sent.wrapping_add(1);
         let id = CommandId { terminal: self.terminal, number: self.commands_sent };
-        let undelivered = self.standing.gone.as_ref().map(|_| "the station has gone");
+        let undelivered = self.session.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
         self.pending_command = Some(PendingCommand { id, kind: kind.clone(), status: None, changed_at, undelivered });
         let request = CommandRequest::on(&self.snapshot, id, kind);

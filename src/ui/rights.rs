@@ -31,7 +31,7 @@ pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
 
 /// The same for a role.
 pub fn lacks(cx: &ViewContext, role: Role) -> Option<String> {
-    match &cx.standing.who {
+    match &cx.session.who {
         None => Some(format!("needs {}; nobody is logged in", title(role))),
         Some(who) if who.role < role => Some(format!("needs {}; {} is {}", title(role), who.user, title(who.role))),
         Some(_) => None,
@@ -44,7 +44,7 @@ pub fn of_key(cx: &ViewContext, tab: Tab, hint: &Hint) -> Option<Role> {
     let acts = match tab {
         Tab::Mimic => plants(hint),
         Tab::Alarms if hint.label == "out of service" => {
-            let lesser = cx.standing.who.as_ref().is_none_or(|who| who.role < Role::Supervisor);
+            let lesser = cx.session.who.as_ref().is_none_or(|who| who.role < Role::Supervisor);
             return lesser.then_some(Role::Supervisor);
         }
         Tab::Alarms => {
@@ -56,6 +56,6 @@ pub fn of_key(cx: &ViewContext, tab: Tab, hint: &Hint) -> Option<Role> {
         Tab::Reports => hint.label == "export",
         Tab::Login | Tab::Users | Tab::Trends | Tab::Faults => false,
     };
-    let role = cx.standing.who.as_ref().map(|who| who.role);
+    let role = cx.session.who.as_ref().map(|who| who.role);
     (acts && role.is_none_or(|role| role < Role::Technician)).then_some(Role::Technician)
 }

@@ -12,7 +12,7 @@ use super::{
     with_tabs,
 };
 use crate::{
-    access::{Durability, SessionRequest, Standing},
+    access::{Durability, SessionRequest, SessionStatus},
     plant::snapshot::Snapshot,
 };
 
@@ -38,28 +38,28 @@ pub struct SessionLock {
 }
 
 /// Is everything but the login page closed?
-pub fn is_closed(standing: &Standing) -> bool {
-    standing.who.as_ref().map_or(!standing.view, |who| who.must_change)
+pub fn is_closed(session: &SessionStatus) -> bool {
+    session.who.as_ref().map_or(!session.view, |who| who.must_change)
 }
 
 impl Model {
     /// How long ago the station went.
     pub fn gone(&self) -> Option<Duration> {
-        let at = self.standing.gone.as_ref().and(self.session_lock.gone_at)?;
+        let at = self.session.gone.as_ref().and(self.session_lock.gone_at)?;
         Some(Duration::from_millis(500) * self.clock.phase.wrapping_sub(at))
     }
 
     /// Time until the terminal is locked, once the station has said that this is near.
     pub fn locks_in(&self) -> Option<Duration> {
         let passed = Duration::from_millis(500) * self.clock.phase.wrapping_sub(self.session_lock.status_at);
-        self.standing.locks_in.filter(|_| !self.standing.locked).map(|left| left.saturating_sub(passed))
+        self.session.locks_in.filter(|_| !self.session.locked).map(|left| left.saturating_sub(passed))
     }
 }
 
 /// The station tells how this terminal stands.
-pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<UiAction> {
-    let before = mem::replace(&mut model.standing, standing);
-    let (now, phase) = (model.standing.clone(), model.clock.phase);
+pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) -> Vec<UiAction> {
+    let before = mem::replace(&mut model.session, session);
+    let (now, phase) = (model.session.clone(), model.clock.phase);
     model.session_lock.status_at = phase;
     match (&before.gone, &now.gone) {
         (None, Some(_)) => {
@@ -70,7 +70,7 @@ pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<UiA
         (Some(_), Some(_)) => {}
     }
     // Nobody inherits the window of somebody else. Whoever is only locked out for a while finds his own again.
-    let user = |standing: &Standing| standing.who.as_ref().map(|who| who.user.clone());
+    let user = |session: &SessionStatus| session.who.as_ref().map(|who| who.user.clone());
     if user(&before) != user(&now) || is_closed(&now) {
         model.modal.take_if(|modal| !modal.is_quit());
         model.pending_command = model.pending_command.take_if(|_| user(&before) == user(&now));
@@ -78,7 +78,7 @@ pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<UiA
     }
     let back = keep_work(model, &before, &now);
     with_tabs(model, |tabs, cx| {
-        tabs.login.on_standing(cx);
+        tabs.login.on_session_status(cx);
         Vec::new()
     });
     let shown = model.tabs.shown;
@@ -99,7 +99,7 @@ pub(super) fn on_standing(model: &mut Model, standing: Arc<Standing>) -> Vec<UiA
 
 /// What was under way when the terminal was locked is put aside, so that nothing hides process and alarms, and comes back
 /// as it was when it is unlocked: then the tab that it stood on.
-fn keep_work(model: &mut Model, before: &Standing, now: &Standing) -> Option<Tab> {
+fn keep_work(model: &mut Model, before: &SessionStatus, now: &SessionStatus) -> Option<Tab> {
     match (before.locked, now.locked) {
         (false, true) => {
             let work = model.modal.take_if(|modal| !modal.only_shows());
@@ -121,10 +121,10 @@ fn keep_work(model: &mut Model, before: &Standing, now: &Standing) -> Option<Tab
 /// A key of the login page while a form has every letter.
 pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     if login::is_leave(event) {
-        let standing = model.standing.clone();
-        let changing = standing.who.is_some() && !standing.locked;
-        model.tabs.login.back(&standing);
-        let leads = !changing && !is_closed(&standing);
+        let session = model.session.clone();
+        let changing = session.who.is_some() && !session.locked;
+        model.tabs.login.back(&session);
+        let leads = !changing && !is_closed(&session);
         return if leads { vec![UiAction::Show(Tab::Mimic)] } else { Vec::new() };
     }
     match keys::find(keys::GLOBAL, event) {
@@ -137,7 +137,7 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
 
 /// Locks at once, if there is somebody to lock it.
 pub(super) fn lock(model: &Model) -> Vec<UiAction> {
-    let may = model.standing.who.is_some() && !model.standing.locked;
+    let may = model.session.who.is_some() && !model.session.locked;
     if may { vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)] } else { Vec::new() }
 }
 
@@ -146,7 +146,7 @@ pub(super) fn lock(model: &Model) -> Vec<UiAction> {
 pub(super) fn ask_before_work(model: &mut Model, event: KeyEvent) -> bool {
     let work = model.modal.as_ref().is_some_and(|modal| !modal.only_looks() && !modal.is_unlock());
     let leaves = keys::ctrl('c').is(event) || login::is_leave(event);
-    if !model.standing.locked || !work || leaves {
+    if !model.session.locked || !work || leaves {
         return false;
     }
     let below = model.modal.take();
@@ -156,7 +156,7 @@ pub(super) fn ask_before_work(model: &mut Model, event: KeyEvent) -> bool {
 
 /// While the terminal is locked nothing is done: the password is asked for, and what was to be opened waits below.
 pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiAction> {
-    if !model.standing.locked {
+    if !model.session.locked {
         return actions;
     }
     let mut held = None;
@@ -187,17 +187,17 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
 }
 
 fn unlock(model: &Model, below: Option<Modal>) -> Option<Modal> {
-    let who = model.standing.who.as_ref()?;
+    let who = model.session.who.as_ref()?;
     Some(Modal::UserForm(Box::new(UserForm::unlock(who.user.clone(), below))))
 }
 
 /// Word to the station that somebody is there; twice a minute at most, but at once when it is about to lock.
 pub(super) fn active(model: &mut Model) -> Option<Effect> {
-    let standing = &model.standing;
-    if standing.who.is_none() || standing.locked || standing.gone.is_some() {
+    let session = &model.session;
+    if session.who.is_none() || session.locked || session.gone.is_some() {
         return None;
     }
-    let pause = if standing.locks_in.is_some() { WARNED_TICKS } else { ACTIVE_TICKS };
+    let pause = if session.locks_in.is_some() { WARNED_TICKS } else { ACTIVE_TICKS };
     if model.session_lock.active_at.is_some_and(|at| model.clock.phase.wrapping_sub(at) < pause) {
         return None;
     }
@@ -248,11 +248,11 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
         "The station has taken up another plant file. What was open here is closed; nothing of it was sent.".to_owned(),
     ];
     with_tabs(model, |tabs, cx| {
-        tabs.login.on_standing(cx);
+        tabs.login.on_session_status(cx);
         tabs.shown = if Tab::offered(cx).contains(&shown) { shown } else { Tab::Mimic };
         Vec::new()
     });
-    let closed = is_closed(&model.standing);
+    let closed = is_closed(&model.session);
     model.modal = (!closed).then(|| Modal::Notice(Notice::new("plant file", words)));
     if closed { vec![UiAction::Show(Tab::Login)] } else { Vec::new() }
 }

@@ -12,7 +12,7 @@ use super::{Effect, Model, Msg, fixture::Fixture, theme::Theme, update, view};
 use crate::{access::SessionRequest, plant::command::CommandKind};
 
 pub fn model(fixture: &Fixture, theme: Theme) -> Model {
-    let mut model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::standing());
+    let mut model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::session());
     update(&mut model, Msg::Resize(80, 24));
     model
 }

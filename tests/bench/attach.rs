@@ -16,7 +16,7 @@ use std::{
 use jiff::Timestamp;
 use rustix::time::{ClockId, clock_gettime};
 use sightglass::{
-    access::Standing,
+    access::SessionStatus,
     attach::{
         io::serve::listen,
         protocol::{self, Greeting, HELLO_BYTES_MAX, Place},
@@ -79,8 +79,8 @@ fn station() {
         tokio::spawn(async move {
             let mut there = Vec::new();
             while let Some(request) = attach_requests.recv().await {
-                request.standing.send_replace(Arc::new(Standing { view: true, ..Standing::default() }));
-                there.push(request.standing);
+                request.status.send_replace(Arc::new(SessionStatus { view: true, ..SessionStatus::default() }));
+                there.push(request.status);
             }
         });
         tokio::spawn(live(plant, def, publish));

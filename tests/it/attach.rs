@@ -9,7 +9,7 @@ use std::{
 };
 
 use sightglass::{
-    access::{CommandRequest, Durability, SessionRequest, Standing},
+    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
     attach::{
         callers::TERMINALS_MAX,
         io::{
@@ -81,8 +81,8 @@ impl Stand {
                 tokio::select! {
                     Some(request) = attach_requests.recv() => {
                         let view = *may.borrow();
-                        request.standing.send_replace(Arc::new(Standing { view, notice: Some(request.peer.from), ..Standing::default() }));
-                        terminals.push(request.standing);
+                        request.status.send_replace(Arc::new(SessionStatus { view, notice: Some(request.peer.from), ..SessionStatus::default() }));
+                        terminals.push(request.status);
                     }
                     Some((_, request)) = requests.recv() => {
                         answer(request, &commands);
@@ -91,7 +91,7 @@ impl Stand {
                     Ok(()) = may.changed() => {
                         let view = *may.borrow_and_update();
                         for terminal in &terminals {
-                            terminal.send_modify(|standing| *standing = Arc::new(Standing { view, ..Standing::clone(standing) }));
+                            terminal.send_modify(|status| *status = Arc::new(SessionStatus { view, ..SessionStatus::clone(status) }));
                         }
                     }
                     _ = tick.tick() => terminals.retain(|terminal| !terminal.is_closed()),
@@ -169,8 +169,8 @@ async fn sees(session: &mut Session, value: f64) {
     until(session, &format!("the value {value}"), |snapshot| snapshot.samples[0].value == Some(value)).await;
 }
 
-async fn until_standing(session: &mut Session, what: &str, so: impl Fn(&Standing) -> bool) {
-    let reached = tokio::time::timeout(PATIENCE, session.standing.wait_for(|standing| so(standing))).await;
+async fn until_status(session: &mut Session, what: &str, so: impl Fn(&SessionStatus) -> bool) {
+    let reached = tokio::time::timeout(PATIENCE, session.status.wait_for(|status| so(status))).await;
     assert!(reached.is_ok_and(|reached| reached.is_ok()), "never: {what}");
 }
 
@@ -209,7 +209,7 @@ async fn a_terminal_sees_the_plant_and_sends_commands() {
     stand.set(1.0);
     let mut session = stand.session().await;
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "at once");
-    let from = session.standing.borrow().notice.clone().unwrap();
+    let from = session.status.borrow().notice.clone().unwrap();
     assert!(from.contains(&format!("process {}", std::process::id())), "{from}");
     for value in [2.0, 3.0, 4.0] {
         stand.set(value);
@@ -277,7 +277,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     stand.set(1.0);
     let mut session = stand.session().await;
     let folder = stand.end().await;
-    until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
+    until_status(&mut session, "gone", |status| status.gone.is_some()).await;
     assert_eq!(session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)), Err("station has gone"));
     assert_eq!(session.request(SessionRequest::Stop).await, Err("station has gone".to_owned()));
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last snapshot stays");
@@ -285,7 +285,7 @@ async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() 
     let mut stand = Stand::start_in(folder);
     let other = stand.session().await;
     stand.set(2.0);
-    until_standing(&mut session, "back", |standing| standing.gone.is_none()).await;
+    until_status(&mut session, "back", |status| status.gone.is_none()).await;
     sees(&mut session, 2.0).await;
     session.send_command(2, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     until(&mut session, "the command has an outcome", |snapshot| !snapshot.commands.is_empty()).await;
@@ -303,7 +303,7 @@ async fn a_command_in_flight_is_uncertain_when_the_station_goes() {
     session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     tokio::task::yield_now().await;
     let _folder = stand.end().await;
-    until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
+    until_status(&mut session, "gone", |status| status.gone.is_some()).await;
     until(&mut session, "an outcome", |snapshot| !snapshot.commands.is_empty()).await;
     let outcome = of(&session, 1).unwrap();
     let honest = [
@@ -320,9 +320,9 @@ async fn another_plant_after_a_restart_comes_with_its_own_definition() {
     let mut session = stand.session().await;
     let before = session.snapshots.borrow().def.clone();
     let folder = stand.end().await;
-    until_standing(&mut session, "gone", |standing| standing.gone.is_some()).await;
+    until_status(&mut session, "gone", |status| status.gone.is_some()).await;
     let stand = Stand::start_in(folder);
-    until_standing(&mut session, "back", |standing| standing.gone.is_none()).await;
+    until_status(&mut session, "back", |status| status.gone.is_none()).await;
     stand.set(5.0);
     sees(&mut session, 5.0).await;
     assert!(Arc::ptr_eq(&before, &session.snapshots.borrow().def), "an equal definition is the same");

@@ -96,7 +96,7 @@ impl Guarded {
     /// A terminal at the socket where nobody has logged in.
     pub async fn nobody(&self) -> Session {
         let session = connect(&self.path).await.unwrap();
-        assert!(session.standing.borrow().who.is_none());
+        assert!(session.status.borrow().who.is_none());
         session
     }
 
@@ -104,7 +104,7 @@ impl Guarded {
     pub async fn person(&self, user: &str) -> Session {
         let mut session = self.nobody().await;
         login(&session, user, PASSWORD).await.unwrap();
-        let there = session.standing.wait_for(|standing| standing.who.as_ref().is_some_and(|who| &*who.user == user));
+        let there = session.status.wait_for(|status| status.who.as_ref().is_some_and(|who| &*who.user == user));
         tokio::time::timeout(PATIENCE, there).await.unwrap().unwrap();
         session
     }

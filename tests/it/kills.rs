@@ -195,7 +195,7 @@ fn entries(book: &Path) -> Vec<Entry> {
 
 /// Logs in, or gives up when the station goes. Passwords of one origin are checked one after the other.
 async fn log_in(session: &Session, user: &str) {
-    while session.standing.borrow().gone.is_none() && login(session, user, PASSWORD).await.is_err() {
+    while session.status.borrow().gone.is_none() && login(session, user, PASSWORD).await.is_err() {
         tokio::task::yield_now().await;
     }
 }
@@ -240,7 +240,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
                 _ => reported.writes.push(note),
             },
             // It had gone, or has refused: too many at once, a value that stood there already.
-            Some(_) | None if session.standing.borrow().gone.is_some() => break,
+            Some(_) | None if session.status.borrow().gone.is_some() => break,
             Some(_) | None => {}
         }
         done.send_modify(|done| *done += 1);
@@ -259,7 +259,7 @@ fn to_acknowledge(snapshot: &Snapshot) -> Option<CommandKind> {
 async fn report_on(session: Session, asked: watch::Sender<bool>) -> u64 {
     let mut reports = 0;
     log_in(&session, "tom").await;
-    while session.standing.borrow().gone.is_none() {
+    while session.status.borrow().gone.is_none() {
         let to = session.snapshots.borrow().at;
         let period = Period { name: "shift".into(), from: to - jiff::SignedDuration::from_hours(8), to };
         let (reply, answer) = tokio::sync::oneshot::channel();
@@ -290,7 +290,7 @@ fn reason_of(history: &Path, kind: AlarmStep, text: Option<&str>) -> Option<Arc<
 /// Logs in and out again and again until the station goes.
 async fn log_in_on(session: Session) -> Reported {
     let mut reported = Reported::default();
-    while session.standing.borrow().gone.is_none() {
+    while session.status.borrow().gone.is_none() {
         // Refused while the password of the other terminal is looked at.
         let enter = SessionRequest::Login { user: "sue".into(), password: PASSWORD.into() };
         if let Ok(durability) = session.request(enter).await {

@@ -134,8 +134,8 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
     let guarded = Guarded::start(|def| def.access.idle_lock = Duration::from_secs(60)).await;
     let mut idle = guarded.person("sue").await;
     let touched = guarded.person("tom").await;
-    let mut standing = idle.standing.clone();
-    let locked = async { standing.wait_for(|standing| standing.locked).await.map(drop) };
+    let mut status = idle.status.clone();
+    let locked = async { status.wait_for(|status| status.locked).await.map(drop) };
     let touching = async {
         loop {
             touched.request(SessionRequest::Active).await.unwrap();
@@ -146,8 +146,8 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
         locked = locked => locked.unwrap(),
         () = touching => unreachable!("it touches for ever"),
     }
-    assert!(!touched.standing.borrow().locked, "keys were pressed there");
-    assert!(idle.standing.borrow().users.is_empty() && idle.standing.borrow().view, "only looking");
+    assert!(!touched.status.borrow().locked, "keys were pressed there");
+    assert!(idle.status.borrow().users.is_empty() && idle.status.borrow().view, "only looking");
 
     guarded.tap.mute();
     let alarmed = until(&mut idle.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;

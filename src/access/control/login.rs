@@ -8,7 +8,7 @@ use super::{
     AccessControl, Effect, LOG_IN_FIRST, SessionState,
     audit_entries::audit,
     passed,
-    standing::LOCK_NEAR,
+    session_status::LOCK_NEAR,
     work::{What, Wrong},
 };
 use crate::access::{Secret, Who, user};
@@ -72,7 +72,7 @@ impl AccessControl {
             people.logged_in(&name, utc);
             self.unsaved = true;
         }
-        self.tell(terminal, &mut effects);
+        self.publish_status(terminal, &mut effects);
         effects
     }
 
@@ -100,7 +100,7 @@ impl AccessControl {
             return reply(ticket, "nobody is logged in here");
         }
         effects.push(Effect::Reply(ticket, Ok(())));
-        self.tell(terminal, &mut effects);
+        self.publish_status(terminal, &mut effects);
         effects
     }
 
@@ -122,7 +122,7 @@ impl AccessControl {
                 let target = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
                 let mut effects =
                     vec![audit(session, "lock terminal", &target, "done", at), Effect::Reply(ticket, Ok(()))];
-                self.tell(terminal, &mut effects);
+                self.publish_status(terminal, &mut effects);
                 effects
             }
             Some(session) if session.locked => reply(ticket, "this terminal is locked already"),
@@ -153,7 +153,7 @@ impl AccessControl {
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         (session.locked, session.active) = (false, at);
         let mut effects = vec![audit(session, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
-        self.tell(terminal, &mut effects);
+        self.publish_status(terminal, &mut effects);
         effects
     }
 
@@ -176,9 +176,9 @@ impl AccessControl {
                 session.locked = true;
                 let name = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
                 effects.push(audit(session, "lock terminal", &name, "done: nobody has touched it", at));
-                self.tell(terminal, &mut effects);
+                self.publish_status(terminal, &mut effects);
             } else {
-                effects.push(Effect::Standing(terminal));
+                effects.push(Effect::SessionStatus(terminal));
             }
         }
         effects
@@ -200,7 +200,7 @@ impl AccessControl {
         let mut effects = Vec::new();
         for terminal in sessions.into_iter().filter(|terminal| Some(*terminal) != except) {
             effects.extend(self.sent_out(terminal, why, at));
-            effects.push(Effect::Standing(terminal));
+            effects.push(Effect::SessionStatus(terminal));
         }
         effects
     }

@@ -278,7 +278,7 @@ impl AccessControl {
         };
         let mut effects = vec![Effect::Record(*record), Effect::Record(file), Effect::Reply(ticket, Ok(()))];
         effects.extend(self.followed(terminal, &change, at));
-        self.tell(terminal, &mut effects);
+        self.publish_status(terminal, &mut effects);
         effects
     }
 

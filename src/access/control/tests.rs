@@ -133,7 +133,7 @@ impl Bench {
     }
 
     fn who(&self, terminal: u32) -> Option<String> {
-        self.access.standing(terminal, self.now).who.map(|who| who.user.to_string())
+        self.access.session_status(terminal, self.now).who.map(|who| who.user.to_string())
     }
 
     fn last(&self) -> (&str, &str, &str) {
@@ -183,7 +183,7 @@ fn five_wrong_passwords_lock_the_name_out_for_that_system_user_and_who_is_in_sta
     let told = bench.login(1, "tech", TECH).unwrap_err();
     assert!(told.contains("wait 284 s"), "{told}");
     assert!(bench.login(3, "TECH", TECH).is_err(), "the right password elsewhere does not help");
-    assert!(bench.access.standing(1, bench.now).view, "alarms and process stay to be seen");
+    assert!(bench.access.session_status(1, bench.now).view, "alarms and process stay to be seen");
     assert_eq!(bench.who(2).as_deref(), Some("tech"));
     assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None, "who is in goes on working");
     bench.request(2, SessionRequest::Lock).unwrap();
@@ -200,7 +200,7 @@ fn a_supervisor_ends_a_lock_out() {
     bench.open(3, "10.0.0.3");
     bench.login(2, "boss", BOSS).unwrap();
     bench.login(1, "tech", "guess").unwrap_err();
-    let rows = bench.access.standing(2, bench.now).users;
+    let rows = bench.access.session_status(2, bench.now).users;
     assert!(rows.iter().any(|row| &*row.user == "tech" && row.locked_until.is_some()));
     bench.request(2, SessionRequest::Disable { user: "tech".into(), disabled: false }).unwrap();
     bench.login(3, "tech", TECH).unwrap();
@@ -263,14 +263,14 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
     bench.open(1, "here");
     bench.login(1, "tech", TECH).unwrap();
     bench.later(850);
-    let standing = bench.access.standing(1, bench.now);
-    assert_eq!((standing.locked, standing.locks_in), (false, Some(Duration::from_secs(50))));
+    let status = bench.access.session_status(1, bench.now);
+    assert_eq!((status.locked, status.locks_in), (false, Some(Duration::from_secs(50))));
     bench.send_command(1, RUN, None).unwrap();
     bench.later(899);
-    assert!(!bench.access.standing(1, bench.now).locked, "a command is a sign of life");
+    assert!(!bench.access.session_status(1, bench.now).locked, "a command is a sign of life");
     bench.later(1);
-    let standing = bench.access.standing(1, bench.now);
-    assert!(standing.locked && standing.view);
+    let status = bench.access.session_status(1, bench.now);
+    assert!(status.locked && status.view);
     assert!(bench.send_command(1, RUN, None).unwrap().1.is_some());
     assert!(bench.request(1, SessionRequest::Unlock("guess".into())).is_err());
     bench.later(1);
@@ -288,12 +288,12 @@ fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station
     let first =
         || SessionRequest::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
     bench.open(1, "10.0.0.1");
-    assert!(!bench.access.standing(1, bench.now).first);
+    assert!(!bench.access.session_status(1, bench.now).first);
     bench.request(1, first()).unwrap_err();
     bench.login(1, "anna", "").unwrap_err();
     let peer = Peer { from: "pts/0".into(), unix_user: Some("sight".into()), own: false };
     bench.access.open(2, peer, bench.now);
-    assert!(bench.access.standing(2, bench.now).first);
+    assert!(bench.access.session_status(2, bench.now).first);
     assert!(
         bench.request(2, SessionRequest::FirstSupervisor { user: "anna".into(), password: "short".into() }).is_err()
     );
@@ -307,7 +307,7 @@ fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station
             )
             .is_err()
     );
-    assert!(!bench.access.standing(2, bench.now).first);
+    assert!(!bench.access.session_status(2, bench.now).first);
 }
 
 #[test]
@@ -413,7 +413,7 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
     assert_eq!(bench.who(1).as_deref(), Some("panel"));
     assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     bench.later(5000);
-    assert!(!bench.access.standing(1, bench.now).locked, "he would have no password to unlock it with");
+    assert!(!bench.access.session_status(1, bench.now).locked, "he would have no password to unlock it with");
     assert!(bench.request(1, SessionRequest::Lock).is_err());
 }
 

@@ -96,7 +96,7 @@ pub(super) struct Wrong {
 }
 
 impl AccessControl {
-    /// Has the password for this name checked. The time that takes must not tell whether the name exists.
+    /// Has the password for this name checked. The time that takes must not publish_status whether the name exists.
     /// `Err` says in words for the operator why it is not checked.
     pub(super) fn look_at(
         &mut self,
@@ -258,7 +258,7 @@ impl AccessControl {
         if let (true, Some(user)) = (locked.account, user) {
             let outcome = format!("done: for {seconds} s, system user {origin}");
             effects.push(super::audit_entries::audit(session, "lock-out", &user, &outcome, at));
-            self.tell(terminal, &mut effects);
+            self.publish_status(terminal, &mut effects);
         }
         if locked.origin {
             let outcome = format!("done: for up to {seconds} s");

@@ -21,7 +21,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::Standing,
+    access::SessionStatus,
     attach::{
         delta::{Delta, Unfit},
         own::Own,
@@ -69,18 +69,18 @@ pub(super) struct Line {
 }
 
 /// Attaches to the station that listens at this path. The session feeds itself from now on: when the station goes, the
-/// standing says so at once, and it is sought again for as long as somebody holds the session.
+/// status says so at once, and it is sought again for as long as somebody holds the session.
 pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let place = here();
     let mut line = open(path, &place).await?;
-    let (standing, snapshot) = timeout(WELCOME_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
+    let (status, snapshot) = timeout(WELCOME_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
     let Welcome { run, terminal, .. } = line.welcome;
     let (publish, snapshots) = watch::channel(snapshot);
-    let (stand, standing) = watch::channel(Arc::new(standing));
+    let (status_sender, status) = watch::channel(Arc::new(status));
     let (requests, requested) = mpsc::channel(REQUESTS);
     let own = Own::new(run, terminal);
-    tokio::spawn(Pump::new(path.to_owned(), place, own, publish, stand).run(line, requested));
-    Ok(Session { snapshots, standing, requests, terminal, drill: None })
+    tokio::spawn(Pump::new(path.to_owned(), place, own, publish, status_sender).run(line, requested));
+    Ok(Session { snapshots, status, requests, terminal, drill: None })
 }
 
 /// Says hello and waits for the welcome.
@@ -97,16 +97,16 @@ pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError
     timeout(WELCOME_MAX, opened).await.unwrap_or(Err(AttachError::Silent))
 }
 
-/// Standing and snapshot, with which a session begins.
-async fn first(line: &mut Line) -> Result<(Standing, Arc<Snapshot>), AttachError> {
-    let mut standing = Standing::default();
+/// SessionStatus and snapshot, with which a session begins.
+async fn first(line: &mut Line) -> Result<(SessionStatus, Arc<Snapshot>), AttachError> {
+    let mut status = SessionStatus::default();
     loop {
         match next(&mut line.read).await? {
-            Told::Standing(told) => standing = *told,
+            Told::SessionStatus(told) => status = *told,
             Told::Delta(delta) => {
                 let mut snapshot = Snapshot::blank(line.welcome.def.clone());
                 Delta::apply(*delta, &mut snapshot)?;
-                return Ok((standing, Arc::new(snapshot)));
+                return Ok((status, Arc::new(snapshot)));
             }
             // Nothing was asked yet.
             Told::Answer { .. } | Told::RequestDone { .. } | Told::Undelivered { .. } => {}

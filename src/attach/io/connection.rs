@@ -14,7 +14,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::{CommandRequest, SessionRequest, Standing},
+    access::{CommandRequest, SessionRequest, SessionStatus},
     attach::{
         check,
         delta::Delta,
@@ -37,7 +37,7 @@ const IN_FLIGHT_MAX: usize = 16;
 /// Queries of one terminal that are before the history, or answered and not taken yet.
 const ANSWERS_MAX: usize = 4;
 /// So long a newcomer may wait to hear how it stands.
-const STANDING_MAX: Duration = Duration::from_secs(2);
+const STATUS_WAIT_MAX: Duration = Duration::from_secs(2);
 
 /// Nobody ends well: there is always a reason.
 type Never = std::convert::Infallible;
@@ -184,9 +184,9 @@ struct Telling<W> {
 }
 
 impl<W: AsyncWrite + Unpin> Telling<W> {
-    /// Welcome, standing, and then the latest snapshot again and again, but never faster than the terminal reads.
+    /// Welcome, status, and then the latest snapshot again and again, but never faster than the terminal reads.
     async fn run(mut self, run: u64, mut answered: mpsc::Receiver<Reply>) -> Result<Never, ConnectionEnd> {
-        match timeout(STANDING_MAX, self.session.standing.changed()).await {
+        match timeout(STATUS_WAIT_MAX, self.session.status.changed()).await {
             Ok(Ok(())) => {}
             Ok(Err(_)) => return Err(ConnectionEnd::SentAway),
             Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal does not hear how it stands"),
@@ -194,16 +194,16 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
         let welcome = Welcome { run, terminal: self.session.terminal, def: self.def.clone() };
         let welcome = protocol::encode_first(&Greeting::own(), Some(&welcome), NEWS_BYTES_MAX);
         self.write(&welcome.map_err(WireError::from)?, STUCK_MAX).await?;
-        self.tell_standing().await?;
+        self.send_session_status().await?;
         let mut sent = Arc::new(Snapshot::blank(self.def.clone()));
         let (mut due, mut next) = (Some(Instant::now()), Instant::now());
         loop {
             tokio::select! {
                 biased;
                 Some((told, _places)) = answered.recv() => self.tell(&told).await?,
-                changed = self.session.standing.changed() => {
+                changed = self.session.status.changed() => {
                     changed.map_err(|_| ConnectionEnd::SentAway)?;
-                    self.tell_standing().await?;
+                    self.send_session_status().await?;
                     due = Some(Instant::now());
                 }
                 changed = self.session.snapshots.changed() => {
@@ -226,7 +226,7 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
             let own = snapshot.commands.iter().filter(|command| command.id.terminal == terminal);
             own.map(|command| (command.id.number, command.outcome.clone())).collect()
         };
-        self.session.standing.borrow().view && own(sent) != own(snapshot)
+        self.session.status.borrow().view && own(sent) != own(snapshot)
     }
 
     /// Tells the latest snapshot, as far as the terminal may see it; gives it back as what was sent.
@@ -235,15 +235,15 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
         if !Arc::ptr_eq(&snapshot.def, &self.def) {
             return Err(ConnectionEnd::OtherPlant);
         }
-        let view = self.session.standing.borrow().view;
+        let view = self.session.status.borrow().view;
         let seen = if view { snapshot } else { Arc::new(sight::alarms_only(&snapshot)) };
         self.tell(&Told::Delta(Box::new(Delta::between(sent, &seen)))).await?;
         Ok(seen)
     }
 
-    async fn tell_standing(&mut self) -> Result<(), ConnectionEnd> {
-        let standing: Standing = self.session.standing.borrow_and_update().as_ref().clone();
-        self.tell(&Told::Standing(Box::new(standing))).await
+    async fn send_session_status(&mut self) -> Result<(), ConnectionEnd> {
+        let status: SessionStatus = self.session.status.borrow_and_update().as_ref().clone();
+        self.tell(&Told::SessionStatus(Box::new(status))).await
     }
 
     async fn tell(&mut self, told: &Told) -> Result<(), ConnectionEnd> {

@@ -13,7 +13,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::{Durability, Standing},
+    access::{Durability, SessionStatus},
     attach::{
         own::{GONE, Own},
         protocol::{self, Asked, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told, Welcome},
@@ -56,7 +56,7 @@ pub struct Pump {
     /// The latest snapshot as the station has it; what is published may differ by own commands.
     latest: Arc<Snapshot>,
     publish: watch::Sender<Arc<Snapshot>>,
-    stand: watch::Sender<Arc<Standing>>,
+    status_sender: watch::Sender<Arc<SessionStatus>>,
     waiting: HashMap<u64, Waiting>,
     last_ticket: u64,
 }
@@ -76,10 +76,10 @@ impl Pump {
         place: Place,
         own: Own,
         publish: watch::Sender<Arc<Snapshot>>,
-        stand: watch::Sender<Arc<Standing>>,
+        status_sender: watch::Sender<Arc<SessionStatus>>,
     ) -> Pump {
         let latest = publish.borrow().clone();
-        Pump { path, place, own, latest, publish, stand, waiting: HashMap::new(), last_ticket: 0 }
+        Pump { path, place, own, latest, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
     }
 
     /// Runs for as long as somebody holds the session.
@@ -92,8 +92,8 @@ impl Pump {
             };
             let Over::Gone(why) = over else { return };
             tracing::warn!(why, "the station has gone");
-            self.stand.send_modify(|standing| {
-                *standing = Arc::new(Standing { gone: Some(why.into()), ..Standing::clone(standing) });
+            self.status_sender.send_modify(|status| {
+                *status = Arc::new(SessionStatus { gone: Some(why.into()), ..SessionStatus::clone(status) });
             });
             for (_, waiting) in self.waiting.drain() {
                 waiting.refuse(GONE);
@@ -139,14 +139,14 @@ impl Pump {
                 delta.apply(Arc::make_mut(&mut self.latest)).map_err(|error| error.to_string())?;
                 self.show();
             }
-            Told::Standing(standing) => {
-                for (id, why) in &standing.undelivered {
+            Told::SessionStatus(status) => {
+                for (id, why) in &status.undelivered {
                     self.own.undelivered(*id, why.to_string());
                 }
-                if !standing.undelivered.is_empty() {
+                if !status.undelivered.is_empty() {
                     self.show();
                 }
-                self.stand.send_replace(Arc::new(*standing));
+                self.status_sender.send_replace(Arc::new(*status));
             }
             Told::Answer { ticket, answer } => {
                 if let Some(Waiting::Ask(reply)) = self.waiting.remove(&ticket) {
@@ -224,7 +224,7 @@ impl Pump {
     }
 
     fn by(&self) -> Arc<str> {
-        self.stand.borrow().who.as_ref().map_or_else(|| "".into(), |who| who.user.clone())
+        self.status_sender.borrow().who.as_ref().map_or_else(|| "".into(), |who| who.user.clone())
     }
 
     /// Seeks the station until it is there again; `None` when nobody holds the session any more.
@@ -252,9 +252,9 @@ impl Pump {
                 }
                 Err(AttachError::NoStation { .. }) => {}
                 // It is there, but does not want this terminal: its operator should know why.
-                Err(error) => self.stand.send_modify(|standing| {
+                Err(error) => self.status_sender.send_modify(|status| {
                     let gone = Some(error.to_string().into());
-                    *standing = Arc::new(Standing { gone, ..Standing::clone(standing) });
+                    *status = Arc::new(SessionStatus { gone, ..SessionStatus::clone(status) });
                 }),
             }
         }
@@ -327,8 +327,8 @@ mod tests {
     #[tokio::test]
     async fn a_question_whose_answer_is_not_waited_for_is_cancelled_at_the_station() {
         let (publish, _snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
-        let (stand, _standing) = watch::channel(Arc::new(Standing::default()));
-        let mut pump = Pump::new(PathBuf::new(), Place::default(), Own::new(1, 1), publish, stand);
+        let (status_sender, _standing) = watch::channel(Arc::new(SessionStatus::default()));
+        let mut pump = Pump::new(PathBuf::new(), Place::default(), Own::new(1, 1), publish, status_sender);
         let (near, mut far) = UnixStream::pair().unwrap();
         let (read, write) = near.into_split();
         let (asks, mut requests) = mpsc::channel(4);

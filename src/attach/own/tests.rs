@@ -67,7 +67,7 @@ fn a_pending_command_is_uncertain_until_the_station_is_back() {
         send(&mut own, 1);
         assert_eq!(seen(&mut own, &under_way), under_way);
         own.gone();
-        assert_eq!(seen(&mut own, &under_way), uncertain, "the last snapshot does not stand for ever");
+        assert_eq!(seen(&mut own, &under_way), uncertain, "the last snapshot does not status_sender for ever");
         own
     };
     let mut same = begun();

@@ -98,7 +98,7 @@ fn requests_and_news_survive_the_way() {
         assert_eq!(decode(&body(encode(&asked, REQUEST_BYTES_MAX).unwrap()), "message"), Ok(asked));
     }
     let told = [
-        Told::Standing(Box::default()),
+        Told::SessionStatus(Box::default()),
         Told::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
         Told::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
         Told::RequestDone { ticket: 2, answer: Err("no".into()) },

@@ -129,7 +129,7 @@ fn not_judged(why: &str) -> String {
 
 /// Why nothing is heard of the station.
 fn silent_words(model: &Model) -> Option<String> {
-    match &model.standing.gone {
+    match &model.session.gone {
         Some(why) => Some(format!("station gone, {why}")),
         None => (model.clock.silent >= SILENCE).then(|| "station silent".to_owned()),
     }

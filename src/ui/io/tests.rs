@@ -10,7 +10,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use tokio::sync::watch;
 
 use super::*;
-use crate::access::{CommandRequest, Standing, Who};
+use crate::access::{CommandRequest, SessionStatus, Who};
 use crate::{plant::role::Role, station::Request};
 use crate::{
     plant::{alarm::AlarmCommand, command::CommandKind},
@@ -34,8 +34,8 @@ fn on_the_pty() {
         let (publish, snapshots) = watch::channel(Fixture::alarm().snapshot());
         let (requests, mut taken) = mpsc::channel(8);
         let who = Who { user: "tech1".into(), role: Role::Supervisor, must_change: false };
-        let (_told, standing) =
-            watch::channel(Arc::new(Standing { who: Some(who), view: true, ..Standing::default() }));
+        let (_told, status) =
+            watch::channel(Arc::new(SessionStatus { who: Some(who), view: true, ..SessionStatus::default() }));
         tokio::spawn(async move {
             while let Some((_, request)) = taken.recv().await {
                 let Request::Command(CommandRequest { kind, .. }) = request else { continue };
@@ -51,7 +51,7 @@ fn on_the_pty() {
                 publish.send_replace(Arc::new(snapshot));
             }
         });
-        let session = Session { snapshots, standing, requests, terminal: 1, drill: None };
+        let session = Session { snapshots, status, requests, terminal: 1, drill: None };
         run(session, Options { theme: Theme::FULL, leaving: Leaving::Station })
             .await
             .expect("left by its operator or a signal");

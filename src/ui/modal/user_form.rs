@@ -195,7 +195,7 @@ impl UserForm {
     /// The password in line `n`, which must stand in the next line too. Courtesy: the station judges it again.
     fn new_password(&self, cx: &ViewContext, n: usize) -> Result<Secret, String> {
         let (password, again) = (self.form.secret(n), self.form.secret(n + 1));
-        let (chars, least) = (password.0.chars().count(), cx.standing.password_chars_min);
+        let (chars, least) = (password.0.chars().count(), cx.session.password_chars_min);
         if password != again {
             return Err("the two passwords differ".to_owned());
         }
@@ -284,10 +284,10 @@ impl UserForm {
     }
 
     fn words(&self, cx: &ViewContext) -> Vec<String> {
-        let least = cx.standing.password_chars_min;
+        let least = cx.session.password_chars_min;
         let rule = format!("A password has at least {least} characters. A phrase is good, in any language, Thai too.");
         let first = "It must be changed at the first login.".to_owned();
-        let own = |user: &Arc<str>| cx.standing.who.as_ref().is_some_and(|who| who.user == *user);
+        let own = |user: &Arc<str>| cx.session.who.as_ref().is_some_and(|who| who.user == *user);
         let you = |user: &Arc<str>| {
             own(user).then_some("This is you: you are out at once, and another Supervisor must help.")
         };

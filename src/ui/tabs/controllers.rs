@@ -313,7 +313,7 @@ impl Controllers {
         let Page::Compare(compare) = &mut self.page else { return Vec::new() };
         match (action, &compare.source) {
             (Action::All, _) => compare.all = !compare.all,
-            // A copy the other way round: the target is chosen by standing on its page.
+            // A copy the other way round: the target is chosen by opening its page.
             (_, Source::Device(other)) => {
                 let (other, here) = (*other, self.device);
                 self.show(other);

@@ -10,7 +10,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::Tab;
 use crate::{
-    access::{SessionRequest, Standing, session_request::Secret},
+    access::{SessionRequest, SessionStatus, session_request::Secret},
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char},
@@ -70,14 +70,14 @@ impl Login {
     }
 
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        if cx.standing.who.is_none() {
+        if cx.session.who.is_none() {
             return Vec::new();
         }
         self.told = None;
         match action {
             Action::Password => {
                 self.changing = true;
-                self.fit(cx.standing);
+                self.fit(cx.session);
                 Vec::new()
             }
             Action::Lock => vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)],
@@ -91,10 +91,10 @@ impl Login {
     }
 
     /// Esc: out of the form, where that leads somewhere; else the form is emptied. `false`: there was nothing to leave.
-    pub fn back(&mut self, standing: &Standing) -> bool {
+    pub fn back(&mut self, session: &SessionStatus) -> bool {
         let typing = self.form.take().is_some();
         self.changing = false;
-        self.fit(standing);
+        self.fit(session);
         typing
     }
 
@@ -106,27 +106,27 @@ impl Login {
     }
 
     /// Somebody came, went, or has something else to do here.
-    pub fn on_standing(&mut self, cx: &ViewContext) {
-        let standing = cx.standing;
-        let user = standing.who.as_ref().map(|who| &who.user);
+    pub fn on_session_status(&mut self, cx: &ViewContext) {
+        let session = cx.session;
+        let user = session.who.as_ref().map(|who| &who.user);
         if self.since.as_ref().map(|(user, _)| user) != user {
             self.since = user.map(|user| (user.clone(), cx.now));
             (self.changing, self.told) = (false, None);
         }
-        if standing.who.as_ref().is_some_and(|who| !who.must_change) {
+        if session.who.as_ref().is_some_and(|who| !who.must_change) {
             self.given = None;
         }
-        self.fit(standing);
+        self.fit(session);
     }
 
     /// The form that fits how things stand; one that fits stays as it is.
-    fn fit(&mut self, standing: &Standing) {
-        let purpose = match &standing.who {
-            Some(_) if standing.locked => Some(Purpose::Login),
+    fn fit(&mut self, session: &SessionStatus) {
+        let purpose = match &session.who {
+            Some(_) if session.locked => Some(Purpose::Login),
             Some(who) if who.must_change => Some(Purpose::Change(self.given.clone())),
             Some(_) if self.changing => Some(Purpose::Change(None)),
             Some(_) => None,
-            None if standing.first => Some(Purpose::First),
+            None if session.first => Some(Purpose::First),
             None => Some(Purpose::Login),
         };
         let fits = self.form.as_ref().map(|form| &form.purpose) == purpose.as_ref();
@@ -148,7 +148,7 @@ impl Login {
                     }
                     self.changing = false;
                     self.form = None;
-                    self.fit(cx.standing);
+                    self.fit(cx.session);
                 }
             }
             Some(_) | None => self.told = answer.err().map(Err),
@@ -158,7 +158,7 @@ impl Login {
     /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let Some(form) = &self.form else { return keys::hints(KEYS) };
-        let leads = if self.changing || cx.standing.view || cx.standing.locked { "back" } else { "clear" };
+        let leads = if self.changing || cx.session.view || cx.session.locked { "back" } else { "clear" };
         let quit = Hint::new("Ctrl-C", "quit", "");
         form.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
     }

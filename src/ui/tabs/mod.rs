@@ -91,8 +91,8 @@ impl Tab {
     /// Those that there are here. Before a login only the login page, unless the plant file lets everybody look; users
     /// only for a Supervisor; faults only where the plant is simulated, and not in an exam.
     pub fn offered(cx: &ViewContext) -> Vec<Tab> {
-        let closed = session_lock::is_closed(cx.standing);
-        let supervisor = cx.standing.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
+        let closed = session_lock::is_closed(cx.session);
+        let supervisor = cx.session.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
         let there = |tab: &Tab| match tab {
             Tab::Login => true,
             Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Reports | Tab::Bus => !closed,

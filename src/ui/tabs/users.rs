@@ -102,7 +102,7 @@ impl Users {
     }
 
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let users = &cx.standing.users;
+        let users = &cx.session.users;
         let place = self.place(cx);
         let row = users.get(place);
         let form = match (action, row) {
@@ -142,13 +142,13 @@ impl Users {
     pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
         match &self.audit {
             Some(audit) => audit.drawn_rows(),
-            None => Rows::of(cx.standing.users.iter().map(|row| (&row.user, state(cx, row))), self.place(cx)),
+            None => Rows::of(cx.session.users.iter().map(|row| (&row.user, state(cx, row))), self.place(cx)),
         }
     }
 
     /// The place of the selected user.
     fn place(&self, cx: &ViewContext) -> usize {
-        cx.standing.users.iter().position(|row| Some(&row.user) == self.selected.as_ref()).unwrap_or(0)
+        cx.session.users.iter().position(|row| Some(&row.user) == self.selected.as_ref()).unwrap_or(0)
     }
 
     /// A step back: from the audit list to the users.

@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use super::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys};
 use crate::{
     access::{
-        CommandRequest, Durability, SessionRequest, Standing, Who,
+        CommandRequest, Durability, SessionRequest, SessionStatus, Who,
         session_request::{SessionRow, UserRow},
     },
     history::{Answer, Query},
@@ -28,29 +28,29 @@ use crate::{
 };
 
 /// Nobody is in, and nothing may be seen but alarms.
-fn closed() -> Standing {
+fn closed() -> SessionStatus {
     let notice = "This is the control of the water tank. Only for those who work here; all that is done is recorded.";
-    Standing { who: None, view: false, notice: Some(notice.into()), ..(*fixture::standing()).clone() }
+    SessionStatus { who: None, view: false, notice: Some(notice.into()), ..(*fixture::session()).clone() }
 }
 
-fn person(user: &str, role: Role) -> Standing {
-    Standing {
+fn person(user: &str, role: Role) -> SessionStatus {
+    SessionStatus {
         who: Some(Who { user: user.into(), role, must_change: false }),
         idle_lock: Some(Duration::from_secs(900)),
-        ..(*fixture::standing()).clone()
+        ..(*fixture::session()).clone()
     }
 }
 
-fn with(fixture: &Fixture, standing: Standing) -> Model {
+fn with(fixture: &Fixture, session: SessionStatus) -> Model {
     let mut model = model(fixture, Theme::FULL);
-    update(&mut model, Msg::Standing(Arc::new(standing)));
+    update(&mut model, Msg::SessionStatus(Arc::new(session)));
     model
 }
 
-fn stand(model: &mut Model, change: impl FnOnce(&mut Standing)) {
-    let mut standing = (*model.standing).clone();
-    change(&mut standing);
-    update(model, Msg::Standing(Arc::new(standing)));
+fn change_session(model: &mut Model, change: impl FnOnce(&mut SessionStatus)) {
+    let mut session = (*model.session).clone();
+    change(&mut session);
+    update(model, Msg::SessionStatus(Arc::new(session)));
 }
 
 fn ctrl(model: &mut Model, c: char) -> Vec<Effect> {
@@ -76,16 +76,16 @@ fn shows(model: &mut Model, words: &str) {
 
 #[test]
 fn the_login_page_in_every_mood() {
-    let first = Standing { first: true, ..closed() };
+    let first = SessionStatus { first: true, ..closed() };
     let moods = [
         ("first", Fixture::normal(), first),
         ("normal", Fixture::normal(), closed()),
         ("alarm", Fixture::alarm(), closed()),
         ("in", Fixture::normal(), person("anna", Role::Technician)),
     ];
-    for (mood, fixture, standing) in moods {
+    for (mood, fixture, session) in moods {
         for (width, height) in [(80, 24), (120, 40)] {
-            let mut model = with(&fixture, standing.clone());
+            let mut model = with(&fixture, session.clone());
             type_keys(&mut model, if mood == "in" { "0" } else { "anna⏎abc" });
             insta::assert_snapshot!(format!("login_{mood}_{width}x{height}"), screen(&mut model, width, height));
         }
@@ -157,15 +157,15 @@ fn before_a_login_every_other_tab_is_closed_and_alarms_are_seen() {
     }
     shows(&mut model, "TIC-1.PV temperature high");
     shows(&mut model, "alarms 3");
-    update(&mut model, Msg::Standing(Arc::new(person("anna", Role::Technician))));
+    update(&mut model, Msg::SessionStatus(Arc::new(person("anna", Role::Technician))));
     assert_eq!(model.tabs.shown, Tab::Mimic);
-    stand(&mut model, |standing| (standing.who, standing.view) = (None, false));
+    change_session(&mut model, |session| (session.who, session.view) = (None, false));
     assert_eq!(model.tabs.shown, Tab::Login);
 }
 
 #[test]
 fn a_plant_that_lets_everybody_look_shows_the_process_and_nothing_can_be_done() {
-    let mut model = with(&Fixture::normal(), Standing { view: true, ..closed() });
+    let mut model = with(&Fixture::normal(), SessionStatus { view: true, ..closed() });
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "Technician: s r m");
     shows(&mut model, "not logged in");
@@ -180,7 +180,7 @@ fn a_plant_that_lets_everybody_look_shows_the_process_and_nothing_can_be_done() 
 #[test]
 fn the_first_supervisor_types_his_password_twice() {
     let check = |keys: &str, expect: Result<&str, &str>| {
-        let mut model = with(&Fixture::normal(), Standing { first: true, ..closed() });
+        let mut model = with(&Fixture::normal(), SessionStatus { first: true, ..closed() });
         let effects = type_keys(&mut model, keys);
         match expect {
             Ok(password) => {
@@ -204,9 +204,9 @@ fn a_password_given_by_somebody_else_is_changed_before_anything() {
     let mut model = with(&Fixture::normal(), closed());
     type_keys(&mut model, "anna⏎given by boris⏎");
     answer(&mut model, Ok(()));
-    stand(&mut model, |standing| {
-        standing.who = Some(Who { user: "anna".into(), role: Role::Technician, must_change: true });
-        standing.view = true;
+    change_session(&mut model, |session| {
+        session.who = Some(Who { user: "anna".into(), role: Role::Technician, must_change: true });
+        session.view = true;
     });
     type_keys(&mut model, "1");
     assert_eq!(model.tabs.shown, Tab::Login);
@@ -215,7 +215,7 @@ fn a_password_given_by_somebody_else_is_changed_before_anything() {
     let expect = SessionRequest::ChangePassword { old: "given by boris".into(), new: "correct horse battery".into() };
     assert_eq!(sent_request(&effects), Some(&expect));
     answer(&mut model, Ok(()));
-    stand(&mut model, |standing| standing.who = person("anna", Role::Technician).who);
+    change_session(&mut model, |session| session.who = person("anna", Role::Technician).who);
     assert_eq!(model.tabs.shown, Tab::Mimic);
 }
 
@@ -225,7 +225,7 @@ fn work_waits_while_the_terminal_is_locked() {
     let mut model = with(&fixture, person("anna", Role::Technician));
     type_keys(&mut model, "s65");
     assert_eq!(sent_request(&ctrl(&mut model, 'k')), Some(&SessionRequest::Lock));
-    stand(&mut model, |standing| standing.locked = true);
+    change_session(&mut model, |session| session.locked = true);
     shows(&mut model, "LOCKED by anna");
     assert_eq!(model.modal, None, "nothing hides the process");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎⎋3a")), None);
@@ -233,7 +233,7 @@ fn work_waits_while_the_terminal_is_locked() {
     assert_eq!(sent_request(&type_keys(&mut model, "horse⏎")), Some(&SessionRequest::Unlock("horse".into())));
     answer(&mut model, Err("wrong password; wait 2 s"));
     shows(&mut model, "wrong password; wait 2 s");
-    stand(&mut model, |standing| standing.locked = false);
+    change_session(&mut model, |session| session.locked = false);
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "new 65");
     let effects = type_keys(&mut model, ".5⏎");
@@ -251,9 +251,9 @@ fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
             panic!("{effects:?}")
         };
         ctrl(&mut model, 'k');
-        stand(&mut model, |standing| standing.locked = true);
+        change_session(&mut model, |session| session.locked = true);
         update(&mut model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
-        stand(&mut model, |standing| standing.locked = false);
+        change_session(&mut model, |session| session.locked = false);
         match left {
             Some(words) => shows(&mut model, words),
             None => assert_eq!(model.modal, None, "the form has done its work"),
@@ -267,16 +267,16 @@ fn a_signature_that_waits_when_the_terminal_is_locked_takes_its_answer() {
     let effects = type_keys(&mut model, "s65⏎boris⏎horse⏎");
     let Some(Effect::Command(command)) = effects.last() else { panic!("no command: {effects:?}") };
     let id = command.id;
-    stand(&mut model, |standing| standing.locked = true);
+    change_session(&mut model, |session| session.locked = true);
     update(&mut model, Msg::Undelivered(id, "station too busy"));
-    stand(&mut model, |standing| standing.locked = false);
+    change_session(&mut model, |session| session.locked = false);
     shows(&mut model, "station too busy");
 }
 
 #[test]
 fn a_locked_terminal_looks_and_does_nothing() {
     let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
-    stand(&mut model, |standing| standing.locked = true);
+    change_session(&mut model, |session| session.locked = true);
     for keys in ["a", "A", "s", "r", "4⏎f", "4⏎↓⏎"] {
         let effects = type_keys(&mut model, keys);
         assert!(sent_kind(&effects).is_none() && sent_request(&effects).is_none(), "{keys}: {effects:?}");
@@ -307,7 +307,7 @@ fn a_locked_terminal_looks_and_does_nothing() {
         sent_request(&effects),
         Some(&SessionRequest::Login { user: "boris".to_owned(), password: "battery".into() })
     );
-    update(&mut model, Msg::Standing(Arc::new(person("boris", Role::Viewer))));
+    update(&mut model, Msg::SessionStatus(Arc::new(person("boris", Role::Viewer))));
     assert_eq!((model.tabs.shown, &model.modal), (Tab::Mimic, &None));
 }
 
@@ -315,7 +315,7 @@ fn a_locked_terminal_looks_and_does_nothing() {
 fn a_terminal_that_is_locked_on_the_login_page_still_shows_the_process() {
     let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
     assert_eq!(sent_request(&type_keys(&mut model, "0k")), Some(&SessionRequest::Lock));
-    stand(&mut model, |standing| standing.locked = true);
+    change_session(&mut model, |session| session.locked = true);
     assert_eq!(model.tabs.shown, Tab::Mimic);
     type_keys(&mut model, "3");
     assert_eq!(model.tabs.shown, Tab::Alarms);
@@ -330,7 +330,7 @@ fn the_lock_is_told_beforehand_and_a_key_puts_it_off() {
     let press = |model: &mut Model| update(model, Msg::Key(KeyEvent::new(KeyCode::Right, KeyModifiers::NONE)));
     assert_eq!(active(&press(&mut model)), 1);
     assert_eq!((0..100).map(|_| active(&press(&mut model))).sum::<usize>(), 0, "twice a minute at most");
-    stand(&mut model, |standing| standing.locks_in = Some(Duration::from_secs(30)));
+    change_session(&mut model, |session| session.locks_in = Some(Duration::from_secs(30)));
     for _ in 0..10 {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
     }
@@ -447,7 +447,7 @@ fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
 #[test]
 fn a_station_that_has_gone_is_shown_and_takes_no_commands() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
-    stand(&mut model, |standing| standing.gone = Some("the socket was closed".into()));
+    change_session(&mut model, |session| session.gone = Some("the socket was closed".into()));
     assert!(model.snapshot.samples.iter().all(|sample| !matches!(sample.quality, Quality::Good)));
     for _ in 0..8 {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
@@ -458,7 +458,7 @@ fn a_station_that_has_gone_is_shown_and_takes_no_commands() {
     assert_eq!(model.tabs.shown, Tab::Login);
     type_keys(&mut model, "4⏎u");
     shows(&mut model, "NOT SENT: the station has gone");
-    stand(&mut model, |standing| standing.gone = None);
+    change_session(&mut model, |session| session.gone = None);
     assert!(!screen(&mut model, 80, 24).contains("GONE"));
 }
 
@@ -477,7 +477,7 @@ fn another_plant_file_builds_everything_anew() {
     assert_eq!((model.plants, sent_kind(&type_keys(&mut model, "⏎"))), (1, None));
 }
 
-fn supervisor() -> Standing {
+fn supervisor() -> SessionStatus {
     let row = |user: &str, role, disabled, must_change| UserRow {
         user: user.into(),
         role,
@@ -501,7 +501,7 @@ fn supervisor() -> Standing {
         locked,
     };
     let sessions = vec![session(1, Some("anna"), false), session(2, Some("tom"), true), session(3, None, false)];
-    Standing { users: Arc::new(users), sessions: Arc::new(sessions), ..person("anna", Role::Supervisor) }
+    SessionStatus { users: Arc::new(users), sessions: Arc::new(sessions), ..person("anna", Role::Supervisor) }
 }
 
 #[test]
@@ -609,7 +609,7 @@ fn keys_for_users_act_only_on_the_user_that_was_drawn() {
             let mut model = with(&Fixture::normal(), supervisor());
             type_keys(&mut model, "7↓");
             let change = |model: &mut Model| {
-                stand(model, |standing| change(Arc::make_mut(&mut standing.users)));
+                change_session(model, |session| change(Arc::make_mut(&mut session.users)));
             };
             acts_only_on_what_was_drawn(&mut model, change, key);
         }

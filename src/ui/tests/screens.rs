@@ -103,7 +103,7 @@ fn the_mimic_with_commands() {
     for (name, theme, width, height) in
         [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("ascii", Theme::PLAIN, 80, 24)]
     {
-        let mut model = Model::new(Arc::new(commanded()), theme, 1, fixture::standing());
+        let mut model = Model::new(Arc::new(commanded()), theme, 1, fixture::session());
         let shown = screen(&mut model, width, height);
         assert!(theme != Theme::PLAIN || shown.is_ascii());
         insta::assert_snapshot!(format!("mimic_commands_{name}"), shown);
@@ -111,7 +111,7 @@ fn the_mimic_with_commands() {
         insta::assert_snapshot!(format!("window_commands_{name}"), screen(&mut model, width, height));
     }
     let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
-    let mut model = Model::new(Arc::new(commanded()), console, 1, fixture::standing());
+    let mut model = Model::new(Arc::new(commanded()), console, 1, fixture::session());
     assert!(screen(&mut model, 80, 24).contains("! not OFF"));
 }
 
@@ -401,7 +401,7 @@ fn trouble_of_the_store_is_in_the_header() {
     snapshot.history.lost = 12;
     snapshot.history.trouble = Some("disk full".to_owned());
     snapshot.speed = 60.0;
-    let mut model = Model::new(Arc::new(snapshot), Theme::FULL, 1, crate::ui::fixture::standing());
+    let mut model = Model::new(Arc::new(snapshot), Theme::FULL, 1, crate::ui::fixture::session());
     let shown = screen(&mut model, 120, 40);
     let header = shown.lines().next().unwrap_or_default();
     for words in ["history: see 3", "12 records lost", "speed ×60"] {
@@ -410,7 +410,7 @@ fn trouble_of_the_store_is_in_the_header() {
     assert!(shown.lines().nth(2).is_some_and(|banner| banner.contains("history: disk full")), "{shown}");
     let mut alarm = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
     alarm.history.trouble = Some("the disk is full and nothing has been written since 13:10, ".repeat(2));
-    let mut model = Model::new(Arc::new(alarm), Theme::FULL, 1, crate::ui::fixture::standing());
+    let mut model = Model::new(Arc::new(alarm), Theme::FULL, 1, crate::ui::fixture::session());
     model.tabs.shown = Tab::Alarms;
     let shown = screen(&mut model, 80, 24);
     assert!(shown.lines().nth(2).is_some_and(|banner| banner.contains("temperature high")), "the alarm first: {shown}");

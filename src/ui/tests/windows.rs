@@ -6,14 +6,14 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::{model, screen, sent_kind, type_keys};
 use crate::{
-    access::{Standing, Who},
+    access::{SessionStatus, Who},
     plant::{alarm::AlarmCommand, command::CommandKind, role::Role},
-    ui::{Leaving, Model, Msg, fixture::Fixture, fixture::standing, modal::Modal, tabs::Tab, theme::Theme, update},
+    ui::{Leaving, Model, Msg, fixture::Fixture, fixture::session, modal::Modal, tabs::Tab, theme::Theme, update},
 };
 
 fn sits(model: &mut Model, role: Role) {
     let who = Who { user: "tom".into(), role, must_change: false };
-    update(model, Msg::Standing(Arc::new(Standing { who: Some(who), ..(*standing()).clone() })));
+    update(model, Msg::SessionStatus(Arc::new(SessionStatus { who: Some(who), ..(*session()).clone() })));
 }
 
 #[test]

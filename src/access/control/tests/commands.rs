@@ -6,7 +6,7 @@ use crate::plant::def::ActionDef;
 impl Bench {
     /// The commands of a terminal that did not reach the plant, and why.
     fn undelivered(&self, terminal: u32) -> Vec<(u32, String)> {
-        let told = self.access.standing(terminal, self.now).undelivered;
+        let told = self.access.session_status(terminal, self.now).undelivered;
         told.iter().map(|(id, why)| (id.number, why.to_string())).collect()
     }
 }

@@ -77,7 +77,7 @@ fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
     bench.request(2, SessionRequest::Lock).unwrap();
     let effects = bench.access.done(unlock, Outcome::Verified(true), bench.now);
     bench.work(effects);
-    assert!(bench.access.standing(2, bench.now).locked, "the unlock belonged to the session before");
+    assert!(bench.access.session_status(2, bench.now).locked, "the unlock belonged to the session before");
 
     bench.login(2, "tech", TECH).unwrap();
     let sign = Some(Signature { user: Some("boss".to_owned()), password: BOSS.into() });

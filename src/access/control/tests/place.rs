@@ -47,11 +47,11 @@ fn after_the_clock_was_set_the_lists_of_a_supervisor_are_in_utc_and_lock_outs_go
     bench.open(2, "10.0.0.6");
     bench.login(1, "boss", BOSS).unwrap();
     let years = jiff::SignedDuration::from_hours(24 * 365 * 56);
-    assert_eq!(bench.access.follow_clock(years), [Effect::Standing(1), Effect::Standing(2)]);
+    assert_eq!(bench.access.follow_clock(years), [Effect::SessionStatus(1), Effect::SessionStatus(2)]);
     assert_eq!(bench.access.follow_clock(years), [], "once");
     bench.login(2, "tech", TECH).unwrap();
-    let standing = bench.access.standing(1, bench.now);
-    assert!(standing.sessions.iter().all(|row| row.since == bench.now + years));
-    let tech = standing.users.iter().find(|row| &*row.user == "tech").unwrap();
+    let status = bench.access.session_status(1, bench.now);
+    assert!(status.sessions.iter().all(|row| row.since == bench.now + years));
+    let tech = status.users.iter().find(|row| &*row.user == "tech").unwrap();
     assert_eq!(tech.last_login, Some(bench.now + years));
 }

@@ -214,7 +214,7 @@ impl Handover {
 }
 
 fn is_own(cx: &ViewContext, row: &ActionRecord) -> bool {
-    cx.standing.who.as_ref().is_some_and(|who| who.user == row.by)
+    cx.session.who.as_ref().is_some_and(|who| who.user == row.by)
 }
 
 /// Each row with its time; those that are alike once, at the time of the newest, with their count.

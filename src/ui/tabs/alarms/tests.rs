@@ -380,9 +380,9 @@ fn what_was_put_aside_is_taken_back() {
 #[test]
 fn a_technician_is_told_that_out_of_service_needs_a_supervisor() {
     let mut model = shown(&Fixture::alarm(), Theme::FULL, "");
-    let mut standing = Arc::unwrap_or_clone(fixture::standing());
-    standing.who.as_mut().expect("somebody sits here").role = Role::Technician;
-    update(&mut model, Msg::Standing(Arc::new(standing)));
+    let mut session = Arc::unwrap_or_clone(fixture::session());
+    session.who.as_mut().expect("somebody sits here").role = Role::Technician;
+    update(&mut model, Msg::SessionStatus(Arc::new(session)));
     let footer = screen(&mut model, 120, 40).lines().last().map(str::to_owned).unwrap_or_default();
     assert!(footer.contains("z shelve") && !footer.contains("o out of service"), "{footer}");
     type_keys(&mut model, "o");

@@ -49,15 +49,15 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
 
 /// The title of the plant stands where somebody has yet to learn where he is.
 fn heading(cx: &ViewContext, title: &str) -> String {
-    match &cx.standing.who {
-        Some(who) if cx.standing.locked => format!("{title} as another person than {}", who.user),
+    match &cx.session.who {
+        Some(who) if cx.session.locked => format!("{title} as another person than {}", who.user),
         Some(_) | None => title.to_owned(),
     }
 }
 
 /// What must be read before a login, in so many rows at the most; returns the row after it.
 fn notice(cx: &ViewContext, canvas: &mut Canvas, most: u16) -> u16 {
-    let Some(notice) = cx.standing.notice.as_ref().filter(|_| cx.standing.who.is_none()) else { return 0 };
+    let Some(notice) = cx.session.notice.as_ref().filter(|_| cx.session.who.is_none()) else { return 0 };
     let most = usize::from(most.max(1));
     let mut lines: Vec<String> = notice.lines().flat_map(|line| wrap(line, canvas.width())).collect();
     if lines.len() > most {
@@ -74,7 +74,7 @@ fn notice(cx: &ViewContext, canvas: &mut Canvas, most: u16) -> u16 {
 /// Who is in, since when, and what he may; returns the row after it.
 fn who(login: &Login, cx: &ViewContext, canvas: &mut Canvas, y: u16) -> u16 {
     let theme = cx.theme;
-    let Some(who) = &cx.standing.who else { return y };
+    let Some(who) = &cx.session.who else { return y };
     let x = canvas.text(0, y, &who.user, theme.strong());
     let x = canvas.text(x + 2, y, rights::title(who.role), theme.normal());
     if let Some((_, since)) = &login.since {
@@ -85,7 +85,7 @@ fn who(login: &Login, cx: &ViewContext, canvas: &mut Canvas, y: u16) -> u16 {
         canvas.text(0, y, &line, theme.normal());
         y += 1;
     }
-    let lock = match cx.standing.idle_lock {
+    let lock = match cx.session.idle_lock {
         Some(idle) => format!("This terminal locks itself after {} without a key.", running(idle)),
         None => "This terminal does not lock itself.".to_owned(),
     };

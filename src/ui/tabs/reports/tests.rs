@@ -31,7 +31,7 @@ struct Stand {
 
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
-        let model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::standing());
+        let model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::session());
         let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), reply: Ok(Durability::Recorded) };
         stand.send(Msg::Resize(width, height));
         stand.press("5");

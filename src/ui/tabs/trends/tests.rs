@@ -50,7 +50,7 @@ fn past(tag: TagId, at: Timestamp) -> f64 {
 
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
-        let mut model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::standing());
+        let mut model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::session());
         update(&mut model, Msg::Resize(80, 24));
         let begin = ago(86_400);
         update(&mut model, Msg::Resize(width, height));

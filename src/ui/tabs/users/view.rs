@@ -13,7 +13,7 @@ use crate::ui::{
 pub(super) fn draw(cx: &ViewContext, place: usize, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = (canvas.width(), canvas.height());
-    let terminals = cx.standing.sessions.len() as u16 + 2;
+    let terminals = cx.session.sessions.len() as u16 + 2;
     let below = terminals.min(height / 3).max(3.min(height));
     users(cx, place, &mut canvas.part(0, 0, width, height.saturating_sub(below)));
     sessions(cx, &mut canvas.part(0, height.saturating_sub(below), width, below));
@@ -21,7 +21,7 @@ pub(super) fn draw(cx: &ViewContext, place: usize, frame: &mut Frame, area: Rect
 
 fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
     let theme = cx.theme;
-    let all = &cx.standing.users;
+    let all = &cx.session.users;
     let name = (canvas.width() / 4).clamp(14, 34);
     canvas.text(1, 0, &format!("{}role         state                      last login", pad("user", name)), theme.dim());
     let rows = usize::from(canvas.height().saturating_sub(1)).max(1);
@@ -50,7 +50,7 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
 
 fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
-    let all = &cx.standing.sessions;
+    let all = &cx.session.sessions;
     let width = canvas.width();
     canvas.run(0, 0, width, '─', theme.dim());
     canvas.text(1, 0, &format!(" terminals attached {} ", all.len()), theme.dim());

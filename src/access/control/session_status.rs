@@ -1,4 +1,4 @@
-//! How each terminal stands, and who hears of it when that changes.
+//! The session status of each terminal, and which terminals get it when it changes.
 
 use std::{sync::Arc, time::Duration};
 
@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{AccessControl, Effect, passed, session::SessionState};
 use crate::{
-    access::{SessionRow, Standing, UserRow, Users, user},
+    access::{SessionRow, SessionStatus, UserRow, Users, user},
     plant::role::Role,
 };
 
@@ -14,15 +14,17 @@ use crate::{
 pub(super) const LOCK_NEAR: Duration = Duration::from_secs(60);
 
 impl AccessControl {
-    /// How a terminal stands.
-    pub fn standing(&self, terminal: u32, at: Timestamp) -> Standing {
+    /// The status of the session of a terminal.
+    pub fn session_status(&self, terminal: u32, at: Timestamp) -> SessionStatus {
         let rules = &self.def.access;
         let notice = rules.notice.as_deref().map(Arc::from);
-        let Some(session) = self.sessions.get(&terminal) else { return Standing { notice, ..Standing::default() } };
+        let Some(session) = self.sessions.get(&terminal) else {
+            return SessionStatus { notice, ..SessionStatus::default() };
+        };
         let supervisor = session.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
         let idle_lock = self.idle_lock(session);
         let left = idle_lock.map(|span| span.saturating_sub(passed(session.active, at)));
-        Standing {
+        SessionStatus {
             who: session.who.clone(),
             locked: session.locked,
             view: rules.view || session.who.is_some(),
@@ -63,11 +65,11 @@ impl AccessControl {
         rows.collect()
     }
 
-    /// This terminal and all that see the lists hear how they stand.
-    pub(super) fn tell(&self, terminal: u32, effects: &mut Vec<Effect>) {
+    /// Publishes the status to this terminal and to all that see the lists.
+    pub(super) fn publish_status(&self, terminal: u32, effects: &mut Vec<Effect>) {
         let sees = |session: &SessionState| session.acting().is_some_and(|who| who.role == Role::Supervisor);
         let others = self.sessions.iter().filter(|(id, session)| **id != terminal && sees(session)).map(|(id, _)| *id);
         let own = self.sessions.contains_key(&terminal).then_some(terminal);
-        effects.extend(own.into_iter().chain(others).map(Effect::Standing));
+        effects.extend(own.into_iter().chain(others).map(Effect::SessionStatus));
     }
 }
