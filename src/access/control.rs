@@ -26,8 +26,9 @@ use self::{
     work::Errand,
 };
 use super::{
-    CommandRequest, Secret, SessionRequest, Who, right,
-    tries::Tries,
+    CommandRequest, Secret, SessionRequest, Who,
+    lockout::LoginAttempts,
+    right,
     user::{Change, Users},
 };
 use crate::{
@@ -98,7 +99,7 @@ pub struct AccessControl {
     /// The user of the operating system that the station runs as.
     host: Option<Arc<str>>,
     sessions: BTreeMap<u32, SessionState>,
-    tries: Tries,
+    attempts: LoginAttempts,
     refusals: BTreeMap<Arc<str>, Refusals>,
     errands: BTreeMap<Job, Errand>,
     /// Passwords that wait for the one before them of the same origin, or for their time.
@@ -123,7 +124,7 @@ impl AccessControl {
             closed: None,
             host,
             sessions: BTreeMap::new(),
-            tries: Tries::default(),
+            attempts: LoginAttempts::default(),
             refusals: BTreeMap::new(),
             errands: BTreeMap::new(),
             waiting: VecDeque::new(),

@@ -1,10 +1,10 @@
-//! Who may: users and their passwords, sessions, rights, lock-out, and the chained book of all that was done.
+//! Who may: users and their passwords, sessions, rights, lockout, and the chained book of all that was done.
 
 pub mod right;
 pub mod session_request;
 pub mod password;
 pub mod user;
-pub mod tries;
+pub mod lockout;
 pub mod control;
 pub mod book;
 pub mod sealing;

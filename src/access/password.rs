@@ -72,7 +72,7 @@ pub fn check(password: &str, user: &str, chars_min: u16) -> Result<(), String> {
     let letters: Vec<char> = plain.chars().collect();
     let short = |count: usize| letters.chunks(count).all(|part| letters.starts_with(part));
     if letters.is_empty() || (1..=3).any(short) || COMMON.iter().any(|common| made_of(&plain, common)) {
-        return Err("this password is among the first that everybody tries".to_owned());
+        return Err("this password is among the first that everybody attempts".to_owned());
     }
     Ok(())
 }

@@ -75,7 +75,7 @@ pub enum SessionRequest {
         /// Which.
         role: Role,
     },
-    /// Shut somebody out, or let him in again; also ends a lock-out.
+    /// Shut somebody out, or let him in again; also ends a lockout.
     Disable {
         /// Whom.
         user: String,

@@ -192,7 +192,7 @@ pub const ELSEWHERE: [&str; 26] = [
     "logout",
     "lock terminal",
     "unlock terminal",
-    "lock-out",
+    "lockout",
     "signature failed",
     "add user",
     "change password",

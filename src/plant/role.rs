@@ -51,10 +51,10 @@ pub struct AccessDef {
     pub view: bool,
     /// Fewest characters of a password (NIST SP 800-63B rev 4: 15 where it stands alone).
     pub password_chars_min: u16,
-    /// Wrong tries in a row that lock an account out.
-    pub tries_max: u16,
+    /// Failed logins in a row that lock an account out.
+    pub login_attempts_max: u16,
     /// For how long.
-    pub lock_out: Duration,
+    pub lockout: Duration,
     /// A terminal whose keys rest for so long is locked; zero for never.
     pub idle_lock: Duration,
     /// Terminals that may be attached at once.
@@ -69,8 +69,8 @@ impl Default for AccessDef {
             notice: None,
             view: false,
             password_chars_min: 15,
-            tries_max: 5,
-            lock_out: Duration::from_secs(300),
+            login_attempts_max: 5,
+            lockout: Duration::from_secs(300),
             idle_lock: Duration::from_secs(900),
             sessions_max: 32,
             trusted: Vec::new(),

@@ -11,9 +11,9 @@ use crate::plant::role::{AccessDef, Role};
 
 /// Passwords shorter than this are nobody's business to permit (NIST SP 800-63B rev 4, 8 with a second factor).
 const CHARS_LEAST: u16 = 8;
-/// Wrong tries that may be permitted at the most (the same, 3.2.2).
-const TRIES_MOST: u16 = 100;
-/// How long a lock-out may last.
+/// Most failed logins that can be permitted (the same, 3.2.2).
+const LOGIN_ATTEMPTS_MOST: u16 = 100;
+/// How long a lockout may last.
 const LOCK_OUT: RangeInclusive<Duration> = Duration::from_secs(10)..=Duration::from_secs(3600);
 
 /// The rules; without the table the usual ones.
@@ -34,16 +34,21 @@ pub(super) fn access(table: Option<&AccessTable>, problems: &mut Problems) -> Ac
         notice: table.notice.as_ref().map(|notice| notice.value.clone()),
         view: table.view.map_or(usual.view, |view| view.value),
         password_chars_min: chars,
-        tries_max: within(table.tries_max, 1..=TRIES_MOST, usual.tries_max, problems),
-        lock_out: lock_out(table.lock_out, usual.lock_out, problems),
+        login_attempts_max: within(
+            table.login_attempts_max,
+            1..=LOGIN_ATTEMPTS_MOST,
+            usual.login_attempts_max,
+            problems,
+        ),
+        lockout: lockout(table.lockout, usual.lockout, problems),
         idle_lock: table.idle_lock.map_or(usual.idle_lock, |span| span.value),
         sessions_max: within(table.sessions_max, 1..=256, usual.sessions_max, problems),
         trusted,
     }
 }
 
-/// A lock-out that lasts nothing is none, and one of days stops the plant instead of a guesser.
-fn lock_out(given: Option<At<Duration>>, usual: Duration, problems: &mut Problems) -> Duration {
+/// A lockout that lasts nothing is none, and one of days stops the plant instead of a guesser.
+fn lockout(given: Option<At<Duration>>, usual: Duration, problems: &mut Problems) -> Duration {
     let Some(given) = given else { return usual };
     if !LOCK_OUT.contains(&given.value) {
         problems.add(given.at, format!("{:?} cannot be used here", given.value)).label("expected 10s … 1h");

@@ -4,6 +4,8 @@ use super::{diagnostic::Problem, reader::Raw};
 
 /// Table as its messages name it (of a keyword: the kind of keyword), old spelling, new spelling.
 const RENAMED: &[(&str, &str, &str)] = &[
+    ("access", "tries_max", "login_attempts_max"),
+    ("access", "lock_out", "lockout"),
     ("a fault", "SV-1 stuck shut", "SV-1 stuck closed"),
     ("a fault", "SV-2 stuck shut", "SV-2 stuck closed"),
     ("the scenario", "about", "description"),

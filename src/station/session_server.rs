@@ -34,7 +34,7 @@ const REQUESTS: usize = 256;
 const ATTACH_QUEUE_MAX: usize = 16;
 /// Requests for the station as a whole that may wait.
 pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
-/// Real time between two looks at the clock: idle terminals, ends of lock-outs, terminals that have gone.
+/// Real time between two looks at the clock: idle terminals, ends of lockouts, terminals that have gone.
 const TICK: Duration = Duration::from_millis(500);
 
 /// A terminal asks to attach.

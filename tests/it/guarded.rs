@@ -39,7 +39,7 @@ use tokio::{
 
 use crate::support::{PATIENCE, folder};
 
-/// Plant seconds a second, so that nobody waits for a lock-out.
+/// Plant seconds a second, so that nobody waits for a lockout.
 const SPEED: f64 = 20.0;
 /// Everybody's.
 pub const PASSWORD: &str = "four wet horses in a tank";

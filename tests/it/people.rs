@@ -1,4 +1,4 @@
-//! People at the terminals of a station: wrong passwords by script, lock-out, idle lock, second persons, two operators at
+//! People at the terminals of a station: wrong passwords by script, lockout, idle lock, second persons, two operators at
 //! once. Alarms are seen through all of it.
 
 use std::time::Duration;
@@ -17,7 +17,7 @@ use sightglass::{
 
 use crate::guarded::{Guarded, PASSWORD, login, request, until};
 
-/// Wrong tries that lock out.
+/// Wrong attempts that lock out.
 const TRIES: u16 = 3;
 /// For how long, plant time.
 const LOCK_OUT: Duration = Duration::from_secs(100);
@@ -27,7 +27,7 @@ const WRONG: &str = "wrong name or password";
 const NOT_CHECKED: &str = "password not checked after wrong ones";
 
 fn strict(def: &mut PlantDef) {
-    (def.access.tries_max, def.access.lock_out) = (TRIES, LOCK_OUT);
+    (def.access.login_attempts_max, def.access.lockout) = (TRIES, LOCK_OUT);
 }
 
 fn wait(seconds: u64) -> String {
@@ -62,7 +62,7 @@ async fn a_script_with_wrong_passwords_waits_longer_each_time_is_locked_out_as_c
         waited(&guarded, told).await;
     }
     assert_eq!(login(&script, "tom", "wrong").await, Err(wait(LOCK_OUT.as_secs())));
-    let locked = guarded.written(written, "the lock-out", |entry| &*entry.action == "lock-out").await;
+    let locked = guarded.written(written, "the lockout", |entry| &*entry.action == "lockout").await;
     assert_eq!((&*locked.target, &*locked.outcome), ("tom", "done: for 100 s, system user eve"));
 
     // For another user of the system nothing is shut, and for this one no other name is.
@@ -111,13 +111,13 @@ async fn an_unknown_name_a_wrong_password_and_a_disabled_user_are_told_the_same(
     let guarded = Guarded::start(strict).await;
     let sue = guarded.person("sue").await;
     sue.request(SessionRequest::Disable { user: "vera".into(), disabled: true }).await.unwrap();
-    let tries = [
+    let attempts = [
         ("nobody-of-this-name", PASSWORD, "unknown user", "unknown user"),
         ("tom", "wrong", "tom", "wrong password"),
         ("vera", PASSWORD, "vera", "disabled"),
         ("not a name\u{1b}[2J", "", "unknown user", "unknown user"),
     ];
-    for (number, (user, password, target, why)) in tries.into_iter().enumerate() {
+    for (number, (user, password, target, why)) in attempts.into_iter().enumerate() {
         let written = guarded.entries().len();
         let script = guarded.far(&format!("user{number}"));
         assert_eq!(login(&script, user, password).await, Err(wait(1)), "{user}");

@@ -305,16 +305,16 @@ impl AccessControl {
             Change::Disable(_, true) => out("done: was disabled", None),
             Change::Delete(_) => {
                 let effects = out("done: was deleted", None);
-                self.tries.pardon(&user::key(&name));
+                self.attempts.clear(&user::key(&name));
                 effects
             }
             Change::Disable(_, false) => {
-                self.tries.pardon(&user::key(&name));
+                self.attempts.clear(&user::key(&name));
                 Vec::new()
             }
             Change::Password { must_change: true, .. } => {
                 let effects = out("done: has another password now", None);
-                self.tries.pardon(&user::key(&name));
+                self.attempts.clear(&user::key(&name));
                 effects
             }
             Change::Password { must_change: false, .. } => {

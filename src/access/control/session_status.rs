@@ -47,7 +47,10 @@ impl AccessControl {
             user: user.name.clone(),
             role: user.role,
             disabled: user.disabled,
-            locked_until: self.tries.locked_until(&user::key(&user.name), &self.def.access, at).map(|at| self.utc(at)),
+            locked_until: self
+                .attempts
+                .locked_until(&user::key(&user.name), &self.def.access, at)
+                .map(|at| self.utc(at)),
             must_change: user.must_change,
             last_login: user.last_login,
         });

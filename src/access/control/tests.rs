@@ -1,11 +1,11 @@
-//! What somebody at a terminal sees of access control: logins, lock-outs, locks, roles, signatures, in plain time.
+//! What somebody at a terminal sees of access control: logins, lockouts, locks, roles, signatures, in plain time.
 #![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    access::{Signature, tries::Key, user::Change},
+    access::{Signature, lockout::Key, user::Change},
     plant::{
         command::{CommandId, CommandKind},
         def::Sign,
@@ -194,7 +194,7 @@ fn five_wrong_passwords_lock_the_name_out_for_that_system_user_and_who_is_in_sta
 
 #[test]
 fn a_supervisor_ends_a_lock_out() {
-    let mut bench = Bench::new(AccessDef { tries_max: 1, ..AccessDef::default() });
+    let mut bench = Bench::new(AccessDef { login_attempts_max: 1, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
     bench.open(2, "10.0.0.2");
     bench.open(3, "10.0.0.3");
@@ -470,7 +470,7 @@ fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
 
 #[test]
 fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
-    let mut bench = Bench::new(AccessDef { tries_max: 2, ..AccessDef::default() });
+    let mut bench = Bench::new(AccessDef { login_attempts_max: 2, ..AccessDef::default() });
     for terminal in 1..=2 {
         bench.open(terminal, "evil");
         let request = SessionRequest::Login { user: "tech".into(), password: "guess".into() };
@@ -504,9 +504,9 @@ mod room;
 proptest! {
     #[test]
     fn nobody_comes_in_while_he_is_locked_out(
-        steps in prop::collection::vec((0u32..4, any::<bool>(), 0i64..60), 1..80), tries_max in 1u16..4
+        steps in prop::collection::vec((0u32..4, any::<bool>(), 0i64..60), 1..80), login_attempts_max in 1u16..4
     ) {
-        let mut bench = Bench::new(AccessDef { tries_max, ..AccessDef::default() });
+        let mut bench = Bench::new(AccessDef { login_attempts_max, ..AccessDef::default() });
         for terminal in 0..4 {
             bench.open(terminal, &format!("10.0.0.{terminal}"));
         }
@@ -518,14 +518,14 @@ proptest! {
                 (wrong, locked_at) = (0, None);
             }
             let key = Key { origin: "panel".into(), account: Some("tech".to_owned()), never_locked: false };
-            let looked_at = bench.access.tries.wait(&key, &bench.access.def.access, bench.now).is_none();
+            let looked_at = bench.access.attempts.wait(&key, &bench.access.def.access, bench.now).is_none();
             let came_in = bench.login(terminal, "tech", if right { TECH } else { "guess" }).is_ok();
             prop_assert_eq!(came_in, right && looked_at && locked_at.is_none());
             if came_in {
                 wrong = 0;
             } else if looked_at && locked_at.is_none() {
                 wrong += 1;
-                if wrong == tries_max {
+                if wrong == login_attempts_max {
                     locked_at = Some(bench.now);
                 }
             }

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{AccessControl, Effect, people::Hashing};
-use crate::access::{CommandRequest, Secret, password, tries::Key, user};
+use crate::access::{CommandRequest, Secret, lockout::Key, password, user};
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
 pub(super) const JOBS_MAX: usize = 64;
@@ -114,7 +114,7 @@ impl AccessControl {
             never_locked: self.is_host(&session.peer),
         };
         let errand = self.errand(terminal, key, what)?;
-        if let Some(wait) = self.tries.wait(&errand.key, &self.def.access, at)
+        if let Some(wait) = self.attempts.wait(&errand.key, &self.def.access, at)
             && !errand.key.never_locked
         {
             return Err(not_checked(wait));
@@ -161,7 +161,7 @@ impl AccessControl {
         let mut effects = Vec::new();
         for (errand, password) in std::mem::take(&mut self.waiting) {
             let busy = self.errands.values().any(|other| other.key.origin == errand.key.origin);
-            match self.tries.wait(&errand.key, &self.def.access, at) {
+            match self.attempts.wait(&errand.key, &self.def.access, at) {
                 _ if !self.sessions.contains_key(&errand.terminal) => {}
                 None if !busy => {
                     let hash = self.stored(&errand.what).unwrap_or_else(|| password::DUMMY.into());
@@ -221,7 +221,7 @@ impl AccessControl {
             // Right when it was checked: it does not count as a wrong attempt.
             None if stale => Some(Wrong { why: "changed meanwhile", told: CHANGED.to_owned() }),
             None => {
-                self.tries.right(&key);
+                self.attempts.on_success(&key);
                 None
             }
             Some(why) => {
@@ -251,20 +251,20 @@ impl AccessControl {
     }
 
     fn count_wrong(&mut self, terminal: u32, key: &Key, user: Option<Arc<str>>, at: Timestamp) -> Vec<Effect> {
-        let locked = self.tries.wrong(key, &self.def.access, at);
-        let (seconds, origin) = (self.def.access.lock_out.as_secs(), &key.origin);
+        let locked = self.attempts.on_failure(key, &self.def.access, at);
+        let (seconds, origin) = (self.def.access.lockout.as_secs(), &key.origin);
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
             let outcome = format!("done: for {seconds} s, system user {origin}");
-            effects.push(super::audit_entries::audit(session, "lock-out", &user, &outcome, at));
+            effects.push(super::audit_entries::audit(session, "lockout", &user, &outcome, at));
             self.publish_status(terminal, &mut effects);
         }
         if locked.origin {
             let outcome = format!("done: for up to {seconds} s");
             effects.push(super::audit_entries::audit(
                 session,
-                "lock-out",
+                "lockout",
                 &format!("system user {origin}"),
                 &outcome,
                 at,
@@ -285,7 +285,7 @@ impl AccessControl {
 
     /// The reply to a wrong attempt: the same whatever was wrong, and how long the next one must wait.
     fn wrong(&self, key: &Key, at: Timestamp) -> String {
-        match self.tries.wait(key, &self.def.access, at) {
+        match self.attempts.wait(key, &self.def.access, at) {
             Some(wait) => format!("{WRONG}; wait {} s", wait.as_secs_f64().ceil()),
             None => WRONG.to_owned(),
         }
@@ -307,8 +307,8 @@ impl What {
         }
     }
 
-    /// Does somebody who is not in yet want to be? Whoever is in already has tries of his own: others at the same place
-    /// must not keep him from his work.
+    /// Does somebody who is not in yet want to be? A logged-in user has attempts of their own, so that others at
+    /// the same place cannot block them.
     fn comes_from_outside(&self) -> bool {
         match self {
             What::Login { .. } => true,

@@ -310,7 +310,7 @@ impl UserForm {
                 let words = format!("{user} is logged out everywhere and cannot log in until this is taken back.");
                 you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
-            Purpose::Disable(user, false) => vec![format!("{user} may log in again; a lock-out ends too.")],
+            Purpose::Disable(user, false) => vec![format!("{user} may log in again; a lockout ends too.")],
             Purpose::Delete(user) => {
                 let words =
                     format!("{user} is removed; all that {user} did stays in the books. Type the name to be sure.");

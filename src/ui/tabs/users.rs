@@ -47,7 +47,7 @@ pub const LIST: &[Key<Action>] = &[
     Key {
         chord: char('d'),
         label: "disable",
-        help: "shut the selected user out, or let in again; ends a lock-out too",
+        help: "shut the selected user out, or let in again; ends a lockout too",
         action: Action::Disable,
     },
     Key {

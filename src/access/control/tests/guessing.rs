@@ -47,7 +47,7 @@ fn wrong_passwords_of_one_system_user_lock_no_other_out() {
 #[test]
 fn root_and_the_stations_own_user_are_delayed_and_never_locked_out() {
     for user in ["root", "sight"] {
-        let mut bench = Bench::new(AccessDef { tries_max: 2, ..AccessDef::default() });
+        let mut bench = Bench::new(AccessDef { login_attempts_max: 2, ..AccessDef::default() });
         bench.open_as(1, user);
         for _ in 0..60 {
             bench.login(1, "boss", "guess").unwrap_err();
@@ -57,7 +57,7 @@ fn root_and_the_stations_own_user_are_delayed_and_never_locked_out() {
         assert_eq!(bench.answer(1, 7_000, "boss", BOSS), None, "it waits for its turn");
         assert_eq!(answer_in(&bench.later(15), 7_000), None);
         assert_eq!(answer_in(&bench.later(1), 7_000), Some(Ok(())), "{user}");
-        assert!(bench.records.iter().all(|record| !record.0.ends_with("lock-out")));
+        assert!(bench.records.iter().all(|record| !record.0.ends_with("lockout")));
     }
 }
 
@@ -105,7 +105,7 @@ fn one_system_user_who_guesses_at_all_names_is_stopped() {
         bench.later(1);
     }
     assert_eq!(looked_at, 40);
-    let locked = bench.records.iter().filter(|record| record.0.ends_with("lock-out"));
+    let locked = bench.records.iter().filter(|record| record.0.ends_with("lockout"));
     assert_eq!(locked.map(|record| &*record.1).collect::<Vec<_>>(), ["system user eve"]);
     bench.open_as(2, "panel");
     bench.login(2, "boss", BOSS).unwrap();
@@ -116,7 +116,7 @@ fn one_system_user_who_guesses_at_all_names_is_stopped() {
 #[test]
 fn an_unknown_name_is_delayed_and_locked_like_a_known_one() {
     let replies = ["tech", "nobody"].map(|name| {
-        let mut bench = Bench::new(AccessDef { tries_max: 3, ..AccessDef::default() });
+        let mut bench = Bench::new(AccessDef { login_attempts_max: 3, ..AccessDef::default() });
         bench.open_as(1, "eve");
         let mut replies = Vec::new();
         for _ in 0..10 {

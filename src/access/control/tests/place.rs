@@ -24,7 +24,7 @@ fn wrong_names_at_a_place_do_not_keep_those_who_are_in_from_their_work() {
 
 #[test]
 fn who_guesses_at_a_locked_terminal_waits_as_long_as_anywhere_else() {
-    let mut bench = Bench::new(AccessDef { tries_max: 3, ..AccessDef::default() });
+    let mut bench = Bench::new(AccessDef { login_attempts_max: 3, ..AccessDef::default() });
     bench.open(1, "10.0.0.5");
     bench.open(2, "10.0.0.5");
     bench.login(1, "tech", TECH).unwrap();
