@@ -307,7 +307,7 @@ impl AccessControl {
             // Locked or not: the snapshot stays, and so does what lies behind it.
             Some(who) if who.must_change => Err(CHANGE_FIRST.to_owned()),
             Some(_) => Ok(()),
-            None if self.def.access.view => Ok(()),
+            None if self.def.access.anonymous_view => Ok(()),
             None => Err(LOG_IN_FIRST.to_owned()),
         }
     }

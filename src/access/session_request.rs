@@ -178,7 +178,7 @@ pub struct SessionStatus {
     /// There are no users yet: the first Supervisor is asked for.
     pub first: bool,
     /// Shown before a login.
-    pub notice: Option<Arc<str>>,
+    pub banner: Option<Arc<str>>,
     /// Fewest characters of a password.
     pub password_chars_min: u16,
     /// After so long without a key the terminal is locked; `None` for never.

@@ -46,9 +46,9 @@ pub enum Sign {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AccessDef {
     /// Shown before anybody logs in (IEC 62443-4-2 CR 1.12).
-    pub notice: Option<String>,
+    pub banner: Option<String>,
     /// The process may be seen without logging in; alarms always can.
-    pub view: bool,
+    pub anonymous_view: bool,
     /// Fewest characters of a password (NIST SP 800-63B rev 4: 15 where it stands alone).
     pub password_chars_min: u16,
     /// Failed logins in a row that lock an account out.
@@ -66,8 +66,8 @@ pub struct AccessDef {
 impl Default for AccessDef {
     fn default() -> AccessDef {
         AccessDef {
-            notice: None,
-            view: false,
+            banner: None,
+            anonymous_view: false,
             password_chars_min: 15,
             login_attempts_max: 5,
             lockout: Duration::from_secs(300),

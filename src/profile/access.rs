@@ -31,8 +31,8 @@ pub(super) fn access(table: Option<&AccessTable>, problems: &mut Problems) -> Ac
         }
     }
     AccessDef {
-        notice: table.notice.as_ref().map(|notice| notice.value.clone()),
-        view: table.view.map_or(usual.view, |view| view.value),
+        banner: table.banner.as_ref().map(|banner| banner.value.clone()),
+        anonymous_view: table.anonymous_view.map_or(usual.anonymous_view, |view| view.value),
         password_chars_min: chars,
         login_attempts_max: within(
             table.login_attempts_max,

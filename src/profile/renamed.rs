@@ -6,6 +6,8 @@ use super::{diagnostic::Problem, reader::Raw};
 const RENAMED: &[(&str, &str, &str)] = &[
     ("access", "tries_max", "login_attempts_max"),
     ("access", "lock_out", "lockout"),
+    ("access", "view", "anonymous_view"),
+    ("access", "notice", "banner"),
     ("a fault", "SV-1 stuck shut", "SV-1 stuck closed"),
     ("a fault", "SV-2 stuck shut", "SV-2 stuck closed"),
     ("the scenario", "about", "description"),

@@ -428,8 +428,8 @@ table!(
 table!(
     /// The rules for logging in.
     AccessTable, "access" {
-        opt "notice" notice: String,
-        opt "view" view: bool,
+        opt "banner" banner: String,
+        opt "anonymous_view" anonymous_view: bool,
         opt "password_chars_min" password_chars_min: u16,
         opt "login_attempts_max" login_attempts_max: u16,
         opt "lockout" lockout: Duration,

@@ -81,7 +81,7 @@ impl Stand {
                 tokio::select! {
                     Some(request) = attach_requests.recv() => {
                         let view = *may.borrow();
-                        request.status.send_replace(Arc::new(SessionStatus { view, notice: Some(request.peer.from), ..SessionStatus::default() }));
+                        request.status.send_replace(Arc::new(SessionStatus { view, banner: Some(request.peer.from), ..SessionStatus::default() }));
                         terminals.push(request.status);
                     }
                     Some((_, request)) = requests.recv() => {
@@ -209,7 +209,7 @@ async fn a_terminal_sees_the_plant_and_sends_commands() {
     stand.set(1.0);
     let mut session = stand.session().await;
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "at once");
-    let from = session.status.borrow().notice.clone().unwrap();
+    let from = session.status.borrow().banner.clone().unwrap();
     assert!(from.contains(&format!("process {}", std::process::id())), "{from}");
     for value in [2.0, 3.0, 4.0] {
         stand.set(value);

@@ -17,9 +17,9 @@ impl AccessControl {
     /// The status of the session of a terminal.
     pub fn session_status(&self, terminal: u32, at: Timestamp) -> SessionStatus {
         let rules = &self.def.access;
-        let notice = rules.notice.as_deref().map(Arc::from);
+        let banner = rules.banner.as_deref().map(Arc::from);
         let Some(session) = self.sessions.get(&terminal) else {
-            return SessionStatus { notice, ..SessionStatus::default() };
+            return SessionStatus { banner, ..SessionStatus::default() };
         };
         let supervisor = session.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
         let idle_lock = self.idle_lock(session);
@@ -27,11 +27,11 @@ impl AccessControl {
         SessionStatus {
             who: session.who.clone(),
             locked: session.locked,
-            view: rules.view || session.who.is_some(),
+            view: rules.anonymous_view || session.who.is_some(),
             first: self.closed.is_none()
                 && self.people.as_ref().is_some_and(Users::is_empty)
                 && self.is_host(&session.peer),
-            notice,
+            banner,
             password_chars_min: rules.password_chars_min,
             idle_lock,
             locks_in: left.filter(|left| *left <= LOCK_NEAR && session.acting().is_some()),

@@ -171,7 +171,7 @@ fn wrong_user_wrong_password_and_locked_out_look_the_same_and_the_book_knows_whi
 
 #[test]
 fn five_wrong_passwords_lock_the_name_out_for_that_system_user_and_who_is_in_stays_in() {
-    let mut bench = Bench::new(AccessDef { view: true, ..AccessDef::default() });
+    let mut bench = Bench::new(AccessDef { anonymous_view: true, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
     bench.open(2, "10.0.0.2");
     bench.open(3, "10.0.0.3");
@@ -233,7 +233,7 @@ fn refused_commands_reach_the_plant_as_refused() {
 fn without_a_login_the_history_is_answered_only_where_the_plant_may_be_seen() {
     let query = Query::Journal { from: Timestamp::MIN, to: Timestamp::MAX, limit: 1 };
     for view in [false, true] {
-        let mut bench = Bench::new(AccessDef { view, ..AccessDef::default() });
+        let mut bench = Bench::new(AccessDef { anonymous_view: view, ..AccessDef::default() });
         bench.open(1, "here");
         assert_eq!(bench.access.may_ask(1, &query, bench.now).is_ok(), view);
         bench.login(1, "view", VIEW).unwrap();

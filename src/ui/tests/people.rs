@@ -29,8 +29,8 @@ use crate::{
 
 /// Nobody is in, and nothing may be seen but alarms.
 fn closed() -> SessionStatus {
-    let notice = "This is the control of the water tank. Only for those who work here; all that is done is recorded.";
-    SessionStatus { who: None, view: false, notice: Some(notice.into()), ..(*fixture::session()).clone() }
+    let banner = "This is the control of the water tank. Only for those who work here; all that is done is recorded.";
+    SessionStatus { who: None, view: false, banner: Some(banner.into()), ..(*fixture::session()).clone() }
 }
 
 fn person(user: &str, role: Role) -> SessionStatus {

@@ -1,4 +1,4 @@
-//! The view of the login page: the notice, the form or who is in, and the most urgent alarms, which never hide.
+//! The view of the login page: the banner, the form or who is in, and the most urgent alarms, which never hide.
 
 use ratatui::{Frame, layout::Rect};
 
@@ -25,7 +25,7 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
     let above = height.saturating_sub(least);
     let mut part = canvas.part(3, u16::from(least > 2), room, above);
     let form = login.form.as_ref().map_or(0, |form| form.height(cx, room) + 4);
-    let mut y = notice(cx, &mut part, above.saturating_sub(form));
+    let mut y = banner(cx, &mut part, above.saturating_sub(form));
     y = match &login.form {
         Some(form) => {
             part.text(0, y, &heading(cx, &form.title()), cx.theme.strong());
@@ -56,10 +56,10 @@ fn heading(cx: &ViewContext, title: &str) -> String {
 }
 
 /// What must be read before a login, in so many rows at the most; returns the row after it.
-fn notice(cx: &ViewContext, canvas: &mut Canvas, most: u16) -> u16 {
-    let Some(notice) = cx.session.notice.as_ref().filter(|_| cx.session.who.is_none()) else { return 0 };
+fn banner(cx: &ViewContext, canvas: &mut Canvas, most: u16) -> u16 {
+    let Some(banner) = cx.session.banner.as_ref().filter(|_| cx.session.who.is_none()) else { return 0 };
     let most = usize::from(most.max(1));
-    let mut lines: Vec<String> = notice.lines().flat_map(|line| wrap(line, canvas.width())).collect();
+    let mut lines: Vec<String> = banner.lines().flat_map(|line| wrap(line, canvas.width())).collect();
     if lines.len() > most {
         lines.truncate(most);
         // That it goes on must be seen; a larger screen shows it.
