@@ -2,7 +2,7 @@
 
 mod login;
 mod audit_entries;
-mod people;
+mod user_admin;
 mod session_limit;
 mod session;
 pub mod sign;
@@ -21,8 +21,8 @@ use jiff::{SignedDuration, Timestamp};
 
 use self::{
     audit_entries::{actor_name, audit, clean, record, words},
-    people::Saving,
     session::{Refusals, SessionState},
+    user_admin::Saving,
     work::Errand,
 };
 use super::{
@@ -74,7 +74,7 @@ pub enum Effect {
     SessionStatus(u32),
     /// Do this beside, and tell [`AccessControl::done`]. At most `JOBS_MAX` are under way or wait.
     Work(Job, Work),
-    /// Write the people down, and tell [`AccessControl::saved`]. Never two at a time.
+    /// Save the users, then call [`AccessControl::saved`]. Never two at a time.
     Save(Users),
     /// End the station.
     Stop,
@@ -84,7 +84,7 @@ pub enum Effect {
     HangUp(u32, String),
 }
 
-/// All that is known of people.
+/// The state of users, sessions and pending requests.
 #[derive(Debug)]
 pub struct AccessControl {
     def: Arc<PlantDef>,
@@ -92,8 +92,8 @@ pub struct AccessControl {
     run: u64,
     /// What its times lack of UTC.
     behind_utc: SignedDuration,
-    /// `None` where nobody is asked who he is: in a demonstration.
-    people: Option<Users>,
+    /// `None` where login is not required: in a demonstration.
+    users: Option<Users>,
     /// Why login is closed: the users file could not be read.
     closed: Option<Arc<str>>,
     /// The user of the operating system that the station runs as.
@@ -120,7 +120,7 @@ impl AccessControl {
             def,
             run: 0,
             behind_utc: SignedDuration::ZERO,
-            people: None,
+            users: None,
             closed: None,
             host,
             sessions: BTreeMap::new(),
@@ -136,15 +136,15 @@ impl AccessControl {
     }
 
     /// Access control with these users. `host` is the user of the operating system that the station runs as.
-    pub fn with_people(def: Arc<PlantDef>, people: Users, host: Option<Arc<str>>) -> AccessControl {
-        AccessControl { people: Some(people), ..AccessControl::new(def, host) }
+    pub fn with_users(def: Arc<PlantDef>, users: Users, host: Option<Arc<str>>) -> AccessControl {
+        AccessControl { users: Some(users), ..AccessControl::new(def, host) }
     }
 
     /// Login is closed because the users file is damaged; `why` is the reply to each attempt.
     pub fn closed(def: Arc<PlantDef>, why: &str, host: Option<Arc<str>>) -> AccessControl {
         AccessControl {
             closed: Some(format!("login is closed: {why}").into()),
-            ..AccessControl::with_people(def, Users::default(), host)
+            ..AccessControl::with_users(def, Users::default(), host)
         }
     }
 
@@ -154,8 +154,8 @@ impl AccessControl {
     }
 
     /// The [`Users::digest`] of its users; `None` in a demonstration, or while login is closed.
-    pub fn people_digest(&self) -> Option<String> {
-        self.people.as_ref().filter(|_| self.closed.is_none()).map(Users::digest)
+    pub fn users_digest(&self) -> Option<String> {
+        self.users.as_ref().filter(|_| self.closed.is_none()).map(Users::digest)
     }
 
     /// Why login is closed, if it is.
@@ -181,7 +181,7 @@ impl AccessControl {
             effects.push(audit(&session, "attach", "", "done", at));
         }
         if let Some(who) = &session.who
-            && self.people.is_some()
+            && self.users.is_some()
         {
             effects.push(audit(&session, "login", &who.user, "done: known to the operating system", at));
         }
@@ -193,7 +193,7 @@ impl AccessControl {
     /// Who is known without a password.
     fn known(&self, peer: &Peer) -> Option<Who> {
         let user = peer.unix_user.clone();
-        let role = match (&self.people, &user) {
+        let role = match (&self.users, &user) {
             (None, _) if self.is_host(peer) => Some(Role::Supervisor),
             (_, Some(name)) => {
                 self.def.access.trusted.iter().find(|(trusted, _)| trusted.as_str() == &**name).map(|(_, role)| *role)

@@ -17,8 +17,8 @@ pub enum Right {
     Export,
     /// Change how a line works, or send bytes to it that may do anything.
     Engineer,
-    /// Say who may what.
-    People,
+    /// Add, change and remove users.
+    ManageUsers,
     /// End the station, or give it another plant file.
     Station,
 }
@@ -26,14 +26,14 @@ pub enum Right {
 impl Right {
     /// Every right.
     pub const ALL: [Right; 6] =
-        [Right::Look, Right::Operate, Right::Export, Right::Engineer, Right::People, Right::Station];
+        [Right::Look, Right::Operate, Right::Export, Right::Engineer, Right::ManageUsers, Right::Station];
 
     /// The least role that has it.
     pub fn role(self) -> Role {
         match self {
             Right::Look => Role::Viewer,
             Right::Operate | Right::Export => Role::Technician,
-            Right::Engineer | Right::People | Right::Station => Role::Supervisor,
+            Right::Engineer | Right::ManageUsers | Right::Station => Role::Supervisor,
         }
     }
 }
@@ -94,7 +94,7 @@ pub fn needs_for_question(query: &Query) -> Role {
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
         | Query::Report { .. } => Right::Look,
-        Query::Audit { .. } => Right::People,
+        Query::Audit { .. } => Right::ManageUsers,
     };
     right.role()
 }
@@ -113,7 +113,7 @@ pub fn needs_for_request(request: &SessionRequest) -> Option<Role> {
         | SessionRequest::SetRole { .. }
         | SessionRequest::Disable { .. }
         | SessionRequest::DeleteUser { .. }
-        | SessionRequest::ResetPassword { .. } => Right::People,
+        | SessionRequest::ResetPassword { .. } => Right::ManageUsers,
         SessionRequest::Exported { .. } => Right::Export,
         SessionRequest::Stop | SessionRequest::Reload => Right::Station,
     };

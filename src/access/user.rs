@@ -1,4 +1,4 @@
-//! The people of a plant: who there is, what they may, and how that may change. At least one Supervisor always remains.
+//! The users of a plant, their roles, and permitted changes. At least one Supervisor always remains.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use super::{book::sha256, password::one_form};
 use crate::plant::role::Role;
 
-/// Most people of a plant.
+/// Most users of a plant.
 pub const USERS_MAX: usize = 200;
 /// Most characters of a name.
 pub const NAME_MAX: usize = 32;
@@ -95,7 +95,7 @@ impl Users {
         sha256(self.iter().map(row).collect::<String>().as_bytes())
     }
 
-    /// These people. `Err` says what is wrong with which of them, by its place.
+    /// These users. `Err` says what is wrong with which of them, by its place.
     pub fn new(list: Vec<User>) -> Result<Users, (usize, String)> {
         let mut users = Users::default();
         for (place, user) in list.into_iter().enumerate() {

@@ -88,7 +88,7 @@ pub enum CommandKind {
     Restore(Box<RestoreRequest>),
     /// Stop the restore of a device after the write under way.
     StopRestore(DeviceId),
-    /// Hand the plant over to the next shift; what its people should know is the note of the command.
+    /// Hand the plant over to the next shift; the note of the command tells it what to know.
     HandOver,
     /// Take the plant over from the shift before.
     TakeOver,

@@ -1,4 +1,4 @@
-//! Who may do what, as the plant file says it: the levels of people, and the rules for logging in.
+//! Roles, and the rules for logging in of the plant file.
 
 use std::time::Duration;
 

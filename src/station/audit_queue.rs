@@ -123,14 +123,14 @@ impl AuditQueue {
         let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
         let start = ActionRecord { new: Some(version.into()), ..own(at, "start station", plant, "done") };
         let changed = file.and_then(|file| self.plant_file(file, at));
-        let people =
+        let users_file =
             users.map(Arc::from).filter(|users| self.users_file.as_ref() != Some(users)).map(|users| ActionRecord {
                 old: self.users_file.take(),
                 new: Some(users),
                 ..own(at, USERS_FILE, "users", "done: found")
             });
         // Nothing else waits in this queue yet, so nothing comes back.
-        let _ = self.put([start].into_iter().chain(changed).chain(people).collect(), Vec::new());
+        let _ = self.put([start].into_iter().chain(changed).chain(users_file).collect(), Vec::new());
     }
 
     /// The record of a plant file, unless it is still the last one that was recorded.

@@ -86,12 +86,12 @@ pub fn start_observed(options: Options, observer: Option<RecordObserver>) -> Res
     begin(options, observer, None)
 }
 
-/// The same for a plant whose people are kept beside its history: everybody must log in.
+/// The same for a plant with a users file beside its history: login is required.
 pub fn start_guarded(options: Options) -> Result<Station, StartError> {
     let path = users_beside(&options.history);
     let (def, host) = (options.def.clone(), Some(own_user().into()));
     let access = match users::read(&path) {
-        Ok(people) => AccessControl::with_people(def, people, host),
+        Ok(users) => AccessControl::with_users(def, users, host),
         // Login is closed: a damaged file is not an empty one. Values and alarms go on.
         Err(error) => {
             tracing::error!(%error, "login is closed");
@@ -125,7 +125,7 @@ fn begin(
     // Without such a file, at the first start or after it was damaged, the journal has the state.
     let from_journal = recorder.alarms.steps.is_none();
     recorder.alarms.steps.iter().for_each(|steps| plant.restore(steps));
-    let users = guarded.as_ref().and_then(|(access, _)| access.people_digest());
+    let users = guarded.as_ref().and_then(|(access, _)| access.users_digest());
     if let Some(state) = guarded.as_ref().and_then(|(access, _)| users_fault(access, &recorder.opened)) {
         plant.on_fault(StationFault::UsersFile, state);
     }
@@ -144,7 +144,7 @@ fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
     let nobody = Users::default().digest();
     let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *nobody);
     let words = "the users file is missing although there were users: bring it back from a copy";
-    (had_users && access.people_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
+    (had_users && access.users_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
 }
 
 /// A station that keeps nothing, for virtual time, where no other thread may take part. Queries to the history

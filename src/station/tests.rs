@@ -1,4 +1,4 @@
-//! A whole station with people: from the first supervisor to the last line of the book.
+//! A whole station with users: from the first Supervisor to the last line of the audit log.
 #![allow(clippy::unwrap_used)]
 
 use std::{path::Path, sync::Arc};

@@ -48,10 +48,10 @@ impl Toil {
     }
 
     /// Writes the users down. Access control never requests it while it is being done.
-    pub fn save(&mut self, people: Users) {
+    pub fn save(&mut self, list: Users) {
         let path = self.path.clone();
         self.saving = Some(tokio::task::spawn_blocking(move || match path {
-            Some(path) => users::write(&path, &people),
+            Some(path) => users::write(&path, &list),
             None => Err("this station keeps no users".to_owned()),
         }));
     }

@@ -1,7 +1,7 @@
 //! Tests of the whole terminal: what an operator sees, and what the keys do; here is what they share.
 
 mod keys;
-mod people;
+mod users;
 mod screens;
 mod windows;
 

@@ -1,4 +1,4 @@
-//! A station of this very process whose people must log in, with its socket, its book, and a tap on the line behind it.
+//! A station in this process whose users must log in, with its socket, its book, and a tap on the line behind it.
 
 use std::{
     path::PathBuf,
@@ -44,7 +44,7 @@ const SPEED: f64 = 20.0;
 /// Everybody's.
 pub const PASSWORD: &str = "four wet horses in a tank";
 
-/// A station with people: `vera` looks, `tom` and `tina` are Technicians, `sue` and `lena` Supervisors, and `mia` is a
+/// A station with users: `vera` looks, `tom` and `tina` are Technicians, `sue` and `lena` Supervisors, and `mia` is a
 /// Supervisor who must choose a password of her own first.
 pub struct Guarded {
     pub def: Arc<PlantDef>,
@@ -176,7 +176,7 @@ impl Guarded {
 fn everybody() -> Users {
     let salt = [7; SALT_BYTES];
     let hash: Arc<str> = hash(PASSWORD, salt).unwrap().into();
-    let people = [
+    let rows = [
         ("vera", Role::Viewer, false),
         ("tom", Role::Technician, false),
         ("tina", Role::Technician, false),
@@ -184,7 +184,7 @@ fn everybody() -> Users {
         ("lena", Role::Supervisor, false),
         ("mia", Role::Supervisor, true),
     ];
-    let people = people.map(|(name, role, must_change)| User {
+    let rows = rows.map(|(name, role, must_change)| User {
         name: name.into(),
         role,
         hash: hash.clone(),
@@ -192,7 +192,7 @@ fn everybody() -> Users {
         must_change,
         last_login: None,
     });
-    Users::new(people.into()).unwrap()
+    Users::new(rows.into()).unwrap()
 }
 
 pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), String> {

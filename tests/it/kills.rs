@@ -139,18 +139,18 @@ impl Place {
         let (port, slow) = (listener.local_addr().unwrap().to_string(), Arc::default());
         tokio::spawn(pass_on(listener, devices, Arc::clone(&slow)));
         let hash: Arc<str> = sightglass::access::password::hash(PASSWORD, [3; 16]).unwrap().into();
-        let mut people = Users::default();
+        let mut all = Users::default();
         for (user, change) in [
             ("sue", Change::First { user: "sue".into(), hash: hash.clone() }),
             ("tom", Change::Add { user: "tom".into(), role: Role::Technician, hash: hash.clone() }),
         ] {
-            people = people.with(&change).unwrap();
+            all = all.with(&change).unwrap();
             let (user, hash, must_change) = (user.into(), hash.clone(), false);
-            people = people.with(&Change::Password { user, hash, must_change }).unwrap();
+            all = all.with(&Change::Password { user, hash, must_change }).unwrap();
         }
         let text = profile::text_of("tank", &Search::shipped()).unwrap();
         std::fs::write(folder.path().join("tank.toml"), text + ALARM_TOML).unwrap();
-        users::write(&users_beside(&folder.path().join("tank.duckdb")), &people).unwrap();
+        users::write(&users_beside(&folder.path().join("tank.duckdb")), &all).unwrap();
         let key = sealing::make(&book::beside(&folder.path().join("tank.duckdb")), jiff::Timestamp::UNIX_EPOCH);
         Place { folder, sockets, port, slow, key: key.unwrap(), _sim: sim }
     }

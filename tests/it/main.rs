@@ -13,7 +13,7 @@
 //! | `reports` | reports and exports as a user gets them: damaged history, suppressed alarms, a running station |
 //! | `devices` | every shipped profile and plant against its simulated devices: a minute, every fault, golden frames |
 //! | `rights` | every command, request and query through the socket, by everybody who may be at a terminal |
-//! | `people` | wrong passwords, lockout, idle lock, second persons, two operators at once |
+//! | `users` | wrong passwords, lockout, idle lock, second persons, two operators at once |
 //! | `kills` | stations killed during writes, acknowledgements, logins and reports: what was reported as done is in the audit log |
 //! | `outstanding` | stations killed and started again, with a slow device: a late reply to the old one is no value |
 //! | `tampering` | the book changed by hand: what `sightglass audit verify` says |
@@ -22,7 +22,7 @@
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file; commands made before a reload |
 //! | `durability` | killed, unplugged, locked, damaged |
-//! | `guarded` | a station whose people must log in, for `rights` and `people` |
+//! | `guarded` | a station whose users must log in, for `rights` and `users` |
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
@@ -40,7 +40,7 @@ mod kills;
 mod masters;
 mod outstanding;
 mod peers;
-mod people;
+mod users;
 mod pty;
 mod reports;
 mod rights;

@@ -27,7 +27,7 @@ use tokio::sync::{mpsc, oneshot};
 use crate::guarded::{Guarded, PASSWORD, request};
 
 /// Who sits at the terminal, in the order of the columns below.
-const PEOPLE: [&str; 6] = ["nobody", "vera", "tom", "sue", "lena", "mia"];
+const USERS: [&str; 6] = ["nobody", "vera", "tom", "sue", "lena", "mia"];
 /// What each of them is told who may not; `{}` is the role that is needed.
 const WHY: [&str; 6] = [
     "log in first",
@@ -154,8 +154,8 @@ async fn sits(guarded: &Guarded, person: usize) -> Session {
     if person == 0 {
         return guarded.nobody().await;
     }
-    let session = guarded.person(PEOPLE[person]).await;
-    if PEOPLE[person] == "lena" {
+    let session = guarded.person(USERS[person]).await;
+    if USERS[person] == "lena" {
         session.request(SessionRequest::Lock).await.unwrap();
     }
     session
@@ -167,7 +167,7 @@ fn is_permitted(status: &CommandStatus) -> bool {
 
 /// Is it this person, as the book has it? Of nobody it tells the user of the operating system.
 fn is_by(line: &Entry, person: usize) -> bool {
-    if person == 0 { line.who.starts_with("not logged in (") } else { &*line.who == PEOPLE[person] }
+    if person == 0 { line.who.starts_with("not logged in (") } else { &*line.who == USERS[person] }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -183,7 +183,7 @@ async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_r
         let session = sits(&guarded, person).await;
         for (number, kind) in (1..).zip(commands(&guarded.def, person)) {
             let row = of_command(&kind);
-            let said = format!("{kind:?} by {}", PEOPLE[person]);
+            let said = format!("{kind:?} by {}", USERS[person]);
             // So slow that each refusal is on record by itself.
             guarded.pass(Duration::from_secs(2)).await;
             let written = guarded.entries().len();
@@ -287,11 +287,11 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
     });
     for request in requests() {
         let (action, answers) = of_request(&request);
-        for person in 0..PEOPLE.len() {
+        for person in 0..USERS.len() {
             let session = sits(&guarded, person).await;
             guarded.pass(Duration::from_secs(8)).await;
             let written = guarded.entries().len();
-            let said = format!("{request:?} by {}", PEOPLE[person]);
+            let said = format!("{request:?} by {}", USERS[person]);
             let answer = session.request(request.clone()).await.map(drop);
             match (&answer, answers[person]) {
                 (Ok(()), DONE) => {}
@@ -364,7 +364,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
 async fn every_question_is_answered_or_refused_as_the_table_says_and_who_asks_for_the_audit_trail_is_on_record() {
     let guarded = Guarded::start(|_| {}).await;
     let at = guarded.truth.borrow().at;
-    for (person, name) in PEOPLE.into_iter().enumerate() {
+    for (person, name) in USERS.into_iter().enumerate() {
         let session = sits(&guarded, person).await;
         for query in queries(&guarded.def, at) {
             let row = of_question(&query);

@@ -27,14 +27,14 @@ impl AccessControl {
         password: Secret,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let Some(people) = &self.people else { return reply(ticket, NOBODY_ASKED) };
+        let Some(users) = &self.users else { return reply(ticket, NOBODY_ASKED) };
         if let Some(why) = &self.closed {
             return reply(ticket, why);
         }
-        if people.is_empty() {
+        if users.is_empty() {
             return reply(ticket, "there are no users yet: whoever has started the station makes the first supervisor");
         }
-        let (name, user) = (user.to_owned(), people.get(user).map(|user| user.name.clone()));
+        let (name, user) = (user.to_owned(), users.get(user).map(|user| user.name.clone()));
         let looked_at = self.look_at(terminal, &name, password, What::Login { ticket, user }, at);
         looked_at.unwrap_or_else(|why| reply(ticket, &why))
     }
@@ -50,7 +50,7 @@ impl AccessControl {
         if let Some(wrong) = wrong {
             return self.failed(terminal, ticket, "login failed", user.as_deref(), wrong, at);
         }
-        let Some(user) = user.and_then(|user| self.people.as_ref()?.get(&user).cloned()) else { return Vec::new() };
+        let Some(user) = user.and_then(|user| self.users.as_ref()?.get(&user).cloned()) else { return Vec::new() };
         if !self.sessions.contains_key(&terminal) {
             return Vec::new();
         }
@@ -68,8 +68,8 @@ impl AccessControl {
         let utc = at.checked_add(self.behind_utc).unwrap_or(at);
         session.enter(who, at);
         let mut effects = vec![audit(session, "login", &name, "done", at)];
-        if let Some(people) = &mut self.people {
-            people.logged_in(&name, utc);
+        if let Some(users) = &mut self.users {
+            users.logged_in(&name, utc);
             self.unsaved = true;
         }
         self.publish_status(terminal, &mut effects);
@@ -106,7 +106,7 @@ impl AccessControl {
 
     /// Whoever sits there leaves; nothing where nobody does.
     pub(super) fn sent_out(&mut self, terminal: u32, outcome: &str, at: Timestamp) -> Vec<Effect> {
-        let asked = self.people.is_some();
+        let asked = self.users.is_some();
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let Some(who) = &session.who else { return Vec::new() };
         let effects = if asked { vec![audit(session, "logout", &who.user, outcome, at)] } else { Vec::new() };
@@ -160,7 +160,7 @@ impl AccessControl {
     /// After how long without a key this terminal is locked; never where there is no password to unlock it with.
     pub(super) fn idle_lock(&self, session: &SessionState) -> Option<Duration> {
         let span = self.def.access.idle_lock;
-        (!span.is_zero() && self.people.is_some() && !session.trusted).then_some(span)
+        (!span.is_zero() && self.users.is_some() && !session.trusted).then_some(span)
     }
 
     /// Locks terminals that nobody has touched for long, and tells those of which this is near.

@@ -29,7 +29,7 @@ impl AccessControl {
             locked: session.locked,
             view: rules.anonymous_view || session.who.is_some(),
             first: self.closed.is_none()
-                && self.people.as_ref().is_some_and(Users::is_empty)
+                && self.users.as_ref().is_some_and(Users::is_empty)
                 && self.is_host(&session.peer),
             banner,
             password_chars_min: rules.password_chars_min,
@@ -43,7 +43,7 @@ impl AccessControl {
     }
 
     fn user_rows(&self, at: Timestamp) -> Vec<UserRow> {
-        let rows = self.people.iter().flat_map(Users::iter).map(|user| UserRow {
+        let rows = self.users.iter().flat_map(Users::iter).map(|user| UserRow {
             user: user.name.clone(),
             role: user.role,
             disabled: user.disabled,

@@ -21,7 +21,7 @@ use crate::{
 impl AccessControl {
     /// Lets a command through whose role is enough, once it is signed as its tag asks.
     pub(super) fn signed(&mut self, terminal: u32, mut request: CommandRequest, at: Timestamp) -> Vec<Effect> {
-        let needed = needed(&self.def, &request.kind).filter(|_| self.people.is_some());
+        let needed = needed(&self.def, &request.kind).filter(|_| self.users.is_some());
         let sign = request.sign.take();
         let (Some(needed), Some(session)) = (needed, self.sessions.get(&terminal)) else {
             return self.let_through(terminal, request, None);
@@ -48,7 +48,7 @@ impl AccessControl {
             return self.not_signed(terminal, request, why.unwrap_or_default().to_owned(), at);
         };
         let name = user.as_deref().unwrap_or(&by).to_owned();
-        let signer = self.people.as_ref().and_then(|people| people.get(&name)).map(|user| user.name.clone());
+        let signer = self.users.as_ref().and_then(|users| users.get(&name)).map(|user| user.name.clone());
         let (copy, request) = (request.clone(), Box::new(request));
         match self.look_at(terminal, &name, password, What::Sign { by, signer, request }, at) {
             Ok(effects) => effects,
@@ -86,7 +86,7 @@ impl AccessControl {
             return self.refuse_command(terminal, request, Refusal::NotPermitted(why), at);
         }
         let other = signer.as_ref().filter(|signer| **signer != by);
-        let other = other.and_then(|signer| self.people.as_ref()?.get(signer));
+        let other = other.and_then(|signer| self.users.as_ref()?.get(signer));
         match other {
             Some(other) if other.must_change => {
                 let why = format!("{} must first choose a password of his own", other.name);

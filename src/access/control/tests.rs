@@ -35,14 +35,14 @@ impl Bench {
         let mut def = fixture::plant();
         def.access = rules;
         def.tags[fixture::SV.index()].sign = Some(Sign::SecondPerson);
-        let people = Users::default().with(&Change::First { user: "boss".into(), hash: BOSS.into() }).unwrap();
-        let add = |people: Users, user: &str, role, hash: &str| {
-            let people = people.with(&Change::Add { user: user.into(), role, hash: hash.into() }).unwrap();
-            people.with(&Change::Password { user: user.into(), hash: hash.into(), must_change: false }).unwrap()
+        let users = Users::default().with(&Change::First { user: "boss".into(), hash: BOSS.into() }).unwrap();
+        let add = |users: Users, user: &str, role, hash: &str| {
+            let users = users.with(&Change::Add { user: user.into(), role, hash: hash.into() }).unwrap();
+            users.with(&Change::Password { user: user.into(), hash: hash.into(), must_change: false }).unwrap()
         };
-        let people = add(people, "tech", Role::Technician, TECH);
-        let people = add(people, "view", Role::Viewer, VIEW);
-        Bench::of(AccessControl::with_people(Arc::new(def), people, Some("sight".into())))
+        let users = add(users, "tech", Role::Technician, TECH);
+        let users = add(users, "view", Role::Viewer, VIEW);
+        Bench::of(AccessControl::with_users(Arc::new(def), users, Some("sight".into())))
     }
 
     fn of(access: AccessControl) -> Bench {
@@ -284,7 +284,7 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
 #[test]
 fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station() {
     let mut bench =
-        Bench::of(AccessControl::with_people(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
+        Bench::of(AccessControl::with_users(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
     let first =
         || SessionRequest::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
     bench.open(1, "10.0.0.1");

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{AccessControl, Effect, people::Hashing};
+use super::{AccessControl, Effect, user_admin::Hashing};
 use crate::access::{CommandRequest, Secret, lockout::Key, password, user};
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
@@ -185,7 +185,7 @@ impl AccessControl {
 
     /// The stored hash of the user that this is about.
     fn stored(&self, what: &What) -> Option<Arc<str>> {
-        Some(self.people.as_ref()?.get(what.whose()?)?.hash.clone())
+        Some(self.users.as_ref()?.get(what.whose()?)?.hash.clone())
     }
 
     fn is_stale(&self, errand: &Errand) -> bool {
@@ -241,7 +241,7 @@ impl AccessControl {
 
     /// What speaks against this attempt, in words for the book; the operator is told less.
     fn why_not(&self, what: &What, right: bool) -> Option<&'static str> {
-        let user = what.whose().and_then(|user| self.people.as_ref()?.get(user));
+        let user = what.whose().and_then(|user| self.users.as_ref()?.get(user));
         match (user, right) {
             (None, _) => Some("unknown user"),
             (Some(user), _) if user.disabled => Some("disabled"),

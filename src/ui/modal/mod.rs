@@ -69,7 +69,7 @@ pub enum Modal {
     Settings(Box<Settings>),
     /// A frame, a block, a test of the bus tab.
     Bus(Box<bus::Window>),
-    /// A form about people.
+    /// A form about users.
     UserForm(Box<UserForm>),
     /// One audit entry.
     AuditEntry(Box<AuditEntryDialog>),

@@ -1,4 +1,4 @@
-//! A form about people: logging in, a password, a user. It carries a request to the station and waits for the answer.
+//! A form about users: login, password, a user. It carries a request to the station and waits for the answer.
 
 use std::sync::Arc;
 

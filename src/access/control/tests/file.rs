@@ -7,10 +7,10 @@ use crate::access::book::USERS_FILE;
 fn each_change_of_the_users_is_tied_to_the_one_before_and_a_login_changes_nothing() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "a");
-    let start = bench.access.people_digest().unwrap();
+    let start = bench.access.users_digest().unwrap();
     bench.login(1, "boss", BOSS).unwrap();
     bench.later(1);
-    assert_eq!(bench.access.people_digest().unwrap(), start);
+    assert_eq!(bench.access.users_digest().unwrap(), start);
     let mut last = start;
     for role in [Role::Technician, Role::Viewer] {
         let effects = bench.access.on_request(1, 99, SessionRequest::SetRole { user: "tech".into(), role }, bench.now);
@@ -19,7 +19,7 @@ fn each_change_of_the_users_is_tied_to_the_one_before_and_a_login_changes_nothin
             Effect::Record(record) if &*record.action == USERS_FILE => Some(record),
             _ => None,
         });
-        let now = bench.access.people_digest().unwrap();
+        let now = bench.access.users_digest().unwrap();
         let Some(file) = file else {
             assert_eq!(now, last, "nothing has changed");
             continue;

@@ -33,7 +33,7 @@ fn a_change_of_password_under_way_does_not_undo_a_reset() {
     let effects = bench.access.done(job, Outcome::Verified(true), bench.now);
     let effects = bench.work(effects);
     assert!(matches!(effects[..], [.., Effect::Reply(9_000, Err(_))]), "{effects:?}");
-    let tech = bench.access.people.as_ref().unwrap().get("tech").unwrap();
+    let tech = bench.access.users.as_ref().unwrap().get("tech").unwrap();
     assert_eq!((&*tech.hash, tech.must_change), ("fresh horse for tech", true));
 }
 
@@ -50,7 +50,7 @@ fn a_new_password_being_hashed_does_not_undo_a_reset() {
     bench.login(2, "tech", "fresh horse for tech").unwrap();
     let effects = bench.access.done(hashing, Outcome::Hashed(Ok("mine for ever and ever".to_owned())), bench.now);
     bench.work(effects);
-    let tech = bench.access.people.as_ref().unwrap().get("tech").unwrap();
+    let tech = bench.access.users.as_ref().unwrap().get("tech").unwrap();
     assert_eq!((&*tech.hash, tech.must_change), ("fresh horse for tech", true));
 }
 

@@ -1,4 +1,4 @@
-//! People at the terminals of a station: wrong passwords by script, lockout, idle lock, second persons, two operators at
+//! Users at the terminals of a station: wrong passwords by script, lockout, idle lock, second persons, two operators at
 //! once. Alarms are seen through all of it.
 
 use std::time::Duration;

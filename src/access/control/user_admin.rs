@@ -1,4 +1,4 @@
-//! Changes of who may what: checked, written down, and only then true.
+//! User administration: changes are checked, saved, and only then take effect.
 
 use std::sync::Arc;
 
@@ -47,7 +47,7 @@ impl AccessControl {
         request: SessionRequest,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if self.people.is_none() {
+        if self.users.is_none() {
             return reply(ticket, "this station keeps no users");
         }
         let (action, target) = words(&request);
@@ -115,7 +115,7 @@ impl AccessControl {
         if !self.is_host(&session.peer) {
             return Err("only whoever has started the station makes the first supervisor".to_owned());
         }
-        if self.people.as_ref().is_none_or(|people| !people.is_empty()) {
+        if self.users.as_ref().is_none_or(|users| !users.is_empty()) {
             return Err("there are users already".to_owned());
         }
         self.new_password(terminal, ticket, password, Hashing::First(user))
@@ -171,14 +171,14 @@ impl AccessControl {
     }
 
     fn check_change(&self, change: &Change) -> Result<crate::access::Users, String> {
-        let people = self.people.as_ref().ok_or("this station keeps no users")?;
+        let users = self.users.as_ref().ok_or("this station keeps no users")?;
         let name = user::key(change.user());
         if let Change::Add { .. } | Change::First { .. } = change
             && self.def.access.trusted.iter().any(|(trusted, _)| user::key(trusted) == name)
         {
             return Err(format!("{} is a user of the operating system who needs no password here", change.user()));
         }
-        people.with(change)
+        users.with(change)
     }
 
     pub(super) fn set_password(
@@ -205,7 +205,7 @@ impl AccessControl {
             | Change::Delete(_)
             | Change::Password { must_change: true, .. } => {
                 let who = session.acting().ok_or(super::LOG_IN_FIRST)?;
-                enough(who.role, right::Right::People.role())?;
+                enough(who.role, right::Right::ManageUsers.role())?;
             }
         }
         match &self.saving {
@@ -218,7 +218,7 @@ impl AccessControl {
         }
         let after = self.check_change(&change)?;
         let (action, old, new) = self.told(&change);
-        let name = self.people.as_ref().and_then(|people| people.get(change.user())).map(|user| user.name.clone());
+        let name = self.users.as_ref().and_then(|users| users.get(change.user())).map(|user| user.name.clone());
         let target = name.unwrap_or_else(|| change.user().clone());
         let record = ActionRecord { old, new, ..record(session, action, &target, "done", at) };
         self.saving = Some(Saving { terminal, request: Some((ticket, change, Box::new(record))) });
@@ -227,7 +227,7 @@ impl AccessControl {
 
     /// What a change is called on record, and what it changes from and to.
     fn told(&self, change: &Change) -> (&'static str, Option<Arc<str>>, Option<Arc<str>>) {
-        let before = self.people.as_ref().and_then(|people| people.get(change.user()));
+        let before = self.users.as_ref().and_then(|users| users.get(change.user()));
         let role = before.map(|user| user.role.word().into());
         let can = |disabled| if disabled { "disabled" } else { "enabled" };
         match change {
@@ -247,33 +247,33 @@ impl AccessControl {
     /// Writes down who has logged in when.
     pub(super) fn save_logins(&mut self) -> Option<Effect> {
         self.unsaved = false;
-        let people = self.people.clone()?;
+        let users = self.users.clone()?;
         self.saving = Some(Saving { terminal: 0, request: None });
-        Some(Effect::Save(people))
+        Some(Effect::Save(users))
     }
 
-    /// The people were written down, or not: `Err` says why.
+    /// The users were saved, or not: `Err` says why.
     pub fn saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
         let Some(Saving { terminal, request: Some((ticket, change, record)) }) = self.saving.take() else {
             return self.go_on(at);
         };
         let after = result.and_then(|()| self.check_change(&change));
-        let people = match after {
-            Ok(people) => people,
+        let users = match after {
+            Ok(users) => users,
             Err(why) => {
                 let outcome = format!("refused: {why}").into();
                 return vec![Effect::Record(ActionRecord { outcome, ..*record }), Effect::Reply(ticket, Err(why))];
             }
         };
-        let before = self.people.replace(people);
-        let digest = |people: Option<&Users>| people.map(|people| people.digest().into());
+        let before = self.users.replace(users);
+        let digest = |users: Option<&Users>| users.map(|users| users.digest().into());
         let by_station =
             ActionRecord { by: "station".into(), from: "".into(), old: None, new: None, ..(*record).clone() };
         let file = ActionRecord {
             action: USERS_FILE.into(),
             target: "users".into(),
             old: digest(before.as_ref()),
-            new: digest(self.people.as_ref()),
+            new: digest(self.users.as_ref()),
             ..by_station
         };
         let mut effects = vec![Effect::Record(*record), Effect::Record(file), Effect::Reply(ticket, Ok(()))];
