@@ -49,7 +49,7 @@ pub fn pcapng(frames: &[Frame]) -> Vec<u8> {
     file
 }
 
-/// One line a frame: time, direction, bytes, meaning, verdict. `sightglass frame` reads it back.
+/// One line a frame: time, direction, bytes, meaning, verdict. `sightglass decode` reads it back.
 pub fn text(frames: &[Frame]) -> String {
     let mut lines = String::new();
     for (index, frame) in frames.iter().enumerate() {

@@ -11,7 +11,7 @@ mod demo;
 mod drill;
 mod experiments;
 mod export;
-mod frame;
+mod decode;
 mod init;
 mod log;
 mod own_files;
@@ -23,7 +23,7 @@ mod sim;
 mod source;
 mod status;
 mod tools;
-mod unit;
+mod systemd_unit;
 
 use std::{
     io::{IsTerminal, Write},
@@ -82,8 +82,8 @@ enum Command {
     Stop(control::Args),
     /// Reloads the plant file of the running station; a file with errors changes nothing
     Reload(control::Args),
-    /// Prints the systemd unit that runs stations on a panel PC
-    Unit,
+    /// Print the systemd unit that runs stations on a panel PC
+    SystemdUnit,
     /// Runs a scenario in virtual time and judges it; without a name lists the scenarios
     Drill(drill::Args),
     /// Serves the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
@@ -100,16 +100,16 @@ enum Command {
     Export(export::Args),
     /// Shows how good the alarm system was in a shift or period: rates, floods, chattering, stale, against their targets
     Alarms(alarms::Args),
-    /// Explains a Modbus frame: every byte, CRC and LRC, what is wrong with it
-    Frame(frame::Args),
-    /// Looks for units on a line: addresses, baud rates, parities
+    /// Decode a Modbus frame: every field, its checksum, and what is wrong with it
+    Decode(decode::Args),
+    /// Scan a line for units: addresses, baud rates, parities
     Scan(tools::scan::Args),
-    /// Asks one unit who it is, or reads some of its registers
+    /// Read the identification or some registers of one unit
     Probe(tools::probe::Args),
-    /// Tests a line: does a unit send back what it is sent
+    /// Test a line by loopback: a unit returns what it is sent
     Loopback(tools::loopback::Args),
-    /// Sends bytes to a line and shows everything that comes back
-    Raw(tools::raw::Args),
+    /// Send bytes to a line and show everything that comes back
+    Send(tools::send::Args),
 }
 
 /// What every command that starts a station takes.
@@ -187,6 +187,10 @@ pub fn main() -> ExitCode {
     // Histories, logs and reports are for the user and the group, whatever the shell says.
     let mask = rustix::process::umask(rustix::fs::Mode::empty());
     rustix::process::umask(mask | rustix::fs::Mode::from_raw_mode(0o027));
+    if let Some(message) = std::env::args_os().nth(1).and_then(|word| renamed(word.to_str()?)) {
+        say_error(&message);
+        return ExitCode::from(2);
+    }
     let args = Args::try_parse().unwrap_or_else(|error| {
         if !error.use_stderr() {
             error.exit();
@@ -209,7 +213,7 @@ pub fn main() -> ExitCode {
         Some(Command::Audit(args)) => audit::main(args),
         Some(Command::Stop(args)) => control::stop(args),
         Some(Command::Reload(args)) => control::reload(args),
-        Some(Command::Unit) => unit::main(),
+        Some(Command::SystemdUnit) => systemd_unit::main(),
         Some(Command::Drill(args)) => drill::main(args),
         Some(Command::Sim(args)) => sim::main(args),
         Some(Command::Experiments(args)) => experiments::main(args),
@@ -218,11 +222,11 @@ pub fn main() -> ExitCode {
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Export(args)) => export::main(args),
         Some(Command::Alarms(args)) => alarms::main(args),
-        Some(Command::Frame(args)) => frame::main(args),
+        Some(Command::Decode(args)) => decode::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),
         Some(Command::Probe(args)) => tools::probe::main(args),
         Some(Command::Loopback(args)) => tools::loopback::main(args),
-        Some(Command::Raw(args)) => tools::raw::main(args),
+        Some(Command::Send(args)) => tools::send::main(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -234,6 +238,13 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// The answer to a command name of an earlier version.
+fn renamed(word: &str) -> Option<String> {
+    const RENAMED: [(&str, &str); 3] = [("unit", "systemd-unit"), ("frame", "decode"), ("raw", "send")];
+    let (old, new) = RENAMED.iter().find(|(old, _)| *old == word)?;
+    Some(format!("`{old}` is now `{new}`"))
 }
 
 /// Says which command was probably meant where there is no plant of this name.

@@ -23,7 +23,7 @@ fn run(args: &[&str]) -> (Option<i32>, String, String) {
 fn help_names_every_command_and_the_exit_codes() {
     let (code, out, _) = run(&["--help"]);
     assert_eq!(code, Some(0));
-    for word in ["demo", "run", "sim", "check", "profiles", "report", "alarms", "frame", "Exit codes:"] {
+    for word in ["demo", "run", "sim", "check", "profiles", "report", "alarms", "decode", "Exit codes:"] {
         assert!(out.contains(word), "no `{word}` in:\n{out}");
     }
     let (code, out, _) = run(&["--version"]);
@@ -158,14 +158,16 @@ fn shipped_profiles_are_in_the_binary() {
 
 #[test]
 fn a_frame_is_told_in_words() {
-    let (code, out, err) = run(&["frame", "01", "03", "03", "EA", "00", "01", "A5", "BA"]);
+    let (code, out, err) = run(&["decode", "01", "03", "03", "EA", "00", "01", "A5", "BA"]);
     assert_eq!(code, Some(0), "{err}");
     for word in
         ["RTU request: unit 1 read holding registers 41003 (0x03EA, 1)", "3 / 0x03", "wire address 1002", "right"]
     {
         assert!(out.contains(word), "no `{word}` in:\n{out}");
     }
-    let (code, _, err) = run(&["frame", "01 0G"]);
+    let (code, _, err) = run(&["frame", "01"]);
+    assert_eq!((code, err.as_str()), (Some(2), "sightglass: `frame` is now `decode`\n"));
+    let (code, _, err) = run(&["decode", "01 0G"]);
     assert!(code == Some(2) && err.contains("position 5: `G` is no hex digit"), "{err}");
 }
 
@@ -174,7 +176,7 @@ fn a_frame_is_told_in_words() {
 fn frames_of_a_log_come_from_standard_input() {
     let log = "TX 01 03 03 EA 00 02 E5 BB\nhello\nRX 01 03 04 00 C8 FF FE BB BD\n";
     let mut child = sightglass()
-        .arg("frame")
+        .arg("decode")
         .stdin(std::process::Stdio::piped())
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())

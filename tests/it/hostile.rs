@@ -41,7 +41,7 @@ fn no_argument_acts_on_the_terminal_by_any_command() {
         "audit",
         "stop",
         "reload",
-        "unit",
+        "systemd-unit",
         "drill",
         "sim",
         "experiments",
@@ -50,11 +50,11 @@ fn no_argument_acts_on_the_terminal_by_any_command() {
         "report",
         "export",
         "alarms",
-        "frame",
+        "decode",
         "scan",
         "probe",
         "loopback",
-        "raw",
+        "send",
     ] {
         let args: Vec<&str> = [command, EVIL].into_iter().filter(|word| !word.is_empty()).collect();
         check(&args, "");
@@ -95,7 +95,7 @@ fn no_file_and_no_name_of_one_acts_on_the_terminal() {
             check(&args, "");
         }
     }
-    check(&["frame"], EVIL);
+    check(&["decode"], EVIL);
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn no_answer_of_a_device_acts_on_the_terminal() {
     });
     check(&["probe", &address, "--timeout", "100"], "");
     check(&["probe", &address, "--timeout", "100", "--verbose"], "");
-    check(&["raw", &address, "--timeout", "100", "01 2B 0E 01 00"], "");
+    check(&["send", &address, "--timeout", "100", "01 2B 0E 01 00"], "");
     check(&["scan", &address, "--timeout", "20", "--units", "1-2"], "");
 }
 

@@ -295,7 +295,7 @@ fn raw_asks_the_server_of_libmodbus() {
     {
         // It serves one connection and ends.
         let Some(_server) = libmodbus_server() else { return };
-        let mut raw = Process::start(sightglass().args(["raw", "127.0.0.1:1502"]).args(bytes.split(' ')));
+        let mut raw = Process::start(sightglass().args(["send", "127.0.0.1:1502"]).args(bytes.split(' ')));
         raw.end();
         assert!(raw.said.iter().any(|line| line.contains(expect)), "{bytes}: {}", raw.said.join("\n"));
     }

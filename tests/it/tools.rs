@@ -60,9 +60,9 @@ fn an_echo_of_the_adapter_is_no_loopback_of_the_unit() {
 #[test]
 fn options_behind_the_bytes_are_options() {
     let unit = peer(answers(|_| vec![0, 1, 0, 0, 0, 5, 1, 3, 2, 0, 7]));
-    let (code, said) = run(&["raw", &unit, "01", "03", "00", "00", "00", "01", "--timeout", "2000"]);
+    let (code, said) = run(&["send", &unit, "01", "03", "00", "00", "00", "01", "--timeout", "2000"]);
     assert!(code == Some(0) && said.contains("ok, after"), "{code:?} {said}");
-    let (code, said) = run(&["frame", "01", "03", "00", "00", "00", "01", "84", "0A", "--rtu"]);
+    let (code, said) = run(&["decode", "01", "03", "00", "00", "00", "01", "84", "0A", "--rtu"]);
     assert!(code == Some(0) && said.contains("RTU request"), "{code:?} {said}");
 }
 
@@ -70,21 +70,21 @@ fn options_behind_the_bytes_are_options() {
 fn bytes_that_are_no_answer_end_raw_with_an_error_and_are_counted_right() {
     let garbage = peer(answers(|_| vec![0x55; 8_128]));
     for mode in ["tcp", "rtu-over-tcp"] {
-        let (code, said) = run(&["raw", &garbage, "--mode", mode, "--timeout", "100", "01 03 00 00 00 01"]);
+        let (code, said) = run(&["send", &garbage, "--mode", mode, "--timeout", "100", "01 03 00 00 00 01"]);
         assert_eq!(code, Some(1), "{said}");
         assert!(!said.contains(" of 8 bytes"), "{said}");
     }
     // A refusal is an answer.
     let unit = peer(answers(|_| vec![0, 1, 0, 0, 0, 3, 1, 0x83, 2]));
-    let (code, said) = run(&["raw", &unit, "01 03 00 00 00 01"]);
+    let (code, said) = run(&["send", &unit, "01 03 00 00 00 01"]);
     assert!(code == Some(0) && said.contains("illegal data address"), "{code:?} {said}");
 }
 
 #[test]
 fn a_frame_with_a_wrong_check_ends_with_an_error() {
-    let (code, said) = run(&["frame", "--rtu", "01 03 00 00 00 01 84 0B"]);
+    let (code, said) = run(&["decode", "--rtu", "01 03 00 00 00 01 84 0B"]);
     assert!(code == Some(1) && said.contains("wrong: CRC error"), "{code:?} {said}");
-    let (code, said) = run(&["frame", ":010300000001FC"]);
+    let (code, said) = run(&["decode", ":010300000001FC"]);
     assert!(code == Some(1) && said.contains("wrong: LRC error"), "{code:?} {said}");
 }
 

@@ -2,7 +2,7 @@
 
 pub mod loopback;
 pub mod probe;
-pub mod raw;
+pub mod send;
 pub mod scan;
 
 use std::{io::IsTerminal, sync::Arc, time::Duration};

@@ -1,4 +1,4 @@
-//! `sightglass unit`: the systemd unit that runs stations on a panel PC.
+//! `sightglass systemd-unit`: the systemd unit that runs stations on a panel PC.
 
 use super::{CliError, say};
 

@@ -1,4 +1,4 @@
-//! `sightglass frame`: bytes in words.
+//! `sightglass decode`: the fields of a frame and their meaning.
 
 use std::io::{BufRead, IsTerminal};
 
@@ -15,7 +15,7 @@ use crate::{
 
 use super::{CliError, say, say_error};
 
-/// Arguments of `frame`.
+/// Arguments of `decode`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Bytes in hex (`01 03 00 00 00 01`, `0x01,0x03…`), an ASCII frame (`:0103…`) or lines of a log (`TX 01 03 …`);

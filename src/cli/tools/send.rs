@@ -1,4 +1,4 @@
-//! `sightglass raw`: bytes as they are, and everything that comes back.
+//! `sightglass send`: bytes as they are, and everything that comes back.
 
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// Arguments of `raw`.
+/// Arguments of `send`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
