@@ -162,6 +162,6 @@ impl AddressRange {
 
     /// Most unused registers or bits between two tags: sixteen bits cost as much on the wire as one register.
     fn gap_max(self, device: &DeviceDef) -> u32 {
-        u32::from(device.limits.gap_words_max) * if self.table.is_bits() { 16 } else { 1 }
+        u32::from(device.limits.gap_registers_max) * if self.table.is_bits() { 16 } else { 1 }
     }
 }

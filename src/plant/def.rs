@@ -118,13 +118,13 @@ pub struct DeviceDef {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
     /// Registers a read may ask for, at most 125.
-    pub read_words_max: u16,
+    pub read_registers_max: u16,
     /// Bits a read may ask for, at most 2000.
     pub read_bits_max: u16,
     /// Registers a write may carry, at most 123.
-    pub write_words_max: u16,
+    pub write_registers_max: u16,
     /// Unused registers that may be read over to join two tags into one block.
-    pub gap_words_max: u16,
+    pub gap_registers_max: u16,
     /// Blocks start and end on multiples of this (2 for meters that refuse odd counts).
     pub alignment: u16,
     /// Requests that may be under way at once, over Modbus TCP only.
@@ -134,15 +134,15 @@ pub struct Limits {
 impl Limits {
     /// Registers or bits that one read of a table may ask for.
     pub fn most(&self, table: Table) -> u32 {
-        u32::from(if table.is_bits() { self.read_bits_max } else { self.read_words_max })
+        u32::from(if table.is_bits() { self.read_bits_max } else { self.read_registers_max })
     }
 
     /// What the standard allows (Modbus application protocol V1.1b3, section 6), one request at a time.
     pub const STANDARD: Limits = Limits {
-        read_words_max: 125,
+        read_registers_max: 125,
         read_bits_max: 2_000,
-        write_words_max: 123,
-        gap_words_max: 8,
+        write_registers_max: 123,
+        gap_registers_max: 8,
         alignment: 1,
         in_flight_max: 1,
     };

@@ -42,10 +42,10 @@ pub fn plant() -> PlantDef {
         profile: "fixture".into(),
         model: "FIXTURE".into(),
         limits: Limits {
-            read_words_max: 60,
+            read_registers_max: 60,
             read_bits_max: 128,
-            write_words_max: 60,
-            gap_words_max: 8,
+            write_registers_max: 60,
+            gap_registers_max: 8,
             ..Limits::STANDARD
         },
         functions: Vec::new(),

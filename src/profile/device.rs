@@ -74,10 +74,10 @@ pub(super) fn limits(
         value.value
     };
     let limits = Limits {
-        read_words_max: within(table.read_words_max, standard.read_words_max, "read_words_max"),
+        read_registers_max: within(table.read_registers_max, standard.read_registers_max, "read_registers_max"),
         read_bits_max: within(table.read_bits_max, standard.read_bits_max, "read_bits_max"),
-        write_words_max: within(table.write_words_max, standard.write_words_max, "write_words_max"),
-        gap_words_max: table.gap_words_max.map_or(8, |gap| gap.value),
+        write_registers_max: within(table.write_registers_max, standard.write_registers_max, "write_registers_max"),
+        gap_registers_max: table.gap_registers_max.map_or(8, |gap| gap.value),
         alignment: table.alignment.map_or(1, |alignment| alignment.value),
         in_flight_max: table.in_flight_max.map_or(1, |count| count.value),
     };
@@ -88,7 +88,7 @@ pub(super) fn limits(
         problems.add(count.at, format!("in_flight_max = {} is not possible", count.value)).label("expected 1 to 64");
     }
     let millis = |value: Option<At<u16>>| Duration::from_millis(value.map_or(0, |value| u64::from(value.value)));
-    (limits, millis(table.gap_ms), millis(table.write_gap_ms))
+    (limits, millis(table.request_gap_ms), millis(table.write_gap_ms))
 }
 
 /// The function codes that the profile lists, against those that its tags need.

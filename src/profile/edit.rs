@@ -105,8 +105,8 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
     }
     entries.extend([
         or_usual("timeout_ms", ms(settings.timeout), ms(usual.timeout)),
-        or_usual("gap_ms", ms(settings.gap), ms(usual.gap)),
-        or_usual("idle_ms", ms(settings.idle), ms(usual.idle)),
+        or_usual("request_gap_ms", ms(settings.gap), ms(usual.gap)),
+        or_usual("frame_timeout_ms", ms(settings.idle), ms(usual.idle)),
     ]);
     Some(entries)
 }
@@ -240,7 +240,7 @@ unit = 1
         let end = "timeout_ms = 500 # long\n";
         check(&serial(|serial| serial.stop_bits = 2), &[(end, &format!("{end}stop_bits = 2\n"))]);
         let gap = LineDef { gap: Duration::from_millis(20), ..l1() };
-        check(&gap, &[(end, &format!("{end}gap_ms = 20\n"))]);
+        check(&gap, &[(end, &format!("{end}request_gap_ms = 20\n"))]);
     }
 
     #[test]

@@ -91,8 +91,8 @@ fn serial(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<W
         (Key::DataBits, table.data_bits.map(|bits| bits.at)),
         (Key::StopBits, table.stop_bits.map(|bits| bits.at)),
         (Key::Timeout, table.timeout_ms.map(|time| time.at)),
-        (Key::Gap, table.gap_ms.map(|time| time.at)),
-        (Key::Idle, table.idle_ms.map(|time| time.at)),
+        (Key::Gap, table.request_gap_ms.map(|time| time.at)),
+        (Key::Idle, table.frame_timeout_ms.map(|time| time.at)),
         (Key::Turnaround, table.turnaround_ms.map(|time| time.at)),
     ];
     let serial = Serial {
@@ -111,8 +111,8 @@ fn serial(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<W
     let usual = LineDef::new(id, &name.value, transport);
     let line = LineDef {
         timeout: millis(table.timeout_ms, usual.timeout),
-        gap: millis(table.gap_ms, usual.gap),
-        idle: millis(table.idle_ms, usual.idle),
+        gap: millis(table.request_gap_ms, usual.gap),
+        idle: millis(table.frame_timeout_ms, usual.idle),
         turnaround: millis(table.turnaround_ms, usual.turnaround),
         ..usual
     };
@@ -125,16 +125,16 @@ fn tcp(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<Writ
         (Key::Host, table.host.as_ref().map(|host| host.at)),
         (Key::TcpPort, table.tcp_port.map(|port| port.at)),
         (Key::Timeout, table.timeout_ms.map(|time| time.at)),
-        (Key::Gap, table.gap_ms.map(|time| time.at)),
-        (Key::Idle, table.idle_ms.map(|time| time.at)),
+        (Key::Gap, table.request_gap_ms.map(|time| time.at)),
+        (Key::Idle, table.frame_timeout_ms.map(|time| time.at)),
     ];
     let (host, port) = (text(&table.host), table.tcp_port.map_or(TCP_PORT, |port| port.value));
     let name = table.name?;
     let usual = LineDef::new(id, &name.value, Transport::Tcp { host, port, framing: mode.framing });
     let line = LineDef {
         timeout: millis(table.timeout_ms, usual.timeout),
-        gap: millis(table.gap_ms, usual.gap),
-        idle: millis(table.idle_ms, usual.idle),
+        gap: millis(table.request_gap_ms, usual.gap),
+        idle: millis(table.frame_timeout_ms, usual.idle),
         ..usual
     };
     Some(Written { line, name, spans: known(spans) })

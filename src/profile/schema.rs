@@ -49,8 +49,8 @@ table!(
         opt "stop_bits" stop_bits: u8,
         opt "rs485" rs485: Rs485,
         opt "timeout_ms" timeout_ms: u16,
-        opt "gap_ms" gap_ms: u16,
-        opt "idle_ms" idle_ms: u16,
+        opt "request_gap_ms" request_gap_ms: u16,
+        opt "frame_timeout_ms" frame_timeout_ms: u16,
         opt "turnaround_ms" turnaround_ms: u16,
     }
 );
@@ -63,8 +63,8 @@ table!(
         need "host" host: String,
         opt "tcp_port" tcp_port: u16,
         opt "timeout_ms" timeout_ms: u16,
-        opt "gap_ms" gap_ms: u16,
-        opt "idle_ms" idle_ms: u16,
+        opt "request_gap_ms" request_gap_ms: u16,
+        opt "frame_timeout_ms" frame_timeout_ms: u16,
     }
 );
 
@@ -114,13 +114,13 @@ table!(
 table!(
     /// What one request may hold.
     LimitsTable, "limits" {
-        opt "read_words_max" read_words_max: u16,
+        opt "read_registers_max" read_registers_max: u16,
         opt "read_bits_max" read_bits_max: u16,
-        opt "write_words_max" write_words_max: u16,
-        opt "gap_words_max" gap_words_max: u16,
+        opt "write_registers_max" write_registers_max: u16,
+        opt "gap_registers_max" gap_registers_max: u16,
         opt "alignment" alignment: u16,
         opt "in_flight_max" in_flight_max: u16,
-        opt "gap_ms" gap_ms: u16,
+        opt "request_gap_ms" request_gap_ms: u16,
         opt "write_gap_ms" write_gap_ms: u16,
     }
 );

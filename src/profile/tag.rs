@@ -226,8 +226,8 @@ fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) 
         );
         problem.label(format!("expected a multiple of {alignment}"));
     }
-    if !point.table.is_bits() && words > limits.read_words_max {
-        let max = limits.read_words_max;
+    if !point.table.is_bits() && words > limits.read_registers_max {
+        let max = limits.read_registers_max;
         problems
             .add(at, format!("the value takes {words} registers, the device reads at most {max}"))
             .label("too long");

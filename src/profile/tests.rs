@@ -57,7 +57,7 @@ status = "manual"
 source = "manual"
 
 [limits]
-read_words_max = 60
+read_registers_max = 60
 alignment = 1
 
 [[tag]]
@@ -198,9 +198,9 @@ fn two_tags_cannot_see_one_register_with_different_eyes() {
         &["a value of 2 registers at address 7 breaks alignment = 2", "expected a multiple of 2"],
     );
     check(
-        "read_words_max = 60",
-        "read_words_max = 200",
-        &["[meter.toml:7:18]", "read_words_max = 200 is not possible", "the Modbus standard allows 1 to 125"],
+        "read_registers_max = 60",
+        "read_registers_max = 200",
+        &["[meter.toml:7:22]", "read_registers_max = 200 is not possible", "the Modbus standard allows 1 to 125"],
     );
 }
 

@@ -42,10 +42,10 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             profile: "fuji_pxr".into(),
             model: "FUJI PXR4".into(),
             limits: Limits {
-                read_words_max: 60,
+                read_registers_max: 60,
                 read_bits_max: 60,
-                write_words_max: 60,
-                gap_words_max: 4,
+                write_registers_max: 60,
+                gap_registers_max: 4,
                 alignment: 1,
                 in_flight_max: 1,
             },

@@ -116,7 +116,7 @@ fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec
             Ok(echo(function, &data[..4]))
         }
         (0x10, &[a, b, c, d, ref block @ ..]) => {
-            let values = block_of_words(word(c, d), device.limits().write_words_max.min(WRITE_WORDS_MAX), block)?;
+            let values = block_of_words(word(c, d), device.limits().write_registers_max.min(WRITE_WORDS_MAX), block)?;
             write_words(device, word(a, b), &values)?;
             Ok(echo(function, &data[..4]))
         }
@@ -128,7 +128,8 @@ fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec
             Ok(echo(function, data))
         }
         (0x17, &[a, b, c, d, e, f, g, h, ref block @ ..]) => {
-            let values = block_of_words(word(g, h), device.limits().write_words_max.min(EXCHANGE_WRITE_MAX), block)?;
+            let values =
+                block_of_words(word(g, h), device.limits().write_registers_max.min(EXCHANGE_WRITE_MAX), block)?;
             let mut trial = device.clone();
             write_words(&mut trial, word(e, f), &values)?;
             let reply = read_words(&trial, function, Words::Holding, word(a, b), word(c, d))?;
@@ -172,9 +173,9 @@ fn read_words<D: Registers>(
     address: u16,
     count: u16,
 ) -> Result<Vec<u8>, Refusal> {
-    let Limits { read_words_max, alignment, .. } = device.limits();
-    let mut reply = vec![function, (count.min(read_words_max) * 2) as u8];
-    let addresses = span(address, count, read_words_max)?;
+    let Limits { read_registers_max, alignment, .. } = device.limits();
+    let mut reply = vec![function, (count.min(read_registers_max) * 2) as u8];
+    let addresses = span(address, count, read_registers_max)?;
     if !address.is_multiple_of(alignment) {
         return Err(Refusal::Address);
     }
@@ -276,7 +277,7 @@ mod tests {
             &[1, 3, 5, 6, 7, 15, 16, 0x16, 0x17, 0x18]
         }
         fn limits(&self) -> Limits {
-            Limits { read_words_max: 6, write_words_max: 6, ..Limits::STANDARD }
+            Limits { read_registers_max: 6, write_registers_max: 6, ..Limits::STANDARD }
         }
 
         fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {

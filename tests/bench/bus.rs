@@ -153,7 +153,7 @@ fn plant(lines: Vec<Transport>, devices: u16, blocks: u16, period: Duration, in_
         def.lines.push(LineDef { timeout, ..LineDef::new(id, &format!("L{line}"), transport) });
         for unit in 1..=devices {
             let device_id = DeviceId(def.devices.len() as u16);
-            let limits = Limits { gap_words_max: WORDS - 2, in_flight_max: in_flight, ..Limits::STANDARD };
+            let limits = Limits { gap_registers_max: WORDS - 2, in_flight_max: in_flight, ..Limits::STANDARD };
             let name = format!("L{line}U{unit}");
             def.devices.push(DeviceDef {
                 id: device_id,

@@ -40,7 +40,7 @@ fn device(id: u16) -> DeviceDef {
         unit: id as u8 + 1,
         profile: String::new(),
         model: String::new(),
-        limits: Limits { gap_words_max: 16, ..Limits::STANDARD },
+        limits: Limits { gap_registers_max: 16, ..Limits::STANDARD },
         functions: Vec::new(),
         gap: Duration::ZERO,
         write_gap: Duration::ZERO,

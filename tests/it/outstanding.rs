@@ -40,7 +40,7 @@ status = "manual"
 source = "test"
 address_base = 0
 functions = [3, 6, 8]
-limits = { gap_words_max = 0 }
+limits = { gap_registers_max = 0 }
 default = { table = "holding", type = "uint16", access = "r", poll = "fast", source = "test" }
 "#;
 

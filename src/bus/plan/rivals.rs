@@ -41,7 +41,7 @@ pub fn fixed(group: &[TagDef], device: &DeviceDef, words: u32) -> Vec<Block> {
     let max = if group[0].point.table.is_bits() {
         (words * 16).min(u32::from(device.limits.read_bits_max))
     } else {
-        words.min(u32::from(device.limits.read_words_max))
+        words.min(u32::from(device.limits.read_registers_max))
     };
     let within = |run: &[&TagDef]| {
         let start = single(device, run[0]).range().0;
@@ -109,9 +109,9 @@ fn joined(group: &[TagDef], run: &[&TagDef], device: &DeviceDef, unreadable: &Un
     let (start, end) = (blocks().map(|range| range.0).min()?, blocks().map(|range| range.1).max()?);
     let (bits, limits) = (first.table.is_bits(), device.limits);
     let (max, gap_max) = if bits {
-        (u32::from(limits.read_bits_max), u32::from(limits.gap_words_max) * 16)
+        (u32::from(limits.read_bits_max), u32::from(limits.gap_registers_max) * 16)
     } else {
-        (u32::from(limits.read_words_max), u32::from(limits.gap_words_max))
+        (u32::from(limits.read_registers_max), u32::from(limits.gap_registers_max))
     };
     let wanted = (run.iter().map(|tag| range(tag).0).min()?, run.iter().map(|tag| range(tag).1).max()?);
     let (mut used, mut near) = (wanted.0, true);

@@ -94,7 +94,7 @@ fn ranges(def: &PlantDef, unreadable: &UnreadableRanges) -> Vec<(u32, u32)> {
 #[test]
 fn a_request_is_not_filled_up_if_that_costs_a_longer_gap_elsewhere() {
     let mut def = words(&[0, 6, 7, 12]);
-    def.devices[0].limits.read_words_max = 8;
+    def.devices[0].limits.read_registers_max = 8;
     // Greedy would take 0 to 7 and leave 12 alone: 9 words with a gap of 5; this reads 7.
     assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 1), (6, 13)]);
 }
@@ -102,7 +102,7 @@ fn a_request_is_not_filled_up_if_that_costs_a_longer_gap_elsewhere() {
 #[test]
 fn over_tcp_a_gap_is_cheaper_than_a_round_trip_and_in_ascii_as_dear_as_the_device_allows() {
     let mut def = words(&[0, 30]);
-    def.devices[0].limits.gap_words_max = 40;
+    def.devices[0].limits.gap_registers_max = 40;
     assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 1), (30, 31)]);
     def.lines[0].transport = Transport::tcp("plc", 502);
     assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 31)]);
@@ -233,9 +233,9 @@ fn plant_of(rows: &[Row], limits: Limits, transport: Transport) -> PlantDef {
 
 fn limits() -> impl Strategy<Value = Limits> {
     (4u16..125, 1u16..2000, 0u16..40, 1u16..3).prop_map(|(words, bits, gap, alignment)| Limits {
-        read_words_max: words,
+        read_registers_max: words,
         read_bits_max: bits,
-        gap_words_max: gap,
+        gap_registers_max: gap,
         alignment,
         ..Limits::STANDARD
     })
@@ -262,7 +262,7 @@ fn holes_at(addresses: &[u16]) -> UnreadableRanges {
 /// 34 and 36 share one all the same.
 #[test]
 fn a_value_too_long_for_a_request_does_not_part_its_neighbours() {
-    let limits = Limits { read_words_max: 4, gap_words_max: 0, alignment: 2, ..Limits::STANDARD };
+    let limits = Limits { read_registers_max: 4, gap_registers_max: 0, alignment: 2, ..Limits::STANDARD };
     let def = plant_of(&[(34, 3, 0, 0), (35, 3, 2, 0), (36, 3, 0, 0)], limits, serial_line(9600, 1, Framing::Rtu));
     let seen: Vec<_> =
         blocks(&def, LineId(0), &UnreadableRanges::default()).iter().map(|b| (b.address, b.count)).collect();
@@ -290,7 +290,7 @@ proptest! {
         }
         for block in &plan {
             // A single value that is larger than the limit must be read all the same, and alignment may add to it.
-            let words_max = limits.read_words_max.max(4 + 2 * (limits.alignment - 1));
+            let words_max = limits.read_registers_max.max(4 + 2 * (limits.alignment - 1));
             let max = if block.table.is_bits() { limits.read_bits_max } else { words_max };
             prop_assert!(block.count <= max, "{:?}", block);
             let (start, end) = block.range();
@@ -309,7 +309,7 @@ proptest! {
         limits in limits(), words in 4u16..30, transport in transport(),
         missing in proptest::collection::vec(0u16..60, 0..4),
     ) {
-        let def = plant_of(&rows, Limits { read_words_max: words, ..limits }, transport);
+        let def = plant_of(&rows, Limits { read_registers_max: words, ..limits }, transport);
         let unreadable = holes_at(&missing);
         let refused = refused(&def, LineId(0), &unreadable);
         let mut tags = rivals::sorted(&def);
@@ -325,7 +325,7 @@ proptest! {
         limits in limits(), transport in transport(),
     ) {
         // Fixed blocks read over gaps of any length, so the limit of gaps must not stand in the way of the plan.
-        let def = plant_of(&rows, Limits { gap_words_max: 200, alignment: 1, ..limits }, transport);
+        let def = plant_of(&rows, Limits { gap_registers_max: 200, alignment: 1, ..limits }, transport);
         let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
         let tags = rivals::sorted(&def);
         let groups = rivals::groups(&def, &tags);

@@ -21,7 +21,7 @@ fn plant(profile: &str) -> Arc<PlantDef> {
 }
 
 const OVEN: &str = r#"
-limits = { read_words_max = 8, write_words_max = 4, gap_words_max = 2 }
+limits = { read_registers_max = 8, write_registers_max = 4, gap_registers_max = 2 }
 tag = [
     { name = "SV", table = "holding", address = 10, type = "int16", scale = 0.1, access = "rw", min = -20, max_from = "SV-H" },
     { name = "SV-H", table = "holding", address = 11, type = "int16", scale = 0.1, access = "rw", max = 500 },

@@ -16,7 +16,7 @@ impl Registers for Pxr {
     }
 
     fn limits(&self) -> Limits {
-        Limits { read_words_max: 60, write_words_max: 60, ..Limits::STANDARD }
+        Limits { read_registers_max: 60, write_registers_max: 60, ..Limits::STANDARD }
     }
 
     fn bit(&self, _: Bits, _: u16) -> Result<bool, Refusal> {

@@ -82,10 +82,10 @@ pub fn plant(mode: Mode) -> PlantDef {
     let mut def = fixture::plant();
     let sample = def.tags[1].clone();
     let limits = Limits {
-        read_words_max: 60,
+        read_registers_max: 60,
         read_bits_max: 100,
-        write_words_max: 60,
-        gap_words_max: 0,
+        write_registers_max: 60,
+        gap_registers_max: 0,
         alignment: 1,
         in_flight_max: if mode == Mode::Tcp16 { 16 } else { 1 },
     };
