@@ -30,7 +30,7 @@ pub const QUERIES_MAX: usize = 64;
 /// Requests of queries on their way to the writer: each that is being answered has one at most.
 const REQUESTS_MAX: usize = 2 * QUESTIONS_MAX;
 /// Real time between two commits: what a power failure may cost.
-const COMMIT_EVERY: Duration = Duration::from_secs(1);
+pub(super) const COMMIT_EVERY: Duration = Duration::from_secs(1);
 
 /// The station's end of the history thread.
 #[derive(Debug)]
@@ -71,14 +71,15 @@ pub fn offer(queue: &mpsc::Sender<Vec<Record>>, mut records: Vec<Record>) -> u64
 /// Starts the threads, which open the store while the station already polls. [`HistoryError::Foreign`] for a file that is
 /// something else; what can change, such as a full disk, is retried and shown.
 pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, HistoryError> {
-    start_with(path, def, clock, Arc::new(Store::answer))
+    start_with(path, def, clock, COMMIT_EVERY, Arc::new(Store::answer))
 }
 
-/// The same with other answers.
+/// The same with another interval between commits and other answers.
 pub(super) fn start_with(
     path: &Path,
     def: Arc<PlantDef>,
     clock: Clock,
+    commit_every: Duration,
     answer: Answerer,
 ) -> Result<Handle, HistoryError> {
     files::refuse_foreign(path)?;
@@ -93,7 +94,7 @@ pub(super) fn start_with(
     let reader = Reader { stores: writer.stores(), writer: requests, clock, answer };
     let reading = spawn("history-reader", || reader.run(queries_in)).map_err(trouble)?;
     let writing = move || async move {
-        let opening = run(&mut writer, clock, records_in, requests_in, &mut outputs).await;
+        let opening = run(&mut writer, clock, commit_every, records_in, requests_in, &mut outputs).await;
         writer.end_reading();
         // A panic of the thread has already been reported by the panic hook.
         let _ = reading.join();
@@ -139,12 +140,13 @@ impl Outputs {
 async fn run(
     writer: &mut Writer,
     clock: Clock,
+    commit_every: Duration,
     mut records: mpsc::Receiver<Vec<Record>>,
     mut requests: mpsc::Receiver<Request>,
     outputs: &mut Outputs,
 ) -> Option<Opening> {
     let mut opening = None;
-    let mut tick = tokio::time::interval(COMMIT_EVERY);
+    let mut tick = tokio::time::interval(commit_every);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         if opening.is_none() && writer.wants_store() {

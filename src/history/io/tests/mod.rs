@@ -534,16 +534,16 @@ fn what_an_operator_does_with_an_alarm_is_committed_at_once() {
     assert_eq!(writer.status().rows, 2);
 
     let (_folder, db) = folder();
-    let handle = thread::start(&db, def(), Clock::starting_at(sec(10), 1.0)).unwrap();
+    // Nothing else commits for an hour.
+    let (clock, answer) = (Clock::starting_at(sec(10), 1.0), Arc::new(Store::answer));
+    let handle = thread::start_with(&db, def(), clock, Duration::from_secs(3600), answer).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let mut status = handle.status.clone();
-    let began = std::time::Instant::now();
     for n in 1..=20 {
         let acknowledged = AlarmRecord { by: Some("anna".into()), ..step(n, "high", AlarmStep::Acknowledged) };
         handle.records.blocking_send(vec![Record::Alarm(acknowledged)]).unwrap();
         runtime.block_on(status.wait_for(|status| status.rows == n as u64)).unwrap();
     }
-    assert!(began.elapsed() < Duration::from_secs(10), "with a commit a second twenty in a row would take twenty");
     handle.stop();
 }
 

@@ -8,6 +8,7 @@ use super::*;
 use crate::history::io::{
     read::ROWS_MAX,
     reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, Request, TIME_MAX},
+    thread::COMMIT_EVERY,
 };
 
 /// Answers that never end by themselves, and two queues that say when one has begun and how it ended.
@@ -32,7 +33,7 @@ fn query() -> (QueryRequest, oneshot::Receiver<Result<Answer, HistoryError>>) {
 fn records_are_committed_while_a_question_runs() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
-    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
+    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), COMMIT_EVERY, answer).unwrap();
     let queries: Vec<_> = (0..QUESTIONS_MAX as u32).map(|terminal| (terminal, query())).collect();
     let mut answers = Vec::new();
     for (terminal, (query, answer)) in queries {
@@ -56,7 +57,7 @@ fn records_are_committed_while_a_question_runs() {
 fn a_terminal_that_asks_without_pause_keeps_no_other_waiting() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
-    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
+    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), COMMIT_EVERY, answer).unwrap();
     let ask = |terminal: u32| {
         let (query, answer) = query();
         handle.queries.blocking_send((terminal, query)).unwrap();
@@ -83,7 +84,7 @@ fn a_terminal_that_asks_without_pause_keeps_no_other_waiting() {
 fn a_station_that_stops_ends_the_questions_and_closes_the_file() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
-    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), answer).unwrap();
+    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), COMMIT_EVERY, answer).unwrap();
     let (query, answer) = query();
     handle.queries.blocking_send((1, query)).unwrap();
     begun.recv().unwrap();
