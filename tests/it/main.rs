@@ -2,7 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `architecture` | the rules of the house: the line of modules, the io edge, file headers |
+//! | `architecture` | the laws: the line of modules, the io edge, sizes, style of tests, words |
 //! | `attach` | the station's socket: equal snapshots at both ends, stuck and hostile terminals, reconnecting |
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
