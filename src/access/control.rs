@@ -5,7 +5,7 @@ mod audit_entries;
 mod user_admin;
 mod session_limit;
 mod session;
-pub mod sign;
+pub mod reauthentication;
 mod session_status;
 #[cfg(test)]
 mod tests;
@@ -241,17 +241,17 @@ impl AccessControl {
         }
         match self.may(terminal, Some(right::needs(&request.kind))) {
             Err(why) => self.refuse_command(terminal, request, Refusal::NotPermitted(why), at),
-            Ok(_) => self.signed(terminal, request, at),
+            Ok(_) => self.reauthenticate(terminal, request, at),
         }
     }
 
-    /// The role is enough, and so is the signature.
-    fn let_through(&self, terminal: u32, request: CommandRequest, signer: Option<&str>) -> Vec<Effect> {
+    /// Role and reauthentication are sufficient.
+    fn let_through(&self, terminal: u32, request: CommandRequest, approver: Option<&str>) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
-        let note = match (request.note, signer) {
+        let note = match (request.note, approver) {
             (note, None) => note,
-            (None, Some(signer)) => Some(format!("signed by {signer}").into()),
-            (Some(note), Some(signer)) => Some(format!("{note}; signed by {signer}").into()),
+            (None, Some(approver)) => Some(format!("approved by {approver}").into()),
+            (Some(note), Some(approver)) => Some(format!("{note}; approved by {approver}").into()),
         };
         let CommandRequest { id, kind, seen, .. } = request;
         let (by, from) = (actor_name(session), session.peer.from.clone());

@@ -12,6 +12,6 @@ pub mod io;
 
 pub use control::{AccessControl, Effect, Peer};
 pub use session_request::{
-    CommandRequest, Durability, Secret, SessionRequest, SessionRow, SessionStatus, Signature, UserRow, Who,
+    CommandRequest, Credentials, Durability, Secret, SessionRequest, SessionRow, SessionStatus, UserRow, Who,
 };
 pub use user::Users;

@@ -116,10 +116,10 @@ pub enum Durability {
     NotRecorded,
 }
 
-/// What is given again for a tag that asks for it.
+/// Credentials for a tag that requires reauthentication.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Signature {
-    /// The second person; `None` for the one who writes.
+pub struct Credentials {
+    /// The second user; `None` for the user who writes.
     pub user: Option<String>,
     /// The password of that person.
     pub password: Secret,
@@ -139,14 +139,14 @@ pub struct CommandRequest {
     pub seen: Option<f64>,
     /// Why, in his words.
     pub note: Option<Arc<str>>,
-    /// What the tag asks for again.
-    pub sign: Option<Signature>,
+    /// Credentials, if the tag requires reauthentication.
+    pub credentials: Option<Credentials>,
 }
 
 impl CommandRequest {
-    /// A command without seen value, note and signature.
+    /// A command without seen value, note and credentials.
     pub fn new(run: u64, id: CommandId, kind: CommandKind) -> CommandRequest {
-        CommandRequest { id, run, kind, seen: None, note: None, sign: None }
+        CommandRequest { id, run, kind, seen: None, note: None, credentials: None }
     }
 
     /// A command made on what a snapshot shows.

@@ -149,7 +149,7 @@ impl Own {
 }
 
 fn status(request: &CommandRequest, by: Arc<str>, at: Timestamp, outcome: Outcome) -> CommandStatus {
-    let CommandRequest { id, run: _, kind, seen, note, sign: _ } = request.clone();
+    let CommandRequest { id, run: _, kind, seen, note, credentials: _ } = request.clone();
     CommandStatus { id, by, from: "".into(), note, kind, at, old: seen, outcome, recorded: true }
 }
 

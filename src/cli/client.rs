@@ -3,12 +3,12 @@
 use std::{io::IsTerminal, time::Duration};
 
 use crate::{
-    access::{Durability, SessionRequest, Signature, control::sign, session_request::Secret},
+    access::{Credentials, Durability, SessionRequest, control::reauthentication, session_request::Secret},
     attach::io::{connect, find},
     plant::{
         Snapshot,
         command::{CommandId, CommandKind, CommandStatus, Outcome},
-        role::Sign,
+        role::Reauthentication,
         sample::{Cause, Quality},
     },
     station::Session,
@@ -143,10 +143,11 @@ pub async fn send_command(
 ) -> Result<CommandStatus, CliError> {
     let id = CommandId { terminal: session.terminal, number };
     // Whoever acts has just given his password: where a tag asks for it again, this is it.
-    let sign = sign::needed(&session.snapshots.borrow().def, &kind) == Some(Sign::Password);
-    let sign = password.filter(|_| sign).map(|password| Signature { user: None, password });
+    let required =
+        reauthentication::required(&session.snapshots.borrow().def, &kind) == Some(Reauthentication::Password);
+    let credentials = password.filter(|_| required).map(|password| Credentials { user: None, password });
     let request = crate::access::CommandRequest {
-        sign,
+        credentials,
         note: note.map(Into::into),
         ..crate::access::CommandRequest::on(&session.snapshots.borrow(), id, kind)
     };

@@ -163,9 +163,9 @@ pub enum Refusal {
     /// His role does not permit it, or nobody is logged in.
     #[error("{0}")]
     NotPermitted(String),
-    /// The tag asks for a password or a second person, which was not given or is wrong.
+    /// The tag requires a password or a second user, which is missing or wrong.
     #[error("{0}")]
-    NotSigned(String),
+    NotReauthenticated(String),
     /// Somebody or something has changed the value since the operator looked; this is what it is now.
     #[error("it was changed to {0} since you looked")]
     ChangedTo(String),

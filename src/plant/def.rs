@@ -13,7 +13,7 @@ pub use super::{
     interlock::ControlLogic,
     line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
     program::{ProgramDef, ProgramStep},
-    role::{AccessDef, Role, Sign},
+    role::{AccessDef, Reauthentication, Role},
 };
 
 /// Everything that a plant file says, checked.

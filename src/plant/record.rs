@@ -193,7 +193,7 @@ pub const ELSEWHERE: [&str; 26] = [
     "lock terminal",
     "unlock terminal",
     "lockout",
-    "signature failed",
+    "reauthentication failed",
     "add user",
     "change password",
     "set role",

@@ -33,13 +33,13 @@ impl Role {
     }
 }
 
-/// What must be given again to write a tag.
+/// What must be entered again to write a tag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Sign {
-    /// The password of the one who writes.
+pub enum Reauthentication {
+    /// The password of the user who writes.
     Password,
-    /// Name and password of a second person who may write too.
-    SecondPerson,
+    /// Name and password of a second user with the right to write.
+    SecondUser,
 }
 
 /// The rules for logging in: the table `[access]` of a plant file.

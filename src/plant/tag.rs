@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     id::{DeviceId, TagId},
-    role::Sign,
+    role::Reauthentication,
     sample::Sample,
     simulate::Simulate,
 };
@@ -47,7 +47,7 @@ pub struct TagDef {
     /// Asked before a write, beyond old and new value.
     pub confirm: Option<String>,
     /// What must be given again to write it.
-    pub sign: Option<Sign>,
+    pub reauthenticate: Option<Reauthentication>,
     /// Names of the numbers of an enumeration; empty for a quantity.
     pub labels: Vec<(i64, String)>,
     /// Names of the bits of a status word.
@@ -105,7 +105,7 @@ impl TagDef {
             max: None,
             access: Access::Read,
             confirm: None,
-            sign: None,
+            reauthenticate: None,
             labels: Vec::new(),
             bit_labels: Vec::new(),
             bad_if: Vec::new(),

@@ -6,6 +6,8 @@ use super::{diagnostic::Problem, reader::Raw};
 const RENAMED: &[(&str, &str, &str)] = &[
     ("access", "tries_max", "login_attempts_max"),
     ("access", "lock_out", "lockout"),
+    ("a tag", "sign", "reauthenticate"),
+    ("reauthenticate", "second person", "second user"),
     ("access", "view", "anonymous_view"),
     ("access", "notice", "banner"),
     ("a fault", "SV-1 stuck shut", "SV-1 stuck closed"),

@@ -10,7 +10,7 @@ use super::{
     simulate::Choices,
 };
 use crate::plant::{
-    def::{AlarmClass, Parity, Priority, Role, Rs485, Sign},
+    def::{AlarmClass, Parity, Priority, Reauthentication, Role, Rs485},
     ne107::Signal,
     tag::{Access, ByteOrder, Confidence, Kind, PollClass, Table},
 };
@@ -151,7 +151,7 @@ table!(
         opt "verify" verify: bool,
         opt "confirm" confirm: String,
         /// What must be given again to write it.
-        opt "sign" sign: Sign,
+        opt "reauthenticate" reauthenticate: Reauthentication,
         opt "enum" labels: Numbered,
         opt "bits" bits: Numbered,
         list "bad_if" bad_if: i64,
@@ -504,7 +504,7 @@ words!(Role, "role" {
     "viewer" => Role::Viewer, "technician" => Role::Technician, "supervisor" => Role::Supervisor,
 });
 
-words!(Sign, "sign" { "password" => Sign::Password, "second person" => Sign::SecondPerson, });
+words!(Reauthentication, "reauthenticate" { "password" => Reauthentication::Password, "second user" => Reauthentication::SecondUser, });
 
 words!(PollClass, "poll class" { "critical" => PollClass::Critical, "normal" => PollClass::Normal, "background" => PollClass::Background, });
 

@@ -91,7 +91,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         max: links.max.map(Bound::From).or(fixed(&row.max)),
         access,
         confirm: row.confirm.as_ref().map(|confirm| confirm.value.clone()),
-        sign: row.sign.map(|sign| sign.value),
+        reauthenticate: row.reauthenticate.map(|kind| kind.value),
         labels: labels(&row, kind, problems),
         bit_labels: bit_labels(&row.bits, kind, problems),
         bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),

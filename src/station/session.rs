@@ -55,7 +55,7 @@ impl Session {
         })
     }
 
-    /// Gives a command without note and signature; its outcome is seen in a later snapshot.
+    /// Gives a command without note and credentials; its outcome is seen in a later snapshot.
     pub fn send_command(&self, number: u32, kind: CommandKind) -> Result<CommandId, &'static str> {
         let id = CommandId { terminal: self.terminal, number };
         let request = CommandRequest::on(&self.snapshots.borrow(), id, kind);

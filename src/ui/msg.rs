@@ -103,7 +103,7 @@ pub enum UiAction {
     ShowOnTrends(TagId, Timestamp),
     /// Give a command and watch its outcome.
     Command(CommandKind),
-    /// The same with what its operator has seen and signed.
+    /// The same with the confirmed value and the credentials.
     Confirmed(Confirmed),
     /// Send the station a request; the answer goes to the window that waits for one, else to this tab.
     SessionRequest(Tab, SessionRequest),

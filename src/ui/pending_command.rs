@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Effect, Model, chrome, modal::Modal};
 use crate::{
-    access::{CommandRequest, Signature},
+    access::{CommandRequest, Credentials},
     plant::command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
 };
 
@@ -19,7 +19,7 @@ pub struct Confirmed {
     /// The displayed value of the tag to be written; `None` where it was not known.
     pub expected: Option<f64>,
     /// What a tag asks for again.
-    pub sign: Option<Signature>,
+    pub credentials: Option<Credentials>,
     /// Why, in his words.
     pub note: Option<Arc<str>>,
 }
@@ -27,7 +27,7 @@ pub struct Confirmed {
 impl From<CommandKind> for Confirmed {
     /// A command that nothing was asked about.
     fn from(kind: CommandKind) -> Confirmed {
-        Confirmed { kind, expected: None, sign: None, note: None }
+        Confirmed { kind, expected: None, credentials: None, note: None }
     }
 }
 
@@ -69,14 +69,14 @@ impl PendingCommand {
 impl Model {
     /// Gives a command and watches it. A station that has gone takes none: that is said at once.
     pub(super) fn send_command(&mut self, confirmed: Confirmed) -> Option<Effect> {
-        let Confirmed { kind, expected, sign, note } = confirmed;
+        let Confirmed { kind, expected, credentials, note } = confirmed;
         self.commands_sent = self.commands_sent.wrapping_add(1);
         let id = CommandId { terminal: self.terminal, number: self.commands_sent };
         let undelivered = self.session.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
         self.pending_command = Some(PendingCommand { id, kind: kind.clone(), status: None, changed_at, undelivered });
         let request = CommandRequest::on(&self.snapshot, id, kind);
-        let request = CommandRequest { seen: expected.or(request.seen), sign, note, ..request };
+        let request = CommandRequest { seen: expected.or(request.seen), credentials, note, ..request };
         undelivered.is_none().then_some(Effect::Command(request))
     }
 
@@ -92,12 +92,12 @@ impl Model {
         }
     }
 
-    /// Ends the wait of a window for the station's word on its signature; one that was not taken is asked for again.
+    /// Ends the wait of a window for the check of its credentials; refused ones are asked for again.
     pub(super) fn settle(&mut self) {
         let Some(pending) = &self.pending_command else { return };
         let refused = match (pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
             (Some(why), _) => Some(format!("not sent: {why}")),
-            (None, Some(Outcome::Refused(Refusal::NotSigned(why)))) => Some(why.clone()),
+            (None, Some(Outcome::Refused(Refusal::NotReauthenticated(why)))) => Some(why.clone()),
             (None, Some(_)) => None,
             (None, None) => return,
         };

@@ -13,7 +13,7 @@
 //! | `reports` | reports and exports as a user gets them: damaged history, suppressed alarms, a running station |
 //! | `devices` | every shipped profile and plant against its simulated devices: a minute, every fault, golden frames |
 //! | `rights` | every command, request and query through the socket, by everybody who may be at a terminal |
-//! | `users` | wrong passwords, lockout, idle lock, second persons, two operators at once |
+//! | `users` | wrong passwords, lockout, idle lock, second users, two operators at once |
 //! | `kills` | stations killed during writes, acknowledgements, logins and reports: what was reported as done is in the audit log |
 //! | `outstanding` | stations killed and started again, with a slow device: a late reply to the old one is no value |
 //! | `tampering` | the book changed by hand: what `sightglass audit verify` says |

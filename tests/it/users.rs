@@ -1,15 +1,15 @@
-//! Users at the terminals of a station: wrong passwords by script, lockout, idle lock, second persons, two operators at
+//! Users at the terminals of a station: wrong passwords by script, lockout, idle lock, second users, two operators at
 //! once. Alarms are seen through all of it.
 
 use std::time::Duration;
 
 use jiff::Timestamp;
 use sightglass::{
-    access::{CommandRequest, SessionRequest, Signature},
+    access::{CommandRequest, Credentials, SessionRequest},
     plant::{
         PlantDef,
         command::{CommandKind, Outcome, Refusal},
-        def::Sign,
+        def::Reauthentication,
         sample::Cause,
     },
     station::Session,
@@ -176,33 +176,36 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
 async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed() {
     let guarded = Guarded::start(|def| {
         let tag = def.tag_named("TIC-1.SV").unwrap();
-        def.tags[tag.index()].sign = Some(Sign::SecondPerson);
+        def.tags[tag.index()].reauthenticate = Some(Reauthentication::SecondUser);
     })
     .await;
     let tom = guarded.person("tom").await;
     let tag = guarded.tag("TIC-1.SV");
-    let signed = |number: u32, by: Option<(&str, &str)>| CommandRequest {
-        sign: by.map(|(user, password)| Signature { user: Some(user.into()), password: password.into() }),
+    let with_credentials = |number: u32, by: Option<(&str, &str)>| CommandRequest {
+        credentials: by.map(|(user, password)| Credentials { user: Some(user.into()), password: password.into() }),
         ..request(&tom, number, CommandKind::Write { tag, value: 61.0 })
     };
     let refused = [
-        (None, "this tag asks for a second person".to_owned()),
-        (Some(("TOM", PASSWORD)), "the second person must be another one".to_owned()),
-        (Some(("vera", PASSWORD)), "vera may not sign this: it is for a technician".to_owned()),
+        (None, "this tag requires a second user".to_owned()),
+        (Some(("TOM", PASSWORD)), "the second user must be another user".to_owned()),
+        (Some(("vera", PASSWORD)), "vera cannot approve this: it is for a technician".to_owned()),
         (Some(("mia", PASSWORD)), "mia must first choose a password of his own".to_owned()),
         (Some(("sue", "wrong")), wait(1)),
         (Some(("nobody-here", PASSWORD)), wait(1)),
     ];
     for (number, (by, why)) in (1..).zip(refused) {
-        let status = guarded.send_command(&tom, signed(number, by)).await;
-        assert_eq!(status.outcome, Outcome::Refused(Refusal::NotSigned(why)), "{by:?}");
+        let status = guarded.send_command(&tom, with_credentials(number, by)).await;
+        assert_eq!(status.outcome, Outcome::Refused(Refusal::NotReauthenticated(why)), "{by:?}");
         waited(&guarded, 2).await;
     }
     assert!(guarded.tap.writes().is_empty(), "something has reached the line: {:?}", guarded.tap.writes());
     let written = guarded.entries().len();
-    assert_eq!(guarded.send_command(&tom, signed(9, Some(("sue", PASSWORD)))).await.outcome, Outcome::Verified);
+    assert_eq!(
+        guarded.send_command(&tom, with_credentials(9, Some(("sue", PASSWORD)))).await.outcome,
+        Outcome::Verified
+    );
     let line = guarded.written(written, "the write", |entry| &*entry.action == "write").await;
-    assert_eq!((&*line.who, line.note.as_deref(), &*line.outcome), ("tom", Some("signed by sue"), "verified"));
+    assert_eq!((&*line.who, line.note.as_deref(), &*line.outcome), ("tom", Some("approved by sue"), "verified"));
     guarded.end().await;
 }
 

@@ -1,14 +1,14 @@
-//! What somebody at a terminal sees of access control: logins, lockouts, locks, roles, signatures, in plain time.
+//! What somebody at a terminal sees of access control: logins, lockouts, locks, roles, reauthentication, in virtual time.
 #![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    access::{Signature, lockout::Key, user::Change},
+    access::{Credentials, lockout::Key, user::Change},
     plant::{
         command::{CommandId, CommandKind},
-        def::Sign,
+        def::Reauthentication,
         fixture,
         role::AccessDef,
     },
@@ -34,7 +34,7 @@ impl Bench {
     fn new(rules: AccessDef) -> Bench {
         let mut def = fixture::plant();
         def.access = rules;
-        def.tags[fixture::SV.index()].sign = Some(Sign::SecondPerson);
+        def.tags[fixture::SV.index()].reauthenticate = Some(Reauthentication::SecondUser);
         let users = Users::default().with(&Change::First { user: "boss".into(), hash: BOSS.into() }).unwrap();
         let add = |users: Users, user: &str, role, hash: &str| {
             let users = users.with(&Change::Add { user: user.into(), role, hash: hash.into() }).unwrap();
@@ -117,11 +117,11 @@ impl Bench {
         &mut self,
         terminal: u32,
         kind: CommandKind,
-        sign: Option<Signature>,
+        credentials: Option<Credentials>,
     ) -> Option<(Command, Option<Refusal>)> {
         self.last_command += 1;
         let id = CommandId { terminal, number: self.last_command };
-        let request = CommandRequest { sign, note: Some("why".into()), ..CommandRequest::new(0, id, kind) };
+        let request = CommandRequest { credentials, note: Some("why".into()), ..CommandRequest::new(0, id, kind) };
         let effects = self.access.on_command(terminal, request, self.now);
         let effects = self.work(effects);
         let command = effects.into_iter().find_map(|effect| match effect {
@@ -384,25 +384,25 @@ fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");
     bench.login(1, "tech", TECH).unwrap();
-    let sign = |user: Option<&str>, password: &str| {
-        Some(Signature { user: user.map(str::to_owned), password: password.into() })
+    let credentials = |user: Option<&str>, password: &str| {
+        Some(Credentials { user: user.map(str::to_owned), password: password.into() })
     };
     let wrong = "wrong name or password; wait 1 s";
     let refused = [
-        (None, "this tag asks for a second person"),
-        (sign(None, TECH), "this tag asks for a second person"),
-        (sign(Some("Tech"), TECH), "the second person must be another one"),
-        (sign(Some("view"), VIEW), "view may not sign this: it is for a technician"),
-        (sign(Some("boss"), "guess"), wrong),
-        (sign(Some("nobody"), BOSS), "wrong name or password; wait 1 s"),
+        (None, "this tag requires a second user"),
+        (credentials(None, TECH), "this tag requires a second user"),
+        (credentials(Some("Tech"), TECH), "the second user must be another user"),
+        (credentials(Some("view"), VIEW), "view cannot approve this: it is for a technician"),
+        (credentials(Some("boss"), "guess"), wrong),
+        (credentials(Some("nobody"), BOSS), "wrong name or password; wait 1 s"),
     ];
-    for (sign, why) in refused {
-        let (_, refused) = bench.send_command(1, SV, sign).unwrap();
-        assert_eq!(refused, Some(Refusal::NotSigned(why.into())));
+    for (credentials, why) in refused {
+        let (_, refused) = bench.send_command(1, SV, credentials).unwrap();
+        assert_eq!(refused, Some(Refusal::NotReauthenticated(why.into())));
         bench.later(2);
     }
-    let (command, refused) = bench.send_command(1, SV, sign(Some("BOSS"), BOSS)).unwrap();
-    assert_eq!((refused, command.note.as_deref()), (None, Some("why; signed by boss")));
+    let (command, refused) = bench.send_command(1, SV, credentials(Some("BOSS"), BOSS)).unwrap();
+    assert_eq!((refused, command.note.as_deref()), (None, Some("why; approved by boss")));
 }
 
 #[test]

@@ -81,7 +81,7 @@ pub(super) enum What {
     /// Of who sits there, before he may have a new one.
     Change { ticket: u64, user: Arc<str>, new: Secret },
     /// Of who signs a command.
-    Sign { by: Arc<str>, signer: Option<Arc<str>>, request: Box<CommandRequest> },
+    Reauthenticate { by: Arc<str>, approver: Option<Arc<str>>, request: Box<CommandRequest> },
     /// A new one is hashed.
     Hash { ticket: u64, hashing: Hashing },
 }
@@ -233,7 +233,9 @@ impl AccessControl {
             What::Login { ticket, user } => self.login_done(terminal, ticket, user, wrong, at),
             What::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, wrong, at),
             What::Change { ticket, user, new } => self.old_password_done(terminal, ticket, user, new, wrong, at),
-            What::Sign { by, signer, request } => self.sign_done(terminal, by, signer, *request, wrong, at),
+            What::Reauthenticate { by, approver, request } => {
+                self.on_reauthenticated(terminal, by, approver, *request, wrong, at)
+            }
             What::Hash { .. } => Vec::new(),
         });
         effects
@@ -279,7 +281,7 @@ impl AccessControl {
             | What::Unlock { ticket, .. }
             | What::Change { ticket, .. }
             | What::Hash { ticket, .. } => vec![Effect::Reply(ticket, Err(why))],
-            What::Sign { request, .. } => self.not_signed(terminal, *request, why, at),
+            What::Reauthenticate { request, .. } => self.refuse_reauthentication(terminal, *request, why, at),
         }
     }
 
@@ -301,7 +303,7 @@ impl What {
     fn whose(&self) -> Option<&Arc<str>> {
         match self {
             What::Login { user, .. } => user.as_ref(),
-            What::Sign { signer, .. } => signer.as_ref(),
+            What::Reauthenticate { approver, .. } => approver.as_ref(),
             What::Unlock { user, .. } | What::Change { user, .. } => Some(user),
             What::Hash { hashing, .. } => Some(hashing.user()),
         }
@@ -312,7 +314,7 @@ impl What {
     fn comes_from_outside(&self) -> bool {
         match self {
             What::Login { .. } => true,
-            What::Sign { by, signer, .. } => signer.as_ref() != Some(by),
+            What::Reauthenticate { by, approver, .. } => approver.as_ref() != Some(by),
             What::Unlock { .. } | What::Change { .. } | What::Hash { .. } => false,
         }
     }

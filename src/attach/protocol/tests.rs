@@ -185,10 +185,10 @@ proptest! {
 
     #[test]
     fn a_corrupt_message_is_refused_without_harm(place in 0usize..200, byte: u8, end in 0usize..200) {
-        let signature = crate::access::Signature { user: Some("somchai".into()), password: "secret".into() };
+        let credentials = crate::access::Credentials { user: Some("somchai".into()), password: "secret".into() };
         let command = CommandRequest {
             note: Some("because".into()),
-            sign: Some(signature),
+            credentials: Some(credentials),
             ..CommandRequest::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
         };
         let mut bytes = body(encode(&Asked::Command(Box::new(command)), REQUEST_BYTES_MAX).unwrap());

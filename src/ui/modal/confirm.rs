@@ -11,13 +11,13 @@ use super::{
     window,
 };
 use crate::{
-    access::{Signature, control::sign},
+    access::{Credentials, control::reauthentication},
     plant::{
         alarm::{AlarmCommand, manager::subject_name},
         command::CommandKind,
         def::TagId,
         diagnostics::Diagnostic,
-        role::Sign,
+        role::Reauthentication,
         tag::{Access, Confidence, TagDef},
     },
     ui::{
@@ -41,10 +41,10 @@ pub struct Confirm {
     /// What its reader saw, where a value is written.
     expected: Option<ConfirmedValue>,
     /// What the tag asks for again.
-    sign: Option<Form>,
+    reauthentication: Option<Form>,
     /// Why the last Enter was not taken.
     problem: Option<String>,
-    /// The signed command is on its way: whether the signature is taken is told by the station.
+    /// The command has been sent; the station checks the credentials.
     waiting: bool,
 }
 
@@ -75,7 +75,7 @@ impl Confirm {
             notes,
             back: None,
             expected: None,
-            sign: None,
+            reauthentication: None,
             problem: None,
             waiting: false,
         }
@@ -95,7 +95,7 @@ impl Confirm {
         let intent = Intent::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
         let confirm = Confirm::new(intent, format!("write {}", def.name), notes);
-        Confirm { expected: Some(ConfirmedValue::new(cx, tag)), ..confirm }.signed(cx)
+        Confirm { expected: Some(ConfirmedValue::new(cx, tag)), ..confirm }.with_reauthentication(cx)
     }
 
     /// The same, asked from a faceplate, with words of its own above all others.
@@ -117,13 +117,13 @@ impl Confirm {
         Confirm::new(Intent::Command(kind), title, vec![words.into()])
     }
 
-    /// The same with a signature, where a tag that it writes asks for one.
-    pub fn signed(self, cx: &ViewContext) -> Confirm {
-        let sign = match &self.intent {
-            Intent::Command(kind) => sign::needed(cx.def(), kind).map(sign_form),
+    /// The same with reauthentication, if a tag that it writes requires it.
+    pub fn with_reauthentication(self, cx: &ViewContext) -> Confirm {
+        let reauthentication = match &self.intent {
+            Intent::Command(kind) => reauthentication::required(cx.def(), kind).map(reauthentication_form),
             Intent::Quit => None,
         };
-        Confirm { sign, ..self }
+        Confirm { reauthentication, ..self }
     }
 
     /// The faceplate that it was asked from.
@@ -191,7 +191,7 @@ impl Confirm {
         if self.waiting {
             return Next::Stay(Modal::Confirm(self));
         }
-        if let Some(form) = &mut self.sign {
+        if let Some(form) = &mut self.reauthentication {
             // Letters belong to the name and the password.
             match form.on_key(event) {
                 Turn::Finished => return self.yes(cx),
@@ -220,7 +220,7 @@ impl Confirm {
         if refused || self.expected.as_mut().is_some_and(|expected| expected.changed(cx)) {
             return Next::Stay(Modal::Confirm(self));
         }
-        if let Some(why) = self.sign.as_mut().and_then(Form::lacking) {
+        if let Some(why) = self.reauthentication.as_mut().and_then(Form::lacking) {
             self.problem = Some(why);
             return Next::Stay(Modal::Confirm(self));
         }
@@ -228,11 +228,11 @@ impl Confirm {
             Intent::Quit => UiAction::Do(Effect::Quit),
             Intent::Command(kind) => {
                 let expected = self.expected.as_ref().and_then(|expected| expected.shown(cx));
-                let sign = self.sign.as_ref().map(signature);
-                UiAction::Confirmed(Confirmed { expected, sign, ..kind.clone().into() })
+                let credentials = self.reauthentication.as_ref().map(credentials);
+                UiAction::Confirmed(Confirmed { expected, credentials, ..kind.clone().into() })
             }
         };
-        if self.sign.is_some() {
+        if self.reauthentication.is_some() {
             // A password that is typed anew after a refusal must find its line, not the keys of the tab below.
             (self.waiting, self.problem) = (true, None);
             return Next::Both(Modal::Confirm(self), vec![act]);
@@ -245,20 +245,20 @@ impl Confirm {
 
     /// Is a name or password typed into it?
     pub(super) fn takes_text(&self) -> bool {
-        self.sign.is_some()
+        self.reauthentication.is_some()
     }
 
-    /// Is the station's word on a signature waited for?
+    /// Whether the station still checks the credentials.
     pub(in crate::ui) fn is_waiting(&self) -> bool {
         self.waiting
     }
 
-    /// What is left once the station has spoken: the same window where the signature was not taken, else where it was
+    /// What is left once the station has spoken: the same window if the credentials were refused, else where it was
     /// asked from.
     pub(in crate::ui) fn answered(mut self, refused: Option<String>) -> Option<Modal> {
         let Some(why) = refused else { return self.back.map(Modal::Faceplate) };
         (self.waiting, self.problem) = (false, Some(why));
-        if let Some(form) = &mut self.sign {
+        if let Some(form) = &mut self.reauthentication {
             form.forget();
         }
         Some(Modal::Confirm(self))
@@ -266,14 +266,14 @@ impl Confirm {
 
     /// Pasted text: a password or a name, where one is asked for.
     pub(super) fn on_paste(&mut self, text: &str) {
-        if let Some(form) = self.sign.as_mut().filter(|_| !self.waiting) {
+        if let Some(form) = self.reauthentication.as_mut().filter(|_| !self.waiting) {
             form.paste(text);
         }
     }
 
     /// What of the window is below the words: rows of the form and of what is wrong with it.
     fn view_sign(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
-        if let Some(form) = &self.sign {
+        if let Some(form) = &self.reauthentication {
             form.view(cx, canvas, y);
             let y = y + form.rows();
             if self.waiting {
@@ -314,9 +314,9 @@ impl Confirm {
             false => format!("{yes} {}   Esc {}", self.verb(), self.escape()),
         };
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
-        let inner = inner.max(self.sign.as_ref().map_or(0, Form::width));
+        let inner = inner.max(self.reauthentication.as_ref().map_or(0, Form::width));
         let problem = self.problem.as_ref().map_or(1, |words| wrap(words, inner).len() as u16);
-        let form = self.sign.as_ref().map_or(0, |form| form.rows() + problem);
+        let form = self.reauthentication.as_ref().map_or(0, |form| form.rows() + problem);
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + form + 2));
         for (y, (text, style)) in rows.iter().enumerate() {
             canvas.text(0, y as u16, text, *style);
@@ -328,18 +328,18 @@ impl Confirm {
 }
 
 /// What is filled in where a tag asks for it again.
-fn sign_form(sign: Sign) -> Form {
-    Form::new(match sign {
-        Sign::Password => vec![Field::secret("your password again")],
-        Sign::SecondPerson => vec![Field::name("second person"), Field::secret("password")],
+fn reauthentication_form(kind: Reauthentication) -> Form {
+    Form::new(match kind {
+        Reauthentication::Password => vec![Field::secret("your password again")],
+        Reauthentication::SecondUser => vec![Field::name("second user"), Field::secret("password")],
     })
 }
 
-/// A second person gives his name; the one who writes is known.
-fn signature(form: &Form) -> Signature {
+/// A second user enters name and password; the user who writes is known.
+fn credentials(form: &Form) -> Credentials {
     match form.rows() {
-        1 => Signature { user: None, password: form.secret(0) },
-        _ => Signature { user: Some(form.name(0)), password: form.secret(1) },
+        1 => Credentials { user: None, password: form.secret(0) },
+        _ => Credentials { user: Some(form.name(0)), password: form.secret(1) },
     }
 }
 

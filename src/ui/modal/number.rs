@@ -1,7 +1,7 @@
 //! A typed number: what it means, whether it can be written, and why to ask again before it is.
 
 use crate::{
-    access::control::sign,
+    access::control::reauthentication,
     plant::{
         command::CommandKind,
         def::{Condition, Level, Subject, TagId},
@@ -65,10 +65,10 @@ pub fn help(cx: &ViewContext, tag: TagId) -> String {
     }
 }
 
-/// Is a number for this tag asked again in a window of its own? What must be signed is.
+/// Is a number for this tag asked again in a window of its own? A tag with reauthentication is.
 pub fn asks(cx: &ViewContext, tag: TagId, value: f64) -> bool {
     cx.def().tag(tag).confirm.is_some()
-        || sign::needed(cx.def(), &CommandKind::Write { tag, value }).is_some()
+        || reauthentication::required(cx.def(), &CommandKind::Write { tag, value }).is_some()
         || rounded_words(cx, tag, value).is_some()
         || !worries(cx, tag, value).is_empty()
 }

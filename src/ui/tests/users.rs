@@ -1,4 +1,4 @@
-//! Who sits here: the login page, the lock, signatures, two operators at once, users and the audit list.
+//! Users: the login page, the lock, credentials, two operators at once, users and the audit list.
 
 use std::{sync::Arc, time::Duration};
 
@@ -14,7 +14,7 @@ use crate::{
     plant::{
         command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         record::{ActionRecord, Seal},
-        role::{Role, Sign},
+        role::{Reauthentication, Role},
         sample::Quality,
     },
     ui::{
@@ -262,8 +262,8 @@ fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
 }
 
 #[test]
-fn a_signature_that_waits_when_the_terminal_is_locked_takes_its_answer() {
-    let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
+fn a_lock_keeps_a_reauthentication_that_awaits_its_answer() {
+    let mut model = with(&reauthenticated(Reauthentication::SecondUser), person("anna", Role::Technician));
     let effects = type_keys(&mut model, "s65⏎boris⏎horse⏎");
     let Some(Effect::Command(command)) = effects.last() else { panic!("no command: {effects:?}") };
     let id = command.id;
@@ -351,40 +351,42 @@ fn what_a_role_may_not_is_told_before_it_is_tried() {
     assert!(!screen(&mut model, 80, 24).contains("needs"));
 }
 
-fn signed(sign: Sign) -> Fixture {
+fn reauthenticated(kind: Reauthentication) -> Fixture {
     let mut fixture = Fixture::normal();
     let sv = fixture.tag("TIC-1.SV");
-    fixture.def.tags[sv.index()].sign = Some(sign);
+    fixture.def.tags[sv.index()].reauthenticate = Some(kind);
     fixture
 }
 
 #[test]
-fn a_tag_that_asks_for_a_signature_gets_one() {
+fn a_tag_with_reauthentication_gets_credentials() {
     let request = |effects: &[Effect]| {
         effects.iter().find_map(|effect| match effect {
             Effect::Command(request) => Some(request.clone()),
             _ => None,
         })
     };
-    let sent = |sign: Sign, keys: &str| -> Option<CommandRequest> {
-        let mut model = with(&signed(sign), person("anna", Role::Technician));
+    let sent = |kind: Reauthentication, keys: &str| -> Option<CommandRequest> {
+        let mut model = with(&reauthenticated(kind), person("anna", Role::Technician));
         request(&type_keys(&mut model, keys))
     };
-    assert_eq!(sent(Sign::Password, "s65⏎⏎"), None, "without the password");
-    let command = sent(Sign::Password, "s65⏎yes n q⏎").expect("a command");
-    let sign = command.sign.expect("a signature");
-    assert_eq!((sign.user, sign.password, command.seen), (None, "yes n q".into(), Some(70.0)));
-    let sign = sent(Sign::SecondPerson, "s65⏎boris⏎horse⏎").and_then(|command| command.sign).expect("a signature");
-    assert_eq!((sign.user.as_deref(), sign.password), (Some("boris"), "horse".into()));
+    assert_eq!(sent(Reauthentication::Password, "s65⏎⏎"), None, "without the password");
+    let command = sent(Reauthentication::Password, "s65⏎yes n q⏎").expect("a command");
+    let credentials = command.credentials.expect("a credentials");
+    assert_eq!((credentials.user, credentials.password, command.seen), (None, "yes n q".into(), Some(70.0)));
+    let credentials = sent(Reauthentication::SecondUser, "s65⏎boris⏎horse⏎")
+        .and_then(|command| command.credentials)
+        .expect("a credentials");
+    assert_eq!((credentials.user.as_deref(), credentials.password), (Some("boris"), "horse".into()));
 
-    let mut model = with(&signed(Sign::SecondPerson), person("anna", Role::Technician));
+    let mut model = with(&reauthenticated(Reauthentication::SecondUser), person("anna", Role::Technician));
     type_keys(&mut model, "s65⏎boris⏎abc");
-    insta::assert_snapshot!("window_signature_80x24", screen(&mut model, 80, 24));
+    insta::assert_snapshot!("window_reauthentication_80x24", screen(&mut model, 80, 24));
 }
 
 #[test]
-fn a_refused_signature_is_asked_again_in_its_window() {
-    let fixture = signed(Sign::Password);
+fn refused_credentials_are_asked_again_in_their_window() {
+    let fixture = reauthenticated(Reauthentication::Password);
     let mut model = with(&fixture, person("anna", Role::Technician));
     let effects = type_keys(&mut model, "s65⏎hors⏎");
     let Some(Effect::Command(first)) = effects.last() else { panic!("no command: {effects:?}") };
@@ -405,13 +407,16 @@ fn a_refused_signature_is_asked_again_in_its_window() {
         }];
         Msg::Snapshot(snapshot)
     };
-    update(&mut model, told(first, Outcome::Refused(Refusal::NotSigned("wrong password; wait 2 s".to_owned()))));
+    update(
+        &mut model,
+        told(first, Outcome::Refused(Refusal::NotReauthenticated("wrong password; wait 2 s".to_owned()))),
+    );
     shows(&mut model, "wrong password; wait 2 s");
     let effects = type_keys(&mut model, "r1q 3a⏎");
     assert_eq!((model.tabs.shown, effects.len()), (Tab::Mimic, 1), "no letter of it was a key: {effects:?}");
     assert!(!screen(&mut model, 80, 24).contains("r1q"));
     let Some(Effect::Command(second)) = effects.last() else { panic!("no command: {effects:?}") };
-    assert_eq!(second.sign.as_ref().map(|sign| sign.password.clone()), Some("r1q 3a".into()));
+    assert_eq!(second.credentials.as_ref().map(|credentials| credentials.password.clone()), Some("r1q 3a".into()));
     update(&mut model, told(second, Outcome::Pending));
     assert_eq!(model.modal, None);
 }

@@ -69,7 +69,7 @@ fn a_login_with_a_password_changed_meanwhile_fails_and_is_no_guess() {
 }
 
 #[test]
-fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
+fn an_unlock_or_reauthentication_counts_only_in_its_session() {
     let mut bench = two_at_work();
     bench.request(2, SessionRequest::Lock).unwrap();
     let unlock = under_way(&bench.access.on_request(2, 9_000, SessionRequest::Unlock(TECH.into()), bench.now));
@@ -80,9 +80,10 @@ fn an_unlock_or_a_signature_counts_only_in_the_session_it_was_given_in() {
     assert!(bench.access.session_status(2, bench.now).locked, "the unlock belonged to the session before");
 
     bench.login(2, "tech", TECH).unwrap();
-    let sign = Some(Signature { user: Some("boss".to_owned()), password: BOSS.into() });
+    let credentials = Some(Credentials { user: Some("boss".to_owned()), password: BOSS.into() });
     let id = CommandId { terminal: 2, number: 50 };
-    let effects = bench.access.on_command(2, CommandRequest { sign, ..CommandRequest::new(0, id, SV) }, bench.now);
+    let effects =
+        bench.access.on_command(2, CommandRequest { credentials, ..CommandRequest::new(0, id, SV) }, bench.now);
     bench.request(2, SessionRequest::Logout).unwrap();
     let effects = bench.access.done(under_way(&effects), Outcome::Verified(true), bench.now);
     let given = effects.iter().any(|effect| matches!(effect, Effect::Command(Command { refused: None, .. })));

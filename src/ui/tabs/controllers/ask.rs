@@ -47,7 +47,7 @@ pub fn query(
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
     let request = RestoreRequest { device: device.id, from, set, changes };
-    Confirm::command(title, query, CommandKind::Restore(Box::new(request))).with_notes(notes).signed(cx)
+    Confirm::command(title, query, CommandKind::Restore(Box::new(request))).with_notes(notes).with_reauthentication(cx)
 }
 
 fn change_words(cx: &ViewContext, change: &Change) -> String {

@@ -1,0 +1,147 @@
+//! Reauthentication: the password or the second user that a tag requires before it is written.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use super::{
+    AccessControl, Effect, right,
+    work::{What, Wrong},
+};
+use crate::{
+    access::{CommandRequest, Credentials, user},
+    plant::{
+        PlantDef,
+        command::{CommandKind, Refusal},
+        def::{Reauthentication, TagId},
+        interlock,
+    },
+};
+
+impl AccessControl {
+    /// Passes on a command with a sufficient role once the tag has the reauthentication it requires.
+    pub(super) fn reauthenticate(&mut self, terminal: u32, mut request: CommandRequest, at: Timestamp) -> Vec<Effect> {
+        let needed = required(&self.def, &request.kind).filter(|_| self.users.is_some());
+        let credentials = request.credentials.take();
+        let (Some(needed), Some(session)) = (needed, self.sessions.get(&terminal)) else {
+            return self.let_through(terminal, request, None);
+        };
+        let Some(by) = session.who.as_ref().map(|who| who.user.clone()) else { return Vec::new() };
+        let own = |name: &str| user::key(name) == user::key(&by);
+        let why = match (needed, &credentials) {
+            (Reauthentication::Password, None) => Some("this tag requires your password again"),
+            (Reauthentication::Password, Some(Credentials { user: Some(user), .. })) if !own(user) => {
+                Some("this tag requires your own password")
+            }
+            (Reauthentication::Password, Some(_)) if session.trusted => {
+                Some("this tag requires a password, and you have none here")
+            }
+            (Reauthentication::SecondUser, None | Some(Credentials { user: None, .. })) => {
+                Some("this tag requires a second user")
+            }
+            (Reauthentication::SecondUser, Some(Credentials { user: Some(user), .. })) if own(user) => {
+                Some("the second user must be another user")
+            }
+            (Reauthentication::Password | Reauthentication::SecondUser, Some(_)) => None,
+        };
+        let (None, Some(Credentials { user, password })) = (why, credentials) else {
+            return self.refuse_reauthentication(terminal, request, why.unwrap_or_default().to_owned(), at);
+        };
+        let name = user.as_deref().unwrap_or(&by).to_owned();
+        let approver = self.users.as_ref().and_then(|users| users.get(&name)).map(|user| user.name.clone());
+        let (copy, request) = (request.clone(), Box::new(request));
+        match self.look_at(terminal, &name, password, What::Reauthenticate { by, approver, request }, at) {
+            Ok(effects) => effects,
+            Err(why) => self.refuse_reauthentication(terminal, copy, why, at),
+        }
+    }
+
+    pub(super) fn on_reauthenticated(
+        &mut self,
+        terminal: u32,
+        by: Arc<str>,
+        approver: Option<Arc<str>>,
+        request: CommandRequest,
+        wrong: Option<Wrong>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        if let Some(Wrong { why, told }) = wrong {
+            let mut effects = Vec::new();
+            if let Some(session) = self.sessions.get(&terminal) {
+                let approver = approver.as_deref().unwrap_or("unknown user");
+                effects.push(super::audit_entries::audit(
+                    session,
+                    "reauthentication failed",
+                    approver,
+                    &format!("refused: {why}"),
+                    at,
+                ));
+            }
+            effects.extend(self.refuse_reauthentication(terminal, request, told, at));
+            return effects;
+        }
+        let needed = right::needs(&request.kind);
+        // Meanwhile the terminal may have been locked.
+        if let Err(why) = self.may(terminal, Some(needed)) {
+            return self.refuse_command(terminal, request, Refusal::NotPermitted(why), at);
+        }
+        let other = approver.as_ref().filter(|approver| **approver != by);
+        let other = other.and_then(|approver| self.users.as_ref()?.get(approver));
+        match other {
+            Some(other) if other.must_change => {
+                let why = format!("{} must choose a new password first", other.name);
+                self.refuse_reauthentication(terminal, request, why, at)
+            }
+            Some(other) if other.role < needed => {
+                let why = format!("{} cannot approve this: it is for a {}", other.name, needed.word());
+                self.refuse_reauthentication(terminal, request, why, at)
+            }
+            Some(_) | None => self.let_through(terminal, request, approver.as_deref()),
+        }
+    }
+
+    pub(super) fn refuse_reauthentication(
+        &mut self,
+        terminal: u32,
+        request: CommandRequest,
+        why: String,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        self.refuse_command(terminal, request, Refusal::NotReauthenticated(why), at)
+    }
+}
+
+/// The reauthentication that a command requires; none for a stop.
+pub fn required(def: &PlantDef, kind: &CommandKind) -> Option<Reauthentication> {
+    let asks = |tag: TagId, value: f64| {
+        let kind = def.tags.get(tag.index())?.reauthenticate?;
+        (!interlock::is_stop(def, tag, value)).then_some(kind)
+    };
+    let strictest = |one: Option<Reauthentication>, other: Option<Reauthentication>| match (one, other) {
+        (Some(Reauthentication::SecondUser), _) | (_, Some(Reauthentication::SecondUser)) => {
+            Some(Reauthentication::SecondUser)
+        }
+        (Some(Reauthentication::Password), _) | (_, Some(Reauthentication::Password)) => {
+            Some(Reauthentication::Password)
+        }
+        (None, None) => None,
+    };
+    match kind {
+        CommandKind::Write { tag, value } => asks(*tag, *value),
+        CommandKind::Restore(request) => {
+            request.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest)
+        }
+        CommandKind::Alarm(_)
+        | CommandKind::Refresh(_)
+        | CommandKind::Connect(..)
+        | CommandKind::Configure(_)
+        | CommandKind::SaveSettings(_)
+        | CommandKind::Test(..)
+        | CommandKind::StopTest(_)
+        | CommandKind::ReadSets
+        | CommandKind::SaveSet { .. }
+        | CommandKind::StopRestore(_)
+        | CommandKind::HandOver
+        | CommandKind::TakeOver => None,
+    }
+}
