@@ -9,7 +9,7 @@ pub mod reauthentication;
 mod session_status;
 #[cfg(test)]
 mod tests;
-mod work;
+mod jobs;
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -21,9 +21,9 @@ use jiff::{SignedDuration, Timestamp};
 
 use self::{
     audit_entries::{actor_name, audit, clean, record, words},
+    jobs::PendingJob,
     session::{Refusals, SessionState},
     user_admin::Saving,
-    work::Errand,
 };
 use super::{
     CommandRequest, Secret, SessionRequest, Who,
@@ -42,7 +42,7 @@ use crate::{
     },
 };
 
-pub use work::{Job, Outcome, Work};
+pub use jobs::{JobId, Outcome, PasswordJob};
 
 /// Said where a terminal asks more than it may.
 const TOO_MANY: &str = "too many requests from this terminal, wait a moment";
@@ -72,9 +72,9 @@ pub enum Effect {
     Reply(u64, Result<(), String>),
     /// The session status of this terminal has changed.
     SessionStatus(u32),
-    /// Do this beside, and tell [`AccessControl::done`]. At most `JOBS_MAX` are under way or wait.
-    Work(Job, Work),
-    /// Save the users, then call [`AccessControl::saved`]. Never two at a time.
+    /// Run this job, then call [`AccessControl::on_job_done`]. At most `JOBS_MAX` are under way or wait.
+    Job(JobId, PasswordJob),
+    /// Save the users, then call [`AccessControl::on_saved`]. Never two at a time.
     Save(Users),
     /// End the station.
     Stop,
@@ -101,10 +101,10 @@ pub struct AccessControl {
     sessions: BTreeMap<u32, SessionState>,
     attempts: LoginAttempts,
     refusals: BTreeMap<Arc<str>, Refusals>,
-    errands: BTreeMap<Job, Errand>,
+    jobs: BTreeMap<JobId, PendingJob>,
     /// Passwords that wait for the one before them of the same origin, or for their time.
-    waiting: VecDeque<(Errand, Secret)>,
-    last_job: Job,
+    waiting: VecDeque<(PendingJob, Secret)>,
+    last_job: JobId,
     saving: Option<Saving>,
     /// A change that waits until last logins are written: the terminal, its ticket, what.
     next: Option<(u32, u64, Change)>,
@@ -126,7 +126,7 @@ impl AccessControl {
             sessions: BTreeMap::new(),
             attempts: LoginAttempts::default(),
             refusals: BTreeMap::new(),
-            errands: BTreeMap::new(),
+            jobs: BTreeMap::new(),
             waiting: VecDeque::new(),
             last_job: 0,
             saving: None,
@@ -408,7 +408,7 @@ impl AccessControl {
     pub fn tick(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.lock_idle(at);
         effects.extend(self.summarise_refusals(at));
-        effects.extend(self.begin_waiting(at));
+        effects.extend(self.start_waiting_jobs(at));
         if self.unsaved && self.saving.is_none() {
             effects.extend(self.save_logins());
         }

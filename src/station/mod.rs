@@ -33,7 +33,7 @@ pub mod pulse;
 mod sets;
 mod supervisor;
 pub mod teller;
-mod toil;
+mod blocking_jobs;
 pub mod io;
 
 #[cfg(test)]

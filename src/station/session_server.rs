@@ -18,8 +18,8 @@ use tokio::{
 
 use super::{
     audit_queue::AuditMessage,
+    blocking_jobs::{BlockingJobs, Done},
     session::{Request, Session},
-    toil::{Done, Toil},
 };
 use crate::{
     access::{AccessControl, Durability, Effect, Peer, SessionStatus},
@@ -123,7 +123,7 @@ pub struct SessionServer {
     /// Reloads whose outcome is awaited, with their tickets.
     reloads: JoinSet<(u64, Result<(), String>)>,
     last_ticket: u64,
-    toil: Toil,
+    jobs: BlockingJobs,
     /// Actions that did not reach the audit log, not reported yet.
     lost: u64,
 }
@@ -139,7 +139,7 @@ impl SessionServer {
             tickets: BTreeMap::new(),
             reloads: JoinSet::new(),
             last_ticket: 0,
-            toil: Toil::new(users),
+            jobs: BlockingJobs::new(users),
             lost: 0,
         }
     }
@@ -162,10 +162,10 @@ impl SessionServer {
                     let effects = self.access.open(request.terminal, request.peer, self.clock.now());
                     self.carry_out(effects);
                 }
-                done = self.toil.next() => {
+                done = self.jobs.next() => {
                     let effects = match done {
-                        Done::Work(job, outcome) => self.access.done(job, outcome, self.clock.now()),
-                        Done::Saved(result) => self.access.saved(result, self.clock.now()),
+                        Done::Job(job, outcome) => self.access.on_job_done(job, outcome, self.clock.now()),
+                        Done::Saved(result) => self.access.on_saved(result, self.clock.now()),
                     };
                     self.carry_out(effects);
                 }
@@ -191,8 +191,8 @@ impl SessionServer {
             }
         }
         // The users are written by now, so the book must say so: nothing else is begun any more.
-        if let Some(result) = self.toil.end().await {
-            let mut effects = self.access.saved(result, self.clock.now());
+        if let Some(result) = self.jobs.end().await {
+            let mut effects = self.access.on_saved(result, self.clock.now());
             effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));
             self.carry_out(effects);
         }
@@ -256,8 +256,8 @@ impl SessionServer {
                         end.send_replace(Arc::new(self.access.session_status(terminal, self.clock.now())));
                     }
                 }
-                Effect::Work(job, work) => self.toil.put(job, work),
-                Effect::Save(users) => self.toil.save(users),
+                Effect::Job(job, work) => self.jobs.put(job, work),
+                Effect::Save(users) => self.jobs.save(users),
                 Effect::Stop => self.send_lifecycle(LifecycleRequest::Stop),
                 Effect::Reload(ticket) => {
                     let (reply, answer) = oneshot::channel();

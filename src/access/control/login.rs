@@ -7,9 +7,9 @@ use jiff::Timestamp;
 use super::{
     AccessControl, Effect, LOG_IN_FIRST, SessionState,
     audit_entries::audit,
+    jobs::{JobError, JobPurpose},
     passed,
     session_status::LOCK_NEAR,
-    work::{What, Wrong},
 };
 use crate::access::{Secret, Who, user};
 
@@ -35,7 +35,7 @@ impl AccessControl {
             return reply(ticket, "there are no users yet: whoever has started the station makes the first supervisor");
         }
         let (name, user) = (user.to_owned(), users.get(user).map(|user| user.name.clone()));
-        let looked_at = self.look_at(terminal, &name, password, What::Login { ticket, user }, at);
+        let looked_at = self.verify_password(terminal, &name, password, JobPurpose::Login { ticket, user }, at);
         looked_at.unwrap_or_else(|why| reply(ticket, &why))
     }
 
@@ -44,7 +44,7 @@ impl AccessControl {
         terminal: u32,
         ticket: u64,
         user: Option<Arc<str>>,
-        wrong: Option<Wrong>,
+        wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
@@ -83,14 +83,14 @@ impl AccessControl {
         ticket: u64,
         action: &str,
         user: Option<&str>,
-        Wrong { why, told }: Wrong,
+        JobError { why, message }: JobError,
         at: Timestamp,
     ) -> Vec<Effect> {
         let mut effects = Vec::new();
         if let Some(session) = self.sessions.get(&terminal) {
             effects.push(audit(session, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
         }
-        effects.push(Effect::Reply(ticket, Err(told)));
+        effects.push(Effect::Reply(ticket, Err(message)));
         effects
     }
 
@@ -135,7 +135,8 @@ impl AccessControl {
         let Some(user) = session.and_then(|session| session.who.as_ref()).map(|who| who.user.clone()) else {
             return reply(ticket, "this terminal is not locked");
         };
-        let looked_at = self.look_at(terminal, &user.clone(), password, What::Unlock { ticket, user }, at);
+        let looked_at =
+            self.verify_password(terminal, &user.clone(), password, JobPurpose::Unlock { ticket, user }, at);
         looked_at.unwrap_or_else(|why| reply(ticket, &why))
     }
 
@@ -144,7 +145,7 @@ impl AccessControl {
         terminal: u32,
         ticket: u64,
         user: Arc<str>,
-        wrong: Option<Wrong>,
+        wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {

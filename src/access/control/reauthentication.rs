@@ -5,8 +5,9 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Effect, right,
-    work::{What, Wrong},
+    AccessControl, Effect,
+    jobs::{JobError, JobPurpose},
+    right,
 };
 use crate::{
     access::{CommandRequest, Credentials, user},
@@ -50,7 +51,8 @@ impl AccessControl {
         let name = user.as_deref().unwrap_or(&by).to_owned();
         let approver = self.users.as_ref().and_then(|users| users.get(&name)).map(|user| user.name.clone());
         let (copy, request) = (request.clone(), Box::new(request));
-        match self.look_at(terminal, &name, password, What::Reauthenticate { by, approver, request }, at) {
+        match self.verify_password(terminal, &name, password, JobPurpose::Reauthenticate { by, approver, request }, at)
+        {
             Ok(effects) => effects,
             Err(why) => self.refuse_reauthentication(terminal, copy, why, at),
         }
@@ -62,10 +64,10 @@ impl AccessControl {
         by: Arc<str>,
         approver: Option<Arc<str>>,
         request: CommandRequest,
-        wrong: Option<Wrong>,
+        wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Some(Wrong { why, told }) = wrong {
+        if let Some(JobError { why, message }) = wrong {
             let mut effects = Vec::new();
             if let Some(session) = self.sessions.get(&terminal) {
                 let approver = approver.as_deref().unwrap_or("unknown user");
@@ -77,7 +79,7 @@ impl AccessControl {
                     at,
                 ));
             }
-            effects.extend(self.refuse_reauthentication(terminal, request, told, at));
+            effects.extend(self.refuse_reauthentication(terminal, request, message, at));
             return effects;
         }
         let needed = right::needs(&request.kind);

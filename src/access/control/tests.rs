@@ -72,16 +72,16 @@ impl Bench {
         while !to_do.is_empty() {
             for effect in std::mem::take(&mut to_do) {
                 match effect {
-                    Effect::Work(job, Work::Verify { password, hash }) => {
-                        to_do.extend(self.access.done(job, Outcome::Verified(*password.0 == *hash), self.now));
+                    Effect::Job(job, PasswordJob::Verify { password, hash }) => {
+                        to_do.extend(self.access.on_job_done(job, Outcome::Verified(*password.0 == *hash), self.now));
                     }
-                    Effect::Work(job, Work::Hash(password)) => {
-                        to_do.extend(self.access.done(job, Outcome::Hashed(Ok(password.0)), self.now));
+                    Effect::Job(job, PasswordJob::Hash(password)) => {
+                        to_do.extend(self.access.on_job_done(job, Outcome::Hashed(Ok(password.0)), self.now));
                     }
                     Effect::Save(users) => {
                         let result = if self.disk_full { Err("disk full".to_owned()) } else { Ok(()) };
                         self.kept = Some(users).filter(|_| result.is_ok());
-                        to_do.extend(self.access.saved(result, self.now));
+                        to_do.extend(self.access.on_saved(result, self.now));
                     }
                     Effect::Record(record) => {
                         let ActionRecord { by, action, target, outcome, .. } = &record;
@@ -372,7 +372,7 @@ fn a_change_that_comes_while_last_logins_are_written_waits_for_them() {
     let request = |user: &str| SessionRequest::DeleteUser { user: user.into() };
     assert_eq!(bench.access.on_request(1, 71, request("view"), bench.now), [], "not answered yet");
     assert!(bench.request(1, request("tech")).is_err(), "one at a time");
-    let effects = bench.access.saved(Ok(()), bench.now);
+    let effects = bench.access.on_saved(Ok(()), bench.now);
     let effects = bench.work(effects);
     assert!(effects.contains(&Effect::Reply(71, Ok(()))));
     let kept = bench.kept.unwrap();

@@ -8,9 +8,9 @@ use super::{
     AccessControl, Effect, Peer,
     audit_entries::{audit, record, words},
     enough,
+    jobs::{JobError, JobPurpose},
     login::reply,
     right,
-    work::{What, Wrong},
 };
 use crate::{
     access::{
@@ -138,7 +138,7 @@ impl AccessControl {
         if password::one_form(&new.0) == password::one_form(&old.0) {
             return Err("this is the present password, choose another one".to_owned());
         }
-        self.look_at(terminal, &user.clone(), old, What::Change { ticket, user, new }, at)
+        self.verify_password(terminal, &user.clone(), old, JobPurpose::Change { ticket, user, new }, at)
     }
 
     pub(super) fn old_password_done(
@@ -147,7 +147,7 @@ impl AccessControl {
         ticket: u64,
         user: Arc<str>,
         new: Secret,
-        wrong: Option<Wrong>,
+        wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
@@ -253,7 +253,7 @@ impl AccessControl {
     }
 
     /// The users were saved, or not: `Err` says why.
-    pub fn saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
+    pub fn on_saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
         let Some(Saving { terminal, request: Some((ticket, change, record)) }) = self.saving.take() else {
             return self.go_on(at);
         };

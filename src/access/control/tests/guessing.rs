@@ -1,7 +1,7 @@
 //! Wrong passwords: who is delayed and locked out, and who never is.
 
 use super::*;
-use crate::access::control::work::{BUSY, JOBS_MAX, JOBS_OF_USER_MAX, WRONG};
+use crate::access::control::jobs::{BUSY, JOBS_MAX, JOBS_OF_USER_MAX, WRONG};
 
 impl Bench {
     /// A terminal of this user of the operating system.
@@ -88,7 +88,7 @@ fn too_many_logins_at_once_are_refused_as_busy() {
     }
     assert_eq!(told.len(), 80 - JOBS_OF_USER_MAX);
     assert!(told.iter().all(|answer| *answer == Err(BUSY.to_owned())), "{told:?}");
-    assert!(bench.access.errands.len() + bench.access.waiting.len() <= JOBS_MAX);
+    assert!(bench.access.jobs.len() + bench.access.waiting.len() <= JOBS_MAX);
     // The others are not touched.
     bench.open_as(30, "panel");
     bench.login(30, "tech", TECH).unwrap();

@@ -1,4 +1,4 @@
-//! What access control has others do, because it takes as long as a hash: which password is looked at for what, and what then.
+//! Password jobs: checks and hashes that run outside the loop because each takes some ten milliseconds.
 
 use std::{sync::Arc, time::Duration};
 
@@ -18,29 +18,29 @@ pub(super) const BUSY: &str = "the station is busy with other logins, try again"
 /// The reply when a password was right, but the session or the stored hash has changed since.
 const CHANGED: &str = "the login here or the password was changed meanwhile, try again";
 
-/// Number of a piece of work.
-pub type Job = u64;
+/// Number of a password job.
+pub type JobId = u64;
 
-/// A piece of work that takes some ten milliseconds: not for a loop that must stay quick.
+/// A computation of some ten milliseconds.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Work {
-    /// Is this the password of this hash?
+pub enum PasswordJob {
+    /// Checks a password against a hash.
     Verify {
         /// What was typed.
         password: Secret,
         /// What is kept.
         hash: Arc<str>,
     },
-    /// Make a hash of it, with a fresh salt.
+    /// Hashes a password with a fresh salt.
     Hash(Secret),
 }
 
-impl Work {
-    /// Does it. `salt` must be fresh and random.
-    pub fn done(self, salt: [u8; password::SALT_BYTES]) -> Outcome {
+impl PasswordJob {
+    /// Runs the job. `salt` must be fresh and random.
+    pub fn run(self, salt: [u8; password::SALT_BYTES]) -> Outcome {
         match self {
-            Work::Verify { password, hash } => Outcome::Verified(password::is(&password.0, &hash)),
-            Work::Hash(password) => Outcome::Hashed(password::hash(&password.0, salt)),
+            PasswordJob::Verify { password, hash } => Outcome::Verified(password::is(&password.0, &hash)),
+            PasswordJob::Hash(password) => Outcome::Hashed(password::hash(&password.0, salt)),
         }
     }
 }
@@ -56,9 +56,9 @@ pub enum Outcome {
     Failed(String),
 }
 
-/// What a piece of work is for. Its result counts only in the same session and for the same stored hash.
+/// A job and its purpose. Its result counts only in the same login and for the same stored hash.
 #[derive(Debug)]
-pub(super) struct Errand {
+pub(super) struct PendingJob {
     pub terminal: u32,
     /// Of the terminal, when it was asked for.
     login_number: u64,
@@ -69,11 +69,11 @@ pub(super) struct Errand {
     key: Key,
     /// The stored hash of that user when the work began.
     stored: Option<Arc<str>>,
-    what: What,
+    what: JobPurpose,
 }
 
 #[derive(Debug)]
-pub(super) enum What {
+pub(super) enum JobPurpose {
     /// The password of `user`, `None` for a name that nobody has.
     Login { ticket: u64, user: Option<Arc<str>> },
     /// Of who sits there.
@@ -86,24 +86,24 @@ pub(super) enum What {
     Hash { ticket: u64, hashing: Hashing },
 }
 
-/// What was wrong with an attempt.
+/// Why an attempt failed.
 #[derive(Debug)]
-pub(super) struct Wrong {
-    /// For the book.
+pub(super) struct JobError {
+    /// For the audit log.
     pub why: &'static str,
-    /// For the operator: the same whatever it was, and how long he must wait.
-    pub told: String,
+    /// For the operator: the same for every reason, and how long to wait.
+    pub message: String,
 }
 
 impl AccessControl {
     /// Has the password for this name checked. The time that takes must not publish_status whether the name exists.
     /// `Err` says in words for the operator why it is not checked.
-    pub(super) fn look_at(
+    pub(super) fn verify_password(
         &mut self,
         terminal: u32,
         name: &str,
         password: Secret,
-        what: What,
+        what: JobPurpose,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
         let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
@@ -113,14 +113,14 @@ impl AccessControl {
             account: user::check_name(name).is_ok().then(|| user::key(name)),
             never_locked: self.is_host(&session.peer),
         };
-        let errand = self.errand(terminal, key, what)?;
-        if let Some(wait) = self.attempts.wait(&errand.key, &self.def.access, at)
-            && !errand.key.never_locked
+        let job = self.pending_job(terminal, key, what)?;
+        if let Some(wait) = self.attempts.wait(&job.key, &self.def.access, at)
+            && !job.key.never_locked
         {
             return Err(not_checked(wait));
         }
-        self.waiting.push_back((errand, password));
-        Ok(self.begin_waiting(at))
+        self.waiting.push_back((job, password));
+        Ok(self.start_waiting_jobs(at))
     }
 
     /// Has a new password hashed.
@@ -134,19 +134,19 @@ impl AccessControl {
         let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
         let origin = format!("hash for terminal {terminal}").into();
         let key = Key { origin, account: None, never_locked: self.is_host(&session.peer) };
-        let errand = self.errand(terminal, key, What::Hash { ticket, hashing })?;
-        Ok(self.send_off(errand, Work::Hash(password)))
+        let job = self.pending_job(terminal, key, JobPurpose::Hash { ticket, hashing })?;
+        Ok(self.start_job(job, PasswordJob::Hash(password)))
     }
 
     /// `Err` where too many are under way.
-    fn errand(&self, terminal: u32, key: Key, what: What) -> Result<Errand, String> {
+    fn pending_job(&self, terminal: u32, key: Key, what: JobPurpose) -> Result<PendingJob, String> {
         let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
-        let users = || self.errands.values().chain(self.waiting.iter().map(|(errand, _)| errand)).map(|job| &job.user);
+        let users = || self.jobs.values().chain(self.waiting.iter().map(|(job, _)| job)).map(|job| &job.user);
         let most = if key.never_locked { JOBS_MAX } else { JOBS_MAX - JOBS_KEPT };
         if most <= users().count() || JOBS_OF_USER_MAX <= users().filter(|user| **user == session.origin).count() {
             return Err(BUSY.to_owned());
         }
-        Ok(Errand {
+        Ok(PendingJob {
             terminal,
             login_number: session.login_number,
             user: session.origin.clone(),
@@ -157,92 +157,92 @@ impl AccessControl {
     }
 
     /// Begins the checks that have waited for the one before them, or for their time.
-    pub(super) fn begin_waiting(&mut self, at: Timestamp) -> Vec<Effect> {
+    pub(super) fn start_waiting_jobs(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
-        for (errand, password) in std::mem::take(&mut self.waiting) {
-            let busy = self.errands.values().any(|other| other.key.origin == errand.key.origin);
-            match self.attempts.wait(&errand.key, &self.def.access, at) {
-                _ if !self.sessions.contains_key(&errand.terminal) => {}
+        for (job, password) in std::mem::take(&mut self.waiting) {
+            let busy = self.jobs.values().any(|other| other.key.origin == job.key.origin);
+            match self.attempts.wait(&job.key, &self.def.access, at) {
+                _ if !self.sessions.contains_key(&job.terminal) => {}
                 None if !busy => {
-                    let hash = self.stored(&errand.what).unwrap_or_else(|| password::DUMMY.into());
-                    effects.extend(self.send_off(errand, Work::Verify { password, hash }));
+                    let hash = self.stored(&job.what).unwrap_or_else(|| password::DUMMY.into());
+                    effects.extend(self.start_job(job, PasswordJob::Verify { password, hash }));
                 }
-                Some(wait) if !errand.key.never_locked => {
-                    effects.extend(self.not_looked_at(errand.terminal, errand.what, not_checked(wait), at));
+                Some(wait) if !job.key.never_locked => {
+                    effects.extend(self.refuse_job(job.terminal, job.what, not_checked(wait), at));
                 }
-                None | Some(_) => self.waiting.push_back((errand, password)),
+                None | Some(_) => self.waiting.push_back((job, password)),
             }
         }
         effects
     }
 
-    fn send_off(&mut self, errand: Errand, work: Work) -> Vec<Effect> {
+    fn start_job(&mut self, job: PendingJob, work: PasswordJob) -> Vec<Effect> {
         self.last_job += 1;
-        let stored = self.stored(&errand.what);
-        self.errands.insert(self.last_job, Errand { stored, ..errand });
-        vec![Effect::Work(self.last_job, work)]
+        let stored = self.stored(&job.what);
+        self.jobs.insert(self.last_job, PendingJob { stored, ..job });
+        vec![Effect::Job(self.last_job, work)]
     }
 
     /// The stored hash of the user that this is about.
-    fn stored(&self, what: &What) -> Option<Arc<str>> {
+    fn stored(&self, what: &JobPurpose) -> Option<Arc<str>> {
         Some(self.users.as_ref()?.get(what.whose()?)?.hash.clone())
     }
 
-    fn is_stale(&self, errand: &Errand) -> bool {
-        let login_number = self.sessions.get(&errand.terminal).map(|session| session.login_number);
-        login_number != Some(errand.login_number) || self.stored(&errand.what) != errand.stored
+    fn is_stale(&self, job: &PendingJob) -> bool {
+        let login_number = self.sessions.get(&job.terminal).map(|session| session.login_number);
+        login_number != Some(job.login_number) || self.stored(&job.what) != job.stored
     }
 
     /// A piece of work is done.
-    pub fn done(&mut self, job: Job, outcome: Outcome, at: Timestamp) -> Vec<Effect> {
-        let Some(errand) = self.errands.remove(&job) else { return Vec::new() };
+    pub fn on_job_done(&mut self, job: JobId, outcome: Outcome, at: Timestamp) -> Vec<Effect> {
+        let Some(job) = self.jobs.remove(&job) else { return Vec::new() };
         let mut effects = match outcome {
-            Outcome::Verified(right) => self.judge(errand, right, at),
-            Outcome::Hashed(_) if self.is_stale(&errand) => self.hashed(errand, Err(CHANGED.to_owned()), at),
-            Outcome::Hashed(hash) => self.hashed(errand, hash, at),
-            Outcome::Failed(why) => self.not_looked_at(errand.terminal, errand.what, why, at),
+            Outcome::Verified(right) => self.on_verified(job, right, at),
+            Outcome::Hashed(_) if self.is_stale(&job) => self.on_hashed(job, Err(CHANGED.to_owned()), at),
+            Outcome::Hashed(hash) => self.on_hashed(job, hash, at),
+            Outcome::Failed(why) => self.refuse_job(job.terminal, job.what, why, at),
         };
-        effects.extend(self.begin_waiting(at));
+        effects.extend(self.start_waiting_jobs(at));
         effects
     }
 
-    fn hashed(&mut self, errand: Errand, hash: Result<String, String>, at: Timestamp) -> Vec<Effect> {
-        match errand.what {
-            What::Hash { ticket, hashing } => self.set_password(errand.terminal, ticket, hashing, hash, at),
-            other => self.not_looked_at(errand.terminal, other, "internal error".to_owned(), at),
+    fn on_hashed(&mut self, job: PendingJob, hash: Result<String, String>, at: Timestamp) -> Vec<Effect> {
+        match job.what {
+            JobPurpose::Hash { ticket, hashing } => self.set_password(job.terminal, ticket, hashing, hash, at),
+            other => self.refuse_job(job.terminal, other, "internal error".to_owned(), at),
         }
     }
 
-    fn judge(&mut self, errand: Errand, right: bool, at: Timestamp) -> Vec<Effect> {
-        let stale = self.is_stale(&errand);
-        let Errand { terminal, key, what, .. } = errand;
+    fn on_verified(&mut self, job: PendingJob, right: bool, at: Timestamp) -> Vec<Effect> {
+        let stale = self.is_stale(&job);
+        let PendingJob { terminal, key, what, .. } = job;
         let mut effects = Vec::new();
-        let wrong = match self.why_not(&what, right) {
+        let wrong = match self.failure_reason(&what, right) {
             // Right when it was checked: it does not count as a wrong attempt.
-            None if stale => Some(Wrong { why: "changed meanwhile", told: CHANGED.to_owned() }),
+            None if stale => Some(JobError { why: "changed meanwhile", message: CHANGED.to_owned() }),
             None => {
                 self.attempts.on_success(&key);
                 None
             }
             Some(why) => {
-                effects = self.count_wrong(terminal, &key, what.whose().cloned(), at);
-                Some(Wrong { why, told: self.wrong(&key, at) })
+                effects = self.count_failure(terminal, &key, what.whose().cloned(), at);
+                Some(JobError { why, message: self.failure_reply(&key, at) })
             }
         };
         effects.extend(match what {
-            What::Login { ticket, user } => self.login_done(terminal, ticket, user, wrong, at),
-            What::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, wrong, at),
-            What::Change { ticket, user, new } => self.old_password_done(terminal, ticket, user, new, wrong, at),
-            What::Reauthenticate { by, approver, request } => {
+            JobPurpose::Login { ticket, user } => self.login_done(terminal, ticket, user, wrong, at),
+            JobPurpose::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, wrong, at),
+            JobPurpose::Change { ticket, user, new } => self.old_password_done(terminal, ticket, user, new, wrong, at),
+            JobPurpose::Reauthenticate { by, approver, request } => {
                 self.on_reauthenticated(terminal, by, approver, *request, wrong, at)
             }
-            What::Hash { .. } => Vec::new(),
+            JobPurpose::Hash { .. } => Vec::new(),
         });
         effects
     }
 
     /// What speaks against this attempt, in words for the book; the operator is told less.
-    fn why_not(&self, what: &What, right: bool) -> Option<&'static str> {
+    fn failure_reason(&self, what: &JobPurpose, right: bool) -> Option<&'static str> {
         let user = what.whose().and_then(|user| self.users.as_ref()?.get(user));
         match (user, right) {
             (None, _) => Some("unknown user"),
@@ -252,7 +252,7 @@ impl AccessControl {
         }
     }
 
-    fn count_wrong(&mut self, terminal: u32, key: &Key, user: Option<Arc<str>>, at: Timestamp) -> Vec<Effect> {
+    fn count_failure(&mut self, terminal: u32, key: &Key, user: Option<Arc<str>>, at: Timestamp) -> Vec<Effect> {
         let locked = self.attempts.on_failure(key, &self.def.access, at);
         let (seconds, origin) = (self.def.access.lockout.as_secs(), &key.origin);
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
@@ -275,18 +275,18 @@ impl AccessControl {
         effects
     }
 
-    fn not_looked_at(&mut self, terminal: u32, what: What, why: String, at: Timestamp) -> Vec<Effect> {
+    fn refuse_job(&mut self, terminal: u32, what: JobPurpose, why: String, at: Timestamp) -> Vec<Effect> {
         match what {
-            What::Login { ticket, .. }
-            | What::Unlock { ticket, .. }
-            | What::Change { ticket, .. }
-            | What::Hash { ticket, .. } => vec![Effect::Reply(ticket, Err(why))],
-            What::Reauthenticate { request, .. } => self.refuse_reauthentication(terminal, *request, why, at),
+            JobPurpose::Login { ticket, .. }
+            | JobPurpose::Unlock { ticket, .. }
+            | JobPurpose::Change { ticket, .. }
+            | JobPurpose::Hash { ticket, .. } => vec![Effect::Reply(ticket, Err(why))],
+            JobPurpose::Reauthenticate { request, .. } => self.refuse_reauthentication(terminal, *request, why, at),
         }
     }
 
     /// The reply to a wrong attempt: the same whatever was wrong, and how long the next one must wait.
-    fn wrong(&self, key: &Key, at: Timestamp) -> String {
+    fn failure_reply(&self, key: &Key, at: Timestamp) -> String {
         match self.attempts.wait(key, &self.def.access, at) {
             Some(wait) => format!("{WRONG}; wait {} s", wait.as_secs_f64().ceil()),
             None => WRONG.to_owned(),
@@ -298,14 +298,14 @@ fn not_checked(wait: Duration) -> String {
     format!("password not checked after wrong ones; wait {} s", wait.as_secs_f64().ceil())
 }
 
-impl What {
+impl JobPurpose {
     /// Whose password it is, or will be; `None` for an unknown name.
     fn whose(&self) -> Option<&Arc<str>> {
         match self {
-            What::Login { user, .. } => user.as_ref(),
-            What::Reauthenticate { approver, .. } => approver.as_ref(),
-            What::Unlock { user, .. } | What::Change { user, .. } => Some(user),
-            What::Hash { hashing, .. } => Some(hashing.user()),
+            JobPurpose::Login { user, .. } => user.as_ref(),
+            JobPurpose::Reauthenticate { approver, .. } => approver.as_ref(),
+            JobPurpose::Unlock { user, .. } | JobPurpose::Change { user, .. } => Some(user),
+            JobPurpose::Hash { hashing, .. } => Some(hashing.user()),
         }
     }
 
@@ -313,9 +313,9 @@ impl What {
     /// the same place cannot block them.
     fn comes_from_outside(&self) -> bool {
         match self {
-            What::Login { .. } => true,
-            What::Reauthenticate { by, approver, .. } => approver.as_ref() != Some(by),
-            What::Unlock { .. } | What::Change { .. } | What::Hash { .. } => false,
+            JobPurpose::Login { .. } => true,
+            JobPurpose::Reauthenticate { by, approver, .. } => approver.as_ref() != Some(by),
+            JobPurpose::Unlock { .. } | JobPurpose::Change { .. } | JobPurpose::Hash { .. } => false,
         }
     }
 }

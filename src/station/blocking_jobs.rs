@@ -1,4 +1,4 @@
-//! What takes too long for the session server: hashes of passwords and the file of users, done on threads beside it.
+//! Jobs that would block the session server: password hashes and the users file, run on threads of their own.
 
 use std::{collections::VecDeque, path::PathBuf, time::Duration};
 
@@ -6,7 +6,7 @@ use tokio::task::{JoinHandle, JoinSet};
 
 use crate::access::{
     Users,
-    control::{Job, Outcome, Work},
+    control::{JobId, Outcome, PasswordJob},
     io::{random, users},
 };
 
@@ -19,30 +19,30 @@ const SAVING_MAX: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 pub enum Done {
     /// A hash.
-    Work(Job, Outcome),
+    Job(JobId, Outcome),
     /// The file of users.
     Saved(Result<(), String>),
 }
 
 /// Everything that is being done.
 #[derive(Debug)]
-pub struct Toil {
+pub struct BlockingJobs {
     path: Option<PathBuf>,
-    waiting: VecDeque<(Job, Work)>,
-    working: JoinSet<(Job, Outcome)>,
+    waiting: VecDeque<(JobId, PasswordJob)>,
+    working: JoinSet<(JobId, Outcome)>,
     /// The jobs that are being worked on: one that panics must be told as well.
-    jobs: Vec<(tokio::task::Id, Job)>,
+    jobs: Vec<(tokio::task::Id, JobId)>,
     saving: Option<JoinHandle<Result<(), String>>>,
 }
 
-impl Toil {
+impl BlockingJobs {
     /// Nothing to do. `path` is the file of users.
-    pub fn new(path: Option<PathBuf>) -> Toil {
-        Toil { path, waiting: VecDeque::new(), working: JoinSet::new(), jobs: Vec::new(), saving: None }
+    pub fn new(path: Option<PathBuf>) -> BlockingJobs {
+        BlockingJobs { path, waiting: VecDeque::new(), working: JoinSet::new(), jobs: Vec::new(), saving: None }
     }
 
     /// One more hash.
-    pub fn put(&mut self, job: Job, work: Work) {
+    pub fn put(&mut self, job: JobId, work: PasswordJob) {
         self.waiting.push_back((job, work));
         self.begin();
     }
@@ -61,7 +61,7 @@ impl Toil {
             && let Some((job, work)) = self.waiting.pop_front()
         {
             let begun = self.working.spawn_blocking(move || {
-                let outcome = random().map_or_else(Outcome::Failed, |salt| work.done(salt));
+                let outcome = random().map_or_else(Outcome::Failed, |salt| work.run(salt));
                 (job, outcome)
             });
             self.jobs.push((begun.id(), job));
@@ -83,11 +83,11 @@ impl Toil {
                 let job = place.map(|place| self.jobs.swap_remove(place).1);
                 self.begin();
                 match done {
-                    Ok((_, (job, outcome))) => Done::Work(job, outcome),
+                    Ok((_, (job, outcome))) => Done::Job(job, outcome),
                     Err(error) => {
                         tracing::error!(%error, "looking at a password ended badly");
                         let job = job.expect("every piece of work that is begun is noted");
-                        Done::Work(job, Outcome::Failed("internal error, see the log".to_owned()))
+                        Done::Job(job, Outcome::Failed("internal error, see the log".to_owned()))
                     }
                 }
             }
