@@ -8,7 +8,7 @@ pub const TERMINALS_MAX: usize = 64;
 const TERMINALS_OF_USER_MAX: usize = TERMINALS_MAX / 2;
 /// So many are kept for these two.
 const TERMINALS_KEPT: usize = 4;
-/// Connections of one user that have not said hello; one more, and the oldest of them is dropped.
+/// Connections of one user that have not completed the handshake; one more, and the oldest of them is dropped.
 pub const STRANGERS_MAX: usize = 8;
 /// The same of all users: the oldest one of the user with the most is dropped.
 const STRANGERS_OF_ALL_MAX: usize = 64;
@@ -71,7 +71,7 @@ impl Callers {
         Callers { hosts: [0, own], users: BTreeMap::new() }
     }
 
-    /// A connection that has said hello becomes a terminal. Returns the user it is counted for, which [`Callers::detach`]
+    /// A connection that has completed the handshake becomes a terminal. Returns the user it is counted for, which [`Callers::detach`]
     /// needs; `Err` says in words for its operator why it may not attach.
     pub fn attach(&mut self, user: u32, now: Duration) -> Result<u32, String> {
         let all: usize = self.users.values().map(|caller| caller.terminals).sum();
@@ -131,7 +131,7 @@ impl Callers {
     }
 }
 
-/// Which of these connections without a hello, the oldest first, makes room for another of this user.
+/// Which of these connections without a handshake, the oldest first, makes room for another of this user.
 pub fn makes_room(strangers: &[u32], user: u32) -> Option<usize> {
     let count = |user: u32| strangers.iter().filter(|stranger| **stranger == user).count();
     let crowd = match count(user) < STRANGERS_MAX {

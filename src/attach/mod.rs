@@ -4,6 +4,6 @@ pub mod callers;
 pub mod check;
 pub mod delta;
 pub mod protocol;
-pub mod sight;
-pub mod own;
+pub mod redaction;
+pub mod command_id_map;
 pub mod io;

@@ -1,6 +1,6 @@
 //! What terminal and station say to each other, as bytes: a u32 little-endian length, then a message in postcard.
 //!
-//! Both begin with a [`Greeting`], which never changes its shape, so that a terminal and a station of different versions
+//! Both begin with a [`Handshake`], which never changes its shape, so that a terminal and a station of different versions
 //! can still tell each other so.
 
 use std::sync::Arc;
@@ -19,7 +19,7 @@ pub const PROTOCOL: u32 = 2;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Longest hello, bytes.
-pub const HELLO_BYTES_MAX: usize = 4 * 1024;
+pub const HANDSHAKE_BYTES_MAX: usize = 4 * 1024;
 /// Longest message of a terminal, bytes.
 pub const REQUEST_BYTES_MAX: usize = 64 * 1024;
 /// Longest message to a terminal, bytes.
@@ -31,7 +31,7 @@ const WORD_CHARS_MAX: usize = 64;
 
 /// The beginning of the first message of both sides. Its shape stays the same for ever.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Greeting {
+pub struct Handshake {
     /// Tells this socket from any other.
     pub magic: [u8; 4],
     /// The protocol that it speaks.
@@ -39,10 +39,10 @@ pub struct Greeting {
     /// The version of its program.
     pub version: String,
     /// Of a station: why the terminal cannot stay, in words for its operator. Nothing follows then.
-    pub sorry: Option<String>,
+    pub rejection: Option<String>,
 }
 
-/// Where a terminal is, as it says itself; it follows the greeting of a terminal.
+/// Where a terminal is, as it says itself; it follows the handshake of a terminal.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Place {
     /// `pts/3`; `None` for a script.
@@ -53,9 +53,9 @@ pub struct Place {
     pub term: Option<String>,
 }
 
-/// What the station tells a terminal that may stay; it follows the greeting of the station.
+/// What the station tells a terminal that may stay; it follows the handshake of the station.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Welcome {
+pub struct HandshakeReply {
     /// Which run of the station this is, see [`Snapshot::run`](crate::plant::Snapshot::run): another one counts terminals
     /// from 1 again.
     pub run: u64,
@@ -67,7 +67,7 @@ pub struct Welcome {
 
 /// What a terminal says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Asked {
+pub enum ClientMessage {
     /// A command to the plant.
     Command(Box<CommandRequest>),
     /// A query to the history.
@@ -93,7 +93,7 @@ pub enum Asked {
 
 /// What a station says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Told {
+pub enum ServerMessage {
     /// The plant has changed.
     Delta(Box<Delta>),
     /// The session status has changed.
@@ -134,7 +134,7 @@ pub enum ProtocolError {
     },
     /// Nothing that this protocol knows.
     #[error("{bytes} bytes that are no {expected}")]
-    Garbled {
+    Malformed {
         /// How many there were.
         bytes: usize,
         /// What was expected.
@@ -145,15 +145,15 @@ pub enum ProtocolError {
     OtherVersion(String),
 }
 
-impl Greeting {
+impl Handshake {
     /// Of this program.
-    pub fn own() -> Greeting {
-        Greeting { magic: *b"sgls", protocol: PROTOCOL, version: VERSION.to_owned(), sorry: None }
+    pub fn current() -> Handshake {
+        Handshake { magic: *b"sgls", protocol: PROTOCOL, version: VERSION.to_owned(), rejection: None }
     }
 
     /// Of a station that sends a terminal away.
-    pub fn sorry(why: impl Into<String>) -> Greeting {
-        Greeting { sorry: Some(why.into()), ..Greeting::own() }
+    pub fn rejected(why: impl Into<String>) -> Handshake {
+        Handshake { rejection: Some(why.into()), ..Handshake::current() }
     }
 }
 
@@ -163,9 +163,13 @@ pub fn encode<T: Serialize>(message: &T, max: usize) -> Result<Vec<u8>, Protocol
     with_length(bytes, max)
 }
 
-/// The first message of either side: a greeting, and what follows it.
-pub fn encode_first<T: Serialize>(greeting: &Greeting, rest: Option<&T>, max: usize) -> Result<Vec<u8>, ProtocolError> {
-    let mut bytes = postcard::to_extend(greeting, vec![0; LENGTH_BYTES]).expect("our messages are plain data");
+/// The first message of either side: a handshake, and what follows it.
+pub fn encode_first<T: Serialize>(
+    handshake: &Handshake,
+    rest: Option<&T>,
+    max: usize,
+) -> Result<Vec<u8>, ProtocolError> {
+    let mut bytes = postcard::to_extend(handshake, vec![0; LENGTH_BYTES]).expect("our messages are plain data");
     if let Some(rest) = rest {
         bytes = postcard::to_extend(rest, bytes).expect("our messages are plain data");
     }
@@ -191,38 +195,38 @@ pub fn length(bytes: [u8; LENGTH_BYTES], max: usize) -> Result<usize, ProtocolEr
 pub fn decode<T: DeserializeOwned>(bytes: &[u8], expected: &'static str) -> Result<T, ProtocolError> {
     match postcard::take_from_bytes(bytes) {
         Ok((message, [])) => Ok(message),
-        Ok(_) | Err(_) => Err(ProtocolError::Garbled { bytes: bytes.len(), expected }),
+        Ok(_) | Err(_) => Err(ProtocolError::Malformed { bytes: bytes.len(), expected }),
     }
 }
 
 /// Where the terminal is that has sent this first message.
-pub fn hello(bytes: &[u8]) -> Result<Place, ProtocolError> {
-    let (greeting, rest) = greeted(bytes, "hello of a terminal")?;
-    if let Some(why) = other_version((&greeting.version, greeting.protocol), (VERSION, PROTOCOL)) {
+pub fn client_handshake(bytes: &[u8]) -> Result<Place, ProtocolError> {
+    let (handshake, rest) = parse_handshake(bytes, "handshake of a terminal")?;
+    if let Some(why) = other_version((&handshake.version, handshake.protocol), (VERSION, PROTOCOL)) {
         return Err(ProtocolError::OtherVersion(why));
     }
-    decode(rest, "hello of a terminal")
+    decode(rest, "handshake of a terminal")
 }
 
 /// What the station says first: welcome, or why not.
-pub fn welcome(bytes: &[u8]) -> Result<Result<Welcome, String>, ProtocolError> {
-    let (greeting, rest) = greeted(bytes, "welcome of a station")?;
-    if let Some(why) = greeting.sorry {
+pub fn handshake_reply(bytes: &[u8]) -> Result<Result<HandshakeReply, String>, ProtocolError> {
+    let (handshake, rest) = parse_handshake(bytes, "handshake of a station")?;
+    if let Some(why) = handshake.rejection {
         return Ok(Err(one_line(&why, 4 * WORD_CHARS_MAX)));
     }
-    if let Some(why) = other_version((VERSION, PROTOCOL), (&greeting.version, greeting.protocol)) {
+    if let Some(why) = other_version((VERSION, PROTOCOL), (&handshake.version, handshake.protocol)) {
         return Err(ProtocolError::OtherVersion(why));
     }
     // Of the same version, but not of the same build.
     let other_build =
         |_| ProtocolError::OtherVersion(format!("the station is another build of version {VERSION}: restart it"));
-    Ok(Ok(decode(rest, "welcome of a station").map_err(other_build)?))
+    Ok(Ok(decode(rest, "handshake of a station").map_err(other_build)?))
 }
 
-fn greeted<'a>(bytes: &'a [u8], expected: &'static str) -> Result<(Greeting, &'a [u8]), ProtocolError> {
-    match postcard::take_from_bytes::<Greeting>(bytes) {
-        Ok((greeting, rest)) if greeting.magic == Greeting::own().magic => Ok((greeting, rest)),
-        Ok(_) | Err(_) => Err(ProtocolError::Garbled { bytes: bytes.len(), expected }),
+fn parse_handshake<'a>(bytes: &'a [u8], expected: &'static str) -> Result<(Handshake, &'a [u8]), ProtocolError> {
+    match postcard::take_from_bytes::<Handshake>(bytes) {
+        Ok((handshake, rest)) if handshake.magic == Handshake::current().magic => Ok((handshake, rest)),
+        Ok(_) | Err(_) => Err(ProtocolError::Malformed { bytes: bytes.len(), expected }),
     }
 }
 

@@ -19,7 +19,7 @@ use sightglass::{
     access::SessionStatus,
     attach::{
         io::serve::listen,
-        protocol::{self, Greeting, HELLO_BYTES_MAX, Place},
+        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, Place},
     },
     plant::{
         Plant, PlantDef,
@@ -52,8 +52,8 @@ fn main() {
 /// Reads whatever comes and says how much that was, each second.
 fn terminal(path: &Path) {
     let mut stream = UnixStream::connect(path).unwrap();
-    let hello = protocol::encode_first(&Greeting::own(), Some(&Place::default()), HELLO_BYTES_MAX);
-    stream.write_all(&hello.unwrap()).unwrap();
+    let handshake = protocol::encode_first(&Handshake::current(), Some(&Place::default()), HANDSHAKE_BYTES_MAX);
+    stream.write_all(&handshake.unwrap()).unwrap();
     let mut total = 0;
     let mut bytes = vec![0; 1 << 20];
     while let Ok(count) = stream.read(&mut bytes)

@@ -18,7 +18,8 @@ use sightglass::{
             serve::{ListenError, listen},
         },
         protocol::{
-            self, Asked, Greeting, HELLO_BYTES_MAX, LENGTH_BYTES, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told,
+            self, ClientMessage, HANDSHAKE_BYTES_MAX, Handshake, LENGTH_BYTES, NEWS_BYTES_MAX, Place,
+            REQUEST_BYTES_MAX, ServerMessage,
         },
     },
     history::{HistoryError, Query, io::QueryRequest},
@@ -179,11 +180,11 @@ fn of(session: &Session, number: u32) -> Option<Outcome> {
     session.snapshots.borrow().commands.iter().find(|command| command.id == id).map(|command| command.outcome.clone())
 }
 
-fn hello() -> Vec<u8> {
-    protocol::encode_first(&Greeting::own(), Some(&Place::default()), HELLO_BYTES_MAX).unwrap()
+fn handshake() -> Vec<u8> {
+    protocol::encode_first(&Handshake::current(), Some(&Place::default()), HANDSHAKE_BYTES_MAX).unwrap()
 }
 
-fn asked(asked: &Asked) -> Vec<u8> {
+fn asked(asked: &ClientMessage) -> Vec<u8> {
     protocol::encode(asked, REQUEST_BYTES_MAX).unwrap()
 }
 
@@ -250,7 +251,7 @@ async fn without_a_login_a_terminal_is_told_no_value_and_after_a_logout_none_sta
 async fn a_terminal_that_does_not_read_costs_only_itself_and_is_let_go_after_five_minutes() {
     let mut stand = Stand::start();
     let mut stuck = UnixStream::connect(stand.path()).await.unwrap();
-    stuck.write_all(&hello()).await.unwrap();
+    stuck.write_all(&handshake()).await.unwrap();
     let mut quick = stand.session().await;
     stand.until_present(2).await;
     let started = tokio::time::Instant::now();
@@ -381,21 +382,21 @@ async fn a_folder_that_others_can_write_to_is_not_trusted_with_passwords() {
 async fn hostile_connections_are_closed_and_the_others_see_the_plant_go_on() {
     let mut stand = Stand::start();
     let mut session = stand.session().await;
-    let mut long = hello();
+    let mut long = handshake();
     long[..4].copy_from_slice(&u32::MAX.to_le_bytes());
-    let command = asked(&Asked::SessionRequest { ticket: 1, request: SessionRequest::Stop });
+    let command = asked(&ClientMessage::SessionRequest { ticket: 1, request: SessionRequest::Stop });
     let hostile: Vec<(&str, Vec<u8>)> = vec![
         ("nothing at all", Vec::new()),
         ("random bytes", (0..4_000u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()),
         ("a giant length", long),
         ("a length and nothing", 4_000u32.to_le_bytes().to_vec()),
-        ("half a hello", hello()[..9].to_vec()),
-        ("a right message before the hello", command.clone()),
+        ("half a handshake", handshake()[..9].to_vec()),
+        ("a right message before the handshake", command.clone()),
         ("an empty message", vec![0; 4]),
-        ("a giant message after the hello", [hello(), u32::MAX.to_le_bytes().to_vec()].concat()),
-        ("noise after the hello", [hello(), vec![3, 0, 0, 0, 250, 251, 252]].concat()),
-        ("the hello twice", [hello(), hello()].concat()),
-        ("half a message after the hello", [hello(), command[..5].to_vec()].concat()),
+        ("a giant message after the handshake", [handshake(), u32::MAX.to_le_bytes().to_vec()].concat()),
+        ("noise after the handshake", [handshake(), vec![3, 0, 0, 0, 250, 251, 252]].concat()),
+        ("the handshake twice", [handshake(), handshake()].concat()),
+        ("half a message after the handshake", [handshake(), command[..5].to_vec()].concat()),
     ];
     for (index, (what, bytes)) in hostile.into_iter().enumerate() {
         let mut stream = UnixStream::connect(stand.path()).await.unwrap();
@@ -413,10 +414,10 @@ async fn hostile_connections_are_closed_and_the_others_see_the_plant_go_on() {
 async fn an_old_terminal_is_told_in_words_what_to_do() {
     let stand = Stand::start();
     let mut stream = UnixStream::connect(stand.path()).await.unwrap();
-    let old = Greeting { protocol: 0, version: "0.0.9".into(), ..Greeting::own() };
-    stream.write_all(&protocol::encode_first(&old, Some(&()), HELLO_BYTES_MAX).unwrap()).await.unwrap();
+    let old = Handshake { protocol: 0, version: "0.0.9".into(), ..Handshake::current() };
+    stream.write_all(&protocol::encode_first(&old, Some(&()), HANDSHAKE_BYTES_MAX).unwrap()).await.unwrap();
     let bytes = until_closed(&mut stream).await;
-    let why = protocol::welcome(&bytes[LENGTH_BYTES..]).unwrap().unwrap_err();
+    let why = protocol::handshake_reply(&bytes[LENGTH_BYTES..]).unwrap().unwrap_err();
     assert!(why.contains("0.0.9 (protocol 0)") && why.contains("restart the older one"), "{why}");
 }
 
@@ -424,10 +425,10 @@ async fn an_old_terminal_is_told_in_words_what_to_do() {
 async fn a_command_of_another_terminal_or_unknown_tag_is_rejected() {
     let stand = Stand::start();
     let mut stream = UnixStream::connect(stand.path()).await.unwrap();
-    stream.write_all(&hello()).await.unwrap();
-    let own = protocol::welcome(&next(&mut stream).await).unwrap().unwrap().terminal;
+    stream.write_all(&handshake()).await.unwrap();
+    let own = protocol::handshake_reply(&next(&mut stream).await).unwrap().unwrap().terminal;
     let command = |terminal, kind| {
-        asked(&Asked::Command(Box::new(CommandRequest::new(0, CommandId { terminal, number: 1 }, kind))))
+        asked(&ClientMessage::Command(Box::new(CommandRequest::new(0, CommandId { terminal, number: 1 }, kind))))
     };
     for (bytes, expected) in [
         (command(own + 1, CommandKind::Alarm(AlarmCommand::Silence)), "this is terminal"),
@@ -435,7 +436,9 @@ async fn a_command_of_another_terminal_or_unknown_tag_is_rejected() {
     ] {
         stream.write_all(&bytes).await.unwrap();
         let why = loop {
-            if let Told::Undelivered { why, .. } = protocol::decode(&next(&mut stream).await, "message").unwrap() {
+            if let ServerMessage::Undelivered { why, .. } =
+                protocol::decode(&next(&mut stream).await, "message").unwrap()
+            {
                 break why;
             }
         };
@@ -486,9 +489,9 @@ async fn a_flood_of_questions_waits_where_it_comes_from() {
     let mut quick = stand.session().await;
     let mut flood = Plain::connect(stand.path()).unwrap();
     flood.set_nonblocking(true).unwrap();
-    flood.write_all(&hello()).unwrap();
+    flood.write_all(&handshake()).unwrap();
     let at = stand.publish.borrow().at;
-    let query = asked(&Asked::Ask { ticket: 1, query: Query::Journal { from: at, to: at, limit: 1 } });
+    let query = asked(&ClientMessage::Ask { ticket: 1, query: Query::Journal { from: at, to: at, limit: 1 } });
     let started = tokio::time::Instant::now();
     let (mut sent, mut begun) = (0, 0);
     for value in 0..200 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{List, Unfit};
+use super::{DeltaMismatch, List};
 use crate::plant::{
     admission::Admission,
     def::{DeviceId, LineDef, TagId},
@@ -65,7 +65,7 @@ impl LineDelta {
     }
 
     /// Makes the old line the new one.
-    pub fn apply(self, def: &LineDef, line: &mut LineStatus) -> Result<(), Unfit> {
+    pub fn apply(self, def: &LineDef, line: &mut LineStatus) -> Result<(), DeltaMismatch> {
         let LineDelta { state, test, report } = self;
         if let Some(state) = state {
             let (test, report) = (line.test.take(), line.report.take());
@@ -110,7 +110,7 @@ impl ReportDelta {
         }
     }
 
-    fn apply(self, report: &mut LineReport) -> Result<(), Unfit> {
+    fn apply(self, report: &mut LineReport) -> Result<(), DeltaMismatch> {
         let ReportDelta { settings, counters, polls, refused, retries, strain, admission, devices, busy, frames } =
             self;
         set(&mut report.settings, settings.map(|settings| *settings));

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Unfit;
+use super::DeltaMismatch;
 
 /// So far on an element is looked for where some were taken away before it.
 const LOOK_AHEAD: usize = 32;
@@ -48,14 +48,14 @@ impl<T: Clone + PartialEq> List<T> {
     }
 
     /// The new list; `None` if it is the old one.
-    pub fn made_of(self, old: &[T]) -> Result<Option<Vec<T>>, Unfit> {
+    pub fn made_of(self, old: &[T]) -> Result<Option<Vec<T>>, DeltaMismatch> {
         let Some(pieces) = self.0 else { return Ok(None) };
         let mut made = Vec::new();
         for piece in pieces {
             match piece {
                 Piece::Kept(from, count) => {
                     let (from, count) = (from as usize, count as usize);
-                    made.extend_from_slice(old.get(from..from.saturating_add(count)).ok_or(Unfit)?);
+                    made.extend_from_slice(old.get(from..from.saturating_add(count)).ok_or(DeltaMismatch)?);
                 }
                 Piece::New(elements) => made.extend(elements),
             }
@@ -64,7 +64,7 @@ impl<T: Clone + PartialEq> List<T> {
     }
 
     /// Makes the old list the new one.
-    pub fn apply(self, list: &mut Vec<T>) -> Result<(), Unfit> {
+    pub fn apply(self, list: &mut Vec<T>) -> Result<(), DeltaMismatch> {
         if let Some(made) = self.made_of(list)? {
             *list = made;
         }
@@ -106,7 +106,7 @@ mod tests {
     fn pieces_of_another_list_are_found_out() {
         let old: Vec<u32> = (0..10).collect();
         let delta = List::between(&old, &old[1..]);
-        assert_eq!(delta.apply(&mut vec![1, 2, 3]), Err(Unfit));
-        assert_eq!(List(Some(vec![Piece::<u8>::Kept(u32::MAX, u32::MAX)])).apply(&mut vec![1]), Err(Unfit));
+        assert_eq!(delta.apply(&mut vec![1, 2, 3]), Err(DeltaMismatch));
+        assert_eq!(List(Some(vec![Piece::<u8>::Kept(u32::MAX, u32::MAX)])).apply(&mut vec![1]), Err(DeltaMismatch));
     }
 }

@@ -64,7 +64,7 @@ type AlarmRates = (u32, u32, Option<Timestamp>);
 /// A delta does not belong to the snapshot that it was applied to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("what came does not fit what was there before")]
-pub struct Unfit;
+pub struct DeltaMismatch;
 
 impl Delta {
     /// What makes `new` of `old`, which has the same definition.
@@ -126,7 +126,7 @@ impl Delta {
     }
 
     /// Makes the old snapshot the new one. After an error the snapshot is good for nothing.
-    pub fn apply(self, snapshot: &mut Snapshot) -> Result<(), Unfit> {
+    pub fn apply(self, snapshot: &mut Snapshot) -> Result<(), DeltaMismatch> {
         snapshot.at = self.at;
         if let Some(run) = self.run {
             snapshot.run = run;
@@ -145,8 +145,8 @@ impl Delta {
         }
         for (place, delta) in self.lines {
             let place = usize::from(place);
-            let line = snapshot.lines.get_mut(place).ok_or(Unfit)?;
-            delta.apply(snapshot.def.lines.get(place).ok_or(Unfit)?, line)?;
+            let line = snapshot.lines.get_mut(place).ok_or(DeltaMismatch)?;
+            delta.apply(snapshot.def.lines.get(place).ok_or(DeltaMismatch)?, line)?;
         }
         self.devices.apply(&mut snapshot.devices)?;
         if let Some(alarms) = self.alarms.made_of(&snapshot.alarms)? {
@@ -186,7 +186,7 @@ impl Delta {
         let fits = snapshot.texts.len() == def.tags.len()
             && snapshot.decimals.len() == def.tags.len()
             && snapshot.devices.len() == def.devices.len();
-        if fits { Ok(()) } else { Err(Unfit) }
+        if fits { Ok(()) } else { Err(DeltaMismatch) }
     }
 }
 

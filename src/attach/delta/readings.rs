@@ -8,7 +8,7 @@ use std::{
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::Unfit;
+use super::DeltaMismatch;
 use crate::plant::{
     sample::{Quality, Sample},
     traffic::Exchange,
@@ -72,16 +72,16 @@ pub fn between(old: &[Sample], new: &[Sample]) -> Vec<Readings> {
 }
 
 /// Takes them in.
-pub fn apply(readings: Vec<Readings>, samples: &mut [Sample]) -> Result<(), Unfit> {
+pub fn apply(readings: Vec<Readings>, samples: &mut [Sample]) -> Result<(), DeltaMismatch> {
     for Readings { at, quality, kept, new, values } in readings {
         for place in kept.iter() {
-            let sample = samples.get_mut(place).ok_or(Unfit)?;
+            let sample = samples.get_mut(place).ok_or(DeltaMismatch)?;
             (sample.at, sample.quality) = (at, quality);
         }
         let mut values = values.into_iter();
         for place in new.iter() {
-            let sample = samples.get_mut(place).ok_or(Unfit)?;
-            *sample = Sample { value: values.next().ok_or(Unfit)?, quality, at };
+            let sample = samples.get_mut(place).ok_or(DeltaMismatch)?;
+            *sample = Sample { value: values.next().ok_or(DeltaMismatch)?, quality, at };
         }
     }
     Ok(())
@@ -120,10 +120,10 @@ pub fn source_frames_between(old: &Exchanges, new: &Exchanges) -> Vec<SourceFram
 }
 
 /// Takes it in.
-pub fn apply_source_frames(news: Vec<SourceFrame>, source_frames: &mut Exchanges) -> Result<(), Unfit> {
+pub fn apply_source_frames(news: Vec<SourceFrame>, source_frames: &mut Exchanges) -> Result<(), DeltaMismatch> {
     for SourceFrame { exchange, tags } in news {
         for tag in tags.iter() {
-            *source_frames.get_mut(tag).ok_or(Unfit)? = exchange.clone();
+            *source_frames.get_mut(tag).ok_or(DeltaMismatch)? = exchange.clone();
         }
     }
     Ok(())

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::Delta;
 use crate::{
-    attach::{protocol, sight::alarms_only},
+    attach::{protocol, redaction::redact},
     plant::{
         Snapshot,
         alarm::AlarmState,
@@ -187,8 +187,8 @@ proptest! {
         more.iter().for_each(|one| change(&mut new, *one));
         check(&old, &new);
         check(&moods()[to], &new);
-        check(&new, &alarms_only(&new));
-        check(&alarms_only(&old), &new);
+        check(&new, &redact(&new));
+        check(&redact(&old), &new);
     }
 
     #[test]
@@ -239,7 +239,7 @@ fn without_a_login_no_value_leaves_the_station() {
     let mut snapshot = Snapshot::clone(&Fixture::alarm().snapshot());
     (0..19).for_each(|kind| change(&mut snapshot, (kind, 1, 1)));
     Arc::make_mut(&mut snapshot.alarms)[0].value = Some(72.1);
-    let seen = alarms_only(&snapshot);
+    let seen = redact(&snapshot);
     assert!(seen.samples.iter().all(|sample| *sample == Sample::bad(Cause::NotAuthorised, snapshot.at)));
     assert!(seen.texts.iter().all(Option::is_none) && seen.source_frames.iter().all(Option::is_none));
     assert!(seen.lines.iter().all(|line| line.report.is_none() && line.test.is_none()));

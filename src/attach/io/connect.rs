@@ -17,21 +17,21 @@ use tokio::{
 };
 
 use super::{
-    pump::Pump,
+    client_task::ClientTask,
     wire::{self, WireError},
 };
 use crate::{
     access::SessionStatus,
     attach::{
-        delta::{Delta, Unfit},
-        own::Own,
-        protocol::{self, Greeting, HELLO_BYTES_MAX, NEWS_BYTES_MAX, Place, Told, Welcome},
+        command_id_map::CommandIdMap,
+        delta::{Delta, DeltaMismatch},
+        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, NEWS_BYTES_MAX, Place, ServerMessage},
     },
     plant::Snapshot,
     station::Session,
 };
 
-/// The station answers a hello within this time, or is taken for stuck.
+/// The station answers a handshake within this time, or is taken for stuck.
 pub const WELCOME_MAX: Duration = Duration::from_secs(5);
 /// Requests that may wait for the socket; more are refused.
 pub const REQUESTS: usize = 32;
@@ -58,14 +58,14 @@ pub enum AttachError {
     Wire(#[from] WireError),
     /// What it says first does not fit together.
     #[error("the station is not understood: {0}")]
-    Unfit(#[from] Unfit),
+    DeltaMismatch(#[from] DeltaMismatch),
 }
 
 /// A connection that was welcomed.
 pub(super) struct Line {
     pub read: OwnedReadHalf,
     pub write: OwnedWriteHalf,
-    pub welcome: Welcome,
+    pub welcome: HandshakeReply,
 }
 
 /// Attaches to the station that listens at this path. The session feeds itself from now on: when the station goes, the
@@ -74,12 +74,12 @@ pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let place = here();
     let mut line = open(path, &place).await?;
     let (status, snapshot) = timeout(WELCOME_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
-    let Welcome { run, terminal, .. } = line.welcome;
+    let HandshakeReply { run, terminal, .. } = line.welcome;
     let (publish, snapshots) = watch::channel(snapshot);
     let (status_sender, status) = watch::channel(Arc::new(status));
     let (requests, requested) = mpsc::channel(REQUESTS);
-    let own = Own::new(run, terminal);
-    tokio::spawn(Pump::new(path.to_owned(), place, own, publish, status_sender).run(line, requested));
+    let id_map = CommandIdMap::new(run, terminal);
+    tokio::spawn(ClientTask::new(path.to_owned(), place, id_map, publish, status_sender).run(line, requested));
     Ok(Session { snapshots, status, requests, terminal, drill: None })
 }
 
@@ -88,10 +88,10 @@ pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError
     let no_station = |error| AttachError::NoStation { path: path.to_owned(), error };
     let opened = async {
         let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
-        let hello = protocol::encode_first(&Greeting::own(), Some(place), HELLO_BYTES_MAX);
+        let hello = protocol::encode_first(&Handshake::current(), Some(place), HANDSHAKE_BYTES_MAX);
         wire::write(&mut write, &hello.map_err(WireError::from)?).await?;
         let bytes = wire::read(&mut read, NEWS_BYTES_MAX).await?;
-        let welcome = protocol::welcome(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;
+        let welcome = protocol::handshake_reply(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;
         Ok(Line { read, write, welcome })
     };
     timeout(WELCOME_MAX, opened).await.unwrap_or(Err(AttachError::Silent))
@@ -102,20 +102,20 @@ async fn first(line: &mut Line) -> Result<(SessionStatus, Arc<Snapshot>), Attach
     let mut status = SessionStatus::default();
     loop {
         match next(&mut line.read).await? {
-            Told::SessionStatus(told) => status = *told,
-            Told::Delta(delta) => {
+            ServerMessage::SessionStatus(told) => status = *told,
+            ServerMessage::Delta(delta) => {
                 let mut snapshot = Snapshot::blank(line.welcome.def.clone());
                 Delta::apply(*delta, &mut snapshot)?;
                 return Ok((status, Arc::new(snapshot)));
             }
             // Nothing was asked yet.
-            Told::Answer { .. } | Told::RequestDone { .. } | Told::Undelivered { .. } => {}
+            ServerMessage::Answer { .. } | ServerMessage::RequestDone { .. } | ServerMessage::Undelivered { .. } => {}
         }
     }
 }
 
 /// The next message of the station.
-pub(super) async fn next(read: &mut OwnedReadHalf) -> Result<Told, WireError> {
+pub(super) async fn next(read: &mut OwnedReadHalf) -> Result<ServerMessage, WireError> {
     let bytes = wire::read(read, NEWS_BYTES_MAX).await?;
     Ok(protocol::decode(&bytes, "message of a station")?)
 }

@@ -10,7 +10,7 @@ use tokio::{
 };
 
 use super::{
-    pace::Pace,
+    rate_limit::RateLimit,
     wire::{self, WireError},
 };
 use crate::{
@@ -18,8 +18,11 @@ use crate::{
     attach::{
         check,
         delta::Delta,
-        protocol::{self, Asked, Greeting, NEWS_BYTES_MAX, ProtocolError, REQUEST_BYTES_MAX, Told, Welcome},
-        sight,
+        protocol::{
+            self, ClientMessage, Handshake, HandshakeReply, NEWS_BYTES_MAX, ProtocolError, REQUEST_BYTES_MAX,
+            ServerMessage,
+        },
+        redaction,
     },
     history::{HistoryError, Query, io::QueryRequest},
     plant::{PlantDef, Snapshot, command::Outcome},
@@ -39,11 +42,8 @@ const ANSWERS_MAX: usize = 4;
 /// So long a newcomer may wait to hear how it stands.
 const STATUS_WAIT_MAX: Duration = Duration::from_secs(2);
 
-/// Nobody ends well: there is always a reason.
-type Never = std::convert::Infallible;
-
 /// An answer on its way to the terminal. It gives its places in flight back only when it has left.
-type Reply = (Told, Vec<OwnedSemaphorePermit>);
+type Reply = (ServerMessage, Vec<OwnedSemaphorePermit>);
 
 /// Serves a terminal until either side ends; says why it ended.
 pub async fn serve<R, W>(read: R, write: W, session: Session, run: u64) -> ConnectionEnd
@@ -56,11 +56,11 @@ where
     let in_flight = Arc::new(Semaphore::new(IN_FLIGHT_MAX));
     let asked = Arc::new(Semaphore::new(ANSWERS_MAX));
     let (queries, tickets) = (JoinSet::new(), HashMap::new());
-    let asking = Asking { session: session.clone(), def: def.clone(), replies, in_flight, asked, queries, tickets };
-    let telling = Telling { write, session, def };
+    let inbound = Inbound { session: session.clone(), def: def.clone(), replies, in_flight, asked, queries, tickets };
+    let outbound = Outbound { write, session, def };
     tokio::select! {
-        Err(ended) = asking.run(read) => ended,
-        Err(ended) = telling.run(run, answered) => ended,
+        Err(ended) = inbound.run(read) => ended,
+        Err(ended) = outbound.run(run, answered) => ended,
         else => ConnectionEnd::StationGone,
     }
 }
@@ -86,7 +86,7 @@ pub enum ConnectionEnd {
 }
 
 /// The half that listens.
-struct Asking {
+struct Inbound {
     session: Session,
     def: Arc<PlantDef>,
     replies: mpsc::Sender<Reply>,
@@ -98,19 +98,19 @@ struct Asking {
     tickets: HashMap<u64, AbortHandle>,
 }
 
-impl Asking {
+impl Inbound {
     /// Takes one message after the other, no faster than a person asks. What waits, waits in the terminal.
-    async fn run(mut self, mut read: impl AsyncRead + Unpin) -> Result<Never, ConnectionEnd> {
-        let mut pace = Pace::new();
+    async fn run(mut self, mut read: impl AsyncRead + Unpin) -> Result<std::convert::Infallible, ConnectionEnd> {
+        let mut rate_limit = RateLimit::new();
         loop {
             let bytes = wire::read(&mut read, REQUEST_BYTES_MAX).await?;
             let asked = protocol::decode(&bytes, "message of a terminal").map_err(WireError::from)?;
-            pace.step().await;
+            rate_limit.acquire().await;
             match asked {
-                Asked::Command(command) => self.send_command(*command).await,
-                Asked::Ask { ticket, query } => self.ask(ticket, query).await,
-                Asked::Cancel { ticket } => self.cancel(ticket),
-                Asked::SessionRequest { ticket, request } => self.send_request(ticket, request).await,
+                ClientMessage::Command(command) => self.send_command(*command).await,
+                ClientMessage::Ask { ticket, query } => self.ask(ticket, query).await,
+                ClientMessage::Cancel { ticket } => self.cancel(ticket),
+                ClientMessage::SessionRequest { ticket, request } => self.send_request(ticket, request).await,
             }
         }
     }
@@ -125,7 +125,7 @@ impl Asking {
         let sent = sent.and_then(|()| self.session.send(Request::Command(command)).map_err(str::to_owned));
         if let Err(why) = sent {
             // Only a terminal that has ended does not hear it.
-            let _ = self.replies.send((Told::Undelivered { id, why }, Vec::new())).await;
+            let _ = self.replies.send((ServerMessage::Undelivered { id, why }, Vec::new())).await;
         }
     }
 
@@ -148,7 +148,7 @@ impl Asking {
                 Err(why) => Err(HistoryError::Engine(why)),
             };
             // Only a terminal that has ended does not hear it.
-            let _ = replies.send((Told::Answer { ticket, answer }, vec![place, turn])).await;
+            let _ = replies.send((ServerMessage::Answer { ticket, answer }, vec![place, turn])).await;
         });
         self.tickets.insert(ticket, query);
     }
@@ -171,28 +171,32 @@ impl Asking {
                 Err(why) => Err(why),
             };
             // Only a terminal that has ended does not hear it.
-            let _ = replies.send((Told::RequestDone { ticket, answer }, vec![place])).await;
+            let _ = replies.send((ServerMessage::RequestDone { ticket, answer }, vec![place])).await;
         });
     }
 }
 
 /// The half that speaks.
-struct Telling<W> {
+struct Outbound<W> {
     write: W,
     session: Session,
     def: Arc<PlantDef>,
 }
 
-impl<W: AsyncWrite + Unpin> Telling<W> {
-    /// Welcome, status, and then the latest snapshot again and again, but never faster than the terminal reads.
-    async fn run(mut self, run: u64, mut answered: mpsc::Receiver<Reply>) -> Result<Never, ConnectionEnd> {
+impl<W: AsyncWrite + Unpin> Outbound<W> {
+    /// Sends the handshake reply, the status, then snapshots, never faster than the terminal reads.
+    async fn run(
+        mut self,
+        run: u64,
+        mut answered: mpsc::Receiver<Reply>,
+    ) -> Result<std::convert::Infallible, ConnectionEnd> {
         match timeout(STATUS_WAIT_MAX, self.session.status.changed()).await {
             Ok(Ok(())) => {}
             Ok(Err(_)) => return Err(ConnectionEnd::SentAway),
             Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal does not hear how it stands"),
         }
-        let welcome = Welcome { run, terminal: self.session.terminal, def: self.def.clone() };
-        let welcome = protocol::encode_first(&Greeting::own(), Some(&welcome), NEWS_BYTES_MAX);
+        let welcome = HandshakeReply { run, terminal: self.session.terminal, def: self.def.clone() };
+        let welcome = protocol::encode_first(&Handshake::current(), Some(&welcome), NEWS_BYTES_MAX);
         self.write(&welcome.map_err(WireError::from)?, STUCK_MAX).await?;
         self.send_session_status().await?;
         let mut sent = Arc::new(Snapshot::blank(self.def.clone()));
@@ -200,7 +204,7 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
         loop {
             tokio::select! {
                 biased;
-                Some((told, _places)) = answered.recv() => self.tell(&told).await?,
+                Some((told, _places)) = answered.recv() => self.send(&told).await?,
                 changed = self.session.status.changed() => {
                     changed.map_err(|_| ConnectionEnd::SentAway)?;
                     self.send_session_status().await?;
@@ -212,7 +216,7 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
                     due = Some(if self.has_news_of_own(&sent, &snapshot) { Instant::now() } else { next });
                 }
                 () = sleep_until(due.unwrap_or(next)), if due.is_some() => {
-                    sent = self.tell_snapshot(&sent).await?;
+                    sent = self.send_snapshot(&sent).await?;
                     (due, next) = (None, Instant::now() + SNAPSHOT_EVERY);
                 }
             }
@@ -230,31 +234,31 @@ impl<W: AsyncWrite + Unpin> Telling<W> {
     }
 
     /// Tells the latest snapshot, as far as the terminal may see it; gives it back as what was sent.
-    async fn tell_snapshot(&mut self, sent: &Snapshot) -> Result<Arc<Snapshot>, ConnectionEnd> {
+    async fn send_snapshot(&mut self, sent: &Snapshot) -> Result<Arc<Snapshot>, ConnectionEnd> {
         let snapshot = self.session.snapshots.borrow_and_update().clone();
         if !Arc::ptr_eq(&snapshot.def, &self.def) {
             return Err(ConnectionEnd::OtherPlant);
         }
         let view = self.session.status.borrow().view;
-        let seen = if view { snapshot } else { Arc::new(sight::alarms_only(&snapshot)) };
-        self.tell(&Told::Delta(Box::new(Delta::between(sent, &seen)))).await?;
+        let seen = if view { snapshot } else { Arc::new(redaction::redact(&snapshot)) };
+        self.send(&ServerMessage::Delta(Box::new(Delta::between(sent, &seen)))).await?;
         Ok(seen)
     }
 
     async fn send_session_status(&mut self) -> Result<(), ConnectionEnd> {
         let status: SessionStatus = self.session.status.borrow_and_update().as_ref().clone();
-        self.tell(&Told::SessionStatus(Box::new(status))).await
+        self.send(&ServerMessage::SessionStatus(Box::new(status))).await
     }
 
-    async fn tell(&mut self, told: &Told) -> Result<(), ConnectionEnd> {
+    async fn send(&mut self, told: &ServerMessage) -> Result<(), ConnectionEnd> {
         let bytes = match (protocol::encode(told, NEWS_BYTES_MAX), told) {
-            (Err(error @ ProtocolError::TooLong { .. }), Told::Answer { ticket, .. }) => {
+            (Err(error @ ProtocolError::TooLong { .. }), ServerMessage::Answer { ticket, .. }) => {
                 let answer = Err(HistoryError::Engine(format!("{error}; choose a shorter period")));
-                protocol::encode(&Told::Answer { ticket: *ticket, answer }, NEWS_BYTES_MAX)
+                protocol::encode(&ServerMessage::Answer { ticket: *ticket, answer }, NEWS_BYTES_MAX)
             }
             (bytes, _) => bytes,
         };
-        let max = if let Told::Answer { .. } = told { ANSWER_STUCK_MAX } else { STUCK_MAX };
+        let max = if let ServerMessage::Answer { .. } = told { ANSWER_STUCK_MAX } else { STUCK_MAX };
         self.write(&bytes.map_err(WireError::from)?, max).await
     }
 
@@ -291,13 +295,13 @@ mod tests {
         (far, requests, served)
     }
 
-    async fn say(far: &mut DuplexStream, asked: &Asked) {
+    async fn say(far: &mut DuplexStream, asked: &ClientMessage) {
         far.write_all(&protocol::encode(asked, REQUEST_BYTES_MAX).unwrap()).await.unwrap();
     }
 
-    fn query(ticket: u64) -> Asked {
+    fn query(ticket: u64) -> ClientMessage {
         let (from, to) = (Timestamp::UNIX_EPOCH, Timestamp::from_second(9).unwrap());
-        Asked::Ask { ticket, query: Query::Journal { from, to, limit: 1 } }
+        ClientMessage::Ask { ticket, query: Query::Journal { from, to, limit: 1 } }
     }
 
     async fn next_question(requests: &mut mpsc::Receiver<(u32, Request)>) -> QueryRequest {
@@ -335,8 +339,8 @@ mod tests {
             "more than a terminal may ask at a time"
         );
         // One that was never asked, and one that is being answered.
-        say(&mut far, &Asked::Cancel { ticket: 99 }).await;
-        say(&mut far, &Asked::Cancel { ticket: 2 }).await;
+        say(&mut far, &ClientMessage::Cancel { ticket: 99 }).await;
+        say(&mut far, &ClientMessage::Cancel { ticket: 2 }).await;
         assert!(is_cancelled(&mut asked[1]).await, "the history still works on it");
         assert!(!asked[0].reply.is_closed() && !asked[2].reply.is_closed(), "others are not touched");
         let mut next = next_question(&mut requests).await;

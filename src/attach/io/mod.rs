@@ -2,8 +2,8 @@
 
 pub mod connect;
 pub mod find;
-mod pace;
-mod pump;
+mod rate_limit;
+mod client_task;
 mod connection;
 pub mod serve;
 mod wire;

@@ -26,13 +26,13 @@ use crate::{
     access::Peer,
     attach::{
         callers::{Callers, makes_room},
-        protocol::{self, Greeting, HELLO_BYTES_MAX, Place, ProtocolError},
+        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, Place, ProtocolError},
     },
     station::SessionAcceptor,
 };
 
 /// A connection says hello within this time.
-pub const HELLO_MAX: Duration = Duration::from_secs(2);
+pub const HANDSHAKE_MAX: Duration = Duration::from_secs(2);
 /// Pause after the system had no connection to give.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
@@ -173,8 +173,8 @@ impl Drop for Listener {
     }
 }
 
-/// A connection that has said hello.
-struct Guest {
+/// A connection that has completed the handshake.
+struct Handshaken {
     read: OwnedReadHalf,
     write: OwnedWriteHalf,
     peer: Peer,
@@ -184,7 +184,7 @@ struct Guest {
 struct Greeted {
     user: u32,
     /// `Err` for one that said something else; `None` for one that has said nothing.
-    guest: Option<Result<Guest, WireError>>,
+    handshaken: Option<Result<Handshaken, WireError>>,
 }
 
 /// A terminal that has gone.
@@ -204,7 +204,7 @@ struct Connections<'a> {
     began: Instant,
     callers: Callers,
     strangers: JoinSet<Greeted>,
-    /// Those that have not said hello, the oldest first.
+    /// Those that have not completed the handshake, the oldest first.
     waiting: Vec<(u32, AbortHandle)>,
     serving: JoinSet<Left>,
 }
@@ -233,7 +233,7 @@ impl Listener {
             tokio::select! {
                 biased;
                 ended = snapshots.changed() => if ended.is_err() { break },
-                Some(greeted) = connections.strangers.join_next() => if let Ok(greeted) = greeted { connections.on_greeted(greeted) },
+                Some(parse_handshake) = connections.strangers.join_next() => if let Ok(parse_handshake) = parse_handshake { connections.on_greeted(parse_handshake) },
                 Some(left) = connections.serving.join_next() => if let Ok(left) = left { connections.on_left(left) },
                 _ = look.tick() => {
                     self.keep();
@@ -292,18 +292,18 @@ impl Connections<'_> {
         self.waiting.retain(|(_, stranger)| !stranger.is_finished());
         let users: Vec<u32> = self.waiting.iter().map(|(user, _)| *user).collect();
         if let Some(place) = makes_room(&users, credentials.uid()) {
-            tracing::debug!("too many connections without a hello: the oldest is dropped");
+            tracing::debug!("too many connections without a handshake: the oldest is dropped");
             self.waiting.remove(place).1.abort();
         }
         self.waiting.push((credentials.uid(), self.strangers.spawn(greet(stream, credentials))));
     }
 
-    fn on_greeted(&mut self, Greeted { user, guest }: Greeted) {
+    fn on_greeted(&mut self, Greeted { user, handshaken }: Greeted) {
         let now = self.now();
-        let Guest { read, write, peer } = match guest {
-            Some(Ok(guest)) => guest,
+        let Handshaken { read, write, peer } = match handshaken {
+            Some(Ok(handshaken)) => handshaken,
             Some(Err(error)) if self.callers.may_log(user, now) => {
-                return tracing::warn!(%error, user, "a connection without a right hello");
+                return tracing::warn!(%error, user, "a connection without a valid handshake");
             }
             Some(Err(_)) | None => return,
         };
@@ -315,7 +315,7 @@ impl Connections<'_> {
                     tracing::warn!(%from, why, "a terminal was sent away");
                 }
                 // Nothing was sent before, so the socket has room for one line.
-                let _ = write.try_write(&sorry(why));
+                let _ = write.try_write(&rejection(why));
                 return;
             }
         };
@@ -344,19 +344,19 @@ impl Connections<'_> {
     }
 }
 
-/// Waits for the hello of a connection.
+/// Waits for the handshake of a connection.
 async fn greet(stream: UnixStream, credentials: UCred) -> Greeted {
     let user = credentials.uid();
     let (mut read, write) = stream.into_split();
-    let place = match timeout(HELLO_MAX, hello(&mut read)).await {
+    let place = match timeout(HANDSHAKE_MAX, hello(&mut read)).await {
         Ok(Ok(place)) => place,
-        Ok(Err(WireError::Closed)) | Err(_) => return Greeted { user, guest: None },
+        Ok(Err(WireError::Closed)) | Err(_) => return Greeted { user, handshaken: None },
         Ok(Err(error)) => {
             if let WireError::Protocol(ProtocolError::OtherVersion(why)) = &error {
                 // Nothing was sent before, so the socket has room for one line.
-                let _ = write.try_write(&sorry(why.clone()));
+                let _ = write.try_write(&rejection(why.clone()));
             }
-            return Greeted { user, guest: Some(Err(error)) };
+            return Greeted { user, handshaken: Some(Err(error)) };
         }
     };
     // The list of users may be on another machine.
@@ -365,13 +365,13 @@ async fn greet(stream: UnixStream, credentials: UCred) -> Greeted {
     let process = credentials.pid().and_then(|process| u32::try_from(process).ok());
     let from = place.words(name.as_deref(), process).into();
     let peer = Peer { from, unix_user: name.map(Into::into), own: false };
-    Greeted { user, guest: Some(Ok(Guest { read, write, peer })) }
+    Greeted { user, handshaken: Some(Ok(Handshaken { read, write, peer })) }
 }
 
 async fn hello(read: &mut OwnedReadHalf) -> Result<Place, WireError> {
-    Ok(protocol::hello(&wire::read(read, HELLO_BYTES_MAX).await?)?)
+    Ok(protocol::client_handshake(&wire::read(read, HANDSHAKE_BYTES_MAX).await?)?)
 }
 
-fn sorry(why: String) -> Vec<u8> {
-    protocol::encode_first(&Greeting::sorry(why), None::<&()>, HELLO_BYTES_MAX).expect("one line is short")
+fn rejection(why: String) -> Vec<u8> {
+    protocol::encode_first(&Handshake::rejected(why), None::<&()>, HANDSHAKE_BYTES_MAX).expect("one line is short")
 }

@@ -28,35 +28,36 @@ fn place() -> Place {
 
 #[test]
 fn a_terminal_says_where_it_is_and_is_told_the_plant() {
-    let hello_bytes = body(encode_first(&Greeting::own(), Some(&place()), HELLO_BYTES_MAX).unwrap());
-    assert_eq!(hello(&hello_bytes), Ok(place()));
+    let hello_bytes = body(encode_first(&Handshake::current(), Some(&place()), HANDSHAKE_BYTES_MAX).unwrap());
+    assert_eq!(client_handshake(&hello_bytes), Ok(place()));
     let def = Fixture::normal().snapshot().def.clone();
-    let told = Welcome { run: 7, terminal: 3, def: def.clone() };
-    let bytes = body(encode_first(&Greeting::own(), Some(&told), NEWS_BYTES_MAX).unwrap());
-    let heard = welcome(&bytes).unwrap().unwrap();
+    let told = HandshakeReply { run: 7, terminal: 3, def: def.clone() };
+    let bytes = body(encode_first(&Handshake::current(), Some(&told), NEWS_BYTES_MAX).unwrap());
+    let heard = handshake_reply(&bytes).unwrap().unwrap();
     assert_eq!((heard.run, heard.terminal), (7, 3));
     assert_eq!(encode(&heard.def, usize::MAX), encode(&def, usize::MAX));
 }
 
 #[test]
 fn a_terminal_and_a_station_of_two_versions_say_so_and_what_to_do() {
-    let old = Greeting { protocol: PROTOCOL + 1, version: "9.9".into(), ..Greeting::own() };
+    let old = Handshake { protocol: PROTOCOL + 1, version: "9.9".into(), ..Handshake::current() };
     // Whatever else that version says is never looked at.
-    let bytes = body(encode_first(&old, Some(&vec![0xFFu8; 40]), HELLO_BYTES_MAX).unwrap());
-    let Err(ProtocolError::OtherVersion(why)) = hello(&bytes) else { panic!("taken for one of ours") };
+    let bytes = body(encode_first(&old, Some(&vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
+    let Err(ProtocolError::OtherVersion(why)) = client_handshake(&bytes) else { panic!("taken for one of ours") };
     let expected =
         format!("this terminal is version 9.9 (protocol {}), the station is version {VERSION}", PROTOCOL + 1);
     assert!(why.starts_with(&expected) && why.ends_with("restart the older one after an update"), "{why}");
-    let Err(ProtocolError::OtherVersion(why)) = welcome(&bytes) else { panic!("taken for one of ours") };
+    let Err(ProtocolError::OtherVersion(why)) = handshake_reply(&bytes) else { panic!("taken for one of ours") };
     assert!(why.starts_with(&format!("this terminal is version {VERSION}")), "{why}");
-    let other_build = Greeting { version: "0.0.1".into(), ..Greeting::own() };
-    let bytes = body(encode_first(&other_build, Some(&place()), HELLO_BYTES_MAX).unwrap());
-    assert!(matches!(hello(&bytes), Err(ProtocolError::OtherVersion(_))));
-    let bytes = body(encode_first(&Greeting::own(), Some(&vec![0xFFu8; 40]), HELLO_BYTES_MAX).unwrap());
-    let Err(ProtocolError::OtherVersion(why)) = welcome(&bytes) else { panic!("taken for one of ours") };
+    let other_build = Handshake { version: "0.0.1".into(), ..Handshake::current() };
+    let bytes = body(encode_first(&other_build, Some(&place()), HANDSHAKE_BYTES_MAX).unwrap());
+    assert!(matches!(client_handshake(&bytes), Err(ProtocolError::OtherVersion(_))));
+    let bytes = body(encode_first(&Handshake::current(), Some(&vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
+    let Err(ProtocolError::OtherVersion(why)) = handshake_reply(&bytes) else { panic!("taken for one of ours") };
     assert!(why.ends_with("restart it"), "{why}");
-    let bytes = body(encode_first(&Greeting::sorry("full, wait\x1b[2J"), None::<&()>, HELLO_BYTES_MAX).unwrap());
-    assert_eq!(welcome(&bytes).unwrap().unwrap_err(), "full, wait[2J");
+    let bytes =
+        body(encode_first(&Handshake::rejected("full, wait\x1b[2J"), None::<&()>, HANDSHAKE_BYTES_MAX).unwrap());
+    assert_eq!(handshake_reply(&bytes).unwrap().unwrap_err(), "full, wait[2J");
 }
 
 #[test]
@@ -74,7 +75,7 @@ fn what_a_terminal_says_of_itself_cannot_disturb_a_screen_or_say_who_it_is() {
     }
     let long = Place { tty: Some("x".repeat(10_000)), ssh: Some("y".repeat(10_000)), term: None };
     assert_eq!(long.words(None, None).chars().count(), 64 + " from ".len() + 64);
-    assert!(encode_first(&Greeting::own(), Some(&long.short()), HELLO_BYTES_MAX).is_ok());
+    assert!(encode_first(&Handshake::current(), Some(&long.short()), HANDSHAKE_BYTES_MAX).is_ok());
 }
 
 #[test]
@@ -82,14 +83,14 @@ fn requests_and_news_survive_the_way() {
     let command =
         CommandRequest::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1 });
     let asked = [
-        Asked::Command(Box::new(command)),
-        Asked::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
-        Asked::Cancel { ticket: 1 },
-        Asked::SessionRequest {
+        ClientMessage::Command(Box::new(command)),
+        ClientMessage::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
+        ClientMessage::Cancel { ticket: 1 },
+        ClientMessage::SessionRequest {
             ticket: 2,
             request: SessionRequest::Login { user: "anna".into(), password: "long and secret".into() },
         },
-        Asked::SessionRequest {
+        ClientMessage::SessionRequest {
             ticket: 3,
             request: SessionRequest::SetRole { user: "anna".into(), role: Role::Technician },
         },
@@ -98,11 +99,11 @@ fn requests_and_news_survive_the_way() {
         assert_eq!(decode(&body(encode(&asked, REQUEST_BYTES_MAX).unwrap()), "message"), Ok(asked));
     }
     let told = [
-        Told::SessionStatus(Box::default()),
-        Told::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
-        Told::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
-        Told::RequestDone { ticket: 2, answer: Err("no".into()) },
-        Told::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: "busy".into() },
+        ServerMessage::SessionStatus(Box::default()),
+        ServerMessage::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
+        ServerMessage::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
+        ServerMessage::RequestDone { ticket: 2, answer: Err("no".into()) },
+        ServerMessage::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: "busy".into() },
     ];
     for told in told {
         assert_eq!(decode(&body(encode(&told, NEWS_BYTES_MAX).unwrap()), "message"), Ok(told));
@@ -114,11 +115,15 @@ fn a_message_is_neither_longer_nor_shorter_than_it_says() {
     assert_eq!(length([0, 0, 1, 0], REQUEST_BYTES_MAX), Ok(65_536));
     assert_eq!(length([1, 0, 1, 0], REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { bytes: 65_537, max: 65_536 }));
     assert!(length([0xFF; 4], NEWS_BYTES_MAX).is_err());
-    let mut bytes = body(encode(&Told::RequestDone { ticket: 2, answer: Ok(Durability::Recorded) }, 100).unwrap());
+    let mut bytes =
+        body(encode(&ServerMessage::RequestDone { ticket: 2, answer: Ok(Durability::Recorded) }, 100).unwrap());
     bytes.push(0);
-    assert!(decode::<Told>(&bytes, "message").is_err(), "something is left over");
-    assert!(decode::<Told>(&bytes[..2], "message").is_err(), "something is missing");
-    let long = Asked::SessionRequest { ticket: 1, request: SessionRequest::Unlock("x".repeat(70_000).as_str().into()) };
+    assert!(decode::<ServerMessage>(&bytes, "message").is_err(), "something is left over");
+    assert!(decode::<ServerMessage>(&bytes[..2], "message").is_err(), "something is missing");
+    let long = ClientMessage::SessionRequest {
+        ticket: 1,
+        request: SessionRequest::Unlock("x".repeat(70_000).as_str().into()),
+    };
     assert!(matches!(encode(&long, REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { .. })));
 }
 
@@ -177,10 +182,10 @@ fn what_this_plant_does_not_have_never_reaches_it() {
 proptest! {
     #[test]
     fn random_bytes_are_refused_without_harm(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
-        let _ = hello(&bytes);
-        let _ = welcome(&bytes).map(|told| told.map(|_| ()));
-        let _ = decode::<Asked>(&bytes, "message");
-        let _ = decode::<Told>(&bytes, "message");
+        let _ = client_handshake(&bytes);
+        let _ = handshake_reply(&bytes).map(|told| told.map(|_| ()));
+        let _ = decode::<ClientMessage>(&bytes, "message");
+        let _ = decode::<ServerMessage>(&bytes, "message");
     }
 
     #[test]
@@ -191,11 +196,11 @@ proptest! {
             credentials: Some(credentials),
             ..CommandRequest::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
         };
-        let mut bytes = body(encode(&Asked::Command(Box::new(command)), REQUEST_BYTES_MAX).unwrap());
+        let mut bytes = body(encode(&ClientMessage::Command(Box::new(command)), REQUEST_BYTES_MAX).unwrap());
         let place = place % bytes.len();
         bytes[place] = byte;
         bytes.truncate(bytes.len() - end % bytes.len());
-        if let Ok(Asked::Command(command)) = decode::<Asked>(&bytes, "message") {
+        if let Ok(ClientMessage::Command(command)) = decode::<ClientMessage>(&bytes, "message") {
             let _ = check::command(&Fixture::normal().def, &command.kind);
         }
     }

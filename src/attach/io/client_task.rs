@@ -15,8 +15,8 @@ use super::{
 use crate::{
     access::{Durability, SessionStatus},
     attach::{
-        own::{GONE, Own},
-        protocol::{self, Asked, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, Told, Welcome},
+        command_id_map::{CommandIdMap, GONE},
+        protocol::{self, ClientMessage, HandshakeReply, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, ServerMessage},
     },
     history::{Answer, HistoryError, io::QueryRequest},
     plant::{PlantDef, Snapshot},
@@ -49,10 +49,10 @@ impl Waiting {
 }
 
 /// Sole owner of the socket of a terminal.
-pub struct Pump {
+pub struct ClientTask {
     path: PathBuf,
     place: Place,
-    own: Own,
+    id_map: CommandIdMap,
     /// The latest snapshot as the station has it; what is published may differ by own commands.
     latest: Arc<Snapshot>,
     publish: watch::Sender<Arc<Snapshot>>,
@@ -62,35 +62,35 @@ pub struct Pump {
 }
 
 /// Why a connection ended.
-enum Over {
+enum Disconnected {
     /// Nobody holds the session any more.
     Left,
     /// The station has gone, in words.
     Gone(String),
 }
 
-impl Pump {
-    /// A pump that has published the first snapshot.
+impl ClientTask {
+    /// A task that has published the first snapshot.
     pub fn new(
         path: PathBuf,
         place: Place,
-        own: Own,
+        id_map: CommandIdMap,
         publish: watch::Sender<Arc<Snapshot>>,
         status_sender: watch::Sender<Arc<SessionStatus>>,
-    ) -> Pump {
+    ) -> ClientTask {
         let latest = publish.borrow().clone();
-        Pump { path, place, own, latest, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
+        ClientTask { path, place, id_map, latest, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
     }
 
     /// Runs for as long as somebody holds the session.
     pub async fn run(mut self, line: Line, mut requests: mpsc::Receiver<(u32, Request)>) {
         let mut line = Some(line);
         loop {
-            let over = match line.take() {
+            let end = match line.take() {
                 Some(Line { read, write, .. }) => self.attend(read, write, &mut requests).await,
-                None => Over::Left,
+                None => Disconnected::Left,
             };
-            let Over::Gone(why) = over else { return };
+            let Disconnected::Gone(why) = end else { return };
             tracing::warn!(why, "the station has gone");
             self.status_sender.send_modify(|status| {
                 *status = Arc::new(SessionStatus { gone: Some(why.into()), ..SessionStatus::clone(status) });
@@ -98,7 +98,7 @@ impl Pump {
             for (_, waiting) in self.waiting.drain() {
                 waiting.refuse(GONE);
             }
-            self.own.gone();
+            self.id_map.gone();
             self.show();
             line = self.seek(&mut requests).await;
         }
@@ -110,58 +110,58 @@ impl Pump {
         read: OwnedReadHalf,
         write: OwnedWriteHalf,
         requests: &mut mpsc::Receiver<(u32, Request)>,
-    ) -> Over {
+    ) -> Disconnected {
         let (come, mut told) = mpsc::channel(IN);
         let (out, go) = mpsc::channel(OUT);
         let conversation = async {
             loop {
                 self.cancel(&out);
                 tokio::select! {
-                    Some(told) = told.recv() => if let Err(why) = self.take(told) { break Over::Gone(why) },
+                    Some(told) = told.recv() => if let Err(why) = self.take(told) { break Disconnected::Gone(why) },
                     request = requests.recv() => match request {
                         Some((_, request)) => self.send(request, &out),
-                        None => break Over::Left,
+                        None => break Disconnected::Left,
                     },
                 }
             }
         };
         tokio::select! {
-            over = conversation => over,
-            error = listen(read, come) => Over::Gone(error.to_string()),
-            error = speak(write, go) => Over::Gone(error.to_string()),
+            end = conversation => end,
+            error = listen(read, come) => Disconnected::Gone(error.to_string()),
+            error = speak(write, go) => Disconnected::Gone(error.to_string()),
         }
     }
 
     /// Takes in what the station says.
-    fn take(&mut self, told: Told) -> Result<(), String> {
+    fn take(&mut self, told: ServerMessage) -> Result<(), String> {
         match told {
-            Told::Delta(delta) => {
+            ServerMessage::Delta(delta) => {
                 delta.apply(Arc::make_mut(&mut self.latest)).map_err(|error| error.to_string())?;
                 self.show();
             }
-            Told::SessionStatus(status) => {
+            ServerMessage::SessionStatus(status) => {
                 for (id, why) in &status.undelivered {
-                    self.own.undelivered(*id, why.to_string());
+                    self.id_map.undelivered(*id, why.to_string());
                 }
                 if !status.undelivered.is_empty() {
                     self.show();
                 }
                 self.status_sender.send_replace(Arc::new(*status));
             }
-            Told::Answer { ticket, answer } => {
+            ServerMessage::Answer { ticket, answer } => {
                 if let Some(Waiting::Ask(reply)) = self.waiting.remove(&ticket) {
                     // Whoever has left needs no answer.
                     let _ = reply.send(answer);
                 }
             }
-            Told::RequestDone { ticket, answer } => {
+            ServerMessage::RequestDone { ticket, answer } => {
                 if let Some(Waiting::SessionRequest(reply)) = self.waiting.remove(&ticket) {
                     // Whoever has left needs no answer.
                     let _ = reply.send(answer);
                 }
             }
-            Told::Undelivered { id, why } => {
-                self.own.undelivered(id, why);
+            ServerMessage::Undelivered { id, why } => {
+                self.id_map.undelivered(id, why);
                 self.show();
             }
         }
@@ -170,7 +170,7 @@ impl Pump {
 
     /// Publishes the latest snapshot, with what became of own commands.
     fn show(&mut self) {
-        let seen = self.own.see(&self.latest);
+        let seen = self.id_map.see(&self.latest);
         self.publish.send_replace(seen);
     }
 
@@ -179,30 +179,30 @@ impl Pump {
         match request {
             Request::Command(command) => {
                 let (by, at) = (self.by(), self.latest.at);
-                let command = self.own.send(command, by, at);
+                let command = self.id_map.send(command, by, at);
                 let id = command.id;
-                if let Err(why) = hand_over(&Asked::Command(Box::new(command)), out) {
-                    self.own.undelivered(id, why);
+                if let Err(why) = hand_over(&ClientMessage::Command(Box::new(command)), out) {
+                    self.id_map.undelivered(id, why);
                     self.show();
                 }
             }
             Request::Ask(QueryRequest { query, reply }) => {
                 let ticket = self.ticket();
-                self.await_answer(ticket, Waiting::Ask(reply), &Asked::Ask { ticket, query }, out);
+                self.await_answer(ticket, Waiting::Ask(reply), &ClientMessage::Ask { ticket, query }, out);
             }
             Request::SessionRequest(request, reply) => {
                 let ticket = self.ticket();
                 self.await_answer(
                     ticket,
                     Waiting::SessionRequest(reply),
-                    &Asked::SessionRequest { ticket, request },
+                    &ClientMessage::SessionRequest { ticket, request },
                     out,
                 );
             }
         }
     }
 
-    fn await_answer(&mut self, ticket: u64, waiting: Waiting, asked: &Asked, out: &mpsc::Sender<Vec<u8>>) {
+    fn await_answer(&mut self, ticket: u64, waiting: Waiting, asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) {
         match hand_over(asked, out) {
             Ok(()) => drop(self.waiting.insert(ticket, waiting)),
             Err(why) => waiting.refuse(&why),
@@ -214,7 +214,7 @@ impl Pump {
         let given_up = |waiting: &Waiting| matches!(waiting, Waiting::Ask(reply) if reply.is_closed());
         for (ticket, _) in self.waiting.extract_if(|_, waiting| given_up(waiting)) {
             // A station that is too busy for it answers in vain.
-            let _ = hand_over(&Asked::Cancel { ticket }, out);
+            let _ = hand_over(&ClientMessage::Cancel { ticket }, out);
         }
     }
 
@@ -264,7 +264,7 @@ impl Pump {
         match request {
             Request::Command(command) => {
                 let (by, at) = (self.by(), self.latest.at);
-                self.own.refuse(&command, by, at, GONE);
+                self.id_map.refuse(&command, by, at, GONE);
                 self.show();
             }
             Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),
@@ -273,8 +273,8 @@ impl Pump {
     }
 
     /// The next delta is from nothing, of this definition; one that is equal stays the very same.
-    fn begin_anew(&mut self, welcome: &Welcome) {
-        self.own.welcomed(welcome.run, welcome.terminal);
+    fn begin_anew(&mut self, welcome: &HandshakeReply) {
+        self.id_map.welcomed(welcome.run, welcome.terminal);
         let def = &self.latest.def;
         let def = if is_equal(def, &welcome.def) { def.clone() } else { welcome.def.clone() };
         self.latest = Arc::new(Snapshot::blank(def));
@@ -285,7 +285,7 @@ fn is_equal(one: &PlantDef, other: &PlantDef) -> bool {
     protocol::encode(one, NEWS_BYTES_MAX) == protocol::encode(other, NEWS_BYTES_MAX)
 }
 
-fn hand_over(asked: &Asked, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
+fn hand_over(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
     let bytes = protocol::encode(asked, REQUEST_BYTES_MAX).map_err(|error| error.to_string())?;
     out.try_send(bytes).map_err(|error| match error {
         mpsc::error::TrySendError::Full(_) => "station too busy".to_owned(),
@@ -294,7 +294,7 @@ fn hand_over(asked: &Asked, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
 }
 
 /// Reads to the end of the connection, which may be at any moment.
-async fn listen(mut read: OwnedReadHalf, come: mpsc::Sender<Told>) -> WireError {
+async fn listen(mut read: OwnedReadHalf, come: mpsc::Sender<ServerMessage>) -> WireError {
     loop {
         let told = match connect::next(&mut read).await {
             Ok(told) => told,
@@ -328,11 +328,12 @@ mod tests {
     async fn a_question_whose_answer_is_not_waited_for_is_cancelled_at_the_station() {
         let (publish, _snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
         let (status_sender, _standing) = watch::channel(Arc::new(SessionStatus::default()));
-        let mut pump = Pump::new(PathBuf::new(), Place::default(), Own::new(1, 1), publish, status_sender);
+        let mut task =
+            ClientTask::new(PathBuf::new(), Place::default(), CommandIdMap::new(1, 1), publish, status_sender);
         let (near, mut far) = UnixStream::pair().unwrap();
         let (read, write) = near.into_split();
         let (asks, mut requests) = mpsc::channel(4);
-        tokio::spawn(async move { pump.attend(read, write, &mut requests).await });
+        tokio::spawn(async move { task.attend(read, write, &mut requests).await });
         let query = Query::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::UNIX_EPOCH, limit: 1 };
         let ask = || {
             let (reply, answer) = oneshot::channel();
@@ -340,15 +341,16 @@ mod tests {
             answer
         };
         let mut asked = async || {
-            protocol::decode::<Asked>(&wire::read(&mut far, REQUEST_BYTES_MAX).await.unwrap(), "message").unwrap()
+            protocol::decode::<ClientMessage>(&wire::read(&mut far, REQUEST_BYTES_MAX).await.unwrap(), "message")
+                .unwrap()
         };
         let first = ask();
-        assert_eq!(asked().await, Asked::Ask { ticket: 1, query: query.clone() });
+        assert_eq!(asked().await, ClientMessage::Ask { ticket: 1, query: query.clone() });
         drop(first);
         let _second = ask();
-        assert_eq!(asked().await, Asked::Ask { ticket: 2, query: query.clone() });
-        assert_eq!(asked().await, Asked::Cancel { ticket: 1 }, "the second is waited for");
+        assert_eq!(asked().await, ClientMessage::Ask { ticket: 2, query: query.clone() });
+        assert_eq!(asked().await, ClientMessage::Cancel { ticket: 1 }, "the second is waited for");
         let _third = ask();
-        assert_eq!(asked().await, Asked::Ask { ticket: 3, query: query.clone() }, "cancelled once");
+        assert_eq!(asked().await, ClientMessage::Ask { ticket: 3, query: query.clone() }, "cancelled once");
     }
 }

@@ -1,4 +1,4 @@
-//! What a terminal may see while nobody who may look at the process is logged in: that it is a station, and its alarms.
+//! Removes from a snapshot what an anonymous terminal may not see: it keeps the station and its alarms.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::plant::{
 
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
 /// bytes, no command. What is left out is absent, not hidden: it does not leave the station.
-pub fn alarms_only(snapshot: &Snapshot) -> Snapshot {
+pub fn redact(snapshot: &Snapshot) -> Snapshot {
     let Snapshot {
         at,
         run,

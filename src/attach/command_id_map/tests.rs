@@ -23,39 +23,39 @@ fn snapshot(commands: &[(u32, u32, Outcome)]) -> Arc<Snapshot> {
     Arc::new(snapshot)
 }
 
-fn seen(own: &mut Own, commands: &[(u32, u32, Outcome)]) -> Vec<(u32, u32, Outcome)> {
-    let seen = own.see(&snapshot(commands));
+fn seen(id_map: &mut CommandIdMap, commands: &[(u32, u32, Outcome)]) -> Vec<(u32, u32, Outcome)> {
+    let seen = id_map.see(&snapshot(commands));
     seen.commands.iter().map(|command| (command.id.terminal, command.id.number, command.outcome.clone())).collect()
 }
 
-fn send(own: &mut Own, number: u32) -> CommandId {
-    own.send(request(own.terminal(), number), "anna".into(), Fixture::normal().snapshot().at).id
+fn send(id_map: &mut CommandIdMap, number: u32) -> CommandId {
+    id_map.send(request(id_map.terminal(), number), "anna".into(), Fixture::normal().snapshot().at).id
 }
 
 #[test]
 fn own_commands_keep_their_number_over_connections() {
-    let mut own = Own::new(1, 3);
-    assert_eq!(send(&mut own, 1), CommandId { terminal: 3, number: 1 });
+    let mut id_map = CommandIdMap::new(1, 3);
+    assert_eq!(send(&mut id_map, 1), CommandId { terminal: 3, number: 1 });
     // The station was started anew: this terminal is 1 now, and somebody else is 3.
-    own.gone();
-    own.welcomed(2, 1);
-    assert_eq!(send(&mut own, 2), CommandId { terminal: 1, number: 2 });
+    id_map.gone();
+    id_map.welcomed(2, 1);
+    assert_eq!(send(&mut id_map, 2), CommandId { terminal: 1, number: 2 });
     let commands = [(1, 2, Outcome::Verified), (3, 9, Outcome::Verified), (4, 7, Outcome::Verified)];
     let lost = (3, 1, NOT_CONFIRMED);
     let expected = [lost, (3, 2, Outcome::Verified), (1, 9, Outcome::Verified), (4, 7, Outcome::Verified)];
-    assert_eq!(seen(&mut own, &commands), expected);
+    assert_eq!(seen(&mut id_map, &commands), expected);
 }
 
 #[test]
 fn the_outcome_of_a_command_survives_a_reconnect() {
-    let mut own = Own::new(1, 3);
-    send(&mut own, 1);
-    own.gone();
-    assert_eq!(seen(&mut own, &[]), [(3, 1, NOT_CONFIRMED)], "not known yet");
-    own.welcomed(1, 5);
-    assert_eq!(seen(&mut own, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
-    assert_eq!(send(&mut own, 2), CommandId { terminal: 5, number: 2 });
-    assert_eq!(seen(&mut own, &[(5, 2, Outcome::Pending)]), [(3, 2, Outcome::Pending)]);
+    let mut id_map = CommandIdMap::new(1, 3);
+    send(&mut id_map, 1);
+    id_map.gone();
+    assert_eq!(seen(&mut id_map, &[]), [(3, 1, NOT_CONFIRMED)], "not known yet");
+    id_map.welcomed(1, 5);
+    assert_eq!(seen(&mut id_map, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
+    assert_eq!(send(&mut id_map, 2), CommandId { terminal: 5, number: 2 });
+    assert_eq!(seen(&mut id_map, &[(5, 2, Outcome::Pending)]), [(3, 2, Outcome::Pending)]);
 }
 
 #[test]
@@ -63,12 +63,12 @@ fn a_pending_command_is_uncertain_until_the_station_is_back() {
     let under_way = [(3, 1, Outcome::Pending), (2, 1, Outcome::Verified)];
     let uncertain = [(3, 1, NOT_CONFIRMED), (2, 1, Outcome::Verified)];
     let begun = || {
-        let mut own = Own::new(1, 3);
-        send(&mut own, 1);
-        assert_eq!(seen(&mut own, &under_way), under_way);
-        own.gone();
-        assert_eq!(seen(&mut own, &under_way), uncertain, "the last snapshot does not status_sender for ever");
-        own
+        let mut id_map = CommandIdMap::new(1, 3);
+        send(&mut id_map, 1);
+        assert_eq!(seen(&mut id_map, &under_way), under_way);
+        id_map.gone();
+        assert_eq!(seen(&mut id_map, &under_way), uncertain, "the last snapshot is not final");
+        id_map
     };
     let mut same = begun();
     same.welcomed(1, 5);
@@ -79,28 +79,28 @@ fn a_pending_command_is_uncertain_until_the_station_is_back() {
     assert_eq!(seen(&mut same, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
     let mut another = begun();
     another.welcomed(2, 3);
-    assert_eq!(seen(&mut another, &[]), uncertain[..1], "a new station has never heard of it");
+    assert_eq!(seen(&mut another, &[]), uncertain[..1], "a new station does not know it");
 }
 
 #[test]
 fn an_undelivered_command_is_refused_with_a_reason() {
-    let mut own = Own::new(1, 3);
-    let id = send(&mut own, 1);
-    own.undelivered(id, "station too busy".to_owned());
+    let mut id_map = CommandIdMap::new(1, 3);
+    let id = send(&mut id_map, 1);
+    id_map.undelivered(id, "station too busy".to_owned());
     let why = |why: &str| Outcome::Refused(Refusal::NotPermitted(why.to_owned()));
-    assert_eq!(seen(&mut own, &[]), [(3, 1, why("station too busy"))]);
-    own.refuse(&request(3, 2), "anna".into(), Fixture::normal().snapshot().at, GONE);
-    assert_eq!(seen(&mut own, &[]), [(3, 2, why(GONE)), (3, 1, why("station too busy"))]);
+    assert_eq!(seen(&mut id_map, &[]), [(3, 1, why("station too busy"))]);
+    id_map.refuse(&request(3, 2), "anna".into(), Fixture::normal().snapshot().at, GONE);
+    assert_eq!(seen(&mut id_map, &[]), [(3, 2, why(GONE)), (3, 1, why("station too busy"))]);
     for number in 3..200 {
-        send(&mut own, number);
+        send(&mut id_map, number);
     }
-    own.gone();
-    assert_eq!(seen(&mut own, &[]).len(), COMMANDS_MAX, "what is remembered is bounded");
+    id_map.gone();
+    assert_eq!(seen(&mut id_map, &[]).len(), COMMANDS_MAX, "what is remembered is bounded");
 }
 
 #[test]
 fn a_snapshot_without_own_news_is_not_copied() {
-    let mut own = Own::new(1, 3);
+    let mut id_map = CommandIdMap::new(1, 3);
     let snapshot = snapshot(&[(3, 1, Outcome::Verified), (2, 1, Outcome::Verified)]);
-    assert!(Arc::ptr_eq(&own.see(&snapshot), &snapshot));
+    assert!(Arc::ptr_eq(&id_map.see(&snapshot), &snapshot));
 }

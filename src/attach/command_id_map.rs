@@ -1,4 +1,4 @@
-//! A terminal's own commands over all its connections: the station may number it anew, its operator sees one terminal.
+//! Maps the command ids of a terminal over reconnects: the station may give it another number, its operator sees one.
 
 use std::{collections::VecDeque, sync::Arc};
 
@@ -20,9 +20,9 @@ const NUMBERS_MAX: usize = 64;
 /// Own commands that are remembered; a snapshot has no more.
 const COMMANDS_MAX: usize = 32;
 
-/// What a terminal remembers of itself.
+/// The ids of a terminal and its commands without a final status.
 #[derive(Debug)]
-pub struct Own {
+pub struct CommandIdMap {
     /// The number that its operator's commands have here, for as long as the terminal lives.
     terminal: u32,
     /// Which run of the station gave the numbers below.
@@ -37,10 +37,17 @@ pub struct Own {
     connected: bool,
 }
 
-impl Own {
+impl CommandIdMap {
     /// First connection: the number that the station gives is the one to keep.
-    pub fn new(run: u64, terminal: u32) -> Own {
-        Own { terminal, run, numbers: [terminal].into(), sent: VecDeque::new(), lost: VecDeque::new(), connected: true }
+    pub fn new(run: u64, terminal: u32) -> CommandIdMap {
+        CommandIdMap {
+            terminal,
+            run,
+            numbers: [terminal].into(),
+            sent: VecDeque::new(),
+            lost: VecDeque::new(),
+            connected: true,
+        }
     }
 
     /// The number of the terminal as its operator's commands have it.
