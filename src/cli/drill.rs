@@ -18,7 +18,7 @@ use crate::{
         },
         simulator::Simulator,
     },
-    station::{io as station, teller},
+    station::{event_log, io as station},
 };
 
 use super::{CliError, demo::simulation_error, log, say};
@@ -140,7 +140,7 @@ fn rehearse(
 
 fn changes(began: Timestamp, before: &Snapshot, after: &Snapshot) -> Vec<String> {
     let at = clock(Duration::try_from(after.at.duration_since(began)).unwrap_or_default());
-    teller::changes(before, after).into_iter().map(|line| format!("{at} {line}")).collect()
+    event_log::changes(before, after).into_iter().map(|line| format!("{at} {line}")).collect()
 }
 
 /// Every drill begins at the same moment, so that replays are alike to the last digit.

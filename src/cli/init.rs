@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use sd_notify::NotifyState;
 
-use crate::{plant::Snapshot, station::pulse::Pulse};
+use crate::{plant::Snapshot, station::liveness::Liveness};
 
 /// The station polls and its socket is open.
 pub fn ready(title: &str) {
@@ -34,20 +34,20 @@ pub struct Watchdog {
     every: Option<Duration>,
     began: Instant,
     fed_at: Option<Instant>,
-    pulse: Pulse,
+    liveness: Liveness,
 }
 
 impl Watchdog {
     /// Not fed yet.
     pub fn new() -> Watchdog {
         let every = sd_notify::watchdog_enabled().map(|span| span / 2);
-        Watchdog { every, began: Instant::now(), fed_at: None, pulse: Pulse::default() }
+        Watchdog { every, began: Instant::now(), fed_at: None, liveness: Liveness::default() }
     }
 
     /// A snapshot has come: if every line that is connected still reports, the station is alive.
     pub fn see(&mut self, snapshot: &Snapshot) {
         let Some(every) = self.every else { return };
-        let alive = self.pulse.beats(snapshot, self.began.elapsed());
+        let alive = self.liveness.check(snapshot, self.began.elapsed());
         if alive && self.fed_at.is_none_or(|at| every / 2 <= at.elapsed()) {
             self.fed_at = Some(Instant::now());
             tell(&[NotifyState::Watchdog]);

@@ -14,7 +14,7 @@ use crate::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot, record::Seal},
     profile::PlantFile,
-    station::{LifecycleRequest, io as station, teller},
+    station::{LifecycleRequest, event_log, io as station},
     ui,
 };
 
@@ -251,7 +251,7 @@ pub async fn follow(
                 let after = snapshots.borrow_and_update().clone();
                 watchdog.see(&after);
                 let time = after.at.to_zoned(after.def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
-                for line in teller::changes(&before, &after) {
+                for line in event_log::changes(&before, &after) {
                     say(&format!("{time} {line}"));
                 }
                 let hour = after.at.as_second().div_euclid(3_600);

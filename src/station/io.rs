@@ -30,7 +30,7 @@ use crate::{
 use super::{
     audit_queue::AuditQueue,
     past::Past,
-    plant_task::{KEPT_FOR_STOPS, Keeping, PlantTask, RecordObserver},
+    plant_task::{KEPT_FOR_STOPS, Persistence, PlantTask, RecordObserver},
     session::Session,
     session_server::{self, Outputs, SessionAcceptor, SessionServer},
     sets, supervisor,
@@ -131,9 +131,10 @@ fn begin(
     }
     audit_queue.started(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
-    let keeping = Keeping { records: Some(records), store, past, book: Some(audit_queue), sets: Some(sets), observer };
+    let persistence =
+        Persistence { records: Some(records), store, past, book: Some(audit_queue), sets: Some(sets), observer };
     let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
-    Ok(assemble(def, clock, connectors, plant, file, keeping, threads, guarded))
+    Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
 }
 
 /// What is wrong with the file of users: it is damaged, or it is missing although the audit log knows of users.
@@ -153,9 +154,10 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, ob
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let keeping = Keeping { records: None, store, past: None, book: None, sets: None, observer: Some(observer) };
+    let persistence =
+        Persistence { records: None, store, past: None, book: None, sets: None, observer: Some(observer) };
     let threads = Threads { queries, history: None, book: None };
-    assemble(def, clock, connectors, plant, None, keeping, threads, None)
+    assemble(def, clock, connectors, plant, None, persistence, threads, None)
 }
 
 /// What runs beside the tasks.
@@ -173,7 +175,7 @@ fn assemble(
     connectors: Vec<Connector>,
     plant: Plant,
     file: Option<PlantFile>,
-    keeping: Keeping,
+    persistence: Persistence,
     threads: Threads,
     guarded: Option<(AccessControl, PathBuf)>,
 ) -> Station {
@@ -200,7 +202,7 @@ fn assemble(
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
-    let plant_task = PlantTask::new(plant, clock, links, file, keeping, publish);
+    let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);

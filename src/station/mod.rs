@@ -29,10 +29,10 @@ mod audit_queue;
 mod session_server;
 mod past;
 mod plant_task;
-pub mod pulse;
+pub mod liveness;
 mod sets;
 mod supervisor;
-pub mod teller;
+pub mod event_log;
 mod blocking_jobs;
 pub mod io;
 

@@ -46,8 +46,8 @@ const TICK_MIN: Duration = Duration::from_millis(20);
 /// Gets every record of the plant, in the task of the plant: it must not block.
 pub type RecordObserver = Box<dyn Fn(&[Record]) + Send>;
 
-/// Where the journal and the parameter sets go.
-pub(super) struct Keeping {
+/// Where records, actions and parameter sets are stored.
+pub(super) struct Persistence {
     pub records: Option<mpsc::Sender<Vec<Record>>>,
     pub store: watch::Receiver<HistoryStatus>,
     /// What is still to come from the history; `None` once it is known.
@@ -99,7 +99,7 @@ pub(super) struct PlantTask {
     saving: Option<Saving>,
     /// The work with the parameter sets.
     filing: Option<JoinHandle<sets::Done>>,
-    keeping: Keeping,
+    persistence: Persistence,
     /// Records that the queue to the store had no room for.
     lost: u64,
     publish: watch::Sender<Arc<Snapshot>>,
@@ -112,10 +112,10 @@ impl PlantTask {
         clock: Clock,
         links: Vec<mpsc::Sender<BusRequest>>,
         file: Option<PlantFile>,
-        keeping: Keeping,
+        persistence: Persistence,
         publish: watch::Sender<Arc<Snapshot>>,
     ) -> PlantTask {
-        PlantTask { plant, clock, links, file, saving: None, filing: None, keeping, lost: 0, publish }
+        PlantTask { plant, clock, links, file, saving: None, filing: None, persistence, lost: 0, publish }
     }
 
     /// Runs until the links have stopped.
@@ -131,14 +131,14 @@ impl PlantTask {
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         // Changed since the last snapshot, and when the next one may go out.
         let (mut changed, mut next) = (false, Instant::now());
-        if self.keeping.past.as_ref().is_some_and(|past| past.from_journal) {
+        if self.persistence.past.as_ref().is_some_and(|past| past.from_journal) {
             // Events wait in their queue; the lines are polled meanwhile.
-            let known = tokio::time::timeout(past::WAIT_MAX, Past::known(&mut self.keeping.past)).await;
+            let known = tokio::time::timeout(past::WAIT_MAX, Past::known(&mut self.persistence.past)).await;
             known.into_iter().for_each(|restored| self.take_up(restored));
         }
         loop {
             // What a snapshot shows as done is on disk, or marked.
-            let due = self.keeping.book.as_ref().map_or(next, |book| book.due(next));
+            let due = self.persistence.book.as_ref().map_or(next, |book| book.due(next));
             tokio::select! {
                 biased;
                 () = tokio::time::sleep_until(due), if changed => {
@@ -160,15 +160,15 @@ impl PlantTask {
                     self.take_filed(done);
                     changed = true;
                 }
-                restored = Past::known(&mut self.keeping.past) => {
+                restored = Past::known(&mut self.persistence.past) => {
                     self.take_up(restored);
                     changed = true;
                 }
-                Ok(()) = self.keeping.store.changed() => {
+                Ok(()) = self.persistence.store.changed() => {
                     self.hear_store();
                     changed = true;
                 }
-                () = AuditQueue::changed(&mut self.keeping.book) => {
+                () = AuditQueue::changed(&mut self.persistence.book) => {
                     self.tell_answers();
                     self.hear_store();
                     changed = true;
@@ -190,8 +190,8 @@ impl PlantTask {
                 }
             }
         }
-        if self.keeping.past.is_some()
-            && let Ok(restored) = tokio::time::timeout(HISTORY_MAX, Past::known(&mut self.keeping.past)).await
+        if self.persistence.past.is_some()
+            && let Ok(restored) = tokio::time::timeout(HISTORY_MAX, Past::known(&mut self.persistence.past)).await
         {
             // A station that ends as soon as it has started completes its history all the same.
             self.take_up(restored);
@@ -216,7 +216,7 @@ impl PlantTask {
         let ended = self.plant.on_stop();
         self.keep(ended.records);
         let stopped = audit_queue::stopped(&self.plant.def().name, self.clock.utc());
-        if let Some(book) = &mut self.keeping.book {
+        if let Some(book) = &mut self.persistence.book {
             book.tell_all();
             self.write_down(vec![stopped], Vec::new());
         }
@@ -226,7 +226,7 @@ impl PlantTask {
     fn publish(&mut self) {
         let mut snapshot = self.plant.snapshot();
         snapshot.shift(self.clock.behind_utc());
-        if let Some(book) = &mut self.keeping.book {
+        if let Some(book) = &mut self.persistence.book {
             book.mark(&mut snapshot);
         }
         self.publish.send_replace(Arc::new(snapshot));
@@ -234,9 +234,9 @@ impl PlantTask {
 
     /// Takes up what the history knows of the time before the start.
     fn take_up(&mut self, restored: Restored) {
-        let Some(past) = self.keeping.past.take() else { return };
+        let Some(past) = self.persistence.past.take() else { return };
         let Restored { steps, recent, seals } = past.join(restored);
-        if let (Some(seals), Some(book)) = (seals, &mut self.keeping.book) {
+        if let (Some(seals), Some(book)) = (seals, &mut self.persistence.book) {
             book.stored(seals);
         }
         if !steps.is_empty() {
@@ -248,7 +248,7 @@ impl PlantTask {
     }
 
     fn handle_audit_message(&mut self, message: AuditMessage) {
-        match (message, &mut self.keeping.book) {
+        match (message, &mut self.persistence.book) {
             (AuditMessage::Entry(action), _) => self.keep(vec![Record::Action(action)]),
             (AuditMessage::Reply(reply, answer), Some(book)) => book.answer(reply, answer),
             // A terminal that has left needs no answer.
@@ -259,7 +259,7 @@ impl PlantTask {
     }
 
     fn tell_answers(&mut self) {
-        let left = self.keeping.book.as_mut().map(AuditQueue::tell).unwrap_or_default();
+        let left = self.persistence.book.as_mut().map(AuditQueue::tell).unwrap_or_default();
         self.store(left.into_iter().map(Record::Action).collect());
     }
 
@@ -298,7 +298,7 @@ impl PlantTask {
 
     /// Has the folder of parameter sets worked on beside the loop, one work at a time.
     fn file_sets(&mut self, work: SetWork) {
-        let refused = match (&self.keeping.sets, &self.filing) {
+        let refused = match (&self.persistence.sets, &self.filing) {
             (Some(folder), None) => {
                 let (folder, def) = (folder.clone(), self.plant.def().clone());
                 self.filing = Some(tokio::task::spawn_blocking(move || sets::work(&folder, &def, work)));
@@ -347,7 +347,7 @@ impl PlantTask {
         let result = match done {
             Ok((file, result)) => {
                 let now = self.clock.utc();
-                let changed = self.keeping.book.as_mut().and_then(|book| book.plant_file(&file, now));
+                let changed = self.persistence.book.as_mut().and_then(|book| book.plant_file(&file, now));
                 self.write_down(changed.into_iter().collect(), Vec::new());
                 self.file = Some(file);
                 result
@@ -387,7 +387,7 @@ impl PlantTask {
         }
         let behind = self.clock.behind_utc();
         records.iter_mut().for_each(|record| record.shift(behind));
-        if let Some(observer) = &self.keeping.observer {
+        if let Some(observer) = &self.persistence.observer {
             observer(&records);
         }
         let (mut actions, mut steps, mut others) = (Vec::new(), Vec::new(), Vec::new());
@@ -395,7 +395,7 @@ impl PlantTask {
             match record {
                 Record::Action(action) => actions.push(action),
                 Record::Alarm(step) => {
-                    self.keeping.past.iter_mut().for_each(|past| past.note(&step));
+                    self.persistence.past.iter_mut().for_each(|past| past.note(&step));
                     steps.push(step.clone());
                     others.push(Record::Alarm(step));
                 }
@@ -411,7 +411,7 @@ impl PlantTask {
         if actions.is_empty() && steps.is_empty() {
             return;
         }
-        let left = match &mut self.keeping.book {
+        let left = match &mut self.persistence.book {
             Some(book) => book.put(actions, steps),
             None => actions,
         };
@@ -419,7 +419,7 @@ impl PlantTask {
     }
 
     fn store(&mut self, records: Vec<Record>) {
-        let Some(store) = &self.keeping.records else { return };
+        let Some(store) = &self.persistence.records else { return };
         let lost = offer(store, records);
         if lost > 0 {
             self.lost += lost;
@@ -428,11 +428,11 @@ impl PlantTask {
     }
 
     fn hear_store(&mut self) {
-        let mut status = self.keeping.store.borrow_and_update().clone();
+        let mut status = self.persistence.store.borrow_and_update().clone();
         status.lost += self.lost;
         let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));
         status.trouble = [status.trouble, lost].into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
-        if let Some(book) = &mut self.keeping.book {
+        if let Some(book) = &mut self.persistence.book {
             let (lost, log, alarms) = book.trouble();
             status.lost += lost;
             status.audit = book.last();

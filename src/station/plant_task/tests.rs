@@ -47,13 +47,13 @@ impl Station {
         let recorder = recorder::start(history, clock, records.clone()).unwrap();
         let (_, store) = watch::channel(HistoryStatus::default());
         let book = Some(AuditQueue::new(&recorder));
-        let keeping = Keeping { records: Some(records), store, past: None, book, sets: None, observer: None };
+        let persistence = Persistence { records: Some(records), store, past: None, book, sets: None, observer: None };
         let (request, requests) = mpsc::channel(8);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (events, event_queue) = mpsc::channel(8);
         let (commands, command_queue) = mpsc::channel(8);
         let (messages, message_queue) = mpsc::channel(8);
-        let task = PlantTask::new(plant, clock, vec![request], None, keeping, publish);
+        let task = PlantTask::new(plant, clock, vec![request], None, persistence, publish);
         let task = tokio::spawn(task.run(event_queue, command_queue, message_queue));
         let recorder = recorder.join;
         let station =

@@ -1,4 +1,4 @@
-//! Tells in plain lines what changed between two snapshots: the voice of a station without a terminal.
+//! One log line for each change between two snapshots, for a station without a terminal.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -151,7 +151,7 @@ mod tests {
     };
 
     #[test]
-    fn each_change_is_told_once() {
+    fn each_change_is_logged_once() {
         let at = |second| Timestamp::from_second(second).expect("a small number");
         let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
         let mut before = plant.snapshot();

@@ -1,4 +1,4 @@
-//! Is the station alive? Judged by what it polls, so that a watchdog is fed by the work and not by a timer.
+//! Liveness of the station for a watchdog, derived from the reports of its lines, not from a timer.
 
 use std::{sync::Arc, time::Duration};
 
@@ -13,17 +13,17 @@ const LINE_MAX: Duration = Duration::from_secs(15);
 /// Answers that one turn of a line may wait for in vain: a probe, a loopback and a block, each of them twice.
 const WAITS_MAX: u32 = 6;
 
-/// What was last heard of each line, and when.
+/// The last report of each line, and when it came.
 #[derive(Debug, Default)]
-pub struct Pulse {
+pub struct Liveness {
     lines: Vec<(Option<Arc<LineReport>>, Duration)>,
 }
 
-impl Pulse {
-    /// Does every line that is connected still report? `now` is real time since any fixed instant.
-    pub fn beats(&mut self, snapshot: &Snapshot, now: Duration) -> bool {
+impl Liveness {
+    /// Whether every connected line still reports. `now` is real time since any fixed instant.
+    pub fn check(&mut self, snapshot: &Snapshot, now: Duration) -> bool {
         self.lines.resize_with(snapshot.lines.len(), || (None, now));
-        let heard = snapshot.lines.iter().zip(&mut self.lines).map(|(line, (last, since))| {
+        let alive = snapshot.lines.iter().zip(&mut self.lines).map(|(line, (last, since))| {
             let same = match (&line.report, &*last) {
                 (Some(new), Some(old)) => Arc::ptr_eq(new, old),
                 (None, None) => true,
@@ -35,8 +35,8 @@ impl Pulse {
             }
             now.saturating_sub(*since) < patience(line)
         });
-        // Every line is looked at: to stop at the first that is silent would forget the others.
-        heard.filter(|heard| !heard).count() == 0
+        // Checks every line: stopping at the first silent one would not update the others.
+        alive.filter(|alive| !alive).count() == 0
     }
 }
 
@@ -55,11 +55,11 @@ mod tests {
     use crate::plant::{Plant, def::LineId, event::Event, fixture};
 
     #[test]
-    fn a_connected_line_that_falls_silent_stops_the_heart() {
+    fn a_silent_connected_line_fails_the_check() {
         let at = Timestamp::UNIX_EPOCH;
         let mut plant = Plant::new(fixture::shared(), at, 1.0);
-        let mut pulse = Pulse::default();
-        let mut beats = |plant: &Plant, second| pulse.beats(&plant.snapshot(), Duration::from_secs(second));
+        let mut liveness = Liveness::default();
+        let mut beats = |plant: &Plant, second| liveness.check(&plant.snapshot(), Duration::from_secs(second));
         assert!(beats(&plant, 0) && beats(&plant, 100), "a line that is not connected yet");
         plant.on_event(Event::Line { at, line: LineId(0), state: LineState::Connected });
         assert!(beats(&plant, 101));
