@@ -32,7 +32,7 @@ pub struct Case {
     pub value: f64,
 }
 
-/// A query to another tag.
+/// A condition on another tag.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Check {
     /// The tag that is asked.

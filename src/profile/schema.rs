@@ -206,7 +206,7 @@ table!(
 );
 
 table!(
-    /// A query to another tag; without `is`, `above` and `below`: is it not 0?
+    /// A condition on another tag; without `is`, `above` and `below`: is it not 0?
     CheckTable, "when" {
         need "tag" tag: String,
         opt "field" field: Choice,

@@ -88,15 +88,15 @@ pub fn view(model: &Model, cx: &ViewContext, frame: &mut Frame) {
     header(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.header));
     tab_bar(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.tabs));
     Canvas::new(frame.buffer_mut(), parts.rule).run(0, 0, parts.rule.width, '─', cx.theme.dim());
-    model.tabs.view(cx, frame, parts.body);
+    model.tabs.shown().view(cx, frame, parts.body);
     status(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.status));
     let hints = match &model.modal {
         Some(modal) => modal.hints(cx),
-        None => model.tabs.hints(cx),
+        None => model.tabs.shown().hints(cx),
     };
     let typing = model.tabs.shown == Tab::Login && model.tabs.login.is_typing();
     let global = model.modal.is_none() && !typing;
-    let lacks = |hint: &Hint| rights::of_key(cx, model.tabs.shown, hint).filter(|_| model.modal.is_none());
+    let lacks = |hint: &Hint| hint.needs.filter(|role| rights::lacks(cx, *role).is_some());
     let (refused, may): (Vec<Hint>, Vec<Hint>) = hints.into_iter().partition(|hint| lacks(hint).is_some());
     let role = refused.first().and_then(lacks).map(|role| (role, refused));
     footer(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer), &may, role, global);
@@ -400,7 +400,7 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> 
 /// What whoever sits here may not do stands behind the role that it needs, all of it dim.
 fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option<(Role, Vec<Hint>)>, global: bool) {
     let tail: Vec<Hint> = if global {
-        keys::hints(keys::GLOBAL).into_iter().filter(|hint| !hint.label.is_empty()).collect()
+        keys::hints(&keys::global()).into_iter().filter(|hint| !hint.label.is_empty()).collect()
     } else {
         Vec::new()
     };

@@ -3,6 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::tabs::Tab;
+use crate::plant::role::Role;
 
 /// One row of a key table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +16,19 @@ pub struct Key<A: 'static> {
     pub help: &'static str,
     /// What it means.
     pub action: A,
+    /// The least role that may press it; `None` where every user may.
+    pub needs: Option<Role>,
+}
+
+impl<A: Copy> Key<A> {
+    /// A key for every user.
+    pub const fn new(chord: Chord, label: &'static str, help: &'static str, action: A) -> Key<A> {
+        Key { chord, label, help, action, needs: None }
+    }
+    /// The same for users of at least this role.
+    pub const fn needs(self, role: Role) -> Key<A> {
+        Key { needs: Some(role), ..self }
+    }
 }
 
 /// What is pressed: a key, alone or with Ctrl.
@@ -26,6 +40,10 @@ pub struct Chord {
     pub ctrl: bool,
 }
 
+/// The chords of each page of a tab.
+#[cfg(test)]
+pub type PageChords = Vec<(&'static str, Vec<Chord>)>;
+
 /// A row of footer or help: key, label, explanation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hint {
@@ -35,12 +53,18 @@ pub struct Hint {
     pub label: String,
     /// `open the faceplate of the selected item`.
     pub help: String,
+    /// The least role that may press it.
+    pub needs: Option<Role>,
 }
 
 impl Hint {
     /// A hint that is no row of a table (keys that the plant file defines).
     pub fn new(key: impl Into<String>, label: impl Into<String>, help: impl Into<String>) -> Hint {
-        Hint { key: key.into(), label: label.into(), help: help.into() }
+        Hint { key: key.into(), label: label.into(), help: help.into(), needs: None }
+    }
+    /// The same for users of at least this role.
+    pub fn needs(self, role: Role) -> Hint {
+        Hint { needs: Some(role), ..self }
     }
 }
 
@@ -65,9 +89,15 @@ pub fn find<A: Copy>(table: &[Key<A>], event: KeyEvent) -> Option<A> {
     table.iter().find(|key| key.chord.is(event)).map(|key| key.action)
 }
 
+/// The chords of a table, for the test that no key means two things.
+#[cfg(test)]
+pub fn chords_of<A>(table: &[Key<A>]) -> Vec<Chord> {
+    table.iter().map(|key| key.chord).collect()
+}
+
 /// The rows of a table for footer and help.
 pub fn hints<A>(table: &[Key<A>]) -> Vec<Hint> {
-    table.iter().map(|key| Hint::new(key.chord.name(), key.label, key.help)).collect()
+    table.iter().map(|key| Hint { needs: key.needs, ..Hint::new(key.chord.name(), key.label, key.help) }).collect()
 }
 
 impl Chord {
@@ -128,68 +158,35 @@ pub enum Global {
     Lock,
 }
 
-/// Keys of every tab.
-pub const GLOBAL: &[Key<Global>] = &[
-    Key { chord: char('1'), label: "", help: "mimic", action: Global::Show(Tab::Mimic) },
-    Key { chord: char('2'), label: "", help: "trends", action: Global::Show(Tab::Trends) },
-    Key { chord: char('3'), label: "", help: "alarms", action: Global::Show(Tab::Alarms) },
-    Key { chord: char('4'), label: "", help: "controllers", action: Global::Show(Tab::Controllers) },
-    Key { chord: char('5'), label: "", help: "reports", action: Global::Show(Tab::Reports) },
-    Key { chord: char('6'), label: "", help: "bus: lines, frames, tests", action: Global::Show(Tab::Bus) },
-    Key {
-        chord: char('7'),
-        label: "",
-        help: "users and audit list: for a Supervisor",
-        action: Global::Show(Tab::Users),
-    },
-    Key { chord: char('8'), label: "", help: "faults: of a simulated plant only", action: Global::Show(Tab::Faults) },
-    Key {
-        chord: char('0'),
-        label: "",
-        help: "who sits here: log in, log out, password",
-        action: Global::Show(Tab::Login),
-    },
-    Key { chord: code(KeyCode::Tab), label: "", help: "next tab", action: Global::Next },
-    Key { chord: code(KeyCode::BackTab), label: "", help: "previous tab", action: Global::Previous },
-    Key {
-        chord: char('a'),
-        label: "",
-        help: "acknowledge the selected or most urgent alarm",
-        action: Global::Acknowledge,
-    },
-    Key { chord: char('A'), label: "", help: "acknowledge all alarms (asks first)", action: Global::AcknowledgeAll },
-    Key {
-        chord: code(KeyCode::Esc),
-        label: "",
-        help: "close a window; take a failure off the screen; a page back",
-        action: Global::Dismiss,
-    },
-    Key { chord: ctrl('k'), label: "", help: "lock this terminal; works in every window too", action: Global::Lock },
-    Key {
-        chord: ctrl('s'),
-        label: "",
-        help: "silence what sounds now; nothing is acknowledged",
-        action: Global::Silence,
-    },
-    Key { chord: ctrl('l'), label: "", help: "draw everything anew", action: Global::Redraw },
-    Key { chord: ctrl('c'), label: "", help: "quit (asks first)", action: Global::Quit },
-    Key {
-        chord: char('q'),
-        label: "quit",
-        help: "quit (asks first, and says what stops with it)",
-        action: Global::Quit,
-    },
-    Key { chord: char('?'), label: "help", help: "all keys", action: Global::Help },
+/// Keys of every tab: first the number keys, which show one.
+pub fn global() -> Vec<Key<Global>> {
+    let mut shown: Vec<_> =
+        Tab::ALL.iter().map(|tab| Key::new(tab.key(), "", tab.help(), Global::Show(*tab))).collect();
+    shown.rotate_left(1);
+    shown.into_iter().chain(GLOBAL.iter().copied()).collect()
+}
+
+/// The other keys of every tab.
+const GLOBAL: &[Key<Global>] = &[
+    Key::new(code(KeyCode::Tab), "", "next tab", Global::Next),
+    Key::new(code(KeyCode::BackTab), "", "previous tab", Global::Previous),
+    Key::new(char('a'), "", "acknowledge the selected or most urgent alarm", Global::Acknowledge),
+    Key::new(char('A'), "", "acknowledge all alarms (asks first)", Global::AcknowledgeAll),
+    Key::new(code(KeyCode::Esc), "", "close a window; take a failure off the screen; a page back", Global::Dismiss),
+    Key::new(ctrl('k'), "", "lock this terminal; works in every window too", Global::Lock),
+    Key::new(ctrl('s'), "", "silence what sounds now; nothing is acknowledged", Global::Silence),
+    Key::new(ctrl('l'), "", "draw everything anew", Global::Redraw),
+    Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),
+    Key::new(char('q'), "quit", "quit (asks first, and says what stops with it)", Global::Quit),
+    Key::new(char('?'), "help", "all keys", Global::Help),
 ];
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::tabs::{alarms, bus, controllers, faults, login, mimic, reports, trends, users};
 
     fn no_clash(name: &str, chords: Vec<Chord>) {
-        let global = GLOBAL.iter().map(|key| key.chord);
-        let all: Vec<Chord> = chords.into_iter().chain(global).collect();
+        let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global())).collect();
         for (n, chord) in all.iter().enumerate() {
             assert!(!all[..n].contains(chord), "{name}: {} means two things", chord.name());
         }
@@ -197,19 +194,8 @@ mod tests {
 
     #[test]
     fn no_key_means_two_things_on_one_tab() {
-        fn chords<A>(table: &[Key<A>]) -> Vec<Chord> {
-            table.iter().map(|key| key.chord).collect()
-        }
         no_clash("global", vec![]);
-        no_clash("mimic", chords(mimic::KEYS));
-        no_clash("trends", chords(trends::KEYS));
-        no_clash("reports", chords(reports::KEYS));
-        no_clash("faults", chords(faults::KEYS));
-        no_clash("login", chords(login::KEYS));
-        no_clash("users", chords(users::LIST));
-        no_clash("audit", chords(users::AUDIT));
-        let pages = bus::all_chords().into_iter().chain(controllers::all_chords());
-        for (page, chords) in pages.chain(alarms::all_chords()) {
+        for (page, chords) in Tab::ALL.iter().flat_map(|tab| tab.chords()) {
             no_clash(page, chords);
         }
     }
@@ -217,10 +203,10 @@ mod tests {
     #[test]
     fn a_split_escape_sequence_is_no_key() {
         let alt_a = KeyEvent::new(KeyCode::Char('a'), KeyModifiers::ALT);
-        assert_eq!(find(GLOBAL, alt_a), None);
+        assert_eq!(find(&global(), alt_a), None);
         let shifted = KeyEvent::new(KeyCode::Char('A'), KeyModifiers::SHIFT);
-        assert_eq!(find(GLOBAL, shifted), Some(Global::AcknowledgeAll));
+        assert_eq!(find(&global(), shifted), Some(Global::AcknowledgeAll));
         let ctrl_a = KeyEvent::new(KeyCode::Char('a'), KeyModifiers::CONTROL);
-        assert_eq!(find(GLOBAL, ctrl_a), None);
+        assert_eq!(find(&global(), ctrl_a), None);
     }
 }

@@ -81,7 +81,13 @@ impl Model {
 
     fn as_drawn(&self) -> LastFrame {
         let alarm = self.alarm_to_acknowledge().map(|alarm| (alarm.id, alarm.annunciated_at));
-        LastFrame { tab: self.tabs.shown, rows: self.tabs.rows(&self.cx()), alarm, news: false, astray: false }
+        LastFrame {
+            tab: self.tabs.shown,
+            rows: self.tabs.shown().fingerprint(&self.cx()),
+            alarm,
+            news: false,
+            astray: false,
+        }
     }
 
     /// May a key of the tab act on the selected row? Else that is said. To move on is always possible.
@@ -90,7 +96,7 @@ impl Model {
             event.code,
             KeyCode::Up | KeyCode::Down | KeyCode::PageUp | KeyCode::PageDown | KeyCode::Home | KeyCode::End
         );
-        let now = self.tabs.rows(&self.cx());
+        let now = self.tabs.shown().fingerprint(&self.cx());
         let Some(last_frame) = self.last_frame.as_mut().filter(|last_frame| last_frame.news) else { return true };
         if moves {
             last_frame.astray |= last_frame.tab != self.tabs.shown || last_frame.rows.all != now.all;

@@ -195,8 +195,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             match &mut model.modal {
                 Some(modal) if model.session.locked && !modal.is_unlock() => {}
                 Some(modal) => modal.on_paste(&text),
-                None if model.tabs.shown == Tab::Login => model.tabs.login.on_paste(&text),
-                None => {}
+                None => model.tabs.shown_mut().on_paste(&text),
             }
             Vec::new()
         }
@@ -206,7 +205,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
                 // A window that cannot be seen must not take keys. What it held is dropped, nothing is done.
                 model.modal.take_if(|modal| !modal.is_quit());
             }
-            with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
+            with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))
         }
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
         Msg::SessionStatus(session) => session_lock::on_session_status(model, session),
@@ -215,8 +214,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.drill = Some(status);
             Vec::new()
         }
-        Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.on_answer(cx, id, answer)),
-        Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.on_saved(cx, tab, result)),
+        Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_answer(cx, id.number, answer)),
+        Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
         Msg::Undelivered(id, why) => {
             if let Some(pending) = model.pending_command.as_mut().filter(|pending| pending.id == id) {
                 pending.undelivered = Some(why);
@@ -274,14 +273,14 @@ fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> 
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     model.note = None;
-    if keys::find(keys::GLOBAL, event) == Some(Global::Lock) {
+    if keys::find(&keys::global(), event) == Some(Global::Lock) {
         return session_lock::lock(model);
     }
     if session_lock::ask_before_work(model, event) {
         return Vec::new();
     }
     let past = session_lock::is_past_unlock(model, event);
-    if let Some(show @ Global::Show(tab)) = keys::find(keys::GLOBAL, event)
+    if let Some(show @ Global::Show(tab)) = keys::find(&keys::global(), event)
         && model.modal.as_ref().is_some_and(|modal| !modal.takes_text())
         && Tab::offered(&model.cx()).contains(&tab)
     {
@@ -299,13 +298,13 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
         return session_lock::on_typed(model, event);
     }
-    match keys::find(keys::GLOBAL, event) {
+    match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
         // Nobody gives commands to what cannot be seen.
         Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
         None if !model.may_act(event) => Vec::new(),
-        None => with_tabs(model, |tabs, cx| tabs.on_key(cx, event)),
+        None => with_tabs(model, |tabs, cx| tabs.shown_mut().on_key(cx, event)),
     }
 }
 
@@ -341,7 +340,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             let failed = model.pending_command.take().is_some_and(|pending| pending.is_trouble());
             if !failed {
                 with_tabs(model, |tabs, cx| {
-                    tabs.back(cx);
+                    tabs.shown_mut().back(cx);
                     Vec::new()
                 });
             }
@@ -354,7 +353,7 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
     model.clock.silent = Duration::ZERO;
     if !Arc::ptr_eq(&snapshot.def, &model.snapshot.def) && snapshot.def != model.snapshot.def {
         let actions = session_lock::on_other_plant(model, snapshot);
-        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect();
+        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
     }
     let rings = model.tabs.alarms.bell && bell::rings(&model.snapshot, &snapshot);
     model.snapshot = snapshot;
@@ -364,7 +363,7 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
         model.doubt();
     }
     let bell = rings.then_some(UiAction::Do(Effect::Bell));
-    bell.into_iter().chain(with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))).collect()
+    bell.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
 }
 
 fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
@@ -375,7 +374,7 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     if silent >= SILENCE {
         model.doubt();
     }
-    with_tabs(model, |tabs, cx| tabs.on_snapshot(cx))
+    with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))
 }
 
 fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
@@ -430,7 +429,7 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
 /// Shows a tab; it asks at once for what it needs.
 fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     model.tabs.shown = tab;
-    let asked = with_tabs(model, |tabs, cx| tabs.on_snapshot(cx));
+    let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
     let effects = asked.into_iter().filter_map(|action| match action {
         UiAction::Do(effect) => Some(effect),
         UiAction::Open(_)

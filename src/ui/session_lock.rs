@@ -8,7 +8,7 @@ use super::{
     Effect, Model, QueryId, UiAction, context,
     keys::{self, Global},
     modal::{Modal, Notice, UserForm, user_form::Purpose},
-    tabs::{Tab, Tabs, login},
+    tabs::{Tab, TabView, Tabs, login},
     with_tabs,
 };
 use crate::{
@@ -123,11 +123,11 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     if login::is_leave(event) {
         let session = model.session.clone();
         let changing = session.who.is_some() && !session.locked;
-        model.tabs.login.back(&session);
+        model.tabs.login.leave_form(&session);
         let leads = !changing && !is_closed(&session);
         return if leads { vec![UiAction::Show(Tab::Mimic)] } else { Vec::new() };
     }
-    match keys::find(keys::GLOBAL, event) {
+    match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Redraw)) if event.modifiers.contains(keys::CONTROL) => {
             super::on_global(model, global)
         }
@@ -214,7 +214,7 @@ pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Dur
     let answer = answer.map(drop);
     if matches!(id.tab, Tab::Reports | Tab::Bus) {
         // A file that waits to be written waits for its own answer, whatever was requested since.
-        return with_tabs(model, |tabs, cx| tabs.on_request_done(cx, id, answer));
+        return with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_request_done(cx, answer));
     }
     let waits = |modal: &Modal| matches!(modal, Modal::UserForm(form) if form.waits_for(id.number));
     let shown = model.modal.take_if(|modal| waits(modal));
@@ -225,7 +225,7 @@ pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Dur
             model.kept = answered(model, form, answer).map(|modal| (tab, modal));
         }
         _ if id.number != 0 && id.number == model.session_lock.last_request => {
-            return with_tabs(model, |tabs, cx| tabs.on_request_done(cx, id, answer));
+            return with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_request_done(cx, answer));
         }
         _ => {}
     }

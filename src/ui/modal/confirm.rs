@@ -81,7 +81,7 @@ impl Confirm {
         }
     }
 
-    /// Is it the query whether to leave?
+    /// Is it the confirmation to leave?
     pub fn is_quit(&self) -> bool {
         self.intent == Intent::Quit
     }

@@ -23,10 +23,11 @@ pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
 }
 
 pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
-    let own = tabs.hints(cx);
+    let own = tabs.shown().hints(cx);
     let offered = Tab::offered(cx);
-    let there = keys::GLOBAL.iter().filter(|key| !matches!(key.action, Global::Show(tab) if !offered.contains(&tab)));
-    let global = keys::hints(&there.copied().collect::<Vec<_>>());
+    let there =
+        keys::global().into_iter().filter(|key| !matches!(key.action, Global::Show(tab) if !offered.contains(&tab)));
+    let global = keys::hints(&there.collect::<Vec<_>>());
     let heading = |text: &str| Hint::new("", text, "");
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
     let rows: Vec<Hint> = [heading(tabs.shown.title())]

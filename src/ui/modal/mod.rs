@@ -138,7 +138,7 @@ impl Modal {
         }
     }
 
-    /// Is it the query whether to leave? The only window that a screen of any size can show.
+    /// Is it the confirmation to leave? The only window that a screen of any size can show.
     pub fn is_quit(&self) -> bool {
         matches!(self, Modal::Confirm(confirm) if confirm.is_quit())
     }

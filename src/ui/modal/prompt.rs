@@ -6,7 +6,7 @@ use ratatui::{Frame, layout::Rect};
 use super::{Modal, Next, line::Line, window};
 use crate::ui::{ViewContext, keys, tabs::Tabs, widgets::text::width};
 
-/// A query with one line for the answer; the shown tab's `on_text` takes it.
+/// A prompt with one line for the answer; the shown tab's `on_text` takes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prompt {
     /// What is asked.
@@ -20,14 +20,14 @@ pub struct Prompt {
 }
 
 impl Prompt {
-    /// A query with a text to start from.
+    /// A prompt with a text to start from.
     pub fn new(title: impl Into<String>, hint: impl Into<String>, text: &str) -> Prompt {
         Prompt { title: title.into(), hint: hint.into(), line: Line::new(text), problem: None }
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
-            match tabs.on_text(cx, &self.line.text()) {
+            match tabs.shown_mut().on_text(cx, &self.line.text()) {
                 Ok(acts) => return Next::Do(acts),
                 Err(problem) => self.problem = Some(problem),
             }

@@ -19,6 +19,7 @@ use crossterm::event::KeyEvent;
 use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
+use super::TabView;
 use crate::{
     history::{Answer, HistoryError},
     plant::{
@@ -38,8 +39,6 @@ use handover::Handover;
 pub use handover::aside_words;
 use journal::Journal;
 use keys::Action;
-#[cfg(test)]
-pub use keys::all_chords;
 use metrics::Metrics;
 
 /// A view of the tab.
@@ -95,49 +94,12 @@ pub struct Alarms {
     pub bell: bool,
 }
 
-impl Alarms {
-    /// As it is at the start.
-    pub fn new(_snapshot: &Snapshot) -> Alarms {
+impl TabView for Alarms {
+    fn new(_snapshot: &Snapshot) -> Alarms {
         Alarms::default()
     }
 
-    /// The selected alarm of the list: the chosen one while it is there, else the first; none on other pages.
-    pub fn selected<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a ActiveAlarm> {
-        let rows = self.rows(cx);
-        rows.get(self.place(&rows)).map(|row| row.alarm)
-    }
-
-    /// The list that keys act on.
-    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
-        match self.page {
-            Page::Active | Page::System => {
-                let rows = self.rows(cx);
-                let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
-                Rows::of(rows.iter().map(seen), self.place(&rows))
-            }
-            Page::Aside => {
-                let place = |aside: &AsideAlarm| Some(aside.id) == self.selected;
-                let place = cx.snapshot.aside.iter().position(place).unwrap_or(0);
-                Rows::of(cx.snapshot.aside.iter().map(|aside| (aside.id, aside.state, aside.note.at)), place)
-            }
-            // Nothing is done with a row of these.
-            Page::Journal | Page::Metrics | Page::Handover => Rows::default(),
-        }
-    }
-
-    /// Shows the first view.
-    pub fn front(&mut self) {
-        self.page = Page::Active;
-    }
-
-    /// The alarms that the filter lets through, in order of urgency; `None` on pages without a list of them.
-    pub fn listed<'a>(&self, cx: &ViewContext<'a>) -> Option<Vec<&'a ActiveAlarm>> {
-        let list = matches!(self.page, Page::Active | Page::System);
-        list.then(|| self.of_page(cx).filter(|alarm| self.filter.holds(cx, alarm)).collect())
-    }
-
-    /// A key of the page.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let Some(action) = find(&keys::table(self.page), event) else { return Vec::new() };
         let alarm = self.selected(cx);
         match action {
@@ -175,28 +137,7 @@ impl Alarms {
         self.on_snapshot(cx)
     }
 
-    /// The words that were typed.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        match self.page {
-            Page::Active | Page::System => self.filter.type_words(text),
-            Page::Journal => self.journal.search(cx, text)?,
-            Page::Aside | Page::Metrics | Page::Handover => {}
-        }
-        Ok(self.on_snapshot(cx))
-    }
-
-    /// Esc: all alarms again, then the first view again.
-    pub fn back(&mut self) -> bool {
-        let list = matches!(self.page, Page::Active | Page::System);
-        if list && !self.filter.is_off() {
-            self.filter = Filter::default();
-            return true;
-        }
-        std::mem::take(&mut self.page) != Page::Active
-    }
-
-    /// The keys of the page; what cannot be done with the selected row is left to the help.
-    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let alarm = self.selected(cx);
         let can = |label: &str| match label {
             "reset" => alarm.is_some_and(|alarm| {
@@ -220,8 +161,33 @@ impl Alarms {
         hints
     }
 
-    /// News, or time has passed: the page that needs the history asks for it.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+    fn back(&mut self, _cx: &ViewContext) -> bool {
+        let list = matches!(self.page, Page::Active | Page::System);
+        if list && !self.filter.is_off() {
+            self.filter = Filter::default();
+            return true;
+        }
+        std::mem::take(&mut self.page) != Page::Active
+    }
+
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        match self.page {
+            Page::Active | Page::System => {
+                let rows = self.rows(cx);
+                let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
+                Rows::of(rows.iter().map(seen), self.place(&rows))
+            }
+            Page::Aside => {
+                let place = |aside: &AsideAlarm| Some(aside.id) == self.selected;
+                let place = cx.snapshot.aside.iter().position(place).unwrap_or(0);
+                Rows::of(cx.snapshot.aside.iter().map(|aside| (aside.id, aside.state, aside.note.at)), place)
+            }
+            // Nothing is done with a row of these.
+            Page::Journal | Page::Metrics | Page::Handover => Rows::default(),
+        }
+    }
+
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let there = |began: &Timestamp| {
             cx.snapshot.alarms.iter().any(|alarm| alarm.burst.is_some_and(|burst| burst.began == *began))
         };
@@ -234,22 +200,52 @@ impl Alarms {
         }
     }
 
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
+    fn awaits(&self, number: u32) -> bool {
         self.journal.awaits(number) || self.metrics.awaits(number) || self.handover.awaits(number)
     }
 
-    /// The history answered query `number`; an answer to an older one is ignored.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.journal.on_answer(cx, number, &answer);
         self.metrics.on_answer(cx, number, &answer);
         self.handover.on_answer(cx, number, &answer);
         Vec::new()
     }
 
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+    fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        match self.page {
+            Page::Active | Page::System => self.filter.type_words(text),
+            Page::Journal => self.journal.search(cx, text)?,
+            Page::Aside | Page::Metrics | Page::Handover => {}
+        }
+        Ok(self.on_snapshot(cx))
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
+    }
+
+    #[cfg(test)]
+    fn chords() -> crate::ui::keys::PageChords {
+        Page::ALL.iter().map(|page| (page.title(), keys::table(*page).iter().map(|key| key.chord).collect())).collect()
+    }
+}
+
+impl Alarms {
+    /// The selected alarm of the list: the chosen one while it is there, else the first; none on other pages.
+    pub fn selected<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a ActiveAlarm> {
+        let rows = self.rows(cx);
+        rows.get(self.place(&rows)).map(|row| row.alarm)
+    }
+
+    /// Shows the first view.
+    pub fn front(&mut self) {
+        self.page = Page::Active;
+    }
+
+    /// The alarms that the filter lets through, in order of urgency; `None` on pages without a list of them.
+    pub fn listed<'a>(&self, cx: &ViewContext<'a>) -> Option<Vec<&'a ActiveAlarm>> {
+        let list = matches!(self.page, Page::Active | Page::System);
+        list.then(|| self.of_page(cx).filter(|alarm| self.filter.holds(cx, alarm)).collect())
     }
 }
 

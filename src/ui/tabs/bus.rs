@@ -21,7 +21,7 @@ use ratatui::{Frame, layout::Rect};
 
 pub use window::Window;
 
-use super::{Tab, periodic_query::PeriodicQuery};
+use super::{Tab, TabView, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError},
     plant::{
@@ -30,6 +30,7 @@ use crate::{
         event::LineState,
         line_minute::LineMinute,
         line_report::LineReport,
+        role::Role,
         snapshot::{DeviceState, LineStatus, Snapshot},
     },
     ui::{
@@ -115,49 +116,49 @@ pub enum Action {
 }
 
 /// Keys of every page.
-pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Left), label: "", help: "the page before", action: Action::Turn(-1) },
-    Key { chord: code(KeyCode::Right), label: "page", help: "the next page", action: Action::Turn(1) },
-    Key { chord: char('L'), label: "", help: "page Line", action: Action::Show(Page::Line) },
-    Key { chord: char('P'), label: "", help: "page Plan", action: Action::Show(Page::Plan) },
-    Key { chord: char('F'), label: "", help: "page Frames", action: Action::Show(Page::Frames) },
-    Key { chord: char('T'), label: "", help: "page Test", action: Action::Show(Page::Test) },
-    Key { chord: char('n'), label: "", help: "the next line of the plant", action: Action::NextLine },
-    Key { chord: code(KeyCode::PageUp), label: "", help: "a screen up", action: Action::Screen(-1) },
-    Key { chord: code(KeyCode::PageDown), label: "", help: "a screen down", action: Action::Screen(1) },
-    Key { chord: code(KeyCode::Home), label: "", help: "to the first row", action: Action::Jump(-1) },
-    Key { chord: code(KeyCode::End), label: "", help: "to the last row", action: Action::Jump(1) },
-    Key { chord: code(KeyCode::Up), label: "", help: "a row up", action: Action::Move(-1) },
+const KEYS: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Left), "", "the page before", Action::Turn(-1)),
+    Key::new(code(KeyCode::Right), "page", "the next page", Action::Turn(1)),
+    Key::new(char('L'), "", "page Line", Action::Show(Page::Line)),
+    Key::new(char('P'), "", "page Plan", Action::Show(Page::Plan)),
+    Key::new(char('F'), "", "page Frames", Action::Show(Page::Frames)),
+    Key::new(char('T'), "", "page Test", Action::Show(Page::Test)),
+    Key::new(char('n'), "", "the next line of the plant", Action::NextLine),
+    Key::new(code(KeyCode::PageUp), "", "a screen up", Action::Screen(-1)),
+    Key::new(code(KeyCode::PageDown), "", "a screen down", Action::Screen(1)),
+    Key::new(code(KeyCode::Home), "", "to the first row", Action::Jump(-1)),
+    Key::new(code(KeyCode::End), "", "to the last row", Action::Jump(1)),
+    Key::new(code(KeyCode::Up), "", "a row up", Action::Move(-1)),
 ];
 /// Keys of the first page.
 const LINE_KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Down), label: "scroll", help: "a row down", action: Action::Move(1) },
-    Key { chord: char('r'), label: "retry", help: "ask devices that do not answer now", action: Action::Retry },
-    Key { chord: char('c'), label: "settings", help: "communication settings of the line", action: Action::Settings },
+    Key::new(code(KeyCode::Down), "scroll", "a row down", Action::Move(1)),
+    Key::new(char('r'), "retry", "ask devices that do not answer now", Action::Retry).needs(Role::Technician),
+    Key::new(char('c'), "settings", "communication settings of the line", Action::Settings),
 ];
 const PLAN_KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
-    Key { chord: code(KeyCode::Enter), label: "tags", help: "the tags of the block", action: Action::Open },
-    Key { chord: char('w'), label: "why", help: "why the values of the block are what they are", action: Action::Why },
+    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
+    Key::new(code(KeyCode::Enter), "tags", "the tags of the block", Action::Open),
+    Key::new(char('w'), "why", "why the values of the block are what they are", Action::Why),
 ];
 const FRAMES_KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
-    Key { chord: char(' '), label: "hold", help: "hold the frames still, or let them run", action: Action::Freeze },
-    Key { chord: code(KeyCode::Enter), label: "decode", help: "every byte of the frame", action: Action::Open },
-    Key { chord: char('f'), label: "filter", help: "choose which frames are shown", action: Action::Filter },
-    Key { chord: char('x'), label: "save", help: "write them as text and for Wireshark", action: Action::Save },
+    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
+    Key::new(char(' '), "hold", "hold the frames still, or let them run", Action::Freeze),
+    Key::new(code(KeyCode::Enter), "decode", "every byte of the frame", Action::Open),
+    Key::new(char('f'), "filter", "choose which frames are shown", Action::Filter),
+    Key::new(char('x'), "save", "write them as text and for Wireshark", Action::Save),
 ];
 const TEST_KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
-    Key { chord: code(KeyCode::Enter), label: "start", help: "start the selected test", action: Action::Open },
-    Key { chord: char('t'), label: "", help: "type bytes and send them", action: Action::Try(Tried::Bytes) },
-    Key { chord: char('f'), label: "", help: "a request by its fields", action: Action::Try(Tried::Request) },
-    Key { chord: char('b'), label: "", help: "browse registers", action: Action::Try(Tried::Registers) },
-    Key { chord: char('l'), label: "", help: "loopback", action: Action::Try(Tried::Loopback) },
-    Key { chord: char('i'), label: "", help: "identify a device", action: Action::Try(Tried::Identify) },
-    Key { chord: char('s'), label: "", help: "scan for units", action: Action::Try(Tried::Scan) },
-    Key { chord: char('r'), label: "again", help: "the last test once more", action: Action::Again },
-    Key { chord: char('x'), label: "stop", help: "stop the test at work", action: Action::Stop },
+    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
+    Key::new(code(KeyCode::Enter), "start", "start the selected test", Action::Open).needs(Role::Technician),
+    Key::new(char('t'), "", "type bytes and send them", Action::Try(Tried::Bytes)),
+    Key::new(char('f'), "", "a request by its fields", Action::Try(Tried::Request)),
+    Key::new(char('b'), "", "browse registers", Action::Try(Tried::Registers)),
+    Key::new(char('l'), "", "loopback", Action::Try(Tried::Loopback)),
+    Key::new(char('i'), "", "identify a device", Action::Try(Tried::Identify)),
+    Key::new(char('s'), "", "scan for units", Action::Try(Tried::Scan)),
+    Key::new(char('r'), "again", "the last test once more", Action::Again).needs(Role::Technician),
+    Key::new(char('x'), "stop", "stop the test at work", Action::Stop).needs(Role::Technician),
 ];
 
 /// State of this tab.
@@ -177,9 +178,8 @@ pub struct Bus {
     asked: u32,
 }
 
-impl Bus {
-    /// The first line of the plant.
-    pub fn new(_snapshot: &Snapshot) -> Bus {
+impl TabView for Bus {
+    fn new(_snapshot: &Snapshot) -> Bus {
         Bus {
             line: LineId(0),
             page: Page::Line,
@@ -193,8 +193,7 @@ impl Bus {
         }
     }
 
-    /// Any key: first those of the page, then those of every page.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let action = keys::find(page_keys(self.page), event).or_else(|| keys::find(KEYS, event));
         let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
         let screen = isize::try_from(self.room(cx)).unwrap_or(1).max(2) - 1;
@@ -227,23 +226,7 @@ impl Bus {
         self.on_snapshot(cx)
     }
 
-    /// Esc: frames that were held still run on, `false` where there is no step back.
-    pub fn back(&mut self, cx: &ViewContext) -> bool {
-        self.frames.dismiss();
-        Place::of(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
-    }
-
-    /// The list that keys act on.
-    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
-        match (self.page, Place::of(cx, self.line)) {
-            (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
-            (Page::Frames, Some(_)) => self.frames.drawn_rows(),
-            (Page::Line | Page::Plan | Page::Frames | Page::Test, _) => Rows::default(),
-        }
-    }
-
-    /// The keys of the moment.
-    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = keys::hints(page_keys(self.page));
         if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
             for hint in hints.iter_mut().filter(|hint| hint.label == "stop") {
@@ -258,8 +241,20 @@ impl Bus {
         common.into_iter().chain(hints).collect()
     }
 
-    /// News: frames that run are taken in now and then.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        self.frames.dismiss();
+        Place::of(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
+    }
+
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        match (self.page, Place::of(cx, self.line)) {
+            (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
+            (Page::Frames, Some(_)) => self.frames.drawn_rows(),
+            (Page::Line | Page::Plan | Page::Frames | Page::Test, _) => Rows::default(),
+        }
+    }
+
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
@@ -271,35 +266,31 @@ impl Bus {
         vec![UiAction::query(Tab::Bus, self.asked, line_trend::query(self.line, cx.now))]
     }
 
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
+    fn awaits(&self, number: u32) -> bool {
         self.periodic.awaits(number)
     }
 
-    /// The history has answered. Without an answer the day before is left as it was.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.periodic.answered(number, cx.steady()), answer) {
             self.minutes = minutes;
         }
+        Vec::new()
     }
 
-    /// A filter was typed.
-    pub fn on_text(&mut self, _cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        self.frames.set_filter(text).map(|()| Vec::new())
-    }
-
-    /// The station has put a capture on record, or refuses it.
-    pub fn on_request_done(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
+    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
         self.frames.on_request_done(answer)
     }
 
-    /// A capture was written, or why not.
-    pub fn on_saved(&mut self, result: Result<PathBuf, String>) {
-        self.frames.on_saved(result);
+    fn on_text(&mut self, _cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        self.frames.set_filter(text).map(|()| Vec::new())
     }
 
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+    fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        self.frames.on_saved(result);
+        Vec::new()
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let Some(at) = Place::of(cx, self.line) else {
             canvas.text(1, 1, "this plant has no lines", cx.theme.normal());
@@ -318,6 +309,11 @@ impl Bus {
             Page::Frames => self.frames.view(cx, &at, &mut page),
             Page::Test => self.test.view(cx, &at, &mut page),
         }
+    }
+
+    #[cfg(test)]
+    fn chords() -> keys::PageChords {
+        Page::ALL.iter().map(|page| (page.title(), keys::chords_of(&[page_keys(*page), KEYS].concat()))).collect()
     }
 }
 
@@ -454,11 +450,4 @@ fn page_keys(page: Page) -> &'static [Key<Action>] {
         Page::Frames => FRAMES_KEYS,
         Page::Test => TEST_KEYS,
     }
-}
-
-/// The keys of each page together with those of every page, for the test that no key means two things.
-#[cfg(test)]
-pub fn all_chords() -> Vec<(&'static str, Vec<keys::Chord>)> {
-    let chords = |page: &Page| page_keys(*page).iter().chain(KEYS).map(|key| key.chord).collect();
-    Page::ALL.iter().map(|page| (page.title(), chords(page))).collect()
 }

@@ -20,7 +20,7 @@ use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
 
 pub use device::signal_mark;
-pub use keys::{Action, all_chords};
+pub use keys::Action;
 
 use self::{
     actions::{confirm, notice, write},
@@ -30,7 +30,7 @@ use self::{
     sets::Source,
     table::Table,
 };
-use super::{Tab, periodic_query::PeriodicQuery};
+use super::{Tab, TabView, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
@@ -94,9 +94,8 @@ pub struct Controllers {
     asked: u32,
 }
 
-impl Controllers {
-    /// The list; the device itself if there is no other.
-    pub fn new(snapshot: &Snapshot) -> Controllers {
+impl TabView for Controllers {
+    fn new(snapshot: &Snapshot) -> Controllers {
         let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
         Controllers {
             page,
@@ -111,67 +110,7 @@ impl Controllers {
         }
     }
 
-    /// Shows a device.
-    pub fn show(&mut self, device: DeviceId) {
-        let defaults = self.table.defaults;
-        *self = Controllers {
-            page: Page::Device,
-            device,
-            table: Table { defaults, ..Table::default() },
-            cell: Cell::default(),
-            set: 0,
-            asked_for: Asked::Filter,
-            trend: None,
-            periodic: PeriodicQuery::default(),
-            asked: self.asked,
-        };
-    }
-
-    /// Shows the device of a tag with the tag selected.
-    pub fn show_parameter(&mut self, cx: &ViewContext, tag: TagId) {
-        let device = cx.def().tag(tag).device;
-        self.show(device);
-        self.table.selected = self.table.rows(cx, device).iter().position(|row| row.id == tag).unwrap_or(0);
-    }
-
-    /// Esc: a step back, `false` where there is none.
-    pub fn back(&mut self, cx: &ViewContext) -> bool {
-        let page = std::mem::replace(&mut self.page, Page::List);
-        let alone = cx.def().devices.len() <= 1;
-        self.page = match page {
-            Page::Device if !self.table.filter.is_empty() => {
-                (self.table.filter, self.table.selected) = (String::new(), 0);
-                Page::Device
-            }
-            Page::Device if !alone => {
-                self.table = Table { defaults: self.table.defaults, ..Table::default() };
-                Page::List
-            }
-            Page::Program | Page::Sets => Page::Device,
-            Page::Compare(_) => Page::Sets,
-            Page::Guide(_, before) => *before,
-            page @ (Page::List | Page::Device) => {
-                self.page = page;
-                return false;
-            }
-        };
-        true
-    }
-
-    /// The list that keys act on: devices, parameters and steps stand where the plant file has them, sets come and go.
-    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
-        match (&self.page, cx.def().devices.get(self.device.index())) {
-            (Page::Sets, Some(device)) => {
-                Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
-            }
-            (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..), _) => {
-                Rows::default()
-            }
-        }
-    }
-
-    /// A key of the page.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let Some(action) = find(page_keys(&self.page), event) else { return Vec::new() };
         let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
         match action {
@@ -246,6 +185,164 @@ impl Controllers {
             | Action::Line
             | Action::Settings => self.on_device(cx, device, action),
         }
+    }
+
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        let mut hints = hints(page_keys(&self.page));
+        let device = cx.def().devices.get(self.device.index());
+        let lacks = |label: &str| {
+            device.is_some_and(|device| match label {
+                "tune" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.tune.is_none()),
+                "standby" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.run.is_none()),
+                "program" => device.program.is_none(),
+                "actions" => device.actions.is_empty(),
+                "defaults" => cx.def().tags_of(device.id).all(|tag| tag.default.is_none()),
+                "hold" => device.program.as_ref().is_none_or(|program| program.halt.is_none()),
+                "stop" => cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work()),
+                "turn" => !matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. })),
+                _ => false,
+            })
+        };
+        // On the page of a device there is no room left for what everybody tries anyway.
+        if !matches!(self.page, Page::List | Page::Device) {
+            let place = hints.iter().position(|hint| hint.key == "⏎").map_or(hints.len(), |enter| enter + 1);
+            hints.insert(place, Hint::new("Esc", "back", "a page back"));
+        }
+        // What the device cannot do is not offered; the help has it all the same.
+        for hint in hints.iter_mut().filter(|hint| lacks(&hint.label)) {
+            hint.label.clear();
+        }
+        hints
+    }
+
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        let page = std::mem::replace(&mut self.page, Page::List);
+        let alone = cx.def().devices.len() <= 1;
+        self.page = match page {
+            Page::Device if !self.table.filter.is_empty() => {
+                (self.table.filter, self.table.selected) = (String::new(), 0);
+                Page::Device
+            }
+            Page::Device if !alone => {
+                self.table = Table { defaults: self.table.defaults, ..Table::default() };
+                Page::List
+            }
+            Page::Program | Page::Sets => Page::Device,
+            Page::Compare(_) => Page::Sets,
+            Page::Guide(_, before) => *before,
+            page @ (Page::List | Page::Device) => {
+                self.page = page;
+                return false;
+            }
+        };
+        true
+    }
+
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        match (&self.page, cx.def().devices.get(self.device.index())) {
+            (Page::Sets, Some(device)) => {
+                Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
+            }
+            (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..), _) => {
+                Rows::default()
+            }
+        }
+    }
+
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
+        let Some(faceplate) = faceplate.filter(|_| self.page == Page::Device) else { return Vec::new() };
+        if !self.periodic.due(cx.steady(), TREND_EVERY, PATIENCE) {
+            return Vec::new();
+        }
+        self.asked = self.asked.wrapping_add(1);
+        self.periodic.asked(self.asked, cx.steady());
+        let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
+        let query = Query::Series { tags: vec![faceplate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
+        vec![UiAction::query(Tab::Controllers, self.asked, query)]
+    }
+
+    fn awaits(&self, number: u32) -> bool {
+        self.periodic.awaits(number)
+    }
+
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        if let (Some(_), Ok(Answer::Series(series))) = (self.periodic.answered(number, cx.steady()), answer) {
+            self.trend = series.into_iter().next();
+        }
+        Vec::new()
+    }
+
+    fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        let text = text.trim();
+        match self.asked_for {
+            Asked::Filter => {
+                let filter = text.to_owned();
+                let mut table = Table { selected: 0, filter, ..self.table.clone() };
+                if table.rows(cx, self.device).is_empty() {
+                    return Err(format!("no parameter has \"{text}\" in its name or meaning"));
+                }
+                table.selected = table.best(cx, self.device);
+                self.table = table;
+                Ok(Vec::new())
+            }
+            Asked::SetName => {
+                parameter_set::check_name(text)?;
+                let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
+                let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
+                let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
+                let words = sets::replace_words(cx, there);
+                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::command(format!("save set {text}"), words, kind)))])
+            }
+        }
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let Some(device) = cx.def().devices.get(self.device.index()) else {
+            canvas.text(1, 1, "this plant has no devices", cx.theme.normal());
+            return;
+        };
+        match (&self.page, &device.program) {
+            (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
+            (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
+            (Page::Device | Page::Program, _) => {
+                device::view(cx, &mut canvas, device, &self.table, self.trend.as_ref())
+            }
+            (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
+            (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
+            (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
+        }
+    }
+
+    #[cfg(test)]
+    fn chords() -> crate::ui::keys::PageChords {
+        keys::all_chords()
+    }
+}
+
+impl Controllers {
+    /// Shows a device.
+    pub fn show(&mut self, device: DeviceId) {
+        let defaults = self.table.defaults;
+        *self = Controllers {
+            page: Page::Device,
+            device,
+            table: Table { defaults, ..Table::default() },
+            cell: Cell::default(),
+            set: 0,
+            asked_for: Asked::Filter,
+            trend: None,
+            periodic: PeriodicQuery::default(),
+            asked: self.asked,
+        };
+    }
+
+    /// Shows the device of a tag with the tag selected.
+    pub fn show_parameter(&mut self, cx: &ViewContext, tag: TagId) {
+        let device = cx.def().tag(tag).device;
+        self.show(device);
+        self.table.selected = self.table.rows(cx, device).iter().position(|row| row.id == tag).unwrap_or(0);
     }
 
     fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
@@ -325,104 +422,5 @@ impl Controllers {
             }
         }
         Vec::new()
-    }
-
-    /// The keys of the moment.
-    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut hints = hints(page_keys(&self.page));
-        let device = cx.def().devices.get(self.device.index());
-        let lacks = |label: &str| {
-            device.is_some_and(|device| match label {
-                "tune" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.tune.is_none()),
-                "standby" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.run.is_none()),
-                "program" => device.program.is_none(),
-                "actions" => device.actions.is_empty(),
-                "defaults" => cx.def().tags_of(device.id).all(|tag| tag.default.is_none()),
-                "hold" => device.program.as_ref().is_none_or(|program| program.halt.is_none()),
-                "stop" => cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work()),
-                "turn" => !matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. })),
-                _ => false,
-            })
-        };
-        // On the page of a device there is no room left for what everybody tries anyway.
-        if !matches!(self.page, Page::List | Page::Device) {
-            let place = hints.iter().position(|hint| hint.key == "⏎").map_or(hints.len(), |enter| enter + 1);
-            hints.insert(place, Hint::new("Esc", "back", "a page back"));
-        }
-        // What the device cannot do is not offered; the help has it all the same.
-        for hint in hints.iter_mut().filter(|hint| lacks(&hint.label)) {
-            hint.label.clear();
-        }
-        hints
-    }
-
-    /// News, or time has passed: the small trend is asked for now and then.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
-        let Some(faceplate) = faceplate.filter(|_| self.page == Page::Device) else { return Vec::new() };
-        if !self.periodic.due(cx.steady(), TREND_EVERY, PATIENCE) {
-            return Vec::new();
-        }
-        self.asked = self.asked.wrapping_add(1);
-        self.periodic.asked(self.asked, cx.steady());
-        let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
-        let query = Query::Series { tags: vec![faceplate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
-        vec![UiAction::query(Tab::Controllers, self.asked, query)]
-    }
-
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number)
-    }
-
-    /// The history has answered.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
-        if let (Some(_), Ok(Answer::Series(series))) = (self.periodic.answered(number, cx.steady()), answer) {
-            self.trend = series.into_iter().next();
-        }
-    }
-
-    /// Words to find, or the name of a set.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        let text = text.trim();
-        match self.asked_for {
-            Asked::Filter => {
-                let filter = text.to_owned();
-                let mut table = Table { selected: 0, filter, ..self.table.clone() };
-                if table.rows(cx, self.device).is_empty() {
-                    return Err(format!("no parameter has \"{text}\" in its name or meaning"));
-                }
-                table.selected = table.best(cx, self.device);
-                self.table = table;
-                Ok(Vec::new())
-            }
-            Asked::SetName => {
-                parameter_set::check_name(text)?;
-                let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
-                let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
-                let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
-                let words = sets::replace_words(cx, there);
-                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::command(format!("save set {text}"), words, kind)))])
-            }
-        }
-    }
-
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        let Some(device) = cx.def().devices.get(self.device.index()) else {
-            canvas.text(1, 1, "this plant has no devices", cx.theme.normal());
-            return;
-        };
-        match (&self.page, &device.program) {
-            (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
-            (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
-            (Page::Device | Page::Program, _) => {
-                device::view(cx, &mut canvas, device, &self.table, self.trend.as_ref())
-            }
-            (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
-            (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
-            (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
-        }
     }
 }

@@ -7,10 +7,12 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use crossterm::event::KeyCode;
+use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
+use super::TabView;
 use crate::{
+    plant::snapshot::Snapshot,
     sim::{
         drill::{SimCommand, Status},
         faults::{Fault, FaultTarget},
@@ -19,7 +21,7 @@ use crate::{
         Effect, UiAction, ViewContext,
         keys::{self, Hint, Key, char, code},
         last_frame::Rows,
-        rights,
+        rights, session_lock,
         tabs::bus,
     },
 };
@@ -57,25 +59,57 @@ pub enum Action {
 }
 
 /// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Up), label: "", help: "select the fault above", action: Action::Up },
-    Key { chord: code(KeyCode::Down), label: "select", help: "select the fault below", action: Action::Down },
-    Key {
-        chord: code(KeyCode::PageDown),
-        label: "",
-        help: "select the next line, unit or the process",
-        action: Action::NextTarget,
-    },
-    Key { chord: code(KeyCode::Enter), label: "on/off", help: "inject or clear the fault", action: Action::Toggle },
-    Key { chord: code(KeyCode::Left), label: "", help: "decrease its parameter", action: Action::Less },
-    Key { chord: code(KeyCode::Right), label: "number", help: "increase its parameter", action: Action::More },
-    Key { chord: char('c'), label: "clear all", help: "clear all faults", action: Action::ClearAll },
-    Key { chord: char('v'), label: "points", help: "score of the drill, or the fault", action: Action::Verdict },
+const KEYS: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Up), "", "select the fault above", Action::Up),
+    Key::new(code(KeyCode::Down), "select", "select the fault below", Action::Down),
+    Key::new(code(KeyCode::PageDown), "", "select the next line, unit or the process", Action::NextTarget),
+    Key::new(code(KeyCode::Enter), "on/off", "inject or clear the fault", Action::Toggle),
+    Key::new(code(KeyCode::Left), "", "decrease its parameter", Action::Less),
+    Key::new(code(KeyCode::Right), "number", "increase its parameter", Action::More),
+    Key::new(char('c'), "clear all", "clear all faults", Action::ClearAll),
+    Key::new(char('v'), "points", "score of the drill, or the fault", Action::Verdict),
 ];
 
+impl TabView for Faults {
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        let drill = cx.drill.is_some_and(|status| status.scenario.is_some());
+        let there = KEYS.iter().filter(|key| drill || key.action != Action::Verdict).copied();
+        keys::hints(&there.collect::<Vec<_>>())
+    }
+
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        let Some(status) = open(cx) else { return Rows::default() };
+        let rows = rows(status);
+        let seen = |(target, fault): &(FaultTarget, Fault)| {
+            (format!("{target:?}"), fault.word(), status.find(*target, *fault).is_some())
+        };
+        Rows::of(rows.iter().map(seen), self.selected.min(rows.len().saturating_sub(1)))
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        view::view(self, cx, frame, area);
+    }
+
+    fn new(_snapshot: &Snapshot) -> Faults {
+        Faults::default()
+    }
+
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
+    }
+
+    fn is_offered(cx: &ViewContext) -> bool {
+        !session_lock::is_closed(cx.session) && open(cx).is_some()
+    }
+
+    #[cfg(test)]
+    fn chords() -> keys::PageChords {
+        vec![("faults", keys::chords_of(KEYS))]
+    }
+}
+
 impl Faults {
-    /// A key.
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let Some(status) = open(cx) else { return Vec::new() };
         let rows = rows(status);
         let Some((target, offered)) = rows.get(self.selected.min(rows.len().saturating_sub(1))).copied() else {
@@ -106,34 +140,12 @@ impl Faults {
         Vec::new()
     }
 
-    /// The list that keys act on, and what of it is in force.
-    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
-        let Some(status) = open(cx) else { return Rows::default() };
-        let rows = rows(status);
-        let seen = |(target, fault): &(FaultTarget, Fault)| {
-            (format!("{target:?}"), fault.word(), status.find(*target, *fault).is_some())
-        };
-        Rows::of(rows.iter().map(seen), self.selected.min(rows.len().saturating_sub(1)))
-    }
-
     /// The fault with the number it has, or would have.
     fn number(&self, status: &Status, target: FaultTarget, offered: Fault) -> Fault {
         match status.find(target, offered) {
             Some(active) => active.fault,
             None => self.numbers.get(&(target, offered.word())).copied().unwrap_or(offered),
         }
-    }
-
-    /// Its keys; points are there only in a drill.
-    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let drill = cx.drill.is_some_and(|status| status.scenario.is_some());
-        let there = KEYS.iter().filter(|key| drill || key.action != Action::Verdict).copied();
-        keys::hints(&there.collect::<Vec<_>>())
-    }
-
-    /// Draws.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        view::view(self, cx, frame, area);
     }
 }
 

@@ -8,9 +8,10 @@ use crossterm::event::{KeyCode, KeyEvent};
 use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
-use super::Tab;
+use super::{Tab, TabView};
 use crate::{
     access::{SessionRequest, SessionStatus, session_request::Secret},
+    plant::snapshot::Snapshot,
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char},
@@ -30,15 +31,10 @@ pub enum Action {
 }
 
 /// Keys of this tab while somebody is logged in; in a form every letter is a letter.
-pub const KEYS: &[Key<Action>] = &[
-    Key { chord: char('p'), label: "password", help: "choose another password for yourself", action: Action::Password },
-    Key {
-        chord: char('k'),
-        label: "lock",
-        help: "lock this terminal, as Ctrl-K does on every tab",
-        action: Action::Lock,
-    },
-    Key { chord: char('o'), label: "log out", help: "log out of this terminal", action: Action::Leave },
+const KEYS: &[Key<Action>] = &[
+    Key::new(char('p'), "password", "choose another password for yourself", Action::Password),
+    Key::new(char('k'), "lock", "lock this terminal, as Ctrl-K does on every tab", Action::Lock),
+    Key::new(char('o'), "log out", "log out of this terminal", Action::Leave),
 ];
 
 /// State of this tab.
@@ -56,9 +52,8 @@ pub struct Login {
     told: Option<Result<&'static str, String>>,
 }
 
-impl Login {
-    /// A key: the form has all of them while there is one.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+impl TabView for Login {
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         let Some(form) = &mut self.form else {
             return keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default();
         };
@@ -69,6 +64,58 @@ impl Login {
         vec![UiAction::SessionRequest(Tab::Login, request)]
     }
 
+    fn on_paste(&mut self, text: &str) {
+        if let Some(form) = &mut self.form {
+            form.paste(text);
+        }
+    }
+
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        let Some(form) = &self.form else { return keys::hints(KEYS) };
+        let leads = if self.changing || cx.session.view || cx.session.locked { "back" } else { "clear" };
+        let quit = Hint::new("Ctrl-C", "quit", "");
+        form.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
+    }
+
+    fn on_request_done(&mut self, cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
+        match &mut self.form {
+            Some(form) if form.is_waiting() => {
+                if answer.is_err() {
+                    self.given = self.given.take_if(|_| form.purpose != Purpose::Login);
+                }
+                if form.answered(cx, answer) {
+                    if matches!(form.purpose, Purpose::Change(_)) {
+                        self.told = Some(Ok("The new password is in force."));
+                    }
+                    self.changing = false;
+                    self.form = None;
+                    self.fit(cx.session);
+                }
+            }
+            Some(_) | None => self.told = answer.err().map(Err),
+        }
+        Vec::new()
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        view::draw(self, cx, frame, area);
+    }
+
+    fn new(_snapshot: &Snapshot) -> Login {
+        Login::default()
+    }
+
+    fn is_offered(_cx: &ViewContext) -> bool {
+        true
+    }
+
+    #[cfg(test)]
+    fn chords() -> keys::PageChords {
+        vec![("login", keys::chords_of(KEYS))]
+    }
+}
+
+impl Login {
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         if cx.session.who.is_none() {
             return Vec::new();
@@ -91,18 +138,11 @@ impl Login {
     }
 
     /// Esc: out of the form, where that leads somewhere; else the form is emptied. `false`: there was nothing to leave.
-    pub fn back(&mut self, session: &SessionStatus) -> bool {
+    pub fn leave_form(&mut self, session: &SessionStatus) -> bool {
         let typing = self.form.take().is_some();
         self.changing = false;
         self.fit(session);
         typing
-    }
-
-    /// Pasted text.
-    pub fn on_paste(&mut self, text: &str) {
-        if let Some(form) = &mut self.form {
-            form.paste(text);
-        }
     }
 
     /// Somebody came, went, or has something else to do here.
@@ -133,39 +173,6 @@ impl Login {
         if !fits {
             self.form = purpose.map(UserForm::new);
         }
-    }
-
-    /// The station's answer to the last request.
-    pub fn on_request_done(&mut self, cx: &ViewContext, answer: Result<(), String>) {
-        match &mut self.form {
-            Some(form) if form.is_waiting() => {
-                if answer.is_err() {
-                    self.given = self.given.take_if(|_| form.purpose != Purpose::Login);
-                }
-                if form.answered(cx, answer) {
-                    if matches!(form.purpose, Purpose::Change(_)) {
-                        self.told = Some(Ok("The new password is in force."));
-                    }
-                    self.changing = false;
-                    self.form = None;
-                    self.fit(cx.session);
-                }
-            }
-            Some(_) | None => self.told = answer.err().map(Err),
-        }
-    }
-
-    /// The keys of the moment.
-    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let Some(form) = &self.form else { return keys::hints(KEYS) };
-        let leads = if self.changing || cx.session.view || cx.session.locked { "back" } else { "clear" };
-        let quit = Hint::new("Ctrl-C", "quit", "");
-        form.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
-    }
-
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        view::draw(self, cx, frame, area);
     }
 }
 

@@ -4,11 +4,12 @@ use crossterm::event::{KeyCode, KeyEvent};
 use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
 
-use super::Tab;
+use super::{Tab, TabView};
 use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
         def::{MimicCommand, MimicItem, MimicRect, TagId},
+        role::Role,
         snapshot::Snapshot,
     },
     ui::{
@@ -39,24 +40,14 @@ pub enum Action {
 
 /// Keys of this tab; the plant file adds its own, and [`Mimic::hints`] tells the four arrows as one.
 pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Left), label: "", help: "", action: Action::Move(-1, 0) },
-    Key { chord: code(KeyCode::Right), label: "", help: "", action: Action::Move(1, 0) },
-    Key { chord: code(KeyCode::Up), label: "", help: "", action: Action::Move(0, -1) },
-    Key { chord: code(KeyCode::Down), label: "", help: "", action: Action::Move(0, 1) },
-    Key { chord: code(KeyCode::Enter), label: "open", help: "faceplate of the selected item", action: Action::Open },
-    Key {
-        chord: char('w'),
-        label: "why",
-        help: "why the value is what it is: quality, scaling, bytes",
-        action: Action::Why,
-    },
-    Key {
-        chord: char('C'),
-        label: "commands",
-        help: "all valves, pumps and heaters with their commands",
-        action: Action::Actuators,
-    },
-    Key { chord: char('M'), label: "", help: "motion of agitators and arrows off and on", action: Action::Motion },
+    Key::new(code(KeyCode::Left), "", "", Action::Move(-1, 0)),
+    Key::new(code(KeyCode::Right), "", "", Action::Move(1, 0)),
+    Key::new(code(KeyCode::Up), "", "", Action::Move(0, -1)),
+    Key::new(code(KeyCode::Down), "", "", Action::Move(0, 1)),
+    Key::new(code(KeyCode::Enter), "open", "faceplate of the selected item", Action::Open),
+    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
+    Key::new(char('C'), "commands", "all valves, pumps and heaters with their commands", Action::Actuators),
+    Key::new(char('M'), "", "motion of agitators and arrows off and on", Action::Motion),
 ];
 
 /// The small trends are asked again after so many ticks (half seconds).
@@ -75,63 +66,22 @@ pub struct Mimic {
     asked: u32,
 }
 
-impl Mimic {
-    /// As it is at the start.
-    pub fn new(snapshot: &Snapshot) -> Mimic {
+impl TabView for Mimic {
+    fn new(snapshot: &Snapshot) -> Mimic {
         let items = snapshot.def.mimic.items.iter().enumerate();
         let trends = items.filter(|(_, item)| matches!(item, MimicItem::Trend { .. })).map(|(n, _)| (n, None));
         Mimic { selected: None, motion: true, trends: trends.collect(), asked_at: None, asked: 0 }
     }
 
-    /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let items = &cx.def().mimic.items;
-        match action {
-            Action::Move(dx, dy) if list::is_shown(cx, cx.area) => {
-                self.selected = list::neighbour(items, self.selected, (dx, dy));
-            }
-            Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
-            Action::Motion => self.motion = !self.motion,
-            Action::Actuators => {
-                let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
-                let faceplate = Faceplate::new("commands", outputs);
-                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
-            }
-            Action::Why => {
-                self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
-                let item = self.selected.and_then(|n| items.get(n));
-                return Why::open(item.and_then(|item| Why::of_all(cx, tags(cx, item))));
-            }
-            Action::Open => {
-                let item = self.selected.and_then(|n| items.get(n));
-                let faceplate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
-                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
-            }
-        }
-        Vec::new()
-    }
-
-    /// Selects the first item that shows one of these tags; none if the mimic has none of them.
-    pub fn select(&mut self, cx: &ViewContext, wanted: &[TagId]) {
-        let shows = |item: &MimicItem| tags(cx, item).iter().any(|tag| wanted.contains(tag));
-        self.selected = cx.def().mimic.items.iter().position(shows);
-    }
-
-    /// A key that the plant file defines: a window with the finished intent.
-    pub fn on_command_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        command_of(cx, event).map(UiAction::Open).into_iter().collect()
-    }
-
-    /// The plant's keys first: they are what the tab is for.
-    pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let commands = cx.def().mimic.commands.iter();
-        let commands =
-            commands.map(|command| Hint::new(command.key, &command.label, format!("{} (asks first)", command.label)));
+        let commands = commands.map(|command| {
+            Hint::new(command.key, &command.label, format!("{} (asks first)", command.label)).needs(Role::Technician)
+        });
         commands.chain([Hint::new("←↑↓→", "select", "select an item")]).chain(keys::hints(KEYS)).collect()
     }
 
-    /// News, or time has passed: the small trends are asked again now and then.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if self.trends.is_empty() || self.asked_at.is_some_and(|at| cx.phase.wrapping_sub(at) < TREND_TICKS) {
             return Vec::new();
         }
@@ -158,13 +108,11 @@ impl Mimic {
         asks.collect()
     }
 
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
+    fn awaits(&self, number: u32) -> bool {
         (number.wrapping_sub(self.asked.wrapping_mul(self.trends.len() as u32)) as usize) < self.trends.len()
     }
 
-    /// The history answered query `number`.
-    pub fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+    fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         let first = self.asked.wrapping_mul(self.trends.len() as u32);
         let place = number.wrapping_sub(first) as usize;
         if let Some((_, series)) = self.trends.get_mut(place) {
@@ -184,8 +132,7 @@ impl Mimic {
         Vec::new()
     }
 
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let items = &cx.def().mimic.items;
         if list::is_shown(cx, area) {
@@ -221,6 +168,53 @@ impl Mimic {
         if items.is_empty() {
             canvas.text(1, 1, "the plant file defines no mimic", cx.theme.dim());
         }
+    }
+
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        match keys::find(KEYS, event) {
+            Some(action) => self.act(cx, action),
+            None => command_of(cx, event).map(UiAction::Open).into_iter().collect(),
+        }
+    }
+
+    #[cfg(test)]
+    fn chords() -> keys::PageChords {
+        vec![("mimic", keys::chords_of(KEYS))]
+    }
+}
+
+impl Mimic {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+        let items = &cx.def().mimic.items;
+        match action {
+            Action::Move(dx, dy) if list::is_shown(cx, cx.area) => {
+                self.selected = list::neighbour(items, self.selected, (dx, dy));
+            }
+            Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
+            Action::Motion => self.motion = !self.motion,
+            Action::Actuators => {
+                let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
+                let faceplate = Faceplate::new("commands", outputs);
+                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
+            }
+            Action::Why => {
+                self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
+                let item = self.selected.and_then(|n| items.get(n));
+                return Why::open(item.and_then(|item| Why::of_all(cx, tags(cx, item))));
+            }
+            Action::Open => {
+                let item = self.selected.and_then(|n| items.get(n));
+                let faceplate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
+                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
+            }
+        }
+        Vec::new()
+    }
+
+    /// Selects the first item that shows one of these tags; none if the mimic has none of them.
+    pub fn select(&mut self, cx: &ViewContext, wanted: &[TagId]) {
+        let shows = |item: &MimicItem| tags(cx, item).iter().any(|tag| wanted.contains(tag));
+        self.selected = cx.def().mimic.items.iter().position(shows);
     }
 
     fn item(&self, cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, n: usize, scale: CanvasScale) {

@@ -8,21 +8,21 @@ mod tests;
 
 use std::path::PathBuf;
 
-use crossterm::event::KeyCode;
+use crossterm::event::{KeyCode, KeyEvent};
 use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Outgoing, Tab, periodic_query::PeriodicQuery};
+use super::{Outgoing, Tab, TabView, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query},
-    plant::{def::CsvDialect, snapshot::Snapshot},
+    plant::{def::CsvDialect, role::Role, snapshot::Snapshot},
     report::{
         Period, ShiftReport,
         csv::{file_name, shift_csv},
     },
     ui::{
         UiAction, ViewContext,
-        keys::{Key, char, code},
+        keys::{self, Hint, Key, char, code},
         modal::{Modal, Prompt, Why},
     },
 };
@@ -57,19 +57,19 @@ pub enum Action {
 }
 
 /// Keys of this tab.
-pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Left), label: "earlier", help: "the shift before", action: Action::Before },
-    Key { chord: code(KeyCode::Right), label: "later", help: "the shift after", action: Action::After },
-    Key { chord: char('l'), label: "running", help: "the shift that is running", action: Action::Running },
-    Key { chord: char('/'), label: "period", help: "any period: from-to, a day, a shift", action: Action::Free },
-    Key { chord: char('e'), label: "export", help: "write the report as CSV", action: Action::Export },
-    Key { chord: char(';'), label: "format", help: "CSV with , and . or with ; and ,", action: Action::Dialect },
-    Key { chord: code(KeyCode::Up), label: "", help: "scroll up", action: Action::Up },
-    Key { chord: code(KeyCode::Down), label: "", help: "scroll down", action: Action::Down },
-    Key { chord: code(KeyCode::PageUp), label: "", help: "a page up", action: Action::PageUp },
-    Key { chord: code(KeyCode::PageDown), label: "", help: "a page down", action: Action::PageDown },
-    Key { chord: char('u'), label: "", help: "read the figures anew", action: Action::Refresh },
-    Key { chord: char('w'), label: "", help: "why its values are what they are now", action: Action::Why },
+const KEYS: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Left), "earlier", "the shift before", Action::Before),
+    Key::new(code(KeyCode::Right), "later", "the shift after", Action::After),
+    Key::new(char('l'), "running", "the shift that is running", Action::Running),
+    Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
+    Key::new(char('e'), "export", "write the report as CSV", Action::Export).needs(Role::Technician),
+    Key::new(char(';'), "format", "CSV with , and . or with ; and ,", Action::Dialect),
+    Key::new(code(KeyCode::Up), "", "scroll up", Action::Up),
+    Key::new(code(KeyCode::Down), "", "scroll down", Action::Down),
+    Key::new(code(KeyCode::PageUp), "", "a page up", Action::PageUp),
+    Key::new(code(KeyCode::PageDown), "", "a page down", Action::PageDown),
+    Key::new(char('u'), "", "read the figures anew", Action::Refresh),
+    Key::new(char('w'), "", "why its values are what they are now", Action::Why),
 ];
 
 /// How often the figures of a running shift are read anew, and when an answer counts as lost (real time).
@@ -110,9 +110,8 @@ enum Export {
     Failed(String),
 }
 
-impl Reports {
-    /// As it is at the start: the running shift.
-    pub fn new(snapshot: &Snapshot) -> Reports {
+impl TabView for Reports {
+    fn new(snapshot: &Snapshot) -> Reports {
         Reports {
             period: period::at(&snapshot.def, snapshot.at),
             follow: true,
@@ -127,8 +126,83 @@ impl Reports {
         }
     }
 
-    /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if self.follow {
+            let running = period::at(cx.def(), cx.now);
+            if running != self.period {
+                self.show(running);
+            }
+        }
+        self.ask(cx)
+    }
+
+    fn awaits(&self, number: u32) -> bool {
+        self.periodic.awaits(number)
+    }
+
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        if self.periodic.answered(number, cx.steady()).is_none() {
+            return Vec::new();
+        }
+        match answer {
+            Ok(Answer::Report(report)) if Some(&report.period) == self.period.as_ref() => {
+                (self.report, self.trouble) = (Some(report), None);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                self.trouble = Some(error.to_string());
+                return Vec::new();
+            }
+        }
+        self.ask(cx)
+    }
+
+    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
+        let Some(outgoing) = self.outgoing.take() else { return Vec::new() };
+        match answer {
+            Ok(()) => vec![outgoing.write()],
+            Err(why) => {
+                self.export = Export::Failed(why);
+                Vec::new()
+            }
+        }
+    }
+
+    fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        let typed = period::typed(cx.def(), text, cx.now)?;
+        self.show(Some(typed));
+        Ok(self.ask(cx))
+    }
+
+    fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        self.export = match result {
+            Ok(path) => Export::Done(path),
+            Err(why) => Export::Failed(why),
+        };
+        Vec::new()
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        view::draw(self, cx, frame, area);
+    }
+
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        self.dismiss();
+        keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
+    }
+
+    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
+        keys::hints(KEYS)
+    }
+
+    #[cfg(test)]
+    fn chords() -> keys::PageChords {
+        vec![("reports", keys::chords_of(KEYS))]
+    }
+}
+
+impl Reports {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let page = usize::from(cx.area.height.saturating_sub(3)).max(1);
         match action {
             Action::Before => self.step(cx, period::before),
@@ -160,77 +234,10 @@ impl Reports {
     }
 
     /// What became of a file has been read.
-    pub fn dismiss(&mut self) {
+    fn dismiss(&mut self) {
         if matches!(self.export, Export::Done(_) | Export::Failed(_)) {
             self.export = Export::Not;
         }
-    }
-
-    /// News, or time has passed.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if self.follow {
-            let running = period::at(cx.def(), cx.now);
-            if running != self.period {
-                self.show(running);
-            }
-        }
-        self.ask(cx)
-    }
-
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number)
-    }
-
-    /// The history answered query `number`; an answer for another period than the one shown is ignored.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if self.periodic.answered(number, cx.steady()).is_none() {
-            return Vec::new();
-        }
-        match answer {
-            Ok(Answer::Report(report)) if Some(&report.period) == self.period.as_ref() => {
-                (self.report, self.trouble) = (Some(report), None);
-            }
-            Ok(_) => {}
-            Err(error) => {
-                self.trouble = Some(error.to_string());
-                return Vec::new();
-            }
-        }
-        self.ask(cx)
-    }
-
-    /// The period that was typed.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        let typed = period::typed(cx.def(), text, cx.now)?;
-        self.show(Some(typed));
-        Ok(self.ask(cx))
-    }
-
-    /// The station has put the export on record, or refuses it: without that nothing is written.
-    pub fn on_request_done(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
-        let Some(outgoing) = self.outgoing.take() else { return Vec::new() };
-        match answer {
-            Ok(()) => vec![outgoing.write()],
-            Err(why) => {
-                self.export = Export::Failed(why);
-                Vec::new()
-            }
-        }
-    }
-
-    /// A report was written, or why not.
-    pub fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        self.export = match result {
-            Ok(path) => Export::Done(path),
-            Err(why) => Export::Failed(why),
-        };
-        Vec::new()
-    }
-
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        view::draw(self, cx, frame, area);
     }
 }
 

@@ -10,12 +10,13 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crossterm::event::KeyEvent;
 use jiff::{SignedDuration, Timestamp};
 use ratatui::{Frame, layout::Rect};
 
 pub use self::keys::{Action, KEYS};
 use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
-use super::{Tab, periodic_query::PeriodicQuery};
+use super::{Tab, TabView, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
@@ -25,6 +26,7 @@ use crate::{
     },
     ui::{
         UiAction, ViewContext,
+        keys::{Hint, find, hints},
         modal::Why,
         widgets::chart::{self, trace::Trace},
     },
@@ -90,9 +92,8 @@ struct PeriodicQueries {
     number: u32,
 }
 
-impl Trends {
-    /// As it is at the start: the first group, ten minutes, live.
-    pub fn new(_snapshot: &Snapshot) -> Trends {
+impl TabView for Trends {
+    fn new(_snapshot: &Snapshot) -> Trends {
         Trends {
             group: 0,
             picked: None,
@@ -110,8 +111,82 @@ impl Trends {
         }
     }
 
-    /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        // Either way: the time of a snapshot may lie a little before what was guessed until it came.
+        let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
+        let unseen = self.data.seen.is_none_or(away);
+        if unseen {
+            self.data.traces.clear();
+            self.moved();
+            self.periodics.hours.want();
+        }
+        self.data.seen = Some(cx.now);
+        self.push_live(cx);
+        self.ask(cx)
+    }
+
+    fn awaits(&self, number: u32) -> bool {
+        let PeriodicQueries { curves, hours, raised, number: _ } = &self.periodics;
+        [curves, hours, raised].iter().any(|periodic| periodic.awaits(number))
+    }
+
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        let (periodics, steady) = (&mut self.periodics, cx.steady());
+        let curves = periodics.curves.answered(number, steady);
+        let (hours, raised) = (periodics.hours.answered(number, steady), periodics.raised.answered(number, steady));
+        let answer = match answer {
+            Ok(answer) => answer,
+            Err(error) => {
+                if curves.or(hours).or(raised).is_some() {
+                    self.data.trouble = Some(error.to_string());
+                }
+                return Vec::new();
+            }
+        };
+        match answer {
+            Answer::Series(series) => {
+                if let Some(asked) = curves {
+                    self.data.trouble = None;
+                    // Asked at a steady time, about times in UTC.
+                    self.take_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
+                } else if hours.is_some() {
+                    self.data.trouble = None;
+                    self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
+                }
+            }
+            Answer::Journal(records) if raised.is_some() => {
+                self.data.raised = records.into_iter().filter(|record| record.step == AlarmStep::Raised).collect();
+            }
+            Answer::Journal(_)
+            | Answer::Actions(_)
+            | Answer::LineMinutes(_)
+            | Answer::Report(_)
+            | Answer::AlarmMetrics(_)
+            | Answer::Values(_) => {}
+        }
+        self.ask(cx)
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        view::draw(self, cx, frame, area);
+    }
+
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
+    }
+
+    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
+        hints(KEYS)
+    }
+
+    #[cfg(test)]
+    fn chords() -> crate::ui::keys::PageChords {
+        vec![("trends", crate::ui::keys::chords_of(KEYS))]
+    }
+}
+
+impl Trends {
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         match (self.values, action) {
             (Some(_), Action::Up) => self.select_value(cx, -1),
             (Some(_), Action::Down) => self.select_value(cx, 1),
@@ -153,70 +228,6 @@ impl Trends {
         self.ask(cx)
     }
 
-    /// News, or time has passed: takes in live values and asks what is due.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        // Either way: the time of a snapshot may lie a little before what was guessed until it came.
-        let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
-        let unseen = self.data.seen.is_none_or(away);
-        if unseen {
-            self.data.traces.clear();
-            self.moved();
-            self.periodics.hours.want();
-        }
-        self.data.seen = Some(cx.now);
-        self.push_live(cx);
-        self.ask(cx)
-    }
-
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        let PeriodicQueries { curves, hours, raised, number: _ } = &self.periodics;
-        [curves, hours, raised].iter().any(|periodic| periodic.awaits(number))
-    }
-
-    /// The history answered query `number`; an answer to an older query is ignored.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        let (periodics, steady) = (&mut self.periodics, cx.steady());
-        let curves = periodics.curves.answered(number, steady);
-        let (hours, raised) = (periodics.hours.answered(number, steady), periodics.raised.answered(number, steady));
-        let answer = match answer {
-            Ok(answer) => answer,
-            Err(error) => {
-                if curves.or(hours).or(raised).is_some() {
-                    self.data.trouble = Some(error.to_string());
-                }
-                return Vec::new();
-            }
-        };
-        match answer {
-            Answer::Series(series) => {
-                if let Some(asked) = curves {
-                    self.data.trouble = None;
-                    // Asked at a steady time, about times in UTC.
-                    self.take_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
-                } else if hours.is_some() {
-                    self.data.trouble = None;
-                    self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
-                }
-            }
-            Answer::Journal(records) if raised.is_some() => {
-                self.data.raised = records.into_iter().filter(|record| record.step == AlarmStep::Raised).collect();
-            }
-            Answer::Journal(_)
-            | Answer::Actions(_)
-            | Answer::LineMinutes(_)
-            | Answer::Report(_)
-            | Answer::AlarmMetrics(_)
-            | Answer::Values(_) => {}
-        }
-        self.ask(cx)
-    }
-
-    /// No entry window is opened here.
-    pub fn on_text(&mut self, _cx: &ViewContext, _text: &str) -> Result<Vec<UiAction>, String> {
-        Ok(Vec::new())
-    }
-
     /// Shows the curve of a tag with the cursor at a moment, and a quarter of the window after it.
     pub fn show(&mut self, cx: &ViewContext, tag: TagId, at: Timestamp) {
         self.open_tag(cx, tag);
@@ -224,11 +235,6 @@ impl Trends {
         let end = at.checked_add(after).ok().filter(|end| *end < cx.now);
         (self.accumulate, self.since, self.end, self.cursor) = (false, None, end, Some(at));
         self.moved();
-    }
-
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        view::draw(self, cx, frame, area);
     }
 }
 

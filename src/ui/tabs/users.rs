@@ -8,14 +8,17 @@ use ratatui::{Frame, layout::Rect};
 
 pub use audit::{Action as AuditAction, Audit, KEYS as AUDIT};
 
+use super::TabView;
 use crate::{
     access::UserRow,
     history::{Answer, HistoryError},
+    plant::{role::Role, snapshot::Snapshot},
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char, code},
         last_frame::Rows,
         modal::{Modal, Notice, UserForm, user_form::Purpose},
+        session_lock,
     },
 };
 
@@ -39,35 +42,15 @@ pub enum Action {
 }
 
 /// Keys of the list of users.
-pub const LIST: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Up), label: "", help: "select the user above", action: Action::Move(-1) },
-    Key { chord: code(KeyCode::Down), label: "select", help: "select the user below", action: Action::Move(1) },
-    Key { chord: char('n'), label: "new", help: "add a user", action: Action::Add },
-    Key { chord: char('r'), label: "role", help: "another role for the selected user", action: Action::Role },
-    Key {
-        chord: char('d'),
-        label: "disable",
-        help: "shut the selected user out, or let in again; ends a lockout too",
-        action: Action::Disable,
-    },
-    Key {
-        chord: char('p'),
-        label: "password",
-        help: "a new first password for the selected user",
-        action: Action::Reset,
-    },
-    Key {
-        chord: char('x'),
-        label: "delete",
-        help: "remove the selected user (asks for the name)",
-        action: Action::Delete,
-    },
-    Key {
-        chord: char('j'),
-        label: "audit list",
-        help: "everything that was done, by whom, from where",
-        action: Action::Audit,
-    },
+const LIST: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Up), "", "select the user above", Action::Move(-1)),
+    Key::new(code(KeyCode::Down), "select", "select the user below", Action::Move(1)),
+    Key::new(char('n'), "new", "add a user", Action::Add),
+    Key::new(char('r'), "role", "another role for the selected user", Action::Role),
+    Key::new(char('d'), "disable", "shut the selected user out, or let in again; ends a lockout too", Action::Disable),
+    Key::new(char('p'), "password", "a new first password for the selected user", Action::Reset),
+    Key::new(char('x'), "delete", "remove the selected user (asks for the name)", Action::Delete),
+    Key::new(char('j'), "audit list", "everything that was done, by whom, from where", Action::Audit),
 ];
 
 /// State of this tab.
@@ -81,9 +64,8 @@ pub struct Users {
     asked: u32,
 }
 
-impl Users {
-    /// A key.
-    pub fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+impl TabView for Users {
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         match &mut self.audit {
             Some(audit) => match keys::find(AUDIT, event) {
                 Some(AuditAction::Back) => {
@@ -101,6 +83,68 @@ impl Users {
         }
     }
 
+    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
+        if self.audit.is_some() { keys::hints(AUDIT) } else { keys::hints(LIST) }
+    }
+
+    fn back(&mut self, _cx: &ViewContext) -> bool {
+        self.audit.take().is_some()
+    }
+
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        match &self.audit {
+            Some(audit) => audit.drawn_rows(),
+            None => Rows::of(cx.session.users.iter().map(|row| (&row.user, state(cx, row))), self.place(cx)),
+        }
+    }
+
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let Some(audit) = &mut self.audit else { return Vec::new() };
+        let acts = audit.ask(cx);
+        self.asked = audit.asked();
+        acts
+    }
+
+    fn awaits(&self, number: u32) -> bool {
+        self.audit.as_ref().is_some_and(|audit| audit.awaits(number))
+    }
+
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        if let Some(audit) = &mut self.audit {
+            audit.on_answer(cx, number, answer);
+        }
+        Vec::new()
+    }
+
+    fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        let Some(audit) = &mut self.audit else { return Ok(Vec::new()) };
+        audit.on_text(cx, text)?;
+        Ok(self.on_snapshot(cx))
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        match &self.audit {
+            Some(audit) => audit.view(cx, frame, area),
+            None => view::draw(cx, self.place(cx), frame, area),
+        }
+    }
+
+    fn new(_snapshot: &Snapshot) -> Users {
+        Users::default()
+    }
+
+    fn is_offered(cx: &ViewContext) -> bool {
+        let supervisor = cx.session.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
+        !session_lock::is_closed(cx.session) && supervisor
+    }
+
+    #[cfg(test)]
+    fn chords() -> keys::PageChords {
+        vec![("users", keys::chords_of(LIST)), ("audit", keys::chords_of(AUDIT))]
+    }
+}
+
+impl Users {
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         let users = &cx.session.users;
         let place = self.place(cx);
@@ -138,62 +182,9 @@ impl Users {
         form.map(|form| UiAction::Open(Modal::UserForm(Box::new(form)))).into_iter().collect()
     }
 
-    /// The list that keys act on.
-    pub fn drawn_rows(&self, cx: &ViewContext) -> Rows {
-        match &self.audit {
-            Some(audit) => audit.drawn_rows(),
-            None => Rows::of(cx.session.users.iter().map(|row| (&row.user, state(cx, row))), self.place(cx)),
-        }
-    }
-
     /// The place of the selected user.
     fn place(&self, cx: &ViewContext) -> usize {
         cx.session.users.iter().position(|row| Some(&row.user) == self.selected.as_ref()).unwrap_or(0)
-    }
-
-    /// A step back: from the audit list to the users.
-    pub fn back(&mut self) -> bool {
-        self.audit.take().is_some()
-    }
-
-    /// News, or time has passed.
-    pub fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let Some(audit) = &mut self.audit else { return Vec::new() };
-        let acts = audit.ask(cx);
-        self.asked = audit.asked();
-        acts
-    }
-
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.audit.as_ref().is_some_and(|audit| audit.awaits(number))
-    }
-
-    /// The history answered query `number`.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
-        if let Some(audit) = &mut self.audit {
-            audit.on_answer(cx, number, answer);
-        }
-    }
-
-    /// What was typed in a window that the audit list had opened.
-    pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        let Some(audit) = &mut self.audit else { return Ok(Vec::new()) };
-        audit.on_text(cx, text)?;
-        Ok(self.on_snapshot(cx))
-    }
-
-    /// The keys of the page.
-    pub fn hints(&self) -> Vec<Hint> {
-        if self.audit.is_some() { keys::hints(AUDIT) } else { keys::hints(LIST) }
-    }
-
-    /// Draws the page.
-    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        match &self.audit {
-            Some(audit) => audit.view(cx, frame, area),
-            None => view::draw(cx, self.place(cx), frame, area),
-        }
     }
 }
 

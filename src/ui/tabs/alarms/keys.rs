@@ -3,7 +3,10 @@
 use crossterm::event::KeyCode;
 
 use super::Page;
-use crate::ui::keys::{Chord, Hint, Key, char, code, hints};
+use crate::{
+    plant::role::Role,
+    ui::keys::{Hint, Key, char, code, hints},
+};
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,45 +65,44 @@ pub enum Action {
 
 type Row = Key<Action>;
 
-const fn row(chord: Chord, label: &'static str, help: &'static str, action: Action) -> Row {
-    Key { chord, label, help, action }
-}
-
 const MOVE: [Row; 6] = [
-    row(code(KeyCode::Up), "", "select the row above, or scroll", Action::Move(-1)),
-    row(code(KeyCode::Down), "select", "select the row below, or scroll", Action::Move(1)),
-    row(code(KeyCode::PageUp), "", "a page up", Action::Page(-1)),
-    row(code(KeyCode::PageDown), "", "a page down", Action::Page(1)),
-    row(code(KeyCode::Home), "", "first row", Action::Move(-99_999)),
-    row(code(KeyCode::End), "", "last row", Action::Move(99_999)),
+    Key::new(code(KeyCode::Up), "", "select the row above, or scroll", Action::Move(-1)),
+    Key::new(code(KeyCode::Down), "select", "select the row below, or scroll", Action::Move(1)),
+    Key::new(code(KeyCode::PageUp), "", "a page up", Action::Page(-1)),
+    Key::new(code(KeyCode::PageDown), "", "a page down", Action::Page(1)),
+    Key::new(code(KeyCode::Home), "", "first row", Action::Move(-99_999)),
+    Key::new(code(KeyCode::End), "", "last row", Action::Move(99_999)),
 ];
 
 const VIEWS: [Row; 3] = [
-    row(char('v'), "view", "next view: active, suppressed, system, journal, metrics, handover", Action::View(1)),
-    row(char('V'), "", "view before", Action::View(-1)),
-    row(char('b'), "", "bell for new alarms on or off", Action::Bell),
+    Key::new(char('v'), "view", "next view: active, suppressed, system, journal, metrics, handover", Action::View(1)),
+    Key::new(char('V'), "", "view before", Action::View(-1)),
+    Key::new(char('b'), "", "bell for new alarms on or off", Action::Bell),
 ];
 
 const ACTIONS: [Row; 9] = [
-    row(char('n'), "note", "acknowledge with a note", Action::Note),
-    row(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve),
-    row(char('/'), "filter", "show only alarms with these words; Esc shows all again", Action::Words),
-    row(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage),
-    row(char(' '), "unfold", "show or fold away the consequences of a burst", Action::Fold),
-    row(char('r'), "reset", "reset a latched alarm whose cause is gone (asks first)", Action::Reset),
-    row(
+    Key::new(char('n'), "note", "acknowledge with a note", Action::Note).needs(Role::Technician),
+    Key::new(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve).needs(Role::Technician),
+    Key::new(char('/'), "filter", "show only alarms with these words; Esc shows all again", Action::Words),
+    Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage)
+        .needs(Role::Technician),
+    Key::new(char(' '), "unfold", "show or fold away the consequences of a burst", Action::Fold),
+    Key::new(char('r'), "reset", "reset a latched alarm whose cause is gone (asks first)", Action::Reset)
+        .needs(Role::Technician),
+    Key::new(
         char('o'),
         "out of service",
         "take the alarm out of service until it is put back, with a reason",
         Action::OutOfService,
-    ),
-    row(char('f'), "", "filter: next priority", Action::Priority),
-    row(char('d'), "", "filter: next state", Action::State),
+    )
+    .needs(Role::Supervisor),
+    Key::new(char('f'), "", "filter: next priority", Action::Priority),
+    Key::new(char('d'), "", "filter: next state", Action::State),
 ];
 
-const AREA: [Row; 1] = [row(char('g'), "", "filter: next area", Action::Area)];
+const AREA: [Row; 1] = [Key::new(char('g'), "", "filter: next area", Action::Area)];
 
-const OPEN: [Row; 1] = [row(
+const OPEN: [Row; 1] = [Key::new(
     code(KeyCode::Enter),
     "guidance",
     "the guidance in full; ⏎ again: the faceplate of what the alarm watches",
@@ -108,29 +110,33 @@ const OPEN: [Row; 1] = [row(
 )];
 
 const GO: [Row; 5] = [
-    row(char('m'), "", "go to the mimic, with what the alarm watches selected", Action::Mimic),
-    row(char('t'), "", "go to the trend at the moment of the alarm", Action::Trend),
-    row(char('c'), "", "go to the controller of the alarm", Action::Controller),
-    row(char('j'), "journal", "journal of what the alarm watches", Action::Journal),
-    row(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
+    Key::new(char('m'), "", "go to the mimic, with what the alarm watches selected", Action::Mimic),
+    Key::new(char('t'), "", "go to the trend at the moment of the alarm", Action::Trend),
+    Key::new(char('c'), "", "go to the controller of the alarm", Action::Controller),
+    Key::new(char('j'), "journal", "journal of what the alarm watches", Action::Journal),
+    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
 ];
 
-const BACK: [Row; 1] = [row(char('u'), "put back", "take it back: from the shelf, or into service", Action::PutBack)];
+const BACK: [Row; 1] =
+    [Key::new(char('u'), "put back", "take it back: from the shelf, or into service", Action::PutBack)
+        .needs(Role::Technician)];
 
 const SEARCH: [Row; 2] = [
-    row(char('/'), "search", "search by words of tag, text, user; and by time: 06:00-14:00", Action::Words),
-    row(char('j'), "list", "back to the list", Action::Journal),
+    Key::new(char('/'), "search", "search by words of tag, text, user; and by time: 06:00-14:00", Action::Words),
+    Key::new(char('j'), "list", "back to the list", Action::Journal),
 ];
 
 const SHIFT: [Row; 3] = [
-    row(code(KeyCode::Left), "", "the shift before", Action::Shift(-1)),
-    row(code(KeyCode::Right), "shift", "the shift after", Action::Shift(1)),
-    row(char('l'), "now", "the present", Action::Now),
+    Key::new(code(KeyCode::Left), "", "the shift before", Action::Shift(-1)),
+    Key::new(code(KeyCode::Right), "shift", "the shift after", Action::Shift(1)),
+    Key::new(char('l'), "now", "the present", Action::Now),
 ];
 
 const HANDOVER: [Row; 2] = [
-    row(char('n'), "hand over", "hand the plant over to the next shift, with a note", Action::HandOver),
-    row(char('o'), "take over", "take the plant over from the shift before", Action::TakeOver),
+    Key::new(char('n'), "hand over", "hand the plant over to the next shift, with a note", Action::HandOver)
+        .needs(Role::Technician),
+    Key::new(char('o'), "take over", "take the plant over from the shift before", Action::TakeOver)
+        .needs(Role::Technician),
 ];
 
 /// The keys of a page, the most wanted ones first.
@@ -150,16 +156,10 @@ pub fn told(page: Page) -> Vec<Hint> {
     let everywhere = match page {
         // Keys of every tab, but here is where they are looked for.
         Page::Active | Page::System => vec![
-            Hint::new("a", "ack", "acknowledge the selected alarm"),
-            Hint::new("A", "all", "acknowledge all that are listed (asks first)"),
+            Hint::new("a", "ack", "acknowledge the selected alarm").needs(Role::Technician),
+            Hint::new("A", "all", "acknowledge all that are listed (asks first)").needs(Role::Technician),
         ],
         Page::Aside | Page::Journal | Page::Metrics | Page::Handover => Vec::new(),
     };
     everywhere.into_iter().chain(hints(&table(page))).collect()
-}
-
-/// The chords of every page, for the test that no key means two things.
-#[cfg(test)]
-pub fn all_chords() -> Vec<(&'static str, Vec<Chord>)> {
-    Page::ALL.map(|page| (page.title(), table(page).iter().map(|key| key.chord).collect())).to_vec()
 }

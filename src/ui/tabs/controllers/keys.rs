@@ -3,7 +3,10 @@
 use crossterm::event::KeyCode;
 
 use super::Page;
-use crate::ui::keys::{Chord, Key, char, code};
+use crate::{
+    plant::role::Role,
+    ui::keys::{Key, char, code},
+};
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,30 +74,29 @@ pub enum ProgramCommand {
     Off,
 }
 
-/// A row of a table; the tables are long, and their rows short.
-const fn key(chord: Chord, label: &'static str, help: &'static str, action: Action) -> Key<Action> {
-    Key { chord, label, help, action }
-}
-
-const UP: Key<Action> = key(code(KeyCode::Up), "", "a row up", Action::Move(-1));
-const DOWN: Key<Action> = key(code(KeyCode::Down), "select", "a row down", Action::Move(1));
-const PAGE_UP: Key<Action> = key(code(KeyCode::PageUp), "", "ten rows up", Action::Move(-10));
-const PAGE_DOWN: Key<Action> = key(code(KeyCode::PageDown), "", "ten rows down", Action::Move(10));
-const HOME: Key<Action> = key(code(KeyCode::Home), "", "first row", Action::Move(-9_999));
-const END: Key<Action> = key(code(KeyCode::End), "", "last row", Action::Move(9_999));
+const UP: Key<Action> = Key::new(code(KeyCode::Up), "", "a row up", Action::Move(-1));
+const DOWN: Key<Action> = Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1));
+const PAGE_UP: Key<Action> = Key::new(code(KeyCode::PageUp), "", "ten rows up", Action::Move(-10));
+const PAGE_DOWN: Key<Action> = Key::new(code(KeyCode::PageDown), "", "ten rows down", Action::Move(10));
+const HOME: Key<Action> = Key::new(code(KeyCode::Home), "", "first row", Action::Move(-9_999));
+const END: Key<Action> = Key::new(code(KeyCode::End), "", "last row", Action::Move(9_999));
 const GUIDE: Key<Action> =
-    key(char('h'), "guide", "what P, I, D, fuzzy and tuning do, and what to change", Action::Guide);
-const REFRESH: Key<Action> = key(
+    Key::new(char('h'), "guide", "what P, I, D, fuzzy and tuning do, and what to change", Action::Guide);
+const REFRESH: Key<Action> = Key::new(
     char('u'),
     "refresh",
     "read all parameters of the device now; retry it at once if it does not answer",
     Action::Refresh,
-);
-const WHY: Key<Action> = key(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why);
-const ACTIONS: Key<Action> = key(char('f'), "actions", "actions of the device (save to memory)", Action::Actions);
+)
+.needs(Role::Technician);
+const WHY: Key<Action> =
+    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why);
+const ACTIONS: Key<Action> =
+    Key::new(char('f'), "actions", "actions of the device (save to memory)", Action::Actions).needs(Role::Technician);
 const LINE: Key<Action> =
-    key(char('L'), "line", "disconnect the device's line, or connect it again (asks first)", Action::Line);
-const SETTINGS: Key<Action> = key(
+    Key::new(char('L'), "line", "disconnect the device's line, or connect it again (asks first)", Action::Line)
+        .needs(Role::Technician);
+const SETTINGS: Key<Action> = Key::new(
     char('c'),
     "settings",
     "communication settings of the device's line: baud rate, parity, timeout …",
@@ -104,7 +106,7 @@ const SETTINGS: Key<Action> = key(
 const LIST: &[Key<Action>] = &[
     UP,
     DOWN,
-    key(code(KeyCode::Enter), "open", "faceplate and parameters of the device", Action::Open),
+    Key::new(code(KeyCode::Enter), "open", "faceplate and parameters of the device", Action::Open),
     PAGE_UP,
     PAGE_DOWN,
     HOME,
@@ -116,44 +118,48 @@ const LIST: &[Key<Action>] = &[
     LINE,
 ];
 const DEVICE: &[Key<Action>] = &[
-    key(code(KeyCode::Left), "", "previous device", Action::Device(-1)),
-    key(code(KeyCode::Right), "device", "next device", Action::Device(1)),
+    Key::new(code(KeyCode::Left), "", "previous device", Action::Device(-1)),
+    Key::new(code(KeyCode::Right), "device", "next device", Action::Device(1)),
     UP,
     DOWN,
     PAGE_UP,
     PAGE_DOWN,
     HOME,
     END,
-    key(code(KeyCode::Enter), "edit", "change the parameter, or look at a read-only one", Action::Open),
-    key(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
-    key(char('s'), "sets", "parameter sets: save, compare, restore, copy", Action::Sets),
+    Key::new(code(KeyCode::Enter), "edit", "change the parameter, or look at a read-only one", Action::Open)
+        .needs(Role::Technician),
+    Key::new(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
+    Key::new(char('s'), "sets", "parameter sets: save, compare, restore, copy", Action::Sets),
     GUIDE,
-    key(char('T'), "tune", "auto-tuning on, or off while it is on", Action::Tune),
+    Key::new(char('T'), "tune", "auto-tuning on, or off while it is on", Action::Tune).needs(Role::Technician),
     ACTIONS,
     WHY,
     REFRESH,
-    key(char('/'), "find", "show only parameters with some words in name or meaning", Action::Find),
-    key(char('d'), "defaults", "mark what differs from the maker's default", Action::Defaults),
-    key(char('S'), "standby", "run or standby, if the device has it", Action::Run),
+    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", Action::Find),
+    Key::new(char('d'), "defaults", "mark what differs from the maker's default", Action::Defaults),
+    Key::new(char('S'), "standby", "run or standby, if the device has it", Action::Run).needs(Role::Technician),
     LINE,
     SETTINGS,
 ];
 const PROGRAM: &[Key<Action>] = &[
-    key(code(KeyCode::Left), "", "the cell to the left", Action::Column(-1)),
-    key(code(KeyCode::Right), "cell", "the cell to the right", Action::Column(1)),
+    Key::new(code(KeyCode::Left), "", "the cell to the left", Action::Column(-1)),
+    Key::new(code(KeyCode::Right), "cell", "the cell to the right", Action::Column(1)),
     UP,
     DOWN,
-    key(code(KeyCode::Enter), "edit", "change the target or time", Action::Open),
-    key(
+    Key::new(code(KeyCode::Enter), "edit", "change the target or time", Action::Open).needs(Role::Technician),
+    Key::new(
         char('r'),
         "run",
         "run the program, or go on after a hold (asks first)",
         Action::CommandKind(ProgramCommand::Run),
-    ),
-    key(char('p'), "hold", "hold the program where it is (asks first)", Action::CommandKind(ProgramCommand::Hold)),
-    key(char('o'), "off", "stop the program (asks first)", Action::CommandKind(ProgramCommand::Off)),
-    key(char('t'), "pattern", "which steps are run", Action::Pattern),
-    key(char('m'), "mode", "what happens at the end and at power-on", Action::Mode),
+    )
+    .needs(Role::Technician),
+    Key::new(char('p'), "hold", "hold the program where it is (asks first)", Action::CommandKind(ProgramCommand::Hold))
+        .needs(Role::Technician),
+    Key::new(char('o'), "off", "stop the program (asks first)", Action::CommandKind(ProgramCommand::Off))
+        .needs(Role::Technician),
+    Key::new(char('t'), "pattern", "which steps are run", Action::Pattern).needs(Role::Technician),
+    Key::new(char('m'), "mode", "what happens at the end and at power-on", Action::Mode).needs(Role::Technician),
     REFRESH,
     GUIDE,
     WHY,
@@ -161,9 +167,9 @@ const PROGRAM: &[Key<Action>] = &[
 const SETS: &[Key<Action>] = &[
     UP,
     DOWN,
-    key(code(KeyCode::Enter), "compare", "what differs between the set and the device", Action::Open),
-    key(char('n'), "new", "save the settings of the device as a set", Action::Save),
-    key(char('u'), "read", "read the folder of sets anew", Action::ReadSets),
+    Key::new(code(KeyCode::Enter), "compare", "what differs between the set and the device", Action::Open),
+    Key::new(char('n'), "new", "save the settings of the device as a set", Action::Save).needs(Role::Technician),
+    Key::new(char('u'), "read", "read the folder of sets anew", Action::ReadSets).needs(Role::Technician),
     PAGE_UP,
     PAGE_DOWN,
     HOME,
@@ -172,11 +178,12 @@ const SETS: &[Key<Action>] = &[
 ];
 const COMPARE: &[Key<Action>] = &[
     UP,
-    key(code(KeyCode::Down), "scroll", "a row down", Action::Move(1)),
-    key(code(KeyCode::Enter), "restore", "write what differs to the device (asks first)", Action::Open),
-    key(char('x'), "stop", "stop after the write under way", Action::Stop),
-    key(char('='), "all", "show what is the same too, or hide it", Action::All),
-    key(char('t'), "turn", "copy the other way round", Action::Turnaround),
+    Key::new(code(KeyCode::Down), "scroll", "a row down", Action::Move(1)),
+    Key::new(code(KeyCode::Enter), "restore", "write what differs to the device (asks first)", Action::Open)
+        .needs(Role::Technician),
+    Key::new(char('x'), "stop", "stop after the write under way", Action::Stop).needs(Role::Technician),
+    Key::new(char('='), "all", "show what is the same too, or hide it", Action::All),
+    Key::new(char('t'), "turn", "copy the other way round", Action::Turnaround),
     ACTIONS,
     REFRESH,
     PAGE_UP,
@@ -186,10 +193,10 @@ const COMPARE: &[Key<Action>] = &[
     GUIDE,
 ];
 const READ: &[Key<Action>] = &[
-    key(code(KeyCode::Left), "", "the page before", Action::Turn(-1)),
-    key(code(KeyCode::Right), "page", "the next page", Action::Turn(1)),
-    key(code(KeyCode::Up), "", "the page before", Action::Turn(-1)),
-    key(code(KeyCode::Down), "", "the next page", Action::Turn(1)),
+    Key::new(code(KeyCode::Left), "", "the page before", Action::Turn(-1)),
+    Key::new(code(KeyCode::Right), "page", "the next page", Action::Turn(1)),
+    Key::new(code(KeyCode::Up), "", "the page before", Action::Turn(-1)),
+    Key::new(code(KeyCode::Down), "", "the next page", Action::Turn(1)),
 ];
 
 /// The keys of a page.
@@ -205,7 +212,8 @@ pub fn page_keys(page: &Page) -> &'static [Key<Action>] {
 }
 
 /// The chords of every page, for the check that none means two things.
-pub fn all_chords() -> Vec<(&'static str, Vec<Chord>)> {
+#[cfg(test)]
+pub fn all_chords() -> crate::ui::keys::PageChords {
     let pages = [
         ("controllers", LIST),
         ("controllers, device", DEVICE),

@@ -120,7 +120,7 @@ fn told(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, ca
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
     };
     paragraph("", description.cause);
-    paragraph("ConfirmedValue: ", description.symptoms);
+    paragraph("Seen: ", description.symptoms);
     paragraph("Do: ", description.response);
 
     let truth = compare(cx, status, target);

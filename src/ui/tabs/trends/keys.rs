@@ -2,7 +2,7 @@
 
 use crossterm::event::KeyCode;
 
-use crate::ui::keys::{Chord, Key, char, code};
+use crate::ui::keys::{Key, char, code};
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,26 +45,22 @@ pub enum Action {
 
 /// Keys of this tab.
 pub const KEYS: &[Key<Action>] = &[
-    key(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", Action::Left),
-    key(code(KeyCode::Right), "", "later (with the cursor on: cursor to the right)", Action::Right),
-    key(code(KeyCode::PageUp), "", "a whole window earlier; a page up", Action::PageBack),
-    key(code(KeyCode::PageDown), "", "a whole window later; a page down", Action::PageOn),
-    key(code(KeyCode::Up), "", "select the pen above", Action::Up),
-    key(code(KeyCode::Down), "", "select the pen below", Action::Down),
-    key(char('l'), "live", "back to the present", Action::Live),
-    key(char('+'), "zoom", "shorter window", Action::ZoomIn),
-    key(char('='), "", "shorter window", Action::ZoomIn),
-    key(char('-'), "", "longer window", Action::ZoomOut),
-    key(char('c'), "cursor", "cursor on or off: reads every pen at one time", Action::Cursor),
-    key(char('g'), "group", "next group of pens", Action::Group),
-    key(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
-    key(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
-    key(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
-    key(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
-    key(char('u'), "rate", "how often the curves are read anew: 0.5, 1, 2, 5, 10 s", Action::Rate),
-    key(code(KeyCode::Enter), "", "in the list of values: show its curve", Action::Open),
+    Key::new(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", Action::Left),
+    Key::new(code(KeyCode::Right), "", "later (with the cursor on: cursor to the right)", Action::Right),
+    Key::new(code(KeyCode::PageUp), "", "a whole window earlier; a page up", Action::PageBack),
+    Key::new(code(KeyCode::PageDown), "", "a whole window later; a page down", Action::PageOn),
+    Key::new(code(KeyCode::Up), "", "select the pen above", Action::Up),
+    Key::new(code(KeyCode::Down), "", "select the pen below", Action::Down),
+    Key::new(char('l'), "live", "back to the present", Action::Live),
+    Key::new(char('+'), "zoom", "shorter window", Action::ZoomIn),
+    Key::new(char('='), "", "shorter window", Action::ZoomIn),
+    Key::new(char('-'), "", "longer window", Action::ZoomOut),
+    Key::new(char('c'), "cursor", "cursor on or off: reads every pen at one time", Action::Cursor),
+    Key::new(char('g'), "group", "next group of pens", Action::Group),
+    Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
+    Key::new(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
+    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
+    Key::new(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
+    Key::new(char('u'), "rate", "how often the curves are read anew: 0.5, 1, 2, 5, 10 s", Action::Rate),
+    Key::new(code(KeyCode::Enter), "", "in the list of values: show its curve", Action::Open),
 ];
-
-const fn key(chord: Chord, label: &'static str, help: &'static str, action: Action) -> Key<Action> {
-    Key { chord, label, help, action }
-}

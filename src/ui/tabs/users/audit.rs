@@ -48,24 +48,19 @@ pub enum Part {
 
 /// Keys of the audit list.
 pub const KEYS: &[Key<Action>] = &[
-    Key { chord: code(KeyCode::Up), label: "", help: "a row up", action: Action::Move(-1) },
-    Key { chord: code(KeyCode::Down), label: "select", help: "a row down", action: Action::Move(1) },
-    Key { chord: code(KeyCode::PageUp), label: "", help: "ten rows up", action: Action::Move(-10) },
-    Key { chord: code(KeyCode::PageDown), label: "", help: "ten rows down", action: Action::Move(10) },
-    Key { chord: code(KeyCode::Home), label: "", help: "the newest", action: Action::Move(-9_999) },
-    Key { chord: code(KeyCode::End), label: "", help: "the oldest", action: Action::Move(9_999) },
-    Key { chord: code(KeyCode::Enter), label: "open", help: "entry details", action: Action::Open },
-    Key { chord: char('/'), label: "search", help: "only rows with some words", action: Action::Search(Part::Words) },
-    Key { chord: char('b'), label: "by", help: "only what a user did", action: Action::Search(Part::Who) },
-    Key {
-        chord: char('w'),
-        label: "what",
-        help: "only an action: write, login …",
-        action: Action::Search(Part::Action),
-    },
-    Key { chord: char('t'), label: "time", help: "another day or period", action: Action::Search(Part::Time) },
-    Key { chord: char('c'), label: "all", help: "search nothing, show the last week", action: Action::Everything },
-    Key { chord: char('j'), label: "users", help: "the list of users", action: Action::Back },
+    Key::new(code(KeyCode::Up), "", "a row up", Action::Move(-1)),
+    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
+    Key::new(code(KeyCode::PageUp), "", "ten rows up", Action::Move(-10)),
+    Key::new(code(KeyCode::PageDown), "", "ten rows down", Action::Move(10)),
+    Key::new(code(KeyCode::Home), "", "the newest", Action::Move(-9_999)),
+    Key::new(code(KeyCode::End), "", "the oldest", Action::Move(9_999)),
+    Key::new(code(KeyCode::Enter), "open", "entry details", Action::Open),
+    Key::new(char('/'), "search", "only rows with some words", Action::Search(Part::Words)),
+    Key::new(char('b'), "by", "only what a user did", Action::Search(Part::Who)),
+    Key::new(char('w'), "what", "only an action: write, login …", Action::Search(Part::Action)),
+    Key::new(char('t'), "time", "another day or period", Action::Search(Part::Time)),
+    Key::new(char('c'), "all", "search nothing, show the last week", Action::Everything),
+    Key::new(char('j'), "users", "the list of users", Action::Back),
 ];
 
 /// Rows of one answer; more are said to be left out.
