@@ -20,14 +20,8 @@ pub struct WriteArgs {
     /// The new value in the tag's unit, or one of its words
     #[arg(allow_negative_numbers = true)]
     value: String,
-    /// The plant, if stations of more than one run here
-    #[arg(long, value_name = "PLANT")]
-    plant: Option<String>,
-    /// Why: goes into the record
-    #[arg(long, value_name = "TEXT")]
-    note: Option<String>,
     #[command(flatten)]
-    login: client::Login,
+    action: client::ActionArgs,
 }
 
 /// Arguments of `ack`.
@@ -39,28 +33,22 @@ pub struct AckArgs {
     /// Every alarm that waits for it now
     #[arg(long, conflicts_with = "subjects")]
     all: bool,
-    /// The plant, if stations of more than one run here
-    #[arg(long, value_name = "PLANT")]
-    plant: Option<String>,
-    /// Why: goes into the record
-    #[arg(long, value_name = "TEXT")]
-    note: Option<String>,
     #[command(flatten)]
-    login: client::Login,
+    action: client::ActionArgs,
 }
 
 /// Writes, and tells the outcome; anything but verified is a failure.
 pub fn write(args: WriteArgs) -> Result<(), CliError> {
     in_runtime(async {
-        let (mut session, password) = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
-        let snapshot = session.snapshots.borrow().clone();
+        let mut actor = args.action.attach().await?;
+        let snapshot = actor.session.snapshots.borrow().clone();
         let tag = snapshot
             .def
             .tag_named(&args.tag)
             .ok_or_else(|| CliError::Usage(format!("no tag `{}` in {}", args.tag, snapshot.def.name)))?;
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
         let kind = CommandKind::Write { tag, value };
-        let status = client::send_command(&mut session, 1, kind, args.note.as_deref(), password).await?;
+        let status = actor.send_command(1, kind).await?;
         let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
         // What the station says that the device holds, which need not be what was typed.
         let new = status.kind.written().map(|(_, held)| held);
@@ -82,8 +70,8 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
 /// Acknowledges alarm after alarm; the first refusal ends it.
 pub fn ack(args: AckArgs) -> Result<(), CliError> {
     in_runtime(async {
-        let (mut session, password) = client::attach_to_act(args.plant.as_deref(), &args.login).await?;
-        let snapshot: Arc<Snapshot> = session.snapshots.borrow().clone();
+        let mut actor = args.action.attach().await?;
+        let snapshot: Arc<Snapshot> = actor.session.snapshots.borrow().clone();
         let known =
             |name: &str| snapshot.def.alarms.iter().any(|alarm| subject_name(&snapshot.def, alarm.subject) == name);
         if let Some(unknown) = args.subjects.iter().find(|name| !known(name)) {
@@ -100,8 +88,7 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
             .collect();
         for (number, seen) in (1..).zip(&waiting) {
             let (alarm, kind) = (snapshot.def.alarm(seen.id), seen.acknowledge());
-            let status =
-                client::send_command(&mut session, number, kind, args.note.as_deref(), password.clone()).await?;
+            let status = actor.send_command(number, kind).await?;
             let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.text);
             if status.outcome != Outcome::Verified {
                 return Err(CliError::Failed(line + &outcome_words(&status.outcome)));

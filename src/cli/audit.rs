@@ -184,7 +184,7 @@ async fn seals(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Seal>, CliE
         let all = String::new;
         let query =
             Query::Audit { from: Timestamp::UNIX_EPOCH, to, words: all(), by: all(), action: all(), limit: PAGE };
-        let Answer::Actions(actions) = source.ask(query).await? else {
+        let Answer::Actions(actions) = source.query(query).await? else {
             return Err(CliError::Failed("the history answered another query".to_owned()));
         };
         let before = seals.len();

@@ -31,6 +31,19 @@ pub struct Login {
     user: Option<String>,
 }
 
+/// Station, note and login of an action.
+#[derive(Debug, clap::Args)]
+pub struct ActionArgs {
+    /// The plant, if stations of more than one run here
+    #[arg(long, value_name = "PLANT")]
+    plant: Option<String>,
+    /// Reason, for the audit log
+    #[arg(long, value_name = "TEXT")]
+    note: Option<String>,
+    #[command(flatten)]
+    login: Login,
+}
+
 /// The place of the station of a plant, or of the only one that runs here.
 pub async fn place(plant: Option<&str>) -> Result<find::Found, CliError> {
     let mut running = find::Places::here().living().await;
@@ -88,13 +101,23 @@ pub fn is_withheld(snapshot: &Snapshot) -> bool {
     snapshot.samples.iter().any(|sample| sample.quality == Quality::Bad(Cause::NotAuthorised))
 }
 
-/// The same for somebody who wants to act: nobody may without a login.
-pub async fn attach_to_act(plant: Option<&str>, login: &Login) -> Result<(Session, Option<Secret>), CliError> {
-    let (session, password) = attach_with_password(plant, login).await?;
-    if session.status.borrow().who.is_none() {
-        return Err(CliError::Failed("log in to act: --user NAME asks for the password".to_owned()));
+/// A logged-in user who sends commands.
+pub struct Actor {
+    /// The station.
+    pub session: Session,
+    password: Option<Secret>,
+    note: Option<String>,
+}
+
+impl ActionArgs {
+    /// Attaches to the station and logs in; without a login nothing may be done.
+    pub async fn attach(self) -> Result<Actor, CliError> {
+        let (session, password) = attach_with_password(self.plant.as_deref(), &self.login).await?;
+        if session.status.borrow().who.is_none() {
+            return Err(CliError::Failed("log in to act: --user NAME asks for the password".to_owned()));
+        }
+        Ok(Actor { session, password, note: self.note })
     }
-    Ok((session, password))
 }
 
 /// Said behind an outcome that the disk of the station has not taken.
@@ -133,35 +156,32 @@ fn password(user: &str) -> Result<String, CliError> {
     Ok(line.to_owned())
 }
 
-/// Gives a command and waits for its outcome. `Err` unless it was done.
-pub async fn send_command(
-    session: &mut Session,
-    number: u32,
-    kind: CommandKind,
-    note: Option<&str>,
-    password: Option<Secret>,
-) -> Result<CommandStatus, CliError> {
-    let id = CommandId { terminal: session.terminal, number };
-    // Whoever acts has just given his password: where a tag asks for it again, this is it.
-    let required =
-        reauthentication::required(&session.snapshots.borrow().def, &kind) == Some(Reauthentication::Password);
-    let credentials = password.filter(|_| required).map(|password| Credentials { user: None, password });
-    let request = crate::access::CommandRequest {
-        credentials,
-        note: note.map(Into::into),
-        ..crate::access::CommandRequest::on(&session.snapshots.borrow(), id, kind)
-    };
-    session.send(crate::station::Request::Command(request)).map_err(|why| CliError::Failed(why.to_owned()))?;
-    let ended = |snapshot: &Snapshot| {
-        snapshot.commands.iter().find(|command| command.id == id && command.outcome != Outcome::Pending).cloned()
-    };
-    let wait = async {
-        let snapshot = session.snapshots.wait_for(|snapshot| ended(snapshot).is_some()).await;
-        snapshot.ok().and_then(|snapshot| ended(&snapshot))
-    };
-    match tokio::time::timeout(OUTCOME_MAX, wait).await {
-        Ok(Some(status)) => Ok(status),
-        Ok(None) => Err(CliError::StationGone),
-        Err(_) => Err(CliError::Failed("no outcome yet; it may or may not take effect".to_owned())),
+impl Actor {
+    /// Sends a command and waits for its outcome.
+    pub async fn send_command(&mut self, number: u32, kind: CommandKind) -> Result<CommandStatus, CliError> {
+        let id = CommandId { terminal: self.session.terminal, number };
+        // The password was just entered: where a tag requires it again, this is it.
+        let required =
+            reauthentication::required(&self.session.snapshots.borrow().def, &kind) == Some(Reauthentication::Password);
+        let credentials =
+            self.password.clone().filter(|_| required).map(|password| Credentials { user: None, password });
+        let request = crate::access::CommandRequest {
+            credentials,
+            note: self.note.as_deref().map(Into::into),
+            ..crate::access::CommandRequest::on(&self.session.snapshots.borrow(), id, kind)
+        };
+        self.session.send(crate::station::Request::Command(request)).map_err(|why| CliError::Failed(why.to_owned()))?;
+        let ended = |snapshot: &Snapshot| {
+            snapshot.commands.iter().find(|command| command.id == id && command.outcome != Outcome::Pending).cloned()
+        };
+        let wait = async {
+            let snapshot = self.session.snapshots.wait_for(|snapshot| ended(snapshot).is_some()).await;
+            snapshot.ok().and_then(|snapshot| ended(&snapshot))
+        };
+        match tokio::time::timeout(OUTCOME_MAX, wait).await {
+            Ok(Some(status)) => Ok(status),
+            Ok(None) => Err(CliError::StationGone),
+            Err(_) => Err(CliError::Failed("no outcome yet; it may or may not take effect".to_owned())),
+        }
     }
 }

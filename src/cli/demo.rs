@@ -3,20 +3,23 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use tokio::sync::oneshot;
 
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
-    history::{Answer, HistoryError, Query, io::QueryRequest},
+    history::{Answer, Query},
     plant::Snapshot,
     profile::io::atomic::write_for_user,
-    report::{Period, ShiftReport, csv},
+    report::{self, Period, ShiftReport},
     sim,
     station::{Session, io as station},
     ui,
 };
 
-use super::{CliError, StationArgs, drill, in_runtime, load, log, own_files, paths, run, say, span, speed};
+use super::{
+    CliError, StationArgs, drill, in_runtime, load, log, own_files, paths, run, say,
+    source::{query_station, unexpected},
+    span, speed,
+};
 
 /// Arguments of `demo`.
 #[derive(Debug, clap::Args)]
@@ -124,32 +127,19 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
     let from = clock.now();
     let last = run::follow(session.snapshots.clone(), clock, duration).await?;
     let period = Period { name: "demo".into(), from, to: clock.now() };
-    let report = ask_report(&session, period).await?;
+    let Answer::Report(report) = query_station(&session, Query::Report { period }).await? else {
+        return Err(unexpected());
+    };
     for line in summary(&last, &report) {
         say(&line);
     }
     if let Some(path) = &args.report {
-        let bytes = csv::shift_csv(&report, &last.def, last.def.report.csv);
+        let bytes = report::FORMATS[0].render(&report, &last.def, last.def.report.csv);
         write_for_user(path, &bytes)
             .map_err(|error| CliError::Io { what: format!("cannot write {}", path.display()), error })?;
         say(&format!("report written: {}", path.display()));
     }
     Ok(())
-}
-
-async fn ask_report(session: &Session, period: Period) -> Result<Box<ShiftReport>, HistoryError> {
-    let (reply, answer) = oneshot::channel();
-    let gone = || HistoryError::Engine("the store has stopped".into());
-    session.ask(QueryRequest { query: Query::Report { period }, reply }).map_err(|_| gone())?;
-    match answer.await.map_err(|_| gone())?? {
-        Answer::Report(report) => Ok(report),
-        Answer::Series(_)
-        | Answer::Journal(_)
-        | Answer::Actions(_)
-        | Answer::LineMinutes(_)
-        | Answer::AlarmMetrics(_)
-        | Answer::Values(_) => Err(HistoryError::Engine("answered another query".into())),
-    }
 }
 
 /// What was done, for people and scripts: one `name value` a line.

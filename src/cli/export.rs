@@ -11,7 +11,7 @@ use jiff::Timestamp;
 
 use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
-    history::{Answer, HistoryError, Query},
+    history::{Answer, Query},
     plant::{PlantDef, def::TagId},
     report::{
         export,
@@ -21,7 +21,8 @@ use crate::{
 };
 
 use super::{
-    CliError, StationArgs, client, in_runtime, load, own_files, report::dialect, run::history_file, source::Source,
+    CliError, in_runtime,
+    source::{CsvArgs, HistoryArgs, Source, unexpected},
     span,
 };
 
@@ -33,49 +34,31 @@ const VALUES_MAX: u128 = 20_000_000;
 /// Arguments of `export`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// A plant file, or the name of a shipped plant
-    plant: String,
+    #[command(flatten)]
+    history: HistoryArgs,
     /// Tags, separated by commas [default: all that are stored]
     #[arg(long, value_name = "TAGS", value_delimiter = ',')]
     tags: Vec<String>,
-    /// Which shift: last, current, NAME or NAME@YYYY-MM-DD [default: last]
-    #[arg(long, value_name = "SHIFT")]
-    shift: Option<String>,
-    /// From this local time (2026-11-21T06:00) or instant with offset
-    #[arg(long, value_name = "TIME")]
-    from: Option<String>,
-    /// To this local time or instant [default: now]
-    #[arg(long, value_name = "TIME")]
-    to: Option<String>,
     /// Time between two rows
     #[arg(long, value_name = "TIME", default_value = "10s", value_parser = span)]
     every: Duration,
     /// File to write, `-` for standard output
     #[arg(long, value_name = "FILE", default_value = "-")]
     out: PathBuf,
-    /// Separator of cells: `,` or `;` (then the decimal mark is a comma)
-    #[arg(long, value_name = "MARK", value_parser = [",", ";"])]
-    separator: Option<String>,
-    /// Begin with a byte order mark, for spreadsheets
-    #[arg(long)]
-    bom: bool,
     #[command(flatten)]
-    login: client::Login,
-    #[command(flatten)]
-    station: StationArgs,
+    csv: CsvArgs,
 }
 
-/// Asks for the values, piece by piece, and writes the table.
+/// Queries the values piece by piece and writes the table.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let def = Arc::new(load(&args.plant, &args.station)?);
+    let def = args.history.load()?;
     in_runtime(write(def, args))
 }
 
 async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let tags = tags(&def, &args.tags)?;
-    own_files::refuse(&args.out, &history_file(&def, &args.station))?;
-    let source = Source::open(&def, &args.station, &args.login).await?;
-    let period = source.period(&def, args.shift.as_deref(), args.from.as_deref(), args.to.as_deref())?;
+    args.history.refuse_own_file(&def, &args.out)?;
+    let (source, period) = args.history.open(&def).await?;
     let to = period.to.min(source.now());
     let rows = rows(period.from, to, args.every, tags.len())?;
     let latest = latest(&source, &def, &tags, period.from, to).await?;
@@ -89,13 +72,12 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
         }));
         for (from, count) in pieces(period.from, args.every, rows, group.len()) {
             let query = Query::Values { tags: group.to_vec(), from, every: args.every, count };
-            for (column, values) in columns[begin..].iter_mut().zip(values(source.ask(query).await?)?) {
+            for (column, values) in columns[begin..].iter_mut().zip(values(source.query(query).await?)?) {
                 column.values.extend(values);
             }
         }
     }
-    let dialect = dialect(def.report.csv, args.separator.as_deref(), args.bom);
-    let bytes = export::export_csv(&def, period.from, args.every, &columns, dialect);
+    let bytes = export::export_csv(&def, period.from, args.every, &columns, args.csv.dialect(&def));
     source.export(&args.out, &bytes).await
 }
 
@@ -112,7 +94,7 @@ async fn latest(
     let mut latest = HashMap::new();
     for tags in choosers.chunks(SERIES_MAX) {
         let query = Query::Series { tags: tags.to_vec(), from, to, buckets: 1 };
-        let Answer::Series(series) = source.ask(query).await? else { return Err(other()) };
+        let Answer::Series(series) = source.query(query).await? else { return Err(unexpected()) };
         latest.extend(series.iter().filter_map(|series| Some((series.tag, (*series.buckets.last()?)?.last))));
     }
     Ok(latest)
@@ -159,10 +141,6 @@ fn instant(from: Timestamp, every: Duration, count: usize) -> Timestamp {
 fn values(answer: Answer) -> Result<Vec<Vec<Option<HeldValue>>>, CliError> {
     match answer {
         Answer::Values(values) => Ok(values),
-        _ => Err(other()),
+        _ => Err(unexpected()),
     }
-}
-
-fn other() -> CliError {
-    CliError::History(HistoryError::Engine("answered another query".into()))
 }

@@ -14,13 +14,71 @@ use crate::{
         Answer, HistoryError, Query,
         io::{QueryRequest, store::Store},
     },
-    plant::PlantDef,
+    plant::{PlantDef, def::CsvDialect},
     profile::io::atomic::write_for_user,
     report::{Period, period_parser},
     station::Session,
 };
 
-use super::{CliError, StationArgs, client, put_out, run, say};
+use super::{CliError, StationArgs, client, load, own_files, put_out, run, say};
+
+/// The plant, the period and the login of a command that reads the history.
+#[derive(Debug, clap::Args)]
+pub struct HistoryArgs {
+    /// A plant file, or the name of a shipped plant
+    plant: String,
+    /// Which shift: last, current, NAME or NAME@YYYY-MM-DD [default: last]
+    #[arg(long, value_name = "SHIFT")]
+    shift: Option<String>,
+    /// From this local time (2026-11-21T06:00) or instant with offset
+    #[arg(long, value_name = "TIME")]
+    from: Option<String>,
+    /// To this local time or instant [default: now]
+    #[arg(long, value_name = "TIME")]
+    to: Option<String>,
+    #[command(flatten)]
+    login: client::Login,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+/// Settings of CSV files, instead of those of the plant.
+#[derive(Debug, clap::Args)]
+pub struct CsvArgs {
+    /// Separator of cells: `,` or `;` (then the decimal mark is a comma)
+    #[arg(long, value_name = "MARK", value_parser = [",", ";"])]
+    separator: Option<String>,
+    /// Begin with a byte order mark, for spreadsheets
+    #[arg(long)]
+    bom: bool,
+}
+
+impl HistoryArgs {
+    /// The plant.
+    pub fn load(&self) -> Result<Arc<PlantDef>, CliError> {
+        Ok(Arc::new(load(&self.plant, &self.station)?))
+    }
+
+    /// Refuses to write to a file of the station.
+    pub fn refuse_own_file(&self, def: &PlantDef, out: &Path) -> Result<(), CliError> {
+        own_files::refuse(out, &run::history_file(def, &self.station))
+    }
+
+    /// Opens the history and resolves the period.
+    pub async fn open(&self, def: &Arc<PlantDef>) -> Result<(Source, Period), CliError> {
+        let source = Source::open(def, &self.station, &self.login).await?;
+        let (shift, from, to) = (self.shift.as_deref(), self.from.as_deref(), self.to.as_deref());
+        let period = period_parser::period(def, shift, from, to, source.now());
+        Ok((source, period.map_err(|error| CliError::Usage(error.to_string()))?))
+    }
+}
+
+impl CsvArgs {
+    /// The dialect to write.
+    pub fn dialect(&self, def: &PlantDef) -> CsvDialect {
+        def.report.csv.with(self.separator.as_deref(), self.bom)
+    }
+}
 
 /// A history that can be asked.
 pub enum Source {
@@ -64,26 +122,11 @@ impl Source {
         }
     }
 
-    /// The period that was asked for.
-    pub fn period(
-        &self,
-        def: &PlantDef,
-        shift: Option<&str>,
-        from: Option<&str>,
-        to: Option<&str>,
-    ) -> Result<Period, CliError> {
-        period_parser::period(def, shift, from, to, self.now()).map_err(|error| CliError::Usage(error.to_string()))
-    }
-
-    /// Asks.
-    pub async fn ask(&self, query: Query) -> Result<Answer, CliError> {
+    /// Queries the history.
+    pub async fn query(&self, query: Query) -> Result<Answer, CliError> {
         match self {
             Source::File { store, until } => Ok(store.answer(&query, *until)?),
-            Source::Station(session) => {
-                let (reply, answer) = oneshot::channel();
-                session.ask(QueryRequest { query, reply }).map_err(|why| CliError::Failed(why.to_owned()))?;
-                Ok(answer.await.map_err(|_| CliError::StationGone)??)
-            }
+            Source::Station(session) => query_station(session, query).await,
         }
     }
 
@@ -105,4 +148,16 @@ impl Source {
         say(&path.display().to_string());
         Ok(())
     }
+}
+
+/// Queries the history of a station.
+pub async fn query_station(session: &Session, query: Query) -> Result<Answer, CliError> {
+    let (reply, answer) = oneshot::channel();
+    session.ask(QueryRequest { query, reply }).map_err(|why| CliError::Failed(why.to_owned()))?;
+    Ok(answer.await.map_err(|_| CliError::StationGone)??)
+}
+
+/// An answer of another kind than the query.
+pub fn unexpected() -> CliError {
+    CliError::History(HistoryError::Engine("answered another query".into()))
 }

@@ -1,11 +1,13 @@
-//! Reports: the shift calendar, the figures of a shift, and their CSV; pure, rows in and bytes out.
+//! Reports: the shift calendar, the figures of a shift, and the formats of its report; pure, rows in and bytes out.
 
 pub mod shift;
 pub mod period_parser;
 pub mod step_series;
 pub mod figures;
 pub mod alarm_metrics;
-pub mod csv;
+mod csv;
+pub mod shift_csv;
+mod record_csv;
 pub mod export;
 pub mod text;
 #[cfg(test)]
@@ -18,9 +20,52 @@ use serde::{Deserialize, Serialize};
 
 use crate::plant::{
     alarm::PeriodMetrics,
-    def::Priority,
-    record::{ActionRecord, AlarmRecord, Seal},
+    def::{CsvDialect, PlantDef, Priority},
+    record::{ActionRecord, AlarmRecord, AlarmStep, Seal},
 };
+
+/// A format of the shift report. To add one: a file with this trait, and its module and row of [`FORMATS`] here.
+pub trait ReportFormat: std::fmt::Debug + Sync {
+    /// The value of `--format`.
+    fn name(&self) -> &'static str;
+
+    /// The extension of its files.
+    fn extension(&self) -> &'static str;
+
+    /// The bytes of its file.
+    fn render(&self, report: &ShiftReport, def: &PlantDef, csv: CsvDialect) -> Vec<u8>;
+
+    /// The name of its file: `2026-11-21-morning.csv`; for a running shift with the time up to which it has data:
+    /// `2026-11-21-morning-until-0930.csv`.
+    fn file_name(&self, def: &PlantDef, period: &Period, until: Timestamp) -> String {
+        let local = |at: Timestamp| at.to_zoned(def.time_zone.clone());
+        let (from, to) = (local(period.from), local(period.to));
+        let word = period.name.split_whitespace().next().unwrap_or("period");
+        let running = until < period.to;
+        let end = if running { local(until).strftime("-until-%H%M").to_string() } else { String::new() };
+        if word == "period" {
+            let to = if running { local(until) } else { to };
+            let (from, to) = (from.strftime("%Y-%m-%dT%H%M"), to.strftime("%Y-%m-%dT%H%M"));
+            return format!("{from}-to-{to}.{}", self.extension());
+        }
+        let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
+        format!("{}-{}{end}.{}", from.date(), word.chars().map(plain).collect::<String>(), self.extension())
+    }
+}
+
+/// Every format of the report; the first is the default.
+pub const FORMATS: [&dyn ReportFormat; 3] = [&shift_csv::ShiftCsv, &record_csv::RecordCsv, &text::Text];
+
+/// The format of this name, or the names that there are.
+pub fn format(name: &str) -> Result<&'static dyn ReportFormat, String> {
+    let known = || FORMATS.map(ReportFormat::name).join(", ");
+    FORMATS.into_iter().find(|format| format.name() == name).ok_or_else(|| format!("expected one of {}", known()))
+}
+
+/// Alarms of a priority that were raised.
+pub fn raised(alarms: &[AlarmRecord], priority: Priority) -> usize {
+    alarms.iter().filter(|alarm| alarm.step == AlarmStep::Raised && alarm.priority == priority).count()
+}
 
 /// Decimals to print where the device has not said how many there are.
 pub const DECIMALS_UNKNOWN: u8 = 2;

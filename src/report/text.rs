@@ -1,13 +1,32 @@
 //! A report as plain lines for the terminal: facts, tags, counts.
 
 use super::{
-    ShiftReport, TagFigures,
-    csv::{floor_percent, iso, raised},
+    ReportFormat, ShiftReport, TagFigures,
+    csv::{floor_percent, iso},
+    raised,
 };
-use crate::plant::def::{PlantDef, Priority};
+use crate::plant::def::{CsvDialect, PlantDef, Priority};
+
+/// The format `text`.
+#[derive(Debug)]
+pub struct Text;
+
+impl ReportFormat for Text {
+    fn name(&self) -> &'static str {
+        "text"
+    }
+
+    fn extension(&self) -> &'static str {
+        "txt"
+    }
+
+    fn render(&self, report: &ShiftReport, def: &PlantDef, _csv: CsvDialect) -> Vec<u8> {
+        shift_text(report, def).into_bytes()
+    }
+}
 
 /// The report as lines, without alarm list, actions and record; a missing figure is `—`.
-pub fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
+fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
     let zone = &def.time_zone;
     let mut lines = vec![
         format!("{}, {}", def.title, report.period.name),

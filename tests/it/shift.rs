@@ -16,7 +16,7 @@ use sightglass::{
         def::{CsvDialect, LineId},
     },
     profile::{self, Search},
-    report::{csv, period_parser},
+    report::{FORMATS, period_parser},
     sim::{
         io::{SimulatorHandle, Wire, serve_line},
         rig::Rig,
@@ -88,7 +88,7 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     assert_eq!(store.alarm_metrics(day.from, day.until, now).unwrap(), *day, "the screen told what the journal tells");
     let report = store.report(&period, now).unwrap();
     let file = folder.path().join("morning.csv");
-    std::fs::write(&file, csv::shift_csv(&report, &def, CsvDialect::default())).unwrap();
+    std::fs::write(&file, FORMATS[0].render(&report, &def, CsvDialect::default())).unwrap();
     if have("python3", "python3") {
         check(&file);
     }

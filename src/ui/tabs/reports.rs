@@ -16,10 +16,7 @@ use super::{Outgoing, Tab, TabView, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::{def::CsvDialect, role::Role, snapshot::Snapshot},
-    report::{
-        Period, ShiftReport,
-        csv::{file_name, shift_csv},
-    },
+    report::{self, Period, ShiftReport},
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char, code},
@@ -221,7 +218,7 @@ impl Reports {
             Action::PageDown => self.scroll(cx, page),
             Action::Export => return self.export(cx),
             Action::Dialect => {
-                self.dialect = other(self.dialect, cx.def().report.csv);
+                self.dialect = self.dialect.toggled(cx.def().report.csv);
                 self.export = Export::Not;
             }
             Action::Refresh => self.periodic.want(),
@@ -289,7 +286,7 @@ impl Reports {
         if self.outgoing.is_some() {
             return Vec::new();
         }
-        let bytes = shift_csv(report, cx.def(), self.dialect);
+        let bytes = report::FORMATS[0].render(report, cx.def(), self.dialect);
         let outgoing = Outgoing { tab: Tab::Reports, path: self.path(cx, report), bytes };
         let request = outgoing.export_request();
         (self.export, self.outgoing) = (Export::Writing, Some(outgoing));
@@ -297,16 +294,6 @@ impl Reports {
     }
 
     fn path(&self, cx: &ViewContext, report: &ShiftReport) -> PathBuf {
-        cx.def().report.folder.join(file_name(cx.def(), &report.period, report.until))
+        cx.def().report.folder.join(report::FORMATS[0].file_name(cx.def(), &report.period, report.until))
     }
-}
-
-/// The other of the two common ways to write CSV. The one with `;` is for spreadsheets, which want the byte order mark
-/// to read `°C`.
-fn other(dialect: CsvDialect, plants: CsvDialect) -> CsvDialect {
-    let choices = match plants.separator {
-        ';' => [plants, CsvDialect::default()],
-        _ => [plants, CsvDialect { separator: ';', decimal: ',', bom: true }],
-    };
-    if dialect == choices[0] { choices[1] } else { choices[0] }
 }

@@ -115,7 +115,7 @@ fn midnight(def: &PlantDef, date: civil::Date) -> Option<Timestamp> {
 
 #[cfg(test)]
 mod tests {
-    use crate::report::csv::file_name;
+    use crate::report::FORMATS;
     use jiff::tz::TimeZone;
 
     use super::*;
@@ -183,7 +183,7 @@ mod tests {
         let check = |text: &str, hours_left: i64, expect: &str| {
             let period = typed(&def, text, now()).expect("a period of the table");
             let until = period.to - SignedDuration::from_hours(hours_left);
-            assert_eq!(file_name(&def, &period, until), expect);
+            assert_eq!(FORMATS[0].file_name(&def, &period, until), expect);
         };
         check("morning@2026-11-21", 0, "2026-11-21-morning.csv");
         check("morning@2026-11-21", 2, "2026-11-21-morning-until-1200.csv");

@@ -16,7 +16,7 @@ use crate::{
         def::Priority,
         record::{ActionRecord, AlarmRecord, AlarmStep},
     },
-    report::{Period, ShiftReport, SuppressedAlarm, TagFigures, csv::raised, text::mean_or_difference},
+    report::{Period, ShiftReport, SuppressedAlarm, TagFigures, raised, text::mean_or_difference},
     ui::{
         ViewContext,
         widgets::text::{Canvas, fit, pad, pad_left, width},

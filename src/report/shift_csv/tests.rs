@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use super::*;
 use crate::{
-    plant::record::Seal,
+    plant::record::{AlarmStep, Seal},
     report::{
-        Period,
+        Period, RecordRow,
+        record_csv::RecordCsv,
         testing::{THREE, at, plant},
     },
 };
@@ -200,7 +201,7 @@ fn every_dialect_is_read_back_by_a_strict_reader_with_the_same_cells() {
 #[test]
 fn the_record_alone_is_a_plain_table() {
     let def = plant("Asia/Bangkok", &THREE);
-    let csv = String::from_utf8(record_csv(&report(), &def, dialect(';', ',', false))).unwrap();
+    let csv = String::from_utf8(RecordCsv.render(&report(), &def, dialect(';', ',', false))).unwrap();
     let expect =
         "date;time;SV;PV;ER\r\n2026-11-21;06:00:00+07:00;70,0;72,5;-2,5\r\n2026-11-21;06:00:10+07:00;70,0;;\r\n";
     assert_eq!(csv, expect);
