@@ -66,7 +66,7 @@ pub struct Peer {
 pub enum Effect {
     /// Hand this command to the plant, permitted or refused.
     Command(Command),
-    /// Put this into the book.
+    /// Put this into the audit log.
     Record(ActionRecord),
     /// Answer a request.
     Reply(u64, Result<(), String>),

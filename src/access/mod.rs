@@ -1,4 +1,4 @@
-//! Who may: users and their passwords, sessions, rights, lockout, and the chained book of all that was done.
+//! Who may: users and their passwords, sessions, rights, lockout, and the audit log.
 
 pub mod right;
 pub mod session_request;
@@ -6,7 +6,7 @@ pub mod password;
 pub mod user;
 pub mod lockout;
 pub mod control;
-pub mod book;
+pub mod audit_log;
 pub mod sealing;
 pub mod io;
 

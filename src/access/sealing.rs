@@ -11,7 +11,7 @@ use std::cmp::Ordering;
 use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 
-use super::book::{Entry, FirstBad, START, unhex};
+use super::audit_log::{Entry, FirstBad, START, unhex};
 use crate::plant::record::{ActionRecord, SEAL_LOG, Seal, hex};
 
 /// Seconds between two seals of a station that runs.
@@ -208,7 +208,7 @@ fn hmac(key: &[u8; 32], message: &[u8]) -> [u8; 32] {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::access::book::{Check, line};
+    use crate::access::audit_log::{Check, line};
 
     const KEY: VerificationKey =
         VerificationKey { first: Key { number: 5, bytes: [7; 32] }, made: Timestamp::UNIX_EPOCH };

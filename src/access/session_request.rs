@@ -82,7 +82,7 @@ pub enum SessionRequest {
         /// Out or in.
         disabled: bool,
     },
-    /// Remove somebody. What he did stays in the book.
+    /// Remove somebody. What he did stays in the audit log.
     DeleteUser {
         /// Whom.
         user: String,

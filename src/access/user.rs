@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{book::sha256, password::one_form};
+use super::{audit_log::sha256, password::one_form};
 use crate::plant::role::Role;
 
 /// Most users of a plant.

@@ -12,8 +12,8 @@ use jiff::Timestamp;
 
 use crate::{
     access::{
-        book::Summary,
-        io::{book, sealing},
+        audit_log::Summary,
+        io::{audit_log, sealing},
         sealing::{Sealed, VerificationKey},
     },
     history::{Answer, Query},
@@ -24,7 +24,7 @@ use super::{CliError, StationArgs, client, in_runtime, load, run, say, source::S
 
 /// The store counts time in these.
 const MICROSECOND: jiff::SignedDuration = jiff::SignedDuration::from_micros(1);
-/// Deeds that one query is answered with.
+/// Actions of one page.
 const PAGE: usize = 10_000;
 
 /// A verification key is a line and some comments; whatever is longer is something else.
@@ -61,7 +61,7 @@ struct VerifyArgs {
     plant: String,
     /// The audit log [default: the plant's own, beside its history]
     #[arg(long, value_name = "FILE")]
-    book: Option<PathBuf>,
+    log: Option<PathBuf>,
     /// Check the seals too, with the verification key in this file; `-` for standard input
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
@@ -81,7 +81,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 fn make_key(args: &KeyArgs) -> Result<(), CliError> {
     let def = load(&args.plant, &args.station)?;
-    let log = book::beside(&run::history_file(&def, &args.station));
+    let log = audit_log::beside(&run::history_file(&def, &args.station));
     let key = sealing::make(&log, Timestamp::now());
     let path = sealing::beside(&log);
     let key = key.map_err(|error| match error.kind() {
@@ -116,19 +116,19 @@ fn read_key(path: &Path) -> Result<VerificationKey, CliError> {
 fn verify(args: VerifyArgs) -> Result<(), CliError> {
     let def = Arc::new(load(&args.plant, &args.station)?);
     let key = args.key.as_deref().map(read_key).transpose()?;
-    // A book that lies somewhere else has no history to compare with.
-    let (path, rows) = match &args.book {
+    // An audit log at another place has no history to compare with.
+    let (path, rows) = match &args.log {
         Some(path) => (path.clone(), None),
-        None => (book::beside(&run::history_file(&def, &args.station)), Some(in_runtime(seals(&def, &args)))),
+        None => (audit_log::beside(&run::history_file(&def, &args.station)), Some(in_runtime(seals(&def, &args)))),
     };
     let mut not_compared = Vec::new();
     let seals = rows.unwrap_or(Ok(Vec::new())).unwrap_or_else(|error| {
         not_compared.push(format!("it was not compared with the history: {error}"));
         Vec::new()
     });
-    let failed = |error: book::VerifyError| CliError::Failed(error.to_string());
+    let failed = |error: audit_log::VerifyError| CliError::Failed(error.to_string());
     let (summary, sealed) = match &key {
-        None => (book::verify(&path, &seals).map_err(failed)?, None),
+        None => (audit_log::verify(&path, &seals).map_err(failed)?, None),
         Some(key) => {
             let (summary, sealed, is_compared) = sealing::verify(&path, &seals, key).map_err(failed)?;
             if !is_compared {

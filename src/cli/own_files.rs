@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::{
-    access::io::{book, sealing, users_beside},
+    access::io::{audit_log, sealing, users_beside},
     history::io::{alarm_file, files},
 };
 
@@ -16,8 +16,8 @@ use super::CliError;
 /// alarm-state file, under whatever name they are reached.
 pub fn refuse(out: &Path, history: &Path) -> Result<(), CliError> {
     let beside = ["", ".wal", ".last", ".opening"].map(|suffix| files::beside(history, suffix));
-    let log = book::beside(history);
-    let of_log = [book::head_of(&log), sealing::beside(&log), log];
+    let log = audit_log::beside(history);
+    let of_log = [audit_log::head_of(&log), sealing::beside(&log), log];
     let others = [users_beside(history), alarm_file::beside(history)];
     let same = |own: &PathBuf| {
         let is_one_file = files::inode(own).is_some() && files::inode(own) == files::inode(out);
@@ -52,7 +52,7 @@ mod tests {
         let hard = folder.path().join("hard.csv");
         fs::hard_link(&history, &hard).unwrap();
         let dotted = folder.path().join("./tank.duckdb.wal");
-        let [log, users, alarms] = [book::beside(&history), users_beside(&history), alarm_file::beside(&history)];
+        let [log, users, alarms] = [audit_log::beside(&history), users_beside(&history), alarm_file::beside(&history)];
         let (key, note) = (sealing::beside(&log), folder.path().join("tank.audit.head"));
         for own in [&history, &link, &hard, &dotted, &log, &key, &note, &users, &alarms] {
             assert!(refuse(own, &history).is_err(), "{}", own.display());

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use tokio::sync::oneshot;
 
 use crate::{
-    access::{SessionRequest, book::sha256},
+    access::{SessionRequest, audit_log::sha256},
     history::{
         Answer, HistoryError, Query,
         io::{QueryRequest, store::Store},

@@ -169,7 +169,7 @@ pub struct ActionRecord {
     pub outcome: Arc<str>,
     /// Why, in his words.
     pub note: Option<Arc<str>>,
-    /// Its place in the chained book; `None` until it is there.
+    /// Its place in the audit log; `None` until it is written.
     pub seal: Option<Seal>,
 }
 
@@ -210,7 +210,7 @@ pub const ELSEWHERE: [&str; 26] = [
     "reload",
 ];
 
-/// The place of a deed in the chained book.
+/// The place of an entry in the hash chain of the audit log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seal {
     /// Running number, from 1.

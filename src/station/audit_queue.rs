@@ -15,7 +15,7 @@ use tokio::{
 use crate::{
     access::{
         Durability,
-        book::{PLANT_FILE, USERS_FILE, sha256},
+        audit_log::{PLANT_FILE, USERS_FILE, sha256},
         io::recorder::{Batch, Handle, Message, Recorded},
     },
     history::alarm_state::LatestSteps,
@@ -258,9 +258,9 @@ impl AuditQueue {
     }
 
     /// Waits until the disk has taken something.
-    pub async fn changed(book: &mut Option<AuditQueue>) {
-        let changed = match book {
-            Some(book) => book.recorded.changed().await.is_ok(),
+    pub async fn changed(audit: &mut Option<AuditQueue>) {
+        let changed = match audit {
+            Some(audit) => audit.recorded.changed().await.is_ok(),
             None => false,
         };
         if !changed {

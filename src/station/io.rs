@@ -10,7 +10,7 @@ use tokio::{
 use crate::{
     access::{
         AccessControl, Peer, Users,
-        io::{book::Opened, own_user, recorder, users, users_beside},
+        io::{audit_log::Opened, own_user, recorder, users, users_beside},
     },
     bus::io::{clock::Clock, transport::Connector},
     history::{
@@ -67,8 +67,8 @@ pub struct Station {
     pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,
-    /// The thread of the book, which ends before the history.
-    book: Option<std::thread::JoinHandle<Option<Seal>>>,
+    /// The thread of the audit log, which ends before the history.
+    audit_writer: Option<std::thread::JoinHandle<Option<Seal>>>,
     /// Nobody is asked who he is.
     open: bool,
     stop: watch::Sender<bool>,
@@ -132,8 +132,8 @@ fn begin(
     audit_queue.started(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
     let persistence =
-        Persistence { records: Some(records), store, past, book: Some(audit_queue), sets: Some(sets), observer };
-    let threads = Threads { queries, history: Some(history), book: Some(recorder.join) };
+        Persistence { records: Some(records), store, past, audit: Some(audit_queue), sets: Some(sets), observer };
+    let threads = Threads { queries, history: Some(history), audit_writer: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
 }
 
@@ -155,8 +155,8 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, ob
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
     let persistence =
-        Persistence { records: None, store, past: None, book: None, sets: None, observer: Some(observer) };
-    let threads = Threads { queries, history: None, book: None };
+        Persistence { records: None, store, past: None, audit: None, sets: None, observer: Some(observer) };
+    let threads = Threads { queries, history: None, audit_writer: None };
     assemble(def, clock, connectors, plant, None, persistence, threads, None)
 }
 
@@ -164,7 +164,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, ob
 struct Threads {
     queries: mpsc::Sender<(u32, QueryRequest)>,
     history: Option<history::Handle>,
-    book: Option<std::thread::JoinHandle<Option<Seal>>>,
+    audit_writer: Option<std::thread::JoinHandle<Option<Seal>>>,
 }
 
 // Everything that a station is made of, each once.
@@ -179,7 +179,7 @@ fn assemble(
     threads: Threads,
     guarded: Option<(AccessControl, PathBuf)>,
 ) -> Station {
-    let Threads { queries, history, book } = threads;
+    let Threads { queries, history, audit_writer } = threads;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
@@ -215,7 +215,7 @@ fn assemble(
     );
     let server = SessionServer::new(access.in_run(run), clock, outputs, users);
     tasks.push(tokio::spawn(server.run(attach_requests, requests, stopped)));
-    Station { acceptor, commands, lifecycle, history, book, open, stop, tasks }
+    Station { acceptor, commands, lifecycle, history, audit_writer, open, stop, tasks }
 }
 
 impl Station {
@@ -233,7 +233,7 @@ impl Station {
 
     /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
     pub async fn stop(self) -> Option<Seal> {
-        let Station { acceptor, commands, lifecycle, history, book, open: _, stop, tasks } = self;
+        let Station { acceptor, commands, lifecycle, history, audit_writer, open: _, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);
         drop((acceptor, commands, lifecycle));
@@ -242,11 +242,11 @@ impl Station {
                 tracing::error!(%error, "a task of the station ended badly");
             }
         }
-        // The last records are on their way; each thread ends when it has stored them, the book before the history.
+        // The last records are on their way; each thread ends when it has stored them, the audit log before the history.
         let history = history?;
         let ended = move || {
             // A panic of the thread has already been reported by the panic hook.
-            let last = book.and_then(|book| book.join().ok().flatten());
+            let last = audit_writer.and_then(|audit_writer| audit_writer.join().ok().flatten());
             history.stop();
             last
         };

@@ -53,7 +53,7 @@ pub(super) struct Persistence {
     /// What is still to come from the history; `None` once it is known.
     pub past: Option<Past>,
     /// AuditQueue and the state of the alarms go there first.
-    pub book: Option<AuditQueue>,
+    pub audit: Option<AuditQueue>,
     /// The folder of parameter sets.
     pub sets: Option<PathBuf>,
     pub observer: Option<RecordObserver>,
@@ -138,7 +138,7 @@ impl PlantTask {
         }
         loop {
             // What a snapshot shows as done is on disk, or marked.
-            let due = self.persistence.book.as_ref().map_or(next, |book| book.due(next));
+            let due = self.persistence.audit.as_ref().map_or(next, |audit| audit.due(next));
             tokio::select! {
                 biased;
                 () = tokio::time::sleep_until(due), if changed => {
@@ -168,7 +168,7 @@ impl PlantTask {
                     self.hear_store();
                     changed = true;
                 }
-                () = AuditQueue::changed(&mut self.persistence.book) => {
+                () = AuditQueue::changed(&mut self.persistence.audit) => {
                     self.tell_answers();
                     self.hear_store();
                     changed = true;
@@ -216,8 +216,8 @@ impl PlantTask {
         let ended = self.plant.on_stop();
         self.keep(ended.records);
         let stopped = audit_queue::stopped(&self.plant.def().name, self.clock.utc());
-        if let Some(book) = &mut self.persistence.book {
-            book.tell_all();
+        if let Some(audit) = &mut self.persistence.audit {
+            audit.tell_all();
             self.write_down(vec![stopped], Vec::new());
         }
         self.publish();
@@ -226,8 +226,8 @@ impl PlantTask {
     fn publish(&mut self) {
         let mut snapshot = self.plant.snapshot();
         snapshot.shift(self.clock.behind_utc());
-        if let Some(book) = &mut self.persistence.book {
-            book.mark(&mut snapshot);
+        if let Some(audit) = &mut self.persistence.audit {
+            audit.mark(&mut snapshot);
         }
         self.publish.send_replace(Arc::new(snapshot));
     }
@@ -236,8 +236,8 @@ impl PlantTask {
     fn take_up(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
         let Restored { steps, recent, seals } = past.join(restored);
-        if let (Some(seals), Some(book)) = (seals, &mut self.persistence.book) {
-            book.stored(seals);
+        if let (Some(seals), Some(audit)) = (seals, &mut self.persistence.audit) {
+            audit.stored(seals);
         }
         if !steps.is_empty() {
             tracing::info!(steps = steps.len(), "the state of the alarms is taken from the journal");
@@ -248,18 +248,18 @@ impl PlantTask {
     }
 
     fn handle_audit_message(&mut self, message: AuditMessage) {
-        match (message, &mut self.persistence.book) {
+        match (message, &mut self.persistence.audit) {
             (AuditMessage::Entry(action), _) => self.keep(vec![Record::Action(action)]),
-            (AuditMessage::Reply(reply, answer), Some(book)) => book.answer(reply, answer),
+            (AuditMessage::Reply(reply, answer), Some(audit)) => audit.answer(reply, answer),
             // A terminal that has left needs no answer.
             (AuditMessage::Reply(reply, answer), None) => drop(reply.send(answer.map(|()| Durability::NotRecorded))),
-            (AuditMessage::Lost(count), Some(book)) => book.lost(count),
+            (AuditMessage::Lost(count), Some(audit)) => audit.lost(count),
             (AuditMessage::Lost(_), None) => {}
         }
     }
 
     fn tell_answers(&mut self) {
-        let left = self.persistence.book.as_mut().map(AuditQueue::tell).unwrap_or_default();
+        let left = self.persistence.audit.as_mut().map(AuditQueue::tell).unwrap_or_default();
         self.store(left.into_iter().map(Record::Action).collect());
     }
 
@@ -347,7 +347,7 @@ impl PlantTask {
         let result = match done {
             Ok((file, result)) => {
                 let now = self.clock.utc();
-                let changed = self.persistence.book.as_mut().and_then(|book| book.plant_file(&file, now));
+                let changed = self.persistence.audit.as_mut().and_then(|audit| audit.plant_file(&file, now));
                 self.write_down(changed.into_iter().collect(), Vec::new());
                 self.file = Some(file);
                 result
@@ -411,8 +411,8 @@ impl PlantTask {
         if actions.is_empty() && steps.is_empty() {
             return;
         }
-        let left = match &mut self.persistence.book {
-            Some(book) => book.put(actions, steps),
+        let left = match &mut self.persistence.audit {
+            Some(audit) => audit.put(actions, steps),
             None => actions,
         };
         self.store(left.into_iter().map(Record::Action).collect());
@@ -432,10 +432,10 @@ impl PlantTask {
         status.lost += self.lost;
         let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));
         status.trouble = [status.trouble, lost].into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
-        if let Some(book) = &mut self.persistence.book {
-            let (lost, log, alarms) = book.trouble();
+        if let Some(audit) = &mut self.persistence.audit {
+            let (lost, log, alarms) = audit.trouble();
             status.lost += lost;
-            status.audit = book.last();
+            status.audit = audit.last();
             let parts: Vec<String> = [&status.trouble, &log, &alarms].into_iter().flatten().cloned().collect();
             status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
             self.plant.on_fault(StationFault::AuditLog, FaultState::lasting(log));

@@ -190,7 +190,7 @@ impl SessionServer {
                 }
             }
         }
-        // The users are written by now, so the book must say so: nothing else is begun any more.
+        // The users are written by now, so the audit log must say so: nothing else is begun any more.
         if let Some(result) = self.jobs.end().await {
             let mut effects = self.access.on_saved(result, self.clock.now());
             effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));

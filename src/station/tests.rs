@@ -7,7 +7,7 @@ use super::io::{Options, start_guarded};
 use crate::{
     access::{
         SessionRequest,
-        io::{book, users_beside},
+        io::{audit_log, users_beside},
     },
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, Query, io::QueryRequest},
@@ -57,8 +57,8 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     let command = other.send_command(1, CommandKind::Alarm(crate::plant::alarm::AlarmCommand::Silence)).unwrap();
     let shown = |snapshot: &Arc<crate::plant::Snapshot>| snapshot.commands.iter().any(|status| status.id == command);
     let snapshot = other.snapshots.wait_for(shown).await.unwrap().clone();
-    let line = std::fs::read_to_string(book::beside(&history)).unwrap();
-    assert!(line.contains("refused: log in first"), "what a snapshot shows is in the book");
+    let line = std::fs::read_to_string(audit_log::beside(&history)).unwrap();
+    assert!(line.contains("refused: log in first"), "what a snapshot shows is in the audit log");
     assert_eq!(snapshot.history.trouble, None);
     // What was typed wrong at one terminal is held against that terminal only.
     other.request(SessionRequest::Login { user: "ANNA".into(), password: password.into() }).await.unwrap();
@@ -70,9 +70,9 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
 
     let seals: Vec<_> = rows.iter().filter_map(|row| row.seal).collect();
     assert_eq!(seals.len(), rows.len(), "every row is sealed");
-    let summary = book::verify(&book::beside(&history), &seals).unwrap();
+    let summary = audit_log::verify(&audit_log::beside(&history), &seals).unwrap();
     assert!(summary.compared == rows.len() as u64 && summary.entries > summary.compared);
-    let text = std::fs::read_to_string(book::beside(&history)).unwrap();
+    let text = std::fs::read_to_string(audit_log::beside(&history)).unwrap();
     let actions: Vec<_> = text.lines().map(|line| line.split("\"action\":\"").nth(1).unwrap()).collect();
     assert!(
         actions[0].starts_with("start station") && actions[actions.len() - 1].starts_with("stop station"),

@@ -1,4 +1,4 @@
-//! A station in this process whose users must log in, with its socket, its book, and a tap on the line behind it.
+//! A station in this process whose users must log in, with its socket, its audit log, and a tap on the line behind it.
 
 use std::{
     path::PathBuf,
@@ -9,8 +9,8 @@ use std::{
 use sightglass::{
     access::{
         CommandRequest, Peer, SessionRequest, Users,
-        book::{Check, Entry, Summary},
-        io::{book, users, users_beside},
+        audit_log::{Check, Entry, Summary},
+        io::{audit_log, users, users_beside},
         password::{SALT_BYTES, hash},
         user::User,
     },
@@ -53,7 +53,7 @@ pub struct Guarded {
     pub tap: Tap,
     pub station: Station,
     clock: Clock,
-    book: PathBuf,
+    audit_log: PathBuf,
     path: PathBuf,
     socket: JoinHandle<()>,
     _simulated: Serving,
@@ -89,8 +89,8 @@ impl Guarded {
             answers && snapshot.sample(sv).quality.is_good()
         };
         until(&mut truth, "the devices answer", known).await;
-        let book = book::beside(&history);
-        Guarded { def, truth, tap, station, clock, book, path, socket, _simulated: simulated, _folder: folder }
+        let audit_log = audit_log::beside(&history);
+        Guarded { def, truth, tap, station, clock, audit_log, path, socket, _simulated: simulated, _folder: folder }
     }
 
     /// A terminal at the socket where nobody has logged in.
@@ -142,16 +142,16 @@ impl Guarded {
         self.truth.borrow().sample(self.tag(name)).value
     }
 
-    /// The book as it is on disk.
+    /// The audit log as it is on disk.
     pub fn entries(&self) -> Vec<Entry> {
-        let text = std::fs::read_to_string(&self.book).unwrap();
+        let text = std::fs::read_to_string(&self.audit_log).unwrap();
         let mut check = Check::new(None, &[]);
         // The last line may be half written.
         let whole = text.split_inclusive('\n').filter(|line| line.ends_with('\n'));
         whole.map(|line| check.line(line.trim_end_matches('\n').as_bytes()).expect("a sound line")).collect()
     }
 
-    /// Waits until the book holds such a line behind the first `after`.
+    /// Waits until the audit log holds such a line behind the first `after`.
     pub async fn written(&self, after: usize, what: &str, is: impl Fn(&Entry) -> bool) -> Entry {
         let mut truth = self.truth.clone();
         let end = tokio::time::Instant::now() + PATIENCE;
@@ -160,16 +160,16 @@ impl Guarded {
             if let Some(entry) = entries.iter().skip(after).find(|entry| is(entry)) {
                 return entry.clone();
             }
-            assert!(tokio::time::Instant::now() < end, "not in the book: {what}\n{:#?}", &entries[after..]);
+            assert!(tokio::time::Instant::now() < end, "not in the audit log: {what}\n{:#?}", &entries[after..]);
             truth.changed().await.unwrap();
         }
     }
 
-    /// Stops the station; the book is whole.
+    /// Stops the station; the audit log is whole.
     pub async fn end(self) -> Summary {
         self.station.stop().await;
         self.socket.await.unwrap();
-        book::verify(&self.book, &[]).unwrap()
+        audit_log::verify(&self.audit_log, &[]).unwrap()
     }
 }
 

@@ -20,8 +20,8 @@ use tokio::{
 use sightglass::{
     access::{
         CommandRequest, Durability, SessionRequest, Users,
-        book::{Check, Entry},
-        io::{book, sealing, users, users_beside},
+        audit_log::{Check, Entry},
+        io::{audit_log, sealing, users, users_beside},
         sealing::VerificationKey,
         user::Change,
     },
@@ -151,7 +151,7 @@ impl Place {
         let text = profile::text_of("tank", &Search::shipped()).unwrap();
         std::fs::write(folder.path().join("tank.toml"), text + ALARM_TOML).unwrap();
         users::write(&users_beside(&folder.path().join("tank.duckdb")), &all).unwrap();
-        let key = sealing::make(&book::beside(&folder.path().join("tank.duckdb")), jiff::Timestamp::UNIX_EPOCH);
+        let key = sealing::make(&audit_log::beside(&folder.path().join("tank.duckdb")), jiff::Timestamp::UNIX_EPOCH);
         Place { folder, sockets, port, slow, key: key.unwrap(), _sim: sim }
     }
 
@@ -163,8 +163,8 @@ impl Place {
         self.folder.path().join("tank.duckdb")
     }
 
-    fn book(&self) -> PathBuf {
-        book::beside(&self.history())
+    fn audit_log(&self) -> PathBuf {
+        audit_log::beside(&self.history())
     }
 
     fn station(&self) -> Process {
@@ -187,8 +187,8 @@ impl Place {
     }
 }
 
-fn entries(book: &Path) -> Vec<Entry> {
-    let text = std::fs::read_to_string(book).unwrap();
+fn entries(audit_log: &Path) -> Vec<Entry> {
+    let text = std::fs::read_to_string(audit_log).unwrap();
     let mut check = Check::new(None, &[]);
     text.lines().filter_map(|line| check.line(line.as_bytes())).collect()
 }
@@ -334,12 +334,12 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
     let mut sum = Reported::default();
     for round in 0..rounds {
         place.slow.store(round % SLOW_EVERY == 0, Ordering::Relaxed);
-        let before = entries_or_none(&place.book());
+        let before = entries_or_none(&place.audit_log());
         let reported = live(&place, round, 2 + round % 5, Duration::from_micros(round * 1_733 % 40_000)).await;
-        let verified = sealing::verify(&place.book(), &[], &place.key);
+        let verified = sealing::verify(&place.audit_log(), &[], &place.key);
         let (whole, sealed, _) = verified.unwrap_or_else(|error| panic!("round {round}: {error}"));
         assert!(round < sealed.seals, "round {round}: each start has its seal, found {}", sealed.seals);
-        let all = entries(&place.book());
+        let all = entries(&place.audit_log());
         assert_eq!(all.len() as u64, whole.entries, "round {round}");
         let lived = &all[before..];
         let writes = reported.writes.iter().map(|note| ("write", note));
@@ -347,7 +347,7 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
             let line = lived.iter().find(|line| &*line.action == action && line.note.as_deref() == Some(note));
             assert!(
                 line.is_some_and(|line| &*line.outcome == "verified"),
-                "round {round}: `{note}` is not in the book: {line:?}"
+                "round {round}: `{note}` is not in the audit log: {line:?}"
             );
         }
         let kept = |kind, text| number_in(round, reason_of(&place.history(), kind, text));
@@ -360,10 +360,10 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
         let (logins, logouts) = (count("login"), count("logout"));
         assert!(
             reported.logins <= logins,
-            "round {round}: {} logins were granted, {logins} are in the book",
+            "round {round}: {} logins were granted, {logins} are in the audit log",
             reported.logins
         );
-        assert!(reported.logouts <= logouts, "round {round}: {} logouts, {logouts} in the book", reported.logouts);
+        assert!(reported.logouts <= logouts, "round {round}: {} logouts, {logouts} in the audit log", reported.logouts);
         sum.writes.extend(reported.writes);
         sum.acknowledged.extend(reported.acknowledged);
         (sum.logins, sum.reports) = (sum.logins + reported.logins, sum.reports + reported.reports);
@@ -379,16 +379,16 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
     let mut station = place.station();
     station.signal("TERM");
     assert_eq!(station.end(), Some(0), "{:?}", station.said);
-    let actions: Vec<_> = entries(&place.book()).into_iter().map(|entry| entry.action).collect();
+    let actions: Vec<_> = entries(&place.audit_log()).into_iter().map(|entry| entry.action).collect();
     assert!(actions.ends_with(&["stop station".into(), SEAL_LOG.into()]), "{:?}", actions.last());
     // Each start has completed the history by what the log held before it.
     let def = profile::load(&place.plant(), &Search::shipped()).unwrap();
     let seals = Store::open_read_only(&place.history(), &def).unwrap().seals().unwrap();
-    let summary = book::verify(&place.book(), &seals).unwrap();
+    let summary = audit_log::verify(&place.audit_log(), &seals).unwrap();
     assert_eq!((summary.compared, seals.len() as u64), (summary.entries.min(5_000), summary.entries.min(5_000)));
 }
 
 /// Lines so far; none before the first start.
-fn entries_or_none(book: &Path) -> usize {
-    if book.exists() { entries(book).len() } else { 0 }
+fn entries_or_none(audit_log: &Path) -> usize {
+    if audit_log.exists() { entries(audit_log).len() } else { 0 }
 }

@@ -16,7 +16,7 @@
 //! | `users` | wrong passwords, lockout, idle lock, second users, two operators at once |
 //! | `kills` | stations killed during writes, acknowledgements, logins and reports: what was reported as done is in the audit log |
 //! | `outstanding` | stations killed and started again, with a slow device: a late reply to the old one is no value |
-//! | `tampering` | the book changed by hand: what `sightglass audit verify` says |
+//! | `tampering` | the audit log changed by hand: what `sightglass audit verify` says |
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
 //! | `tools` | the tools for a line against peers that echo, chatter and lie |
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |

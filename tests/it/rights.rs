@@ -1,11 +1,11 @@
 //! Every command, request and query through the socket, by everybody who may be at a terminal: what is let through, what
-//! is refused, and that the book has it. The tables below are written by hand; the program has its own.
+//! is refused, and that the audit log has it. The tables below are written by hand; the program has its own.
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use sightglass::{
-    access::{Peer, SessionRequest, book::Entry},
+    access::{Peer, SessionRequest, audit_log::Entry},
     history::{Query, io::QueryRequest},
     plant::{
         PlantDef,
@@ -38,7 +38,7 @@ const WHY: [&str; 6] = [
     "choose a password of your own first",
 ];
 
-/// What is called so in the book may be done by whom: nobody, Viewer, Technician, Supervisor, Supervisor at a locked
+/// What is called so in the audit log may be done by whom: nobody, Viewer, Technician, Supervisor, Supervisor at a locked
 /// terminal, Supervisor who must change the password.
 struct Row {
     action: &'static str,
@@ -165,7 +165,7 @@ fn is_permitted(status: &CommandStatus) -> bool {
     !matches!(status.outcome, Outcome::Refused(Refusal::NotPermitted(_)))
 }
 
-/// Is it this person, as the book has it? Of nobody it tells the user of the operating system.
+/// Is it this person, as the audit log has it? Of nobody it tells the user of the operating system.
 fn is_by(line: &Entry, person: usize) -> bool {
     if person == 0 { line.who.starts_with("not logged in (") } else { &*line.who == USERS[person] }
 }
@@ -218,7 +218,7 @@ const SUPERVISOR: Answers = [LOG_IN, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, C
 /// Whoever has started the station can end it anyway, logged in or not: these tests run as the same user.
 const HOST: Answers = [DONE, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, CHANGE];
 
-/// A new request does not compile until it has a row here; put it into [`requests`] as well. The word is that of the book; an
+/// A new request does not compile until it has a row here; put it into [`requests`] as well. The word is that of the audit log; an
 /// empty one is not put on record by itself.
 fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
     const SHORT: &str = "has 5 characters";

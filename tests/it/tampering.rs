@@ -1,17 +1,17 @@
-//! The book changed by hand, and what `sightglass audit verify` says about it.
+//! The audit log changed by hand, and what `sightglass audit verify` says about it.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use sightglass::access::book::{Check, Entry, START, head_text, line};
+use sightglass::access::audit_log::{Check, Entry, START, head_text, line};
 
 use crate::support::{Process, folder, sightglass};
 
-/// A book as a station leaves it: several lives of it, each with its start and stop.
+/// An audit log as a station leaves it: several lives of it, each with its start and stop.
 fn written(folder: &Path) -> PathBuf {
-    let book = folder.join("tank.audit.jsonl");
+    let audit_log = folder.join("tank.audit.jsonl");
     for _ in 0..3 {
         let mut station = Process::start(
             sightglass()
@@ -20,13 +20,13 @@ fn written(folder: &Path) -> PathBuf {
                 .env("XDG_STATE_HOME", folder),
         );
         assert_eq!(station.end(), Some(0), "{:?}", station.said);
-        let text = fs::read_to_string(&book).unwrap();
+        let text = fs::read_to_string(&audit_log).unwrap();
         let last: serde_json::Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
         let anchor = format!("audit log: entry {} {}", last["n"], last["hash"].as_str().unwrap());
         assert!(station.said.contains(&anchor), "the end has its anchor: {:?}", station.said);
     }
-    assert!(4 < fs::read_to_string(&book).unwrap().lines().count());
-    book
+    assert!(4 < fs::read_to_string(&audit_log).unwrap().lines().count());
+    audit_log
 }
 
 /// The exit code, and everything that it says.
@@ -41,8 +41,8 @@ fn verify(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
 #[test]
 fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
     let folder = folder();
-    let book = written(folder.path());
-    let good = fs::read_to_string(&book).unwrap();
+    let audit_log = written(folder.path());
+    let good = fs::read_to_string(&audit_log).unwrap();
     let lines: Vec<&str> = good.split_inclusive('\n').collect();
     let count = lines.len();
     let history = folder.path().join("tank.duckdb");
@@ -63,8 +63,8 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
         ("cut", without(2), 3, "lines before it were cut out or moved"),
         ("first line cut", without(0), 1, "lines before it were cut out or moved"),
         ("tail cut", lines[..count - 2].concat(), count - 1, &format!("the station has noted {count} entries")),
-        ("everything cut", String::new(), 1, "the book was cut here"),
-        ("half of the tail", good[..good.len() - 20].to_owned(), count, "the book was cut here"),
+        ("everything cut", String::new(), 1, "the audit log was cut here"),
+        ("half of the tail", good[..good.len() - 20].to_owned(), count, "the audit log was cut here"),
         ("reordered", swapped, 2, "lines before it were cut out or moved"),
         ("doubled", doubled, 4, "it was moved or doubled"),
         ("put in", [lines[0], "{\"n\":2}\n", &lines[1..].concat()].concat(), 2, "this does not end with a hash"),
@@ -72,8 +72,8 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
     let head = folder.path().join("tank.audit.head");
     let noted = fs::read_to_string(&head).unwrap();
     for (what, text, line, why) in cases {
-        fs::write(&book, text).unwrap();
-        for args in [&["--book", book.to_str().unwrap()][..], &["--history", history.to_str().unwrap()]] {
+        fs::write(&audit_log, text).unwrap();
+        for args in [&["--log", audit_log.to_str().unwrap()][..], &["--history", history.to_str().unwrap()]] {
             let (code, said) = verify(folder.path(), args);
             assert_eq!(code, Some(1), "{what}: {said}");
             assert!(said.contains(&format!("line {line}: ")) && said.contains(why), "{what}: {said}");
@@ -81,13 +81,13 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
     }
     // Who knows how can cut the tail and the note that the station keeps of it, but not the rows of the history.
     let second: serde_json::Value = serde_json::from_str(lines[1]).unwrap();
-    fs::write(&book, lines[..2].concat()).unwrap();
+    fs::write(&audit_log, lines[..2].concat()).unwrap();
     fs::write(&head, format!("{:020} {}\n", 2, second["hash"].as_str().unwrap())).unwrap();
     let (code, said) = verify(folder.path(), &["--history", history.to_str().unwrap()]);
     assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("line 3: the book was cut here: the history holds entry 3"), "{said}");
+    assert!(said.contains("line 3: the audit log was cut here: the history holds entry 3"), "{said}");
 
-    fs::write(&book, &good).unwrap();
+    fs::write(&audit_log, &good).unwrap();
     fs::write(&head, noted).unwrap();
     assert_eq!(verify(folder.path(), &["--history", history.to_str().unwrap()]).0, Some(0), "as it was");
 }
@@ -123,7 +123,7 @@ fn an_audit_log_that_was_not_compared_with_the_history_is_no_success() {
 #[test]
 fn a_book_that_is_not_there_is_told_by_name() {
     let folder = folder();
-    let (code, said) = verify(folder.path(), &["--book", "/nowhere/tank.audit.jsonl"]);
+    let (code, said) = verify(folder.path(), &["--log", "/nowhere/tank.audit.jsonl"]);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("/nowhere/tank.audit.jsonl cannot be read"), "{said}");
 }
@@ -131,13 +131,13 @@ fn a_book_that_is_not_there_is_told_by_name() {
 #[test]
 fn a_station_goes_on_after_a_book_that_was_changed_and_says_where_it_is_broken() {
     let folder = folder();
-    let book = written(folder.path());
-    let good = fs::read_to_string(&book).unwrap();
-    fs::write(&book, good.replacen("\"outcome\":\"done\"", "\"outcome\":\"undone\"", 1)).unwrap();
+    let audit_log = written(folder.path());
+    let good = fs::read_to_string(&audit_log).unwrap();
+    fs::write(&audit_log, good.replacen("\"outcome\":\"done\"", "\"outcome\":\"undone\"", 1)).unwrap();
     written(folder.path());
-    let after = fs::read_to_string(&book).unwrap();
+    let after = fs::read_to_string(&audit_log).unwrap();
     assert!(after.len() > good.len() && after.contains("it is broken at line 1"), "{after}");
-    let (code, said) = verify(folder.path(), &["--book", book.to_str().unwrap()]);
+    let (code, said) = verify(folder.path(), &["--log", audit_log.to_str().unwrap()]);
     assert!(code == Some(1) && said.contains("line 1: "), "{said}");
 }
 
@@ -152,14 +152,14 @@ fn make_key(folder: &Path, name: &str) -> (Option<i32>, PathBuf) {
 }
 
 /// Writes a log with its chain and its note computed again, as who owns the files can.
-fn rewrite(book: &Path, entries: &[Entry]) {
+fn rewrite(audit_log: &Path, entries: &[Entry]) {
     let (mut text, mut last) = (String::new(), START);
     for entry in entries {
         let (line, seal) = line(last, &entry.clone().sealed(last));
         (text, last) = (text + &line, seal);
     }
-    fs::write(book, text).unwrap();
-    fs::write(book.with_extension("head"), head_text(last)).unwrap();
+    fs::write(audit_log, text).unwrap();
+    fs::write(audit_log.with_extension("head"), head_text(last)).unwrap();
 }
 
 #[test]
@@ -170,20 +170,20 @@ fn a_sealed_log_that_was_rewritten_with_its_chain_or_cut_with_its_seals_is_found
     let text = fs::read(folder.path().join("tank.audit.key")).unwrap();
     assert_eq!(make_key(folder.path(), "refused").0, Some(1), "once");
     assert_eq!(fs::read(folder.path().join("tank.audit.key")).unwrap(), text, "the key that was there is left alone");
-    let book = written(folder.path());
+    let audit_log = written(folder.path());
     let history = folder.path().join("tank.duckdb");
-    let verify = |extra: &[&str]| verify(folder.path(), &[&["--book", book.to_str().unwrap()], extra].concat());
+    let verify = |extra: &[&str]| verify(folder.path(), &[&["--log", audit_log.to_str().unwrap()], extra].concat());
     let (code, said) =
         self::verify(folder.path(), &["--history", history.to_str().unwrap(), "--key", key.to_str().unwrap()]);
     assert!(code == Some(0) && said.contains("; 0 entries behind it are not sealed yet"), "{said}");
     let mut check = Check::new(None, &[]);
-    let text = fs::read_to_string(&book).unwrap();
+    let text = fs::read_to_string(&audit_log).unwrap();
     let good: Vec<Entry> = text.lines().map(|line| check.line(line.as_bytes()).unwrap()).collect();
     let seals: Vec<usize> = (0..good.len()).filter(|place| &*good[*place].action == "seal audit log").collect();
     assert!(3 <= seals.len() && seals.last() == Some(&(good.len() - 1)), "at the end of each life: {text}");
     let key = key.to_str().unwrap();
     let found = |entries: &[Entry], line: usize, why: &str| {
-        rewrite(&book, entries);
+        rewrite(&audit_log, entries);
         assert_eq!(verify(&[]).0, Some(0), "the chain is whole");
         let (code, said) = verify(&["--key", key]);
         assert!(code == Some(1) && said.contains(&format!("line {line}: ")) && said.contains(why), "{said}");
@@ -203,14 +203,14 @@ fn a_sealed_log_that_was_rewritten_with_its_chain_or_cut_with_its_seals_is_found
     found(&good[..1], 2, "seals 0 to ");
 
     // Not detectable: changes and cuts behind the last seal. The output says how far the seals reach.
-    rewrite(&book, &[&good[..], &[Entry { n: good.len() as u64 + 1, ..good[0].clone() }]].concat());
+    rewrite(&audit_log, &[&good[..], &[Entry { n: good.len() as u64 + 1, ..good[0].clone() }]].concat());
     let (code, said) = verify(&["--key", key]);
     assert!(code == Some(0) && said.contains(&format!("up to entry {} of", good.len())), "{said}");
     assert!(said.contains("; 1 entries behind it are not sealed yet"), "{said}");
-    rewrite(&book, &good);
-    assert_eq!(fs::read_to_string(&book).unwrap(), text, "as it was");
+    rewrite(&audit_log, &good);
+    assert_eq!(fs::read_to_string(&audit_log).unwrap(), text, "as it was");
 
-    let present = book.with_extension("key");
+    let present = audit_log.with_extension("key");
     fs::write(folder.path().join("garbage"), "garbage").unwrap();
     assert_eq!(verify(&["--key", folder.path().join("garbage").to_str().unwrap()]).0, Some(2));
     fs::rename(&present, folder.path().join("moved")).unwrap();
@@ -228,8 +228,8 @@ fn a_sealed_log_that_was_rewritten_with_its_chain_or_cut_with_its_seals_is_found
 fn a_station_whose_sealing_key_is_missing_says_so_and_goes_on() {
     let folder = folder();
     make_key(folder.path(), "kept");
-    let book = written(folder.path());
-    fs::remove_file(book.with_extension("key")).unwrap();
+    let audit_log = written(folder.path());
+    fs::remove_file(audit_log.with_extension("key")).unwrap();
     let mut station = Process::start(
         sightglass()
             .args(["run", "tank", "--port", "L1=/dev/none", "--history"])

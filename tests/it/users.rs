@@ -122,7 +122,7 @@ async fn an_unknown_name_a_wrong_password_and_a_disabled_user_are_told_the_same(
         let script = guarded.far(&format!("user{number}"));
         assert_eq!(login(&script, user, password).await, Err(wait(1)), "{user}");
         let line = guarded.written(written, user, |entry| &*entry.action == "login failed").await;
-        assert_eq!((&*line.target, &*line.outcome), (target, &*format!("refused: {why}")), "the book knows");
+        assert_eq!((&*line.target, &*line.outcome), (target, &*format!("refused: {why}")), "the audit log knows");
     }
     let text = format!("{:?}", guarded.entries());
     assert!(!text.contains("nobody-of-this-name"), "what is typed as a name may be a password");

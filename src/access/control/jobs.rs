@@ -241,7 +241,7 @@ impl AccessControl {
         effects
     }
 
-    /// What speaks against this attempt, in words for the book; the operator is told less.
+    /// What speaks against this attempt, in words for the audit log; the operator is told less.
     fn failure_reason(&self, what: &JobPurpose, right: bool) -> Option<&'static str> {
         let user = what.whose().and_then(|user| self.users.as_ref()?.get(user));
         match (user, right) {

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     access::{
         Secret, SessionRequest, Users, Who,
-        book::USERS_FILE,
+        audit_log::USERS_FILE,
         password,
         user::{self, Change},
     },

@@ -1,8 +1,8 @@
-//! The edge of access: the file of users, the book on disk, and who the operating system says is here.
+//! The edge of access: the file of users, the audit log on disk, and who the operating system says is here.
 
 use std::path::{Path, PathBuf};
 
-pub mod book;
+pub mod audit_log;
 pub mod recorder;
 pub mod sealing;
 pub mod users;

@@ -13,12 +13,12 @@ use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
 
 use super::{
-    book::{self, Book, IN_USE, Opened},
+    audit_log::{self, AuditLog, IN_USE, Opened},
     sealing,
 };
 use crate::{
     access::{
-        book::{Comparison, START, compare, fit},
+        audit_log::{Comparison, START, compare, fit},
         sealing::is_due,
     },
     bus::io::clock::Clock,
@@ -120,7 +120,7 @@ struct Recorder {
     path: PathBuf,
     clock: Clock,
     history: mpsc::Sender<Vec<Record>>,
-    book: Option<Book>,
+    audit_log: Option<AuditLog>,
     alarms: AlarmFile,
     pending: Vec<Pending>,
     /// The latest entries of the log at the start, until they were compared with the history, and its seal then.
@@ -149,10 +149,10 @@ impl Recorder {
     fn new(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> (Recorder, Found) {
         let (alarms, found) = AlarmFile::open(&alarm_file::beside(history_file), clock.utc());
         let recorder = Recorder {
-            path: book::beside(history_file),
+            path: audit_log::beside(history_file),
             clock,
             history,
-            book: None,
+            audit_log: None,
             alarms,
             pending: Vec::new(),
             tail: VecDeque::new(),
@@ -233,7 +233,7 @@ impl Recorder {
 
     /// The log first: a loss of power between the two leaves no acknowledged alarm without a trace of who did it.
     fn write(&mut self) {
-        if self.book.is_none() && REOPEN <= self.opened_at.elapsed() {
+        if self.audit_log.is_none() && REOPEN <= self.opened_at.elapsed() {
             self.open();
         }
         self.write_log();
@@ -252,9 +252,9 @@ impl Recorder {
     /// Opens the log; what is found is put on record in it.
     fn open(&mut self) -> Opened {
         self.opened_at = Instant::now();
-        match Book::open(&self.path) {
-            Ok((book, opened)) => {
-                (self.book, self.in_use) = (Some(book), false);
+        match AuditLog::open(&self.path) {
+            Ok((audit_log, opened)) => {
+                (self.audit_log, self.in_use) = (Some(audit_log), false);
                 let broken: Vec<_> = opened.wrong.iter().filter(|wrong| wrong.contains("broken")).cloned().collect();
                 if !broken.is_empty() {
                     self.found.push(format!("the audit log was tampered with: {}", broken.join("; ")));
@@ -282,7 +282,7 @@ impl Recorder {
         if actions.is_empty() {
             return;
         }
-        match self.book.as_mut().map(|book| book.append(&mut actions)) {
+        match self.audit_log.as_mut().map(|audit_log| audit_log.append(&mut actions)) {
             Some(Ok(())) => {
                 self.pending.clear();
                 (self.unsealed, self.log_fault) = (0, None);
@@ -305,8 +305,8 @@ impl Recorder {
 
     /// Seals what the log holds, if it has a key.
     fn seal(&mut self, now: Timestamp) {
-        let Some(book) = &mut self.book else { return };
-        let (entry, sealed) = sealing::seal(book, &self.path, now);
+        let Some(audit_log) = &mut self.audit_log else { return };
+        let (entry, sealed) = sealing::seal(audit_log, &self.path, now);
         self.seal_tried = Some((now, sealed.is_ok()));
         let fault = sealed.err();
         if let Some(why) = fault.as_ref().filter(|_| fault != self.seal_fault) {
@@ -331,7 +331,7 @@ impl Recorder {
             tracing::error!(%error, path = %self.path.display(), "the audit log cannot be written");
         }
         // One that is as it was left is tried again at once, another one must be read first.
-        self.book = self.book.take().filter(Book::is_intact);
+        self.audit_log = self.audit_log.take().filter(AuditLog::is_intact);
         self.log_fault = Some(why);
     }
 
@@ -367,7 +367,7 @@ impl Recorder {
             batches: self.recorded,
             waiting: self.taken - self.recorded,
             lost: self.lost,
-            last: self.book.as_ref().map(Book::last),
+            last: self.audit_log.as_ref().map(AuditLog::last),
             log: all(log.or_else(|| self.seal_fault.clone()), &self.found),
             alarms: all(alarms, self.alarms_found.as_slice()),
         }

@@ -10,12 +10,12 @@ use std::{
 use jiff::Timestamp;
 
 use super::{
-    book::{self, Book, VerifyError, verify_each},
+    audit_log::{self, AuditLog, VerifyError, verify_each},
     random,
 };
 use crate::{
     access::{
-        book::Summary,
+        audit_log::Summary,
         sealing::{Key, SealCheck, Sealed, VerificationKey},
     },
     history::words::plain,
@@ -48,7 +48,7 @@ pub fn make(log: &Path, made: Timestamp) -> io::Result<VerificationKey> {
     let path = beside(log);
     let last = match File::open(log) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        file => book::last_seal(file?)?,
+        file => audit_log::last_seal(file?)?,
     };
     let bytes = random().map_err(io::Error::other)?;
     let first = Key::new(last.map_or(0, |last| last + 1), bytes);
@@ -71,16 +71,16 @@ pub fn make(log: &Path, made: Timestamp) -> io::Result<VerificationKey> {
 ///
 /// The seal is on disk before its key is replaced, and a key that the log has a seal of is replaced before the next one: a
 /// process that is killed in between leaves neither a gap nor two seals of one key.
-pub fn seal(book: &mut Book, log: &Path, at: Timestamp) -> (Option<ActionRecord>, Result<(), String>) {
+pub fn seal(audit_log: &mut AuditLog, log: &Path, at: Timestamp) -> (Option<ActionRecord>, Result<(), String>) {
     let path = beside(log);
     let failed = |why: &str| Err(format!("the audit log is not sealed: {why}: {}", path.display()));
     let present = match read(&path) {
         Ok(Some(key)) => key,
-        Ok(None) if book.last_seal().is_none() => return (None, Ok(())),
+        Ok(None) if audit_log.last_seal().is_none() => return (None, Ok(())),
         Ok(None) => return (None, failed("the sealing key is missing")),
         Err(error) => return (None, failed(&plain(&error.to_string()))),
     };
-    let Some(key) = present.after(book.last_seal()) else {
+    let Some(key) = present.after(audit_log.last_seal()) else {
         return (None, failed("the sealing key is older than the last seal"));
     };
     if key != present
@@ -88,10 +88,10 @@ pub fn seal(book: &mut Book, log: &Path, at: Timestamp) -> (Option<ActionRecord>
     {
         return (None, failed(&plain(&error.to_string())));
     }
-    if book.is_sealed() {
+    if audit_log.is_sealed() {
         return (None, Ok(()));
     }
-    match book.seal(&key, at) {
+    match audit_log.seal(&key, at) {
         Ok(entry) => (Some(entry), replace(&path, &key.next()).or_else(|error| failed(&plain(&error.to_string())))),
         Err(error) => (None, Err(format!("the audit log is not sealed: {}", plain(&error.to_string())))),
     }
@@ -105,7 +105,7 @@ fn replace(path: &Path, key: &Key) -> io::Result<()> {
     old.sync_data()
 }
 
-/// Reads a log as [`book::verify`] does, and checks its seals. `false` if the present key is missing: then a log that was cut
+/// Reads a log as [`audit_log::verify`] does, and checks its seals. `false` if the present key is missing: then a log that was cut
 /// with its last seals is not found.
 pub fn verify(log: &Path, rows: &[Seal], key: &VerificationKey) -> Result<(Summary, Sealed, bool), VerifyError> {
     let path = beside(log);

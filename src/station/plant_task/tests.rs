@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 
 use super::*;
 use crate::{
-    access::io::{book, recorder},
+    access::io::{audit_log, recorder},
     history::io::alarm_file::{self, AlarmFile},
     plant::{
         alarm::AlarmCommand,
@@ -46,8 +46,8 @@ impl Station {
         records.try_send(Vec::new()).unwrap();
         let recorder = recorder::start(history, clock, records.clone()).unwrap();
         let (_, store) = watch::channel(HistoryStatus::default());
-        let book = Some(AuditQueue::new(&recorder));
-        let persistence = Persistence { records: Some(records), store, past: None, book, sets: None, observer: None };
+        let audit = Some(AuditQueue::new(&recorder));
+        let persistence = Persistence { records: Some(records), store, past: None, audit, sets: None, observer: None };
         let (request, requests) = mpsc::channel(8);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (events, event_queue) = mpsc::channel(8);
@@ -108,7 +108,7 @@ async fn an_acknowledgement_that_is_shown_is_on_disk_also_while_the_history_take
     assert!(snapshot.commands[0].recorded);
     // A kill at this very moment leaves these files.
     assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
-    let log = fs::read_to_string(book::beside(&history)).unwrap();
+    let log = fs::read_to_string(audit_log::beside(&history)).unwrap();
     assert!(log.contains("\"who\":\"anna\"") && log.contains("\"action\":\"acknowledge\""), "{log}");
     station.stop().await;
 }
@@ -185,7 +185,7 @@ async fn a_clock_that_is_set_while_the_station_runs_is_followed_recorded_and_ala
     let snapshot = station.ended(|_| true).await;
     assert!(off(snapshot.commands[0].at) < jiff::SignedDuration::from_secs(60));
     station.stop().await;
-    let log = fs::read_to_string(book::beside(&history)).unwrap();
+    let log = fs::read_to_string(audit_log::beside(&history)).unwrap();
     let line = log.lines().find(|line| line.contains("clock step")).unwrap_or_else(|| panic!("{log}"));
     let day = |at: jiff::Timestamp| at.strftime("%Y-%m-%dT").to_string();
     assert!(line.contains(&format!("\"old\":\"{}", day(wrong))), "{line}");

@@ -313,7 +313,7 @@ impl UserForm {
             Purpose::Disable(user, false) => vec![format!("{user} may log in again; a lockout ends too.")],
             Purpose::Delete(user) => {
                 let words =
-                    format!("{user} is removed; all that {user} did stays in the books. Type the name to be sure.");
+                    format!("{user} is removed; all that {user} did stays in the audit log. Type the name to be sure.");
                 you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
         }

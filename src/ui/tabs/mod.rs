@@ -23,7 +23,7 @@ use super::{
     session_lock,
 };
 use crate::{
-    access::{SessionRequest, book::sha256},
+    access::{SessionRequest, audit_log::sha256},
     history::{Answer, HistoryError},
     plant::snapshot::Snapshot,
 };

@@ -1,7 +1,7 @@
-//! What the book says of the file of users.
+//! What the audit log says of the file of users.
 
 use super::*;
-use crate::access::book::USERS_FILE;
+use crate::access::audit_log::USERS_FILE;
 
 #[test]
 fn each_change_of_the_users_is_tied_to_the_one_before_and_a_login_changes_nothing() {

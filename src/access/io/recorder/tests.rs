@@ -10,7 +10,7 @@ use std::{
 use super::*;
 use crate::{
     access::{
-        io::book::{VerifyError, beside, verify},
+        io::audit_log::{VerifyError, beside, verify},
         sealing::VerificationKey,
     },
     plant::{
@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-fn deed(what: &str) -> ActionRecord {
+fn record(what: &str) -> ActionRecord {
     ActionRecord {
         at: jiff::Timestamp::from_second(1_000_000).unwrap(),
         by: "anna".into(),
@@ -41,7 +41,7 @@ fn clock() -> Clock {
 fn batch(actions: &[&str], steps: &[AlarmStep]) -> Batch {
     let at = jiff::Timestamp::from_second(1_000_000).unwrap();
     let step = |kind: &AlarmStep| AlarmRecord::new(at, "TIC-1.PV", "high", Priority::High, *kind);
-    Batch { actions: actions.iter().map(|what| deed(what)).collect(), steps: steps.iter().map(step).collect() }
+    Batch { actions: actions.iter().map(|what| record(what)).collect(), steps: steps.iter().map(step).collect() }
 }
 
 /// What went to the history.
@@ -49,7 +49,7 @@ fn stored(rows: &mut mpsc::Receiver<Vec<Record>>) -> Vec<ActionRecord> {
     let mut kept = Vec::new();
     while let Ok(batch) = rows.try_recv() {
         kept.extend(batch.into_iter().map(|record| match record {
-            Record::Action(deed) => deed,
+            Record::Action(record) => record,
             other => panic!("{other:?}"),
         }));
     }
@@ -79,8 +79,8 @@ fn deeds_of_several_lives_are_one_chain_and_only_the_station_can_read_it() {
     let path = beside(&history);
     assert!(path.ends_with("tank.audit.jsonl"));
     let mut rows = Vec::new();
-    for deeds in [&["start", "write"][..], &[], &["plant file", "stop"]] {
-        rows.extend(life(&history, deeds).0);
+    for records in [&["start", "write"][..], &[], &["plant file", "stop"]] {
+        rows.extend(life(&history, records).0);
     }
     let summary = verify(&path, &seals(&rows)).unwrap();
     assert_eq!((summary.entries, summary.compared), (4, 4));
@@ -150,11 +150,11 @@ fn without_a_disk_deeds_go_to_the_history_without_a_seal_and_it_is_said() {
 fn a_book_that_is_taken_away_while_it_is_written_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tank.audit.jsonl");
-    let (mut book, _) = Book::open(&path).unwrap();
-    book.append(&mut [deed("start")]).unwrap();
+    let (mut audit_log, _) = AuditLog::open(&path).unwrap();
+    audit_log.append(&mut [record("start")]).unwrap();
     fs::remove_file(&path).unwrap();
-    assert!(book.append(&mut [deed("write")]).unwrap_err().to_string().contains("removed"));
-    let (_, opened) = Book::open(&path).unwrap();
+    assert!(audit_log.append(&mut [record("write")]).unwrap_err().to_string().contains("removed"));
+    let (_, opened) = AuditLog::open(&path).unwrap();
     assert!(opened.wrong[0].contains("broken"), "{opened:?}");
 }
 
@@ -218,11 +218,11 @@ fn a_full_disk_that_outlasts_the_waiting_actions_leaves_a_trace_in_the_log() {
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
     // The file stays as it is and takes nothing, so it is not opened again.
-    recorder.book.as_mut().unwrap().set_file(fs::File::open(&path).unwrap());
+    recorder.audit_log.as_mut().unwrap().set_file(fs::File::open(&path).unwrap());
     recorder.take(batch(&vec!["write"; PENDING_MAX + 7], &[]));
     recorder.write();
     assert!(recorder.status().log.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
-    recorder.book.as_mut().unwrap().set_file(OpenOptions::new().append(true).open(&path).unwrap());
+    recorder.audit_log.as_mut().unwrap().set_file(OpenOptions::new().append(true).open(&path).unwrap());
     recorder.write();
     let text = fs::read_to_string(&path).unwrap();
     assert!(text.lines().next().unwrap().contains("7 actions before this one are not in it"));
@@ -238,7 +238,7 @@ fn what_is_said_of_the_log_itself_waits_for_the_disk_like_every_action() {
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.tail = recorder.open().tail;
     assert!(recorder.is_written());
-    recorder.book.as_mut().unwrap().set_file(fs::File::open(beside(&history_file)).unwrap());
+    recorder.audit_log.as_mut().unwrap().set_file(fs::File::open(beside(&history_file)).unwrap());
     recorder.compare(&[]);
     recorder.write();
     assert!(!recorder.is_written(), "it is tried again each second");
@@ -297,7 +297,7 @@ fn files_that_another_process_writes_are_left_alone_until_it_ends() {
     life(&history_file, &["start"]);
     let state = alarm_file::beside(&history_file);
     let (log, alarms) = (fs::read(beside(&history_file)).unwrap(), fs::read(&state).ok());
-    let (other, _) = Book::open(&beside(&history_file)).unwrap();
+    let (other, _) = AuditLog::open(&beside(&history_file)).unwrap();
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
@@ -369,22 +369,23 @@ fn a_process_killed_at_any_step_of_a_seal_leaves_no_gap_and_uses_no_key_twice() 
         let (history_file, log) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
         let key = sealing::make(&log, at(0)).unwrap();
         life(&history_file, &["start"]);
-        let (mut book, _) = Book::open(&log).unwrap();
-        book.append(&mut [deed("write")]).unwrap();
+        let (mut audit_log, _) = AuditLog::open(&log).unwrap();
+        audit_log.append(&mut [record("write")]).unwrap();
         let present = sealing::read(&sealing::beside(&log)).unwrap().unwrap();
         match step {
             "before the entry" => {}
             "within the entry" => {
-                let (line, _) = crate::access::book::line(book.last(), &present.entry(book.last(), at(1)));
+                let (line, _) =
+                    crate::access::audit_log::line(audit_log.last(), &present.entry(audit_log.last(), at(1)));
                 let mut file = OpenOptions::new().append(true).open(&log).unwrap();
                 file.write_all(&line.as_bytes()[..line.len() - 1]).unwrap();
             }
-            _ => drop(book.seal(&present, at(1)).unwrap()),
+            _ => drop(audit_log.seal(&present, at(1)).unwrap()),
         }
         if step == "within the key" {
             fs::write(folder.path().join("tank.audit.key.new-2147483647"), present.next().text()).unwrap();
         }
-        drop(book);
+        drop(audit_log);
         let (_, status, _) = life(&history_file, &["start"]);
         assert_eq!((sealed(&log, &key), status.log), ((seals, 0), None), "{step}");
         let present = sealing::read(&sealing::beside(&log)).unwrap().unwrap();

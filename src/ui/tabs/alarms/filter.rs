@@ -1,4 +1,4 @@
-//! Which alarms of the book the list shows: by priority, state, area and words; pure.
+//! Which alarms of the audit log the list shows: by priority, state, area and words; pure.
 
 use crate::{
     plant::{

@@ -482,7 +482,7 @@ fn silence_is_one_key_on_every_tab_and_acknowledges_nothing() {
     assert!(screen(&mut model, 120, 40).lines().nth(2).is_some_and(|banner| banner.contains("silenced")));
 }
 
-/// Ten thousand alarms in the book, and so many active in one burst.
+/// Ten thousand alarms in the audit log, and so many active in one burst.
 fn flood(active: u16) -> Model {
     let mut fixture = Fixture::alarm();
     let pattern = fixture.def.alarms[2].clone();

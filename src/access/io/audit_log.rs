@@ -1,4 +1,4 @@
-//! The book on disk: read, verified, appended to.
+//! The audit log on disk: read, verified, appended to.
 
 use std::{
     collections::VecDeque,
@@ -14,7 +14,7 @@ use jiff::Timestamp;
 
 use crate::{
     access::{
-        book::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
+        audit_log::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
         sealing::{self, Key},
     },
     history::io::seals::SEALS_MAX,
@@ -24,17 +24,17 @@ use crate::{
 /// Why the files beside a history that another process has are left alone.
 pub const IN_USE: &str = "another process records to this history";
 
-/// The book beside a history: `tank.audit.jsonl` beside `tank.duckdb`.
+/// The audit log beside a history: `tank.audit.jsonl` beside `tank.duckdb`.
 pub fn beside(history: &Path) -> PathBuf {
     history.with_extension("audit.jsonl")
 }
 
 /// Where the last seal is noted: `tank.audit.head` beside `tank.audit.jsonl`.
-pub fn head_of(book: &Path) -> PathBuf {
-    book.with_extension("head")
+pub fn head_of(audit_log: &Path) -> PathBuf {
+    audit_log.with_extension("head")
 }
 
-/// Why a book is not whole, or cannot be read.
+/// Why an audit log is not whole, or cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// It cannot be read.
@@ -55,8 +55,8 @@ pub enum VerifyError {
     },
 }
 
-/// Reads a book from its beginning and finds the first line that is not as it was written. `rows` are the seals that the
-/// history holds; empty to look at the book alone. Safe while a station writes.
+/// Reads an audit log from its beginning and finds the first line that is not as it was written. `rows` are the seals that the
+/// history holds; empty to look at the audit log alone. Safe while a station writes.
 pub fn verify(path: &Path, rows: &[Seal]) -> Result<Summary, VerifyError> {
     verify_each(path, rows, |_, _| {})
 }
@@ -65,10 +65,10 @@ pub fn verify(path: &Path, rows: &[Seal]) -> Result<Summary, VerifyError> {
 pub(super) fn verify_each(
     path: &Path,
     rows: &[Seal],
-    mut each: impl FnMut(&book::Entry, Seal),
+    mut each: impl FnMut(&audit_log::Entry, Seal),
 ) -> Result<Summary, VerifyError> {
     let failed = |error| VerifyError::Io { path: path.display().to_string(), error };
-    // The note first: the book may be ahead of it, never behind.
+    // The note first: the audit log may be ahead of it, never behind.
     let head = read_head(path).map_err(failed)?;
     let file = File::open(path).map_err(failed)?;
     let mut check = Check::new(head, rows);
@@ -76,14 +76,14 @@ pub(super) fn verify_each(
     check.end(scanned.torn).map_err(|bad| VerifyError::Bad { path: path.display().to_string(), bad })
 }
 
-fn read_head(book: &Path) -> io::Result<Option<Seal>> {
-    match File::open(head_of(book)) {
+fn read_head(audit_log: &Path) -> io::Result<Option<Seal>> {
+    match File::open(head_of(audit_log)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),
         Ok(file) => {
             let mut text = String::new();
             file.take(1_000).read_to_string(&mut text)?;
-            Ok(book::head(&text))
+            Ok(audit_log::head(&text))
         }
     }
 }
@@ -94,14 +94,14 @@ struct Scanned {
     torn: bool,
 }
 
-fn scan(file: File, check: &mut Check, mut each: impl FnMut(book::Entry, Seal)) -> io::Result<Scanned> {
+fn scan(file: File, check: &mut Check, mut each: impl FnMut(audit_log::Entry, Seal)) -> io::Result<Scanned> {
     let mut reader = BufReader::new(file);
     let mut bytes = 0;
     let mut line = Vec::new();
     loop {
         line.clear();
-        let read = (&mut reader).take(book::LINE_MAX as u64).read_until(b'\n', &mut line)?;
-        if line.last() != Some(&b'\n') && read < book::LINE_MAX {
+        let read = (&mut reader).take(audit_log::LINE_MAX as u64).read_until(b'\n', &mut line)?;
+        if line.last() != Some(&b'\n') && read < audit_log::LINE_MAX {
             return Ok(Scanned { bytes, torn: read > 0 });
         }
         bytes += read as u64;
@@ -119,9 +119,9 @@ pub(super) fn last_seal(log: File) -> io::Result<Option<u64>> {
     Ok(last)
 }
 
-/// A book that can be written.
+/// An audit log that can be written.
 #[derive(Debug)]
-pub struct Book {
+pub struct AuditLog {
     file: File,
     head: File,
     last: Seal,
@@ -130,7 +130,7 @@ pub struct Book {
     last_seal: Option<(u64, u64)>,
 }
 
-/// What was found when the book was opened.
+/// What was found when the audit log was opened.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Opened {
     /// What is wrong with it, each for a line of its own.
@@ -143,11 +143,11 @@ pub struct Opened {
     pub tail: VecDeque<ActionRecord>,
 }
 
-impl Book {
-    /// Opens a book, or begins one. Nothing in it is ever changed or removed: a torn last line is put beside, and behind
+impl AuditLog {
+    /// Opens an audit log, or begins one. Nothing in it is ever changed or removed: a torn last line is put beside, and behind
     /// lines that were tampered with it goes on from the last seal that the station knows.
     /// [`io::ErrorKind::WouldBlock`] while another process writes it: two writers would break the chain.
-    pub fn open(path: &Path) -> io::Result<(Book, Opened)> {
+    pub fn open(path: &Path) -> io::Result<(AuditLog, Opened)> {
         let mut file = own(OpenOptions::new().read(true).append(true).create(true), path)?;
         file.try_lock().map_err(|error| match error {
             TryLockError::WouldBlock => io::Error::new(io::ErrorKind::WouldBlock, IN_USE),
@@ -178,13 +178,13 @@ impl Book {
             opened.wrong.push(format!("it is broken at {bad}; it goes on after entry {}", last.number));
         }
         let head = own(OpenOptions::new().write(true).create(true).truncate(false), &head_of(path))?;
-        let book = Book { file, head, last, bytes, last_seal };
-        book.note(last)?;
-        book.head.sync_all()?;
+        let audit_log = AuditLog { file, head, last, bytes, last_seal };
+        audit_log.note(last)?;
+        audit_log.head.sync_all()?;
         // The names must outlive a loss of power too.
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         File::open(folder)?.sync_all()?;
-        Ok((book, opened))
+        Ok((audit_log, opened))
     }
 
     /// Is it still as it was left? If not it must be opened again.
@@ -222,29 +222,29 @@ impl Book {
         Ok(entry)
     }
 
-    /// Writes deeds, all or none, and seals them. When this returns they are on disk.
-    pub fn append(&mut self, deeds: &mut [ActionRecord]) -> io::Result<()> {
+    /// Appends records, all or none, and sets their chain hashes. When this returns they are on disk.
+    pub fn append(&mut self, records: &mut [ActionRecord]) -> io::Result<()> {
         if !self.is_intact() {
-            return Err(io::Error::other("somebody else has removed or changed it"));
+            return Err(io::Error::other("another process has removed or changed it"));
         }
-        let (mut last, mut text, mut seals) = (self.last, String::new(), Vec::with_capacity(deeds.len()));
-        for deed in deeds.iter() {
-            let (line, seal) = book::line(last, deed);
+        let (mut last, mut text, mut seals) = (self.last, String::new(), Vec::with_capacity(records.len()));
+        for record in records.iter() {
+            let (line, seal) = audit_log::line(last, record);
             text += &line;
             seals.push(seal);
             last = seal;
         }
         let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data());
         if let Err(error) = written {
-            // Half a line helps nobody; if it cannot be taken back it is put beside when the book is opened again.
+            // Half a line helps nobody; if it cannot be taken back it is put beside when the audit log is opened again.
             let _ = self.file.set_len(self.bytes);
             return Err(error);
         }
         (self.last, self.bytes) = (last, self.bytes + text.len() as u64);
-        for (deed, seal) in deeds.iter_mut().zip(seals) {
-            deed.seal = Some(seal);
+        for (record, seal) in records.iter_mut().zip(seals) {
+            record.seal = Some(seal);
         }
-        // The deeds are safe already; a note that is behind is no fault, and no reason to write them twice.
+        // The records are on disk; a note that is behind is no reason to write them twice.
         if let Err(error) = self.note(last) {
             tracing::warn!(%error, "the last entry of the audit log could not be noted");
         }
@@ -252,7 +252,7 @@ impl Book {
     }
 
     fn note(&self, last: Seal) -> io::Result<()> {
-        self.head.write_all_at(book::head_text(last).as_bytes(), 0)
+        self.head.write_all_at(audit_log::head_text(last).as_bytes(), 0)
     }
 }
 
@@ -265,11 +265,11 @@ fn own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// Puts what stands behind the last whole line into a file beside the book.
+/// Puts what stands behind the last whole line into a file beside the audit log.
 fn set_aside(file: &mut File, path: &Path, bytes: u64) -> io::Result<PathBuf> {
     let mut torn = Vec::new();
     file.seek(SeekFrom::Start(bytes))?;
-    file.take(book::LINE_MAX as u64).read_to_end(&mut torn)?;
+    file.take(audit_log::LINE_MAX as u64).read_to_end(&mut torn)?;
     let name = path.file_name().unwrap_or(OsStr::new("audit")).to_string_lossy().into_owned();
     // The place of the line, so that a second one does not replace the first.
     let mut places = (0..).map(|more| path.with_file_name(format!("{name}.torn-{bytes}-{more}")));

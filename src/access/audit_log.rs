@@ -1,5 +1,5 @@
-//! The chained book of deeds: one line each, tied to the line before by a hash, so that nothing can be changed, cut,
-//! moved or put in without being seen.
+//! The audit log: one line an entry, each with a hash over itself and the hash before it, so that a change, a cut, a move
+//! or an insertion is found.
 //!
 //! ```text
 //! {"n":1,"utc":"2026-05-01T12:00:00Z","who":"anna",…,"outcome":"verified","hash":"5f…"}
@@ -17,8 +17,10 @@ use crate::plant::{
     visible::acts,
 };
 
-/// What the first line is tied to.
-pub const START: Seal = Seal { number: 0, hash: *b"sightglass, the book of deeds, 1" };
+/// The start of the chain in version 1.
+const START_V1: [u8; 32] = *b"sightglass, the book of deeds, 1";
+/// The start of the chain: version 2 of the format.
+pub const START: Seal = Seal { number: 0, hash: *b"sightglass audit log, version 2." };
 /// Bytes of a line at the most; whatever is longer was not written by a station.
 pub const LINE_MAX: usize = 64 << 10;
 /// Bytes of a text of a line at the most: eight of them, all of what must be escaped, are still shorter than a line.
@@ -35,7 +37,7 @@ pub const PLANT_FILE: &str = "plant file";
 /// What a change of the file of users is called.
 pub const USERS_FILE: &str = "users file";
 
-/// A line of the book.
+/// A line of the audit log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
@@ -106,13 +108,13 @@ pub fn compare<'a>(
     comparison
 }
 
-/// A deed as it can stand in the book, whatever its texts are made of: none of them endless, and nothing in them that moves
-/// a cursor or turns the direction of what follows. What fits already stays as it is.
-pub fn fit(mut deed: ActionRecord) -> ActionRecord {
-    let ActionRecord { at: _, by, from, action, target, old, new, outcome, note, seal: _ } = &mut deed;
+/// An action as the audit log can hold it: texts are limited in length and have no characters that move a cursor or change
+/// the direction of text. An action that fits stays as it is.
+pub fn fit(mut record: ActionRecord) -> ActionRecord {
+    let ActionRecord { at: _, by, from, action, target, old, new, outcome, note, seal: _ } = &mut record;
     let texts = [by, from, action, target, outcome].into_iter();
     texts.chain([old, new, note].into_iter().flatten()).for_each(fit_text);
-    deed
+    record
 }
 
 fn fit_text(text: &mut Arc<str>) {
@@ -124,9 +126,9 @@ fn fit_text(text: &mut Arc<str>) {
     }
 }
 
-/// The next line after `last`, with its end of line, and its seal. Whatever the deed says, [`Check`] takes the line.
-pub fn line(last: Seal, deed: &ActionRecord) -> (String, Seal) {
-    let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: _ } = fit(deed.clone());
+/// The next line after `last`, with its end of line, and its seal. [`Check`] accepts the line for every action.
+pub fn line(last: Seal, record: &ActionRecord) -> (String, Seal) {
+    let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: _ } = fit(record.clone());
     let entry = Entry { n: last.number + 1, utc: at, who: by, from, action, target, old, new, outcome, note };
     let mut text = serde_json::to_string(&entry).expect("texts, numbers and times can always be written");
     text.pop();
@@ -139,7 +141,7 @@ fn tied(last: [u8; 32], bytes: &[u8]) -> [u8; 32] {
     Sha256::new().chain_update(last).chain_update(bytes).finalize().into()
 }
 
-/// What is found in a book that is whole.
+/// What is found in an audit log that is whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Summary {
     /// Lines.
@@ -165,7 +167,7 @@ pub struct FirstBad {
     pub why: String,
 }
 
-/// Reads a book line by line and finds what is wrong with it.
+/// Reads an audit log line by line and finds what is wrong with it.
 #[derive(Debug)]
 pub struct Check {
     last: Seal,
@@ -203,9 +205,10 @@ impl Check {
 
     fn look_at(&mut self, bytes: &[u8]) -> Result<(Entry, Seal), String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "this is no text".to_owned())?;
-        let (body, hash) = split(text).ok_or("this does not end with a hash: it was cut or is no line of the book")?;
+        let (body, hash) =
+            split(text).ok_or("this does not end with a hash: it was cut or is no line of the audit log")?;
         let entry: Entry =
-            serde_json::from_str(&format!("{body}}}")).map_err(|_| "this is no line of the book".to_owned())?;
+            serde_json::from_str(&format!("{body}}}")).map_err(|_| "this is no line of the audit log".to_owned())?;
         let expected = self.last.number + 1;
         if entry.n < expected {
             return Err(format!("found entry {}, expected {expected}: it was moved or doubled", entry.n));
@@ -213,11 +216,14 @@ impl Check {
         if expected < entry.n {
             return Err(format!("found entry {}, expected {expected}: lines before it were cut out or moved", entry.n));
         }
+        if self.last == START && tied(START_V1, body.as_bytes()) == hash {
+            return Err("this audit log has the format of an earlier version: move it to another folder".to_owned());
+        }
         if tied(self.last.hash, body.as_bytes()) != hash {
             return Err("the hash does not fit: this line was changed or put in".to_owned());
         }
         if self.head.is_some_and(|head| head.number == entry.n && head.hash != hash) {
-            return Err("the station has noted another hash for this entry: the book was written anew".to_owned());
+            return Err("the station has noted another hash for this entry: the audit log was written anew".to_owned());
         }
         match self.rows.remove(&entry.n) {
             Some(row) if row != hash => return Err("the history holds another hash for this entry".to_owned()),
@@ -240,7 +246,7 @@ impl Check {
         }
         let line = self.line + 1;
         if let Some(head) = self.head.filter(|head| self.last.number < head.number) {
-            let why = format!("the book was cut here: the station has noted {} entries", head.number);
+            let why = format!("the audit log was cut here: the station has noted {} entries", head.number);
             return Err(FirstBad { line, why });
         }
         if self.head.is_none() && 0 < self.line {
@@ -248,7 +254,7 @@ impl Check {
             return Err(FirstBad { line, why: why.to_owned() });
         }
         if let Some((row, _)) = self.rows.range(self.last.number + 1..).next() {
-            return Err(FirstBad { line, why: format!("the book was cut here: the history holds entry {row}") });
+            return Err(FirstBad { line, why: format!("the audit log was cut here: the history holds entry {row}") });
         }
         let Check { last, span, compared, .. } = self;
         Ok(Summary { entries: self.line, last, span, compared, torn })
@@ -279,7 +285,7 @@ pub fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// What is noted of the last entry, beside the book: always of the same length, so that it is written in one piece.
+/// What is noted of the last entry, beside the audit log: always of the same length, so that it is written in one piece.
 pub fn head_text(seal: Seal) -> String {
     format!("{:020} {}\n", seal.number, seal.hash_hex())
 }
@@ -297,7 +303,7 @@ mod tests {
 
     use super::*;
 
-    fn deed(n: u64) -> ActionRecord {
+    fn record(n: u64) -> ActionRecord {
         ActionRecord {
             at: Timestamp::from_microsecond(1_000_000 * n as i64 + 7).unwrap(),
             by: "anna".into(),
@@ -312,10 +318,10 @@ mod tests {
         }
     }
 
-    fn book(count: u64) -> (Vec<String>, Vec<Seal>) {
+    fn audit_log(count: u64) -> (Vec<String>, Vec<Seal>) {
         let (mut lines, mut seals, mut last) = (Vec::new(), Vec::new(), START);
         for n in 1..=count {
-            let (line, seal) = super::line(last, &deed(n));
+            let (line, seal) = super::line(last, &record(n));
             lines.push(line.strip_suffix('\n').unwrap().to_owned());
             seals.push(seal);
             last = seal;
@@ -333,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_book_as_it_was_written_is_whole_and_its_lines_can_be_read() {
-        let (lines, seals) = book(5);
+        let (lines, seals) = audit_log(5);
         let summary = verify(&lines, seals.last().copied(), &seals).unwrap();
         assert_eq!((summary.entries, summary.compared, summary.last), (5, 5, seals[4]));
         let entry = Check::new(None, &[]).line(lines[0].as_bytes()).unwrap();
@@ -345,7 +351,7 @@ mod tests {
 
     #[test]
     fn a_book_that_was_written_anew_is_found_by_the_note_and_by_the_history() {
-        let (lines, seals) = book(5);
+        let (lines, seals) = audit_log(5);
         let forged = Seal { number: 3, hash: [1; 32] };
         assert_eq!(verify(&lines, Some(forged), &[]).unwrap_err().line, 3);
         assert_eq!(verify(&lines, seals.last().copied(), &[forged]).unwrap_err().line, 3);
@@ -355,7 +361,7 @@ mod tests {
 
     #[test]
     fn what_the_history_lacks_of_the_log_is_found_and_so_is_what_differs() {
-        let (lines, seals) = book(6);
+        let (lines, seals) = audit_log(6);
         let mut check = Check::new(None, &[]);
         let entry = |line: &String| check.line(line.as_bytes()).map(|entry| entry.sealed(check.last()));
         let tail: Vec<_> = lines.iter().filter_map(entry).collect();
@@ -378,7 +384,7 @@ mod tests {
         ) {
             let texts: Vec<Arc<str>> = texts.iter().map(|(text, times)| text.repeat(*times).into()).collect();
             let [by, from, action, target, outcome, old, new, note] = &texts[..] else { unreachable!() };
-            let deed = ActionRecord {
+            let record = ActionRecord {
                 by: by.clone(),
                 from: from.clone(),
                 action: action.clone(),
@@ -387,25 +393,25 @@ mod tests {
                 old: Some(old.clone()),
                 new: Some(new.clone()),
                 note: Some(note.clone()),
-                ..deed(1)
+                ..record(1)
             };
-            let (line, seal) = super::line(START, &deed);
+            let (line, seal) = super::line(START, &record);
             prop_assert!(line.len() < LINE_MAX, "{} bytes", line.len());
             let mut check = Check::new(Some(seal), &[]);
             let entry = check.line(line.trim_end_matches('\n').as_bytes()).unwrap();
             prop_assert!(check.end(false).is_ok());
-            prop_assert_eq!(&entry.target, &fit(deed.clone()).target);
+            prop_assert_eq!(&entry.target, &fit(record.clone()).target);
             prop_assert_eq!(entry.target.ends_with(CUT), TEXT_MAX < target.len());
             let moved = entry.who.contains(['\n', '\u{1b}', '\u{202e}']);
             prop_assert!(!moved, "a cursor could be moved");
-            prop_assert_eq!(fit(fit(deed.clone())), fit(deed));
+            prop_assert_eq!(fit(fit(record.clone())), fit(record));
         }
 
         #[test]
         fn whatever_is_done_to_a_book_the_first_bad_line_is_named(
             count in 3u64..12, what in 0u8..6, at in 0usize..100, other in 0usize..100, byte in 0usize..1000, bit in 0u8..7
         ) {
-            let (good, seals) = book(count);
+            let (good, seals) = audit_log(count);
             let (place, other) = (at % good.len(), other % good.len());
             let mut lines = good.clone();
             let first = match what {
@@ -425,7 +431,7 @@ mod tests {
                 3 => { let line = lines[place].clone(); lines.insert(place, line); place + 1 }
                 4 => { lines.swap(place, other); place.min(other) }
                 _ => {
-                    let (line, _) = super::line(Seal { number: place as u64, hash: [9; 32] }, &deed(99));
+                    let (line, _) = super::line(Seal { number: place as u64, hash: [9; 32] }, &record(99));
                     lines.insert(place, line.trim_end().to_owned());
                     place
                 }
