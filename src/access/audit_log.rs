@@ -13,14 +13,14 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::plant::{
-    record::{ActionRecord, Seal, hex},
+    record::{ActionRecord, ChainHash, hex},
     visible::acts,
 };
 
 /// The start of the chain in version 1.
 const START_V1: [u8; 32] = *b"sightglass, the book of deeds, 1";
 /// The start of the chain: version 2 of the format.
-pub const START: Seal = Seal { number: 0, hash: *b"sightglass audit log, version 2." };
+pub const START: ChainHash = ChainHash { number: 0, hash: *b"sightglass audit log, version 2." };
 /// Bytes of a line at the most; whatever is longer was not written by a station.
 pub const LINE_MAX: usize = 64 << 10;
 /// Bytes of a text of a line at the most: eight of them, all of what must be escaped, are still shorter than a line.
@@ -68,9 +68,9 @@ pub struct Entry {
 
 impl Entry {
     /// The action that it records.
-    pub fn sealed(self, seal: Seal) -> ActionRecord {
+    pub fn chained(self, chain_hash: ChainHash) -> ActionRecord {
         let Entry { n: _, utc: at, who: by, from, action, target, old, new, outcome, note } = self;
-        ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: Some(seal) }
+        ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash: Some(chain_hash) }
     }
 }
 
@@ -85,22 +85,22 @@ pub struct Comparison {
     pub not_in_log: Vec<u64>,
 }
 
-/// Compares the latest entries of the log, up to its seal `last`, with the latest `rows` of the history, at most `rows_max`.
+/// Compares the latest entries of the log, up to its chain_hash `last`, with the latest `rows` of the history, at most `rows_max`.
 pub fn compare<'a>(
     tail: impl IntoIterator<Item = &'a ActionRecord>,
-    last: Seal,
-    rows: &[Seal],
+    last: ChainHash,
+    rows: &[ChainHash],
     rows_max: usize,
 ) -> Comparison {
-    let rows: BTreeMap<u64, [u8; 32]> = rows.iter().map(|seal| (seal.number, seal.hash)).collect();
+    let rows: BTreeMap<u64, [u8; 32]> = rows.iter().map(|chain_hash| (chain_hash.number, chain_hash.hash)).collect();
     // Before the first of as many as were asked for there may be others.
     let from = if rows.len() < rows_max { 0 } else { rows.keys().next().copied().unwrap_or(0) };
     let mut comparison = Comparison::default();
     for entry in tail {
-        let Some(seal) = entry.seal.filter(|seal| from <= seal.number) else { continue };
-        match rows.get(&seal.number) {
-            Some(hash) if *hash == seal.hash => {}
-            Some(_) => comparison.differing.push(seal.number),
+        let Some(chain_hash) = entry.chain_hash.filter(|chain_hash| from <= chain_hash.number) else { continue };
+        match rows.get(&chain_hash.number) {
+            Some(hash) if *hash == chain_hash.hash => {}
+            Some(_) => comparison.differing.push(chain_hash.number),
             None => comparison.missing.push(entry.clone()),
         }
     }
@@ -111,7 +111,7 @@ pub fn compare<'a>(
 /// An action as the audit log can hold it: texts are limited in length and have no characters that move a cursor or change
 /// the direction of text. An action that fits stays as it is.
 pub fn fit(mut record: ActionRecord) -> ActionRecord {
-    let ActionRecord { at: _, by, from, action, target, old, new, outcome, note, seal: _ } = &mut record;
+    let ActionRecord { at: _, by, from, action, target, old, new, outcome, note, chain_hash: _ } = &mut record;
     let texts = [by, from, action, target, outcome].into_iter();
     texts.chain([old, new, note].into_iter().flatten()).for_each(fit_text);
     record
@@ -126,15 +126,15 @@ fn fit_text(text: &mut Arc<str>) {
     }
 }
 
-/// The next line after `last`, with its end of line, and its seal. [`Check`] accepts the line for every action.
-pub fn line(last: Seal, record: &ActionRecord) -> (String, Seal) {
-    let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal: _ } = fit(record.clone());
+/// The next line after `last`, with its end of line, and its chain_hash. [`Check`] accepts the line for every action.
+pub fn line(last: ChainHash, record: &ActionRecord) -> (String, ChainHash) {
+    let ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash: _ } = fit(record.clone());
     let entry = Entry { n: last.number + 1, utc: at, who: by, from, action, target, old, new, outcome, note };
     let mut text = serde_json::to_string(&entry).expect("texts, numbers and times can always be written");
     text.pop();
     let hash = tied(last.hash, text.as_bytes());
     text += &format!("{}{}{}\n", HASH.0, hex(&hash), HASH.1);
-    (text, Seal { number: entry.n, hash })
+    (text, ChainHash { number: entry.n, hash })
 }
 
 fn tied(last: [u8; 32], bytes: &[u8]) -> [u8; 32] {
@@ -146,8 +146,8 @@ fn tied(last: [u8; 32], bytes: &[u8]) -> [u8; 32] {
 pub struct Summary {
     /// Lines.
     pub entries: u64,
-    /// The seal of the last one.
-    pub last: Seal,
+    /// The chain_hash of the last one.
+    pub last: ChainHash,
     /// The first and the last time.
     pub span: Option<(Timestamp, Timestamp)>,
     /// Rows of the history that have their line here.
@@ -170,19 +170,19 @@ pub struct FirstBad {
 /// Reads an audit log line by line and finds what is wrong with it.
 #[derive(Debug)]
 pub struct Check {
-    last: Seal,
+    last: ChainHash,
     line: u64,
     span: Option<(Timestamp, Timestamp)>,
     bad: Option<FirstBad>,
-    head: Option<Seal>,
+    head: Option<ChainHash>,
     rows: BTreeMap<u64, [u8; 32]>,
     compared: u64,
 }
 
 impl Check {
-    /// Before the first line. `head` is the seal that the station noted last, `rows` are those of the history.
-    pub fn new(head: Option<Seal>, rows: &[Seal]) -> Check {
-        let rows = rows.iter().map(|seal| (seal.number, seal.hash)).collect();
+    /// Before the first line. `head` is the chain_hash that the station noted last, `rows` are those of the history.
+    pub fn new(head: Option<ChainHash>, rows: &[ChainHash]) -> Check {
+        let rows = rows.iter().map(|chain_hash| (chain_hash.number, chain_hash.hash)).collect();
         Check { last: START, line: 0, span: None, bad: None, head, rows, compared: 0 }
     }
 
@@ -191,8 +191,8 @@ impl Check {
     pub fn line(&mut self, bytes: &[u8]) -> Option<Entry> {
         self.line += 1;
         match self.look_at(bytes) {
-            Ok((entry, seal)) => {
-                self.last = seal;
+            Ok((entry, chain_hash)) => {
+                self.last = chain_hash;
                 self.span = Some((self.span.map_or(entry.utc, |span| span.0), entry.utc));
                 Some(entry)
             }
@@ -203,7 +203,7 @@ impl Check {
         }
     }
 
-    fn look_at(&mut self, bytes: &[u8]) -> Result<(Entry, Seal), String> {
+    fn look_at(&mut self, bytes: &[u8]) -> Result<(Entry, ChainHash), String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "this is no text".to_owned())?;
         let (body, hash) =
             split(text).ok_or("this does not end with a hash: it was cut or is no line of the audit log")?;
@@ -231,11 +231,11 @@ impl Check {
             None => {}
         }
         let number = entry.n;
-        Ok((entry, Seal { number, hash }))
+        Ok((entry, ChainHash { number, hash }))
     }
 
-    /// The seal of the last sound line.
-    pub fn last(&self) -> Seal {
+    /// The chain_hash of the last sound line.
+    pub fn last(&self) -> ChainHash {
         self.last
     }
 
@@ -286,14 +286,14 @@ pub fn sha256(bytes: &[u8]) -> String {
 }
 
 /// What is noted of the last entry, beside the audit log: always of the same length, so that it is written in one piece.
-pub fn head_text(seal: Seal) -> String {
-    format!("{:020} {}\n", seal.number, seal.hash_hex())
+pub fn head_text(chain_hash: ChainHash) -> String {
+    format!("{:020} {}\n", chain_hash.number, chain_hash.hash_hex())
 }
 
-/// The seal of such a note.
-pub fn head(text: &str) -> Option<Seal> {
+/// The chain_hash of such a note.
+pub fn head(text: &str) -> Option<ChainHash> {
     let (number, hash) = text.strip_suffix('\n')?.split_once(' ')?;
-    Some(Seal { number: number.parse().ok()?, hash: unhex(hash)? })
+    Some(ChainHash { number: number.parse().ok()?, hash: unhex(hash)? })
 }
 
 #[cfg(test)]
@@ -314,22 +314,22 @@ mod tests {
             new: Some(format!("{n} \"°C\"\n").into()),
             outcome: "verified".into(),
             note: None,
-            seal: None,
+            chain_hash: None,
         }
     }
 
-    fn audit_log(count: u64) -> (Vec<String>, Vec<Seal>) {
-        let (mut lines, mut seals, mut last) = (Vec::new(), Vec::new(), START);
+    fn audit_log(count: u64) -> (Vec<String>, Vec<ChainHash>) {
+        let (mut lines, mut chain_hashes, mut last) = (Vec::new(), Vec::new(), START);
         for n in 1..=count {
-            let (line, seal) = super::line(last, &record(n));
+            let (line, chain_hash) = super::line(last, &record(n));
             lines.push(line.strip_suffix('\n').unwrap().to_owned());
-            seals.push(seal);
-            last = seal;
+            chain_hashes.push(chain_hash);
+            last = chain_hash;
         }
-        (lines, seals)
+        (lines, chain_hashes)
     }
 
-    fn verify(lines: &[String], head: Option<Seal>, rows: &[Seal]) -> Result<Summary, FirstBad> {
+    fn verify(lines: &[String], head: Option<ChainHash>, rows: &[ChainHash]) -> Result<Summary, FirstBad> {
         let mut check = Check::new(head, rows);
         for line in lines {
             check.line(line.as_bytes());
@@ -339,42 +339,50 @@ mod tests {
 
     #[test]
     fn a_book_as_it_was_written_is_whole_and_its_lines_can_be_read() {
-        let (lines, seals) = audit_log(5);
-        let summary = verify(&lines, seals.last().copied(), &seals).unwrap();
-        assert_eq!((summary.entries, summary.compared, summary.last), (5, 5, seals[4]));
+        let (lines, chain_hashes) = audit_log(5);
+        let summary = verify(&lines, chain_hashes.last().copied(), &chain_hashes).unwrap();
+        assert_eq!((summary.entries, summary.compared, summary.last), (5, 5, chain_hashes[4]));
         let entry = Check::new(None, &[]).line(lines[0].as_bytes()).unwrap();
         assert_eq!((entry.n, &*entry.who, entry.new.as_deref()), (1, "anna", Some("1 \"°C\" ")));
         assert!(lines.iter().all(|line| !line.contains('\n')), "one line each, whatever the note");
-        assert_eq!(head(&head_text(seals[4])), Some(seals[4]));
+        assert_eq!(head(&head_text(chain_hashes[4])), Some(chain_hashes[4]));
         assert_eq!(verify(&[], Some(START), &[]).unwrap().entries, 0);
     }
 
     #[test]
     fn a_book_that_was_written_anew_is_found_by_the_note_and_by_the_history() {
-        let (lines, seals) = audit_log(5);
-        let forged = Seal { number: 3, hash: [1; 32] };
+        let (lines, chain_hashes) = audit_log(5);
+        let forged = ChainHash { number: 3, hash: [1; 32] };
         assert_eq!(verify(&lines, Some(forged), &[]).unwrap_err().line, 3);
-        assert_eq!(verify(&lines, seals.last().copied(), &[forged]).unwrap_err().line, 3);
-        assert_eq!(verify(&lines[..3], Some(seals[2]), &seals).unwrap_err().line, 4, "cut, and the note as well");
+        assert_eq!(verify(&lines, chain_hashes.last().copied(), &[forged]).unwrap_err().line, 3);
+        assert_eq!(
+            verify(&lines[..3], Some(chain_hashes[2]), &chain_hashes).unwrap_err().line,
+            4,
+            "cut, and the note as well"
+        );
         assert_eq!(verify(&lines, None, &[]).unwrap_err().line, 6, "without the note a cut cannot be ruled out");
     }
 
     #[test]
     fn what_the_history_lacks_of_the_log_is_found_and_so_is_what_differs() {
-        let (lines, seals) = audit_log(6);
+        let (lines, chain_hashes) = audit_log(6);
         let mut check = Check::new(None, &[]);
-        let entry = |line: &String| check.line(line.as_bytes()).map(|entry| entry.sealed(check.last()));
+        let entry = |line: &String| check.line(line.as_bytes()).map(|entry| entry.chained(check.last()));
         let tail: Vec<_> = lines.iter().filter_map(entry).collect();
-        let forged = Seal { number: 5, hash: [1; 32] };
-        let ahead = Seal { number: 9, hash: [2; 32] };
-        let found = compare(&tail, seals[5], &[ahead, forged, seals[3], seals[1]], 100);
-        let missing: Vec<_> = found.missing.iter().map(|entry| entry.seal.unwrap().number).collect();
+        let forged = ChainHash { number: 5, hash: [1; 32] };
+        let ahead = ChainHash { number: 9, hash: [2; 32] };
+        let found = compare(&tail, chain_hashes[5], &[ahead, forged, chain_hashes[3], chain_hashes[1]], 100);
+        let missing: Vec<_> = found.missing.iter().map(|entry| entry.chain_hash.unwrap().number).collect();
         assert_eq!((missing, found.differing, found.not_in_log), (vec![1, 3, 6], vec![5], vec![9]));
         assert_eq!(found.missing[0].new.as_deref(), Some("1 \"°C\" "), "as it is in the log");
-        assert_eq!(compare(&tail, seals[5], &seals, 100), Comparison::default());
-        let found = compare(&tail, seals[5], &[seals[5], seals[3]], 2);
+        assert_eq!(compare(&tail, chain_hashes[5], &chain_hashes, 100), Comparison::default());
+        let found = compare(&tail, chain_hashes[5], &[chain_hashes[5], chain_hashes[3]], 2);
         assert_eq!(found.missing.len(), 1, "nobody knows what else the history holds before the rows that were read");
-        assert_eq!(compare(&tail, seals[5], &[], 100).missing.len(), 6, "a new history is completed from the log");
+        assert_eq!(
+            compare(&tail, chain_hashes[5], &[], 100).missing.len(),
+            6,
+            "a new history is completed from the log"
+        );
     }
 
     proptest! {
@@ -395,9 +403,9 @@ mod tests {
                 note: Some(note.clone()),
                 ..record(1)
             };
-            let (line, seal) = super::line(START, &record);
+            let (line, chain_hash) = super::line(START, &record);
             prop_assert!(line.len() < LINE_MAX, "{} bytes", line.len());
-            let mut check = Check::new(Some(seal), &[]);
+            let mut check = Check::new(Some(chain_hash), &[]);
             let entry = check.line(line.trim_end_matches('\n').as_bytes()).unwrap();
             prop_assert!(check.end(false).is_ok());
             prop_assert_eq!(&entry.target, &fit(record.clone()).target);
@@ -411,7 +419,7 @@ mod tests {
         fn whatever_is_done_to_a_book_the_first_bad_line_is_named(
             count in 3u64..12, what in 0u8..6, at in 0usize..100, other in 0usize..100, byte in 0usize..1000, bit in 0u8..7
         ) {
-            let (good, seals) = audit_log(count);
+            let (good, chain_hashes) = audit_log(count);
             let (place, other) = (at % good.len(), other % good.len());
             let mut lines = good.clone();
             let first = match what {
@@ -419,7 +427,7 @@ mod tests {
                     let mut bytes = lines[place].clone().into_bytes();
                     let byte = byte % bytes.len();
                     bytes[byte] ^= 1 << bit;
-                    let mut check = Check::new(seals.last().copied(), &[]);
+                    let mut check = Check::new(chain_hashes.last().copied(), &[]);
                     for (index, line) in lines.iter().enumerate() {
                         check.line(if index == place { &bytes } else { line.as_bytes() });
                     }
@@ -431,12 +439,12 @@ mod tests {
                 3 => { let line = lines[place].clone(); lines.insert(place, line); place + 1 }
                 4 => { lines.swap(place, other); place.min(other) }
                 _ => {
-                    let (line, _) = super::line(Seal { number: place as u64, hash: [9; 32] }, &record(99));
+                    let (line, _) = super::line(ChainHash { number: place as u64, hash: [9; 32] }, &record(99));
                     lines.insert(place, line.trim_end().to_owned());
                     place
                 }
             };
-            let verdict = verify(&lines, seals.last().copied(), &seals);
+            let verdict = verify(&lines, chain_hashes.last().copied(), &chain_hashes);
             if lines == good {
                 prop_assert!(verdict.is_ok());
             } else {

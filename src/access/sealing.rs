@@ -12,7 +12,7 @@ use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 
 use super::audit_log::{Entry, FirstBad, START, unhex};
-use crate::plant::record::{ActionRecord, SEAL_LOG, Seal, hex};
+use crate::plant::record::{ActionRecord, ChainHash, SEAL_LOG, hex};
 
 /// Seconds between two seals of a station that runs.
 const INTERVAL: i64 = 3_600;
@@ -62,7 +62,7 @@ impl Key {
     }
 
     /// The seal, as an entry of the log, after the entry `last`.
-    pub fn entry(&self, last: Seal, at: Timestamp) -> ActionRecord {
+    pub fn entry(&self, last: ChainHash, at: Timestamp) -> ActionRecord {
         ActionRecord {
             at,
             by: "station".into(),
@@ -73,11 +73,11 @@ impl Key {
             new: Some(hex(&self.seal(last, at)).into()),
             outcome: "done".into(),
             note: None,
-            seal: None,
+            chain_hash: None,
         }
     }
 
-    fn seal(&self, last: Seal, at: Timestamp) -> [u8; 32] {
+    fn seal(&self, last: ChainHash, at: Timestamp) -> [u8; 32] {
         hmac(&self.bytes, &[&last.hash[..], &at.as_nanosecond().to_be_bytes()].concat())
     }
 
@@ -138,7 +138,7 @@ pub struct SealCheck {
     first: Key,
     next: Key,
     /// The last entry that was looked at.
-    entry: Seal,
+    entry: ChainHash,
     last: Option<(u64, Timestamp)>,
     bad: Option<FirstBad>,
 }
@@ -150,8 +150,8 @@ impl SealCheck {
     }
 
     /// The next entry, and its place in the chain.
-    pub fn entry(&mut self, entry: &Entry, seal: Seal) {
-        let before = std::mem::replace(&mut self.entry, seal);
+    pub fn entry(&mut self, entry: &Entry, chain_hash: ChainHash) {
+        let before = std::mem::replace(&mut self.entry, chain_hash);
         let Some(number) = number(entry).filter(|_| self.bad.is_none()) else { return };
         let expected = self.next.number;
         if number < expected && self.last.is_none() {
@@ -218,12 +218,12 @@ mod tests {
     }
 
     /// A log with an action before each seal and one behind the last; `key` makes the seals.
-    fn sealed(mut key: Key, seals: u64) -> Vec<(Entry, Seal)> {
+    fn sealed(mut key: Key, seals: u64) -> Vec<(Entry, ChainHash)> {
         let (mut check, mut entries) = (Check::new(None, &[]), Vec::new());
         let mut append = |action: ActionRecord| {
-            let (text, seal) = line(check.last(), &action);
-            entries.push((check.line(text.trim_end().as_bytes()).unwrap(), seal));
-            seal
+            let (text, chain_hash) = line(check.last(), &action);
+            entries.push((check.line(text.trim_end().as_bytes()).unwrap(), chain_hash));
+            chain_hash
         };
         for second in 0..seals {
             let last = append(ActionRecord { action: "write".into(), ..key.entry(START, at(0)) });
@@ -234,9 +234,9 @@ mod tests {
         entries
     }
 
-    fn check(entries: &[(Entry, Seal)], present: Option<Key>) -> Result<Sealed, FirstBad> {
+    fn check(entries: &[(Entry, ChainHash)], present: Option<Key>) -> Result<Sealed, FirstBad> {
         let mut check = SealCheck::new(&KEY);
-        entries.iter().for_each(|(entry, seal)| check.entry(entry, *seal));
+        entries.iter().for_each(|(entry, chain_hash)| check.entry(entry, *chain_hash));
         check.end(present)
     }
 
@@ -283,7 +283,7 @@ mod tests {
 
     #[test]
     fn wrong_and_missing_seals_are_named_with_their_line() {
-        let line = |entries: &[(Entry, Seal)], present| check(entries, present).unwrap_err().line;
+        let line = |entries: &[(Entry, ChainHash)], present| check(entries, present).unwrap_err().line;
         let entries = sealed(KEY.first, 3);
         // Written again with a chain that is whole, by who has the key after them.
         assert_eq!(line(&sealed(key(8), 3), Some(key(8))), 2, "a later key's number");

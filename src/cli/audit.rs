@@ -17,7 +17,7 @@ use crate::{
         sealing::{Sealed, VerificationKey},
     },
     history::{Answer, Query},
-    plant::{PlantDef, record::Seal},
+    plant::{PlantDef, record::ChainHash},
 };
 
 use super::{CliError, StationArgs, client, in_runtime, load, run, say, source::Source};
@@ -119,18 +119,20 @@ fn verify(args: VerifyArgs) -> Result<(), CliError> {
     // An audit log at another place has no history to compare with.
     let (path, rows) = match &args.log {
         Some(path) => (path.clone(), None),
-        None => (audit_log::beside(&run::history_file(&def, &args.station)), Some(in_runtime(seals(&def, &args)))),
+        None => {
+            (audit_log::beside(&run::history_file(&def, &args.station)), Some(in_runtime(chain_hashes(&def, &args))))
+        }
     };
     let mut not_compared = Vec::new();
-    let seals = rows.unwrap_or(Ok(Vec::new())).unwrap_or_else(|error| {
+    let chain_hashes = rows.unwrap_or(Ok(Vec::new())).unwrap_or_else(|error| {
         not_compared.push(format!("it was not compared with the history: {error}"));
         Vec::new()
     });
     let failed = |error: audit_log::VerifyError| CliError::Failed(error.to_string());
     let (summary, sealed) = match &key {
-        None => (audit_log::verify(&path, &seals).map_err(failed)?, None),
+        None => (audit_log::verify(&path, &chain_hashes).map_err(failed)?, None),
         Some(key) => {
-            let (summary, sealed, is_compared) = sealing::verify(&path, &seals, key).map_err(failed)?;
+            let (summary, sealed, is_compared) = sealing::verify(&path, &chain_hashes, key).map_err(failed)?;
             if !is_compared {
                 let present = sealing::beside(&path);
                 not_compared
@@ -165,7 +167,7 @@ fn local(at: Timestamp, def: &PlantDef) -> String {
 fn summary_lines(summary: &Summary, def: &PlantDef) -> Vec<String> {
     let mut lines = vec![
         format!("lines      {}", summary.entries),
-        format!("last seal  {}", summary.last),
+        format!("last entry {}", summary.last),
         format!("history    {} of {} entries compared", summary.compared, summary.entries),
     ];
     lines.extend(summary.span.map(|(first, last)| format!("from       {} to {}", local(first, def), local(last, def))));
@@ -175,11 +177,11 @@ fn summary_lines(summary: &Summary, def: &PlantDef) -> Vec<String> {
     lines
 }
 
-/// The seals that the history holds.
-async fn seals(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Seal>, CliError> {
+/// The chain hashes that the history holds.
+async fn chain_hashes(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<ChainHash>, CliError> {
     let source = Source::open(def, &args.station, &args.login).await?;
     // Whatever the clock was: a history may hold what is yet to come.
-    let (mut seals, mut to) = (BTreeMap::new(), Timestamp::MAX);
+    let (mut chain_hashes, mut to) = (BTreeMap::new(), Timestamp::MAX);
     loop {
         let all = String::new;
         let query =
@@ -187,12 +189,14 @@ async fn seals(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Seal>, CliE
         let Answer::Actions(actions) = source.query(query).await? else {
             return Err(CliError::Failed("the history answered another query".to_owned()));
         };
-        let before = seals.len();
-        seals.extend(actions.iter().filter_map(|action| action.seal).map(|seal| (seal.number, seal)));
+        let before = chain_hashes.len();
+        chain_hashes.extend(
+            actions.iter().filter_map(|action| action.chain_hash).map(|chain_hash| (chain_hash.number, chain_hash)),
+        );
         // Newest first: the next page ends with the instant in which this one begins, whose actions come once more.
-        match actions.last().filter(|_| actions.len() == PAGE && before < seals.len()) {
+        match actions.last().filter(|_| actions.len() == PAGE && before < chain_hashes.len()) {
             Some(last) => to = last.at + MICROSECOND,
-            None => return Ok(seals.into_values().collect()),
+            None => return Ok(chain_hashes.into_values().collect()),
         }
     }
 }

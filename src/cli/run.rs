@@ -12,7 +12,7 @@ use crate::{
     access::io::{users, users_beside},
     attach::io::{find, serve},
     bus::io::{clock::Clock, transport::Connector},
-    plant::{PlantDef, Snapshot, record::Seal},
+    plant::{PlantDef, Snapshot, record::ChainHash},
     profile::PlantFile,
     station::{LifecycleRequest, event_log, io as station},
     ui,
@@ -197,7 +197,7 @@ impl Serving {
     }
 
     /// Ends the station; its terminals hear of it by its silence. Gives the socket back, and the last entry of the audit log.
-    async fn stop(self) -> Result<(serve::Listener, Option<Seal>), CliError> {
+    async fn stop(self) -> Result<(serve::Listener, Option<ChainHash>), CliError> {
         let last = self.station.stop().await;
         let socket = self.socket.await;
         Ok((socket.map_err(|error| CliError::Failed(format!("the socket ended badly: {error}")))?, last))
@@ -268,9 +268,9 @@ pub async fn follow(
 
 /// Prints the last entry of the audit log, for the journal of the system: whoever changes the log later, and all hashes
 /// behind the change, must change the journal as well.
-pub fn say_anchor(last: Option<Seal>) {
-    if let Some(seal) = last {
-        say(&format!("audit log: entry {seal}"));
+pub fn say_anchor(last: Option<ChainHash>) {
+    if let Some(chain_hash) = last {
+        say(&format!("audit log: entry {chain_hash}"));
     }
 }
 

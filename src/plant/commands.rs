@@ -160,7 +160,7 @@ impl CommandTracker {
             new: tag.write_unlock.map(|(_, new)| value_words(image, key, new).into()),
             outcome: format!("{}; for {}", outcome_words(&outcome), tag.name).into(),
             note: None,
-            seal: None,
+            chain_hash: None,
         })
     }
 
@@ -432,7 +432,7 @@ fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImage) -> Actio
         new: new.map(Into::into),
         outcome: outcome_words(&status.outcome).into(),
         note: status.note.clone(),
-        seal: None,
+        chain_hash: None,
     }
 }
 

@@ -170,7 +170,7 @@ pub struct ActionRecord {
     /// Why, in his words.
     pub note: Option<Arc<str>>,
     /// Its place in the audit log; `None` until it is written.
-    pub seal: Option<Seal>,
+    pub chain_hash: Option<ChainHash>,
 }
 
 /// The word on record for a write that is about to be sent; its outcome has a line of its own.
@@ -212,14 +212,14 @@ pub const ELSEWHERE: [&str; 26] = [
 
 /// The place of an entry in the hash chain of the audit log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Seal {
+pub struct ChainHash {
     /// Running number, from 1.
     pub number: u64,
-    /// SHA-256 over the line and the seal before it.
+    /// SHA-256 over the line and the hash before it.
     pub hash: [u8; 32],
 }
 
-impl Seal {
+impl ChainHash {
     /// The hash in hexadecimal digits.
     pub fn hash_hex(&self) -> String {
         hex(&self.hash)
@@ -227,7 +227,7 @@ impl Seal {
 }
 
 /// Number and hash: `17 5f0c…`.
-impl fmt::Display for Seal {
+impl fmt::Display for ChainHash {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.number, self.hash_hex())
     }

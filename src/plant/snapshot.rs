@@ -18,7 +18,7 @@ use super::{
     line_report::LineReport,
     ne107,
     parameter_set::StoredSet,
-    record::{Burst, Seal},
+    record::{Burst, ChainHash},
     restore::Restore,
     sample::{Cause, Sample},
     scale,
@@ -340,7 +340,7 @@ pub struct HistoryStatus {
     /// How often the clock was set while this history was written; stored with each record.
     pub epoch: u16,
     /// The last entry of the audit log that is on disk.
-    pub audit: Option<Seal>,
+    pub audit: Option<ChainHash>,
     /// All that is wrong with it, in words for the operator.
     pub trouble: Option<String>,
     /// Size of the file, bytes.

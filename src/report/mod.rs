@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use crate::plant::{
     alarm::PeriodMetrics,
     def::{CsvDialect, PlantDef, Priority},
-    record::{ActionRecord, AlarmRecord, AlarmStep, Seal},
+    record::{ActionRecord, AlarmRecord, AlarmStep, ChainHash},
 };
 
 /// A format of the shift report. To add one: a file with this trait, and its module and row of [`FORMATS`] here.
@@ -100,7 +100,7 @@ pub struct ShiftReport {
     /// Up to when data were there: the end of the period, or earlier for a running shift.
     pub until: Timestamp,
     /// The last entry of the audit log before `until`: whoever changes the log later must change every copy of the report.
-    pub audit: Option<Seal>,
+    pub audit: Option<ChainHash>,
     /// Where stored values could not be read: there, none is counted.
     pub unreadable: Vec<Gap>,
     /// One row a tag.

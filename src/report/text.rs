@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        plant::record::Seal,
+        plant::record::ChainHash,
         report::{
             Period,
             testing::{THREE, at, plant},
@@ -111,7 +111,7 @@ mod tests {
                 to: at("2026-11-21T14:00+07"),
             },
             until: at("2026-11-21T09:00+07"),
-            audit: Some(Seal { number: 7, hash: [0xA5; 32] }),
+            audit: Some(ChainHash { number: 7, hash: [0xA5; 32] }),
             unreadable: Vec::new(),
             tags: vec![TagFigures {
                 tag: "TIC-1.PV".into(),

@@ -24,7 +24,7 @@ use crate::{
         alarm::manager::subject_name,
         command::{CommandId, CommandStatus, Outcome},
         def::AlarmId,
-        record::{ActionRecord, AlarmRecord, Seal},
+        record::{ActionRecord, AlarmRecord, ChainHash},
     },
     profile::PlantFile,
 };
@@ -269,14 +269,14 @@ impl AuditQueue {
     }
 
     /// The history is open and holds these entries of the audit log.
-    pub fn stored(&self, seals: Vec<Seal>) {
-        if self.queue.try_send(Message::Stored(seals)).is_err() {
+    pub fn stored(&self, chain_hashes: Vec<ChainHash>) {
+        if self.queue.try_send(Message::Stored(chain_hashes)).is_err() {
             tracing::warn!("the audit log is too busy to be compared with the history before the next start");
         }
     }
 
     /// The last entry of the audit log that is on disk.
-    pub fn last(&self) -> Option<Seal> {
+    pub fn last(&self) -> Option<ChainHash> {
         self.recorded.borrow().last
     }
 
@@ -325,6 +325,6 @@ fn own(at: Timestamp, action: &str, target: &str, outcome: &str) -> ActionRecord
         new: None,
         outcome: outcome.into(),
         note: None,
-        seal: None,
+        chain_hash: None,
     }
 }

@@ -20,7 +20,7 @@ use crate::{
     plant::{
         Plant, PlantDef,
         command::Command,
-        record::Seal,
+        record::ChainHash,
         snapshot::HistoryStatus,
         station::{FaultState, StationFault},
     },
@@ -68,7 +68,7 @@ pub struct Station {
     /// `None` for a rehearsal, which keeps nothing.
     history: Option<history::Handle>,
     /// The thread of the audit log, which ends before the history.
-    audit_writer: Option<std::thread::JoinHandle<Option<Seal>>>,
+    audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
     /// Nobody is asked who he is.
     open: bool,
     stop: watch::Sender<bool>,
@@ -164,7 +164,7 @@ pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, ob
 struct Threads {
     queries: mpsc::Sender<(u32, QueryRequest)>,
     history: Option<history::Handle>,
-    audit_writer: Option<std::thread::JoinHandle<Option<Seal>>>,
+    audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
 }
 
 // Everything that a station is made of, each once.
@@ -232,7 +232,7 @@ impl Station {
     }
 
     /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
-    pub async fn stop(self) -> Option<Seal> {
+    pub async fn stop(self) -> Option<ChainHash> {
         let Station { acceptor, commands, lifecycle, history, audit_writer, open: _, stop, tasks } = self;
         // Links may have ended already; then nobody listens, which is fine.
         let _ = stop.send(true);

@@ -77,7 +77,7 @@ mod tests {
     fn a_past_that_comes_late_changes_no_alarm_that_has_moved_since() {
         let before = vec![step(1, "high", AlarmStep::Raised), step(2, "low", AlarmStep::Raised)];
         let recent = Recent { steps: before.clone(), ..Recent::default() };
-        let restored = Restored { steps: before.clone(), recent, seals: None };
+        let restored = Restored { steps: before.clone(), recent, chain_hashes: None };
         let now = step(9, "low", AlarmStep::Returned);
         for from_journal in [true, false] {
             let mut past = Past::new(None, from_journal);

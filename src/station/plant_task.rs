@@ -235,9 +235,9 @@ impl PlantTask {
     /// Takes up what the history knows of the time before the start.
     fn take_up(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
-        let Restored { steps, recent, seals } = past.join(restored);
-        if let (Some(seals), Some(audit)) = (seals, &mut self.persistence.audit) {
-            audit.stored(seals);
+        let Restored { steps, recent, chain_hashes } = past.join(restored);
+        if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
+            audit.stored(chain_hashes);
         }
         if !steps.is_empty() {
             tracing::info!(steps = steps.len(), "the state of the alarms is taken from the journal");

@@ -68,9 +68,9 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     drop((session, other));
     station.stop().await;
 
-    let seals: Vec<_> = rows.iter().filter_map(|row| row.seal).collect();
-    assert_eq!(seals.len(), rows.len(), "every row is sealed");
-    let summary = audit_log::verify(&audit_log::beside(&history), &seals).unwrap();
+    let chain_hashes: Vec<_> = rows.iter().filter_map(|row| row.chain_hash).collect();
+    assert_eq!(chain_hashes.len(), rows.len(), "every row is sealed");
+    let summary = audit_log::verify(&audit_log::beside(&history), &chain_hashes).unwrap();
     assert!(summary.compared == rows.len() as u64 && summary.entries > summary.compared);
     let text = std::fs::read_to_string(audit_log::beside(&history)).unwrap();
     let actions: Vec<_> = text.lines().map(|line| line.split("\"action\":\"").nth(1).unwrap()).collect();

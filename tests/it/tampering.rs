@@ -155,8 +155,8 @@ fn make_key(folder: &Path, name: &str) -> (Option<i32>, PathBuf) {
 fn rewrite(audit_log: &Path, entries: &[Entry]) {
     let (mut text, mut last) = (String::new(), START);
     for entry in entries {
-        let (line, seal) = line(last, &entry.clone().sealed(last));
-        (text, last) = (text + &line, seal);
+        let (line, chain_hash) = line(last, &entry.clone().chained(last));
+        (text, last) = (text + &line, chain_hash);
     }
     fs::write(audit_log, text).unwrap();
     fs::write(audit_log.with_extension("head"), head_text(last)).unwrap();

@@ -77,7 +77,7 @@ impl AccessControl {
                     new: None,
                     outcome: outcome.into(),
                     note: None,
-                    seal: None,
+                    chain_hash: None,
                 }));
                 (refusals.unrecorded, refusals.recorded_at) = (0, at);
             }
@@ -129,7 +129,7 @@ pub(super) fn record(session: &SessionState, action: &str, target: &str, outcome
         new: None,
         outcome: outcome.into(),
         note: None,
-        seal: None,
+        chain_hash: None,
     }
 }
 

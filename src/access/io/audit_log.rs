@@ -17,8 +17,8 @@ use crate::{
         audit_log::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
         sealing::{self, Key},
     },
-    history::io::seals::SEALS_MAX,
-    plant::record::{ActionRecord, Seal},
+    history::io::chain::CHAIN_HASHES_MAX,
+    plant::record::{ActionRecord, ChainHash},
 };
 
 /// Why the files beside a history that another process has are left alone.
@@ -29,7 +29,7 @@ pub fn beside(history: &Path) -> PathBuf {
     history.with_extension("audit.jsonl")
 }
 
-/// Where the last seal is noted: `tank.audit.head` beside `tank.audit.jsonl`.
+/// Where the last chain hash is noted: `tank.audit.head` beside `tank.audit.jsonl`.
 pub fn head_of(audit_log: &Path) -> PathBuf {
     audit_log.with_extension("head")
 }
@@ -55,28 +55,28 @@ pub enum VerifyError {
     },
 }
 
-/// Reads an audit log from its beginning and finds the first line that is not as it was written. `rows` are the seals that the
+/// Reads an audit log from its beginning and finds the first line that is not as it was written. `rows` are the chain hashes that the
 /// history holds; empty to look at the audit log alone. Safe while a station writes.
-pub fn verify(path: &Path, rows: &[Seal]) -> Result<Summary, VerifyError> {
+pub fn verify(path: &Path, rows: &[ChainHash]) -> Result<Summary, VerifyError> {
     verify_each(path, rows, |_, _| {})
 }
 
 /// As [`verify`], and hands out each sound entry.
 pub(super) fn verify_each(
     path: &Path,
-    rows: &[Seal],
-    mut each: impl FnMut(&audit_log::Entry, Seal),
+    rows: &[ChainHash],
+    mut each: impl FnMut(&audit_log::Entry, ChainHash),
 ) -> Result<Summary, VerifyError> {
     let failed = |error| VerifyError::Io { path: path.display().to_string(), error };
     // The note first: the audit log may be ahead of it, never behind.
     let head = read_head(path).map_err(failed)?;
     let file = File::open(path).map_err(failed)?;
     let mut check = Check::new(head, rows);
-    let scanned = scan(file, &mut check, |entry, seal| each(&entry, seal)).map_err(failed)?;
+    let scanned = scan(file, &mut check, |entry, chain_hash| each(&entry, chain_hash)).map_err(failed)?;
     check.end(scanned.torn).map_err(|bad| VerifyError::Bad { path: path.display().to_string(), bad })
 }
 
-fn read_head(audit_log: &Path) -> io::Result<Option<Seal>> {
+fn read_head(audit_log: &Path) -> io::Result<Option<ChainHash>> {
     match File::open(head_of(audit_log)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),
@@ -94,7 +94,7 @@ struct Scanned {
     torn: bool,
 }
 
-fn scan(file: File, check: &mut Check, mut each: impl FnMut(audit_log::Entry, Seal)) -> io::Result<Scanned> {
+fn scan(file: File, check: &mut Check, mut each: impl FnMut(audit_log::Entry, ChainHash)) -> io::Result<Scanned> {
     let mut reader = BufReader::new(file);
     let mut bytes = 0;
     let mut line = Vec::new();
@@ -124,7 +124,7 @@ pub(super) fn last_seal(log: File) -> io::Result<Option<u64>> {
 pub struct AuditLog {
     file: File,
     head: File,
-    last: Seal,
+    last: ChainHash,
     bytes: u64,
     /// The number of the last seal over it, and of its entry.
     last_seal: Option<(u64, u64)>,
@@ -139,13 +139,13 @@ pub struct Opened {
     pub plant_file: Option<Arc<str>>,
     /// The hash of the users that was recorded last.
     pub users_file: Option<Arc<str>>,
-    /// The latest sound entries, with their seals, oldest first: to compare the history with, and to complete it.
+    /// The latest sound entries, with their chain hashes, oldest first: to compare the history with, and to complete it.
     pub tail: VecDeque<ActionRecord>,
 }
 
 impl AuditLog {
     /// Opens an audit log, or begins one. Nothing in it is ever changed or removed: a torn last line is put beside, and behind
-    /// lines that were tampered with it goes on from the last seal that the station knows.
+    /// lines that were tampered with it goes on from the last chain hash that the station knows.
     /// [`io::ErrorKind::WouldBlock`] while another process writes it: two writers would break the chain.
     pub fn open(path: &Path) -> io::Result<(AuditLog, Opened)> {
         let mut file = own(OpenOptions::new().read(true).append(true).create(true), path)?;
@@ -157,15 +157,15 @@ impl AuditLog {
         let head = read_head(path)?;
         let mut check = Check::new(head, &[]);
         let mut last_seal = None;
-        let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry, seal| {
+        let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry, chain_hash| {
             if &*entry.action == PLANT_FILE {
                 opened.plant_file.clone_from(&entry.new);
             } else if &*entry.action == USERS_FILE {
                 opened.users_file.clone_from(&entry.new);
             }
             last_seal = sealing::number(&entry).map(|number| (number, entry.n)).or(last_seal);
-            opened.tail.push_back(entry.sealed(seal));
-            if SEALS_MAX < opened.tail.len() {
+            opened.tail.push_back(entry.chained(chain_hash));
+            if CHAIN_HASHES_MAX < opened.tail.len() {
                 opened.tail.pop_front();
             }
         })?;
@@ -198,8 +198,8 @@ impl AuditLog {
         self.file = file;
     }
 
-    /// The seal of the last line.
-    pub fn last(&self) -> Seal {
+    /// The chain hash of the last line.
+    pub fn last(&self) -> ChainHash {
         self.last
     }
 
@@ -227,12 +227,12 @@ impl AuditLog {
         if !self.is_intact() {
             return Err(io::Error::other("another process has removed or changed it"));
         }
-        let (mut last, mut text, mut seals) = (self.last, String::new(), Vec::with_capacity(records.len()));
+        let (mut last, mut text, mut chain_hashes) = (self.last, String::new(), Vec::with_capacity(records.len()));
         for record in records.iter() {
-            let (line, seal) = audit_log::line(last, record);
+            let (line, chain_hash) = audit_log::line(last, record);
             text += &line;
-            seals.push(seal);
-            last = seal;
+            chain_hashes.push(chain_hash);
+            last = chain_hash;
         }
         let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data());
         if let Err(error) = written {
@@ -241,8 +241,8 @@ impl AuditLog {
             return Err(error);
         }
         (self.last, self.bytes) = (last, self.bytes + text.len() as u64);
-        for (record, seal) in records.iter_mut().zip(seals) {
-            record.seal = Some(seal);
+        for (record, chain_hash) in records.iter_mut().zip(chain_hashes) {
+            record.chain_hash = Some(chain_hash);
         }
         // The records are on disk; a note that is behind is no reason to write them twice.
         if let Err(error) = self.note(last) {
@@ -251,7 +251,7 @@ impl AuditLog {
         Ok(())
     }
 
-    fn note(&self, last: Seal) -> io::Result<()> {
+    fn note(&self, last: ChainHash) -> io::Result<()> {
         self.head.write_all_at(audit_log::head_text(last).as_bytes(), 0)
     }
 }

@@ -25,11 +25,11 @@ use crate::{
     history::{
         io::{
             alarm_file::{self, AlarmFile, Found},
-            seals::SEALS_MAX,
+            chain::CHAIN_HASHES_MAX,
         },
         words::plain,
     },
-    plant::record::{ActionRecord, AlarmRecord, Record, Seal},
+    plant::record::{ActionRecord, AlarmRecord, ChainHash, Record},
 };
 
 /// Batches on their way to the thread; the sender handles a full queue.
@@ -60,7 +60,7 @@ pub enum Message {
     /// To be written.
     Batch(Batch),
     /// The history is open, and holds these entries: what it lacks of the log is sent to it.
-    Stored(Vec<Seal>),
+    Stored(Vec<ChainHash>),
 }
 
 /// How it stands.
@@ -73,7 +73,7 @@ pub struct Recorded {
     /// Actions that the history had no room for.
     pub lost: u64,
     /// The last entry of the log.
-    pub last: Option<Seal>,
+    pub last: Option<ChainHash>,
     /// What is wrong with the log, in words for the operator.
     pub log: Option<String>,
     /// What is wrong with the alarm-state file.
@@ -92,7 +92,7 @@ pub struct Handle {
     /// What was found when the alarm-state file was opened.
     pub alarms: Found,
     /// The thread; ends with the last entry of the log.
-    pub join: JoinHandle<Option<Seal>>,
+    pub join: JoinHandle<Option<ChainHash>>,
 }
 
 /// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
@@ -102,7 +102,7 @@ pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record
     let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
     let mut opened = recorder.open();
     recorder.tail = std::mem::take(&mut opened.tail);
-    recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.seal).unwrap_or(START);
+    recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.chain_hash).unwrap_or(START);
     let (status, recorded) = watch::channel(recorder.status());
     let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &status))?;
     Ok(Handle { batches, recorded, opened, alarms, join })
@@ -111,7 +111,7 @@ pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record
 /// An action that waits for the log.
 struct Pending {
     action: ActionRecord,
-    /// The history has it already, without a seal.
+    /// The history has it already, without a chain hash.
     stored: bool,
 }
 
@@ -123,9 +123,9 @@ struct Recorder {
     audit_log: Option<AuditLog>,
     alarms: AlarmFile,
     pending: Vec<Pending>,
-    /// The latest entries of the log at the start, until they were compared with the history, and its seal then.
+    /// The latest entries of the log at the start, until they were compared with the history, and its chain hash then.
     tail: VecDeque<ActionRecord>,
-    last_at_start: Seal,
+    last_at_start: ChainHash,
     /// What was found wrong in the log and in the alarm-state file: true until the next start.
     found: Vec<String>,
     alarms_found: Option<String>,
@@ -138,8 +138,8 @@ struct Recorder {
     /// Another process writes both files.
     in_use: bool,
     opened_at: Instant,
-    /// Actions that are in the history without a seal, since the last fault.
-    unsealed: u64,
+    /// Actions that are in the history without a chain hash, since the last fault.
+    unchained: u64,
     taken: u64,
     recorded: u64,
     lost: u64,
@@ -165,7 +165,7 @@ impl Recorder {
             seal_tried: None,
             in_use: false,
             opened_at: Instant::now(),
-            unsealed: 0,
+            unchained: 0,
             taken: 0,
             recorded: 0,
             lost: 0,
@@ -173,7 +173,7 @@ impl Recorder {
         (recorder, found)
     }
 
-    fn run(mut self, queue: &queue::Receiver<Message>, status: &watch::Sender<Recorded>) -> Option<Seal> {
+    fn run(mut self, queue: &queue::Receiver<Message>, status: &watch::Sender<Recorded>) -> Option<ChainHash> {
         loop {
             let wait = if self.is_written() { LOOK } else { AGAIN };
             match queue.recv_timeout(wait) {
@@ -214,9 +214,9 @@ impl Recorder {
 
     /// Compares the history with the log as both were at the start, and sends it what it lacks: a station that was killed
     /// had written it here first.
-    fn compare(&mut self, rows: &[Seal]) {
+    fn compare(&mut self, rows: &[ChainHash]) {
         let tail = std::mem::take(&mut self.tail);
-        let Comparison { missing, differing, not_in_log } = compare(&tail, self.last_at_start, rows, SEALS_MAX);
+        let Comparison { missing, differing, not_in_log } = compare(&tail, self.last_at_start, rows, CHAIN_HASHES_MAX);
         let mut wrong = Vec::new();
         if let Some(first) = differing.first() {
             wrong.push(format!("{} entries differ from the history, the first is {first}", differing.len()));
@@ -273,10 +273,10 @@ impl Recorder {
         }
     }
 
-    /// Into the log, and on to the history; without a seal while the log cannot be written.
+    /// Into the log, and on to the history; without a chain hash while the log cannot be written.
     fn write_log(&mut self) {
-        let lacks = format!("{} actions before this one are not in it", self.unsealed);
-        let lacks = (self.unsealed > 0).then(|| self.note(&lacks));
+        let lacks = format!("{} actions before this one are not in it", self.unchained);
+        let lacks = (self.unchained > 0).then(|| self.note(&lacks));
         let waiting = self.pending.iter().map(|pending| pending.action.clone());
         let mut actions: Vec<ActionRecord> = lacks.into_iter().chain(waiting).collect();
         if actions.is_empty() {
@@ -285,7 +285,7 @@ impl Recorder {
         match self.audit_log.as_mut().map(|audit_log| audit_log.append(&mut actions)) {
             Some(Ok(())) => {
                 self.pending.clear();
-                (self.unsealed, self.log_fault) = (0, None);
+                (self.unchained, self.log_fault) = (0, None);
                 return self.store(actions);
             }
             Some(Err(error)) => self.fail(&error),
@@ -300,7 +300,7 @@ impl Recorder {
         self.store(fresh);
         let excess = self.pending.len().saturating_sub(PENDING_MAX);
         self.pending.drain(..excess);
-        self.unsealed += excess as u64;
+        self.unchained += excess as u64;
     }
 
     /// Seals what the log holds, if it has a key.
@@ -347,12 +347,12 @@ impl Recorder {
             new: None,
             outcome: outcome.into(),
             note: None,
-            seal: None,
+            chain_hash: None,
         }
     }
 
     fn status(&self) -> Recorded {
-        let waiting = self.pending.len() as u64 + self.unsealed;
+        let waiting = self.pending.len() as u64 + self.unchained;
         let log = self
             .log_fault
             .as_ref()

@@ -19,7 +19,7 @@ use crate::{
         sealing::{Key, SealCheck, Sealed, VerificationKey},
     },
     history::words::plain,
-    plant::record::{ActionRecord, Seal},
+    plant::record::{ActionRecord, ChainHash},
     profile::io::atomic::{self, write_atomic},
 };
 
@@ -107,13 +107,13 @@ fn replace(path: &Path, key: &Key) -> io::Result<()> {
 
 /// Reads a log as [`audit_log::verify`] does, and checks its seals. `false` if the present key is missing: then a log that was cut
 /// with its last seals is not found.
-pub fn verify(log: &Path, rows: &[Seal], key: &VerificationKey) -> Result<(Summary, Sealed, bool), VerifyError> {
+pub fn verify(log: &Path, rows: &[ChainHash], key: &VerificationKey) -> Result<(Summary, Sealed, bool), VerifyError> {
     let path = beside(log);
     // Before the log, which may be ahead of it. Once more where the station replaces it at this moment.
     let present = read(&path).or_else(|_| read(&path));
     let present = present.map_err(|error| VerifyError::Io { path: path.display().to_string(), error })?;
     let mut check = SealCheck::new(key);
-    let summary = verify_each(log, rows, |entry, seal| check.entry(entry, seal))?;
+    let summary = verify_each(log, rows, |entry, chain_hash| check.entry(entry, chain_hash))?;
     let sealed = check.end(present).map_err(|bad| VerifyError::Bad { path: log.display().to_string(), bad })?;
     Ok((summary, sealed, present.is_some()))
 }

@@ -24,7 +24,7 @@ pub mod read;
 pub mod samples;
 pub mod report;
 pub mod alarm_metrics;
-pub mod seals;
+pub mod chain;
 pub mod writer;
 pub mod reader;
 pub mod thread;

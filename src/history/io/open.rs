@@ -16,7 +16,7 @@ use crate::{
     history::{HistoryError, words::plain},
     plant::{
         def::PlantDef,
-        record::{AlarmRecord, Seal},
+        record::{AlarmRecord, ChainHash},
     },
 };
 
@@ -38,7 +38,7 @@ pub struct Restored {
     /// What the quality meter of the alarms must know of the last day.
     pub recent: Recent,
     /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
-    pub seals: Option<Vec<Seal>>,
+    pub chain_hashes: Option<Vec<ChainHash>>,
 }
 
 impl Store {
@@ -56,9 +56,11 @@ impl Store {
                 }
                 recent => recent?,
             };
-            let seals =
-                store.seals().inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
-            Ok(Restored { steps, recent, seals })
+            let chain_hashes = store
+                .chain_hashes()
+                .inspect_err(|error| tracing::warn!(%error, "not compared with the audit log"))
+                .ok();
+            Ok(Restored { steps, recent, chain_hashes })
         })
     }
 

@@ -18,7 +18,7 @@ use crate::{
     plant::{
         def::{Priority, TagId},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Seal},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, ChainHash},
     },
     report::step_series::{AsOf, HeldValue},
 };
@@ -225,13 +225,13 @@ pub(super) fn action(row: &Row) -> duckdb::Result<ActionRecord> {
         outcome: shared(row, 6)?,
         from: maybe_shared(row, 7)?.unwrap_or_default(),
         note: maybe_shared(row, 8)?,
-        seal: seal(row.get(9)?, row.get(10)?),
+        chain_hash: chain_hash(row.get(9)?, row.get(10)?),
     })
 }
 
 /// Number and hash of an entry; `None` for an action that the audit log does not have.
-pub(super) fn seal(number: Option<u64>, hash: Option<Vec<u8>>) -> Option<Seal> {
-    Some(Seal { number: number?, hash: hash?.try_into().ok()? })
+pub(super) fn chain_hash(number: Option<u64>, hash: Option<Vec<u8>>) -> Option<ChainHash> {
+    Some(ChainHash { number: number?, hash: hash?.try_into().ok()? })
 }
 
 fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {

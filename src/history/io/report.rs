@@ -11,7 +11,7 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{ROWS_MAX, SAMPLES_MAX, action, check_span, seal, within},
+    read::{ROWS_MAX, SAMPLES_MAX, action, chain_hash, check_span, within},
     sql,
     store::{Store, utc},
 };
@@ -65,7 +65,7 @@ impl Store {
         let alarms = self.steps(from, until)?;
         let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
         let actions = self.whole_list(&sql::actions_oldest(), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
-        let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(seal(row.get(0)?, row.get(1)?)))?;
+        let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(chain_hash(row.get(0)?, row.get(1)?)))?;
         let audit = audit.into_iter().flatten().next();
         let shown: HashSet<TagId> = reported.iter().copied().collect();
         let gather = |tag: &TagId| Gathered {

@@ -287,8 +287,9 @@ impl Store {
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("operator_action")?;
         for action in std::iter::once(first).chain(rows) {
-            let ActionRecord { at, by, from, action, target, old, new, outcome, note, seal } = action;
-            let (number, hash) = (seal.map(|seal| seal.number), seal.map(|seal| seal.hash.to_vec()));
+            let ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash } = action;
+            let (number, hash) =
+                (chain_hash.map(|chain_hash| chain_hash.number), chain_hash.map(|chain_hash| chain_hash.hash.to_vec()));
             appender.append_row(params![
                 utc(*at),
                 by,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::{
-    plant::record::{AlarmStep, Seal},
+    plant::record::{AlarmStep, ChainHash},
     report::{
         Period, RecordRow,
         record_csv::RecordCsv,
@@ -17,7 +17,7 @@ fn report() -> ShiftReport {
     ShiftReport {
         period: Period { name: "morning 2026-11-21".into(), from, to: at("2026-11-21T14:00+07") },
         until: at("2026-11-21T13:59:30+07"),
-        audit: Some(Seal { number: 17, hash: [0xA5; 32] }),
+        audit: Some(ChainHash { number: 17, hash: [0xA5; 32] }),
         unreadable: vec![Gap {
             from: from + Duration::from_secs(3_600),
             to: from + Duration::from_secs(3_720),
@@ -92,7 +92,7 @@ fn report() -> ShiftReport {
             outcome: "verified".into(),
             from: "".into(),
             note: None,
-            seal: None,
+            chain_hash: None,
         }],
         record: vec![
             RecordRow { at: from, sv: Some(70.0), pv: Some(72.5), er: Some(-2.5) },

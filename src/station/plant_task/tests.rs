@@ -13,7 +13,7 @@ use crate::{
         def::{AlarmId, TagId},
         event::Fault,
         fixture,
-        record::{AlarmStep, Seal},
+        record::{AlarmStep, ChainHash},
     },
 };
 
@@ -25,7 +25,7 @@ struct Station {
     commands: mpsc::Sender<Command>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     task: JoinHandle<()>,
-    recorder: std::thread::JoinHandle<Option<Seal>>,
+    recorder: std::thread::JoinHandle<Option<ChainHash>>,
     _blocked: mpsc::Receiver<Vec<Record>>,
     messages: mpsc::Sender<AuditMessage>,
     _requests: mpsc::Receiver<BusRequest>,

@@ -32,11 +32,11 @@ impl AuditEntryDialog {
         let entry = &self.0;
         let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
         let at = entry.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
-        let seal = entry.seal.map_or((String::new(), "not in the audit log".to_owned()), |seal| {
-            (seal.number.to_string(), seal.hash_hex())
+        let chain_hash = entry.chain_hash.map_or((String::new(), "not in the audit log".to_owned()), |chain_hash| {
+            (chain_hash.number.to_string(), chain_hash.hash_hex())
         });
         let lines = [
-            ("number", seal.0),
+            ("number", chain_hash.0),
             ("time", at),
             ("who", entry.by.to_string()),
             ("from", entry.from.to_string()),
@@ -46,7 +46,7 @@ impl AuditEntryDialog {
             ("new", told(&entry.new)),
             ("outcome", entry.outcome.to_string()),
             ("note", told(&entry.note)),
-            ("hash", seal.1),
+            ("hash", chain_hash.1),
         ];
         lines.into_iter().filter(|(_, words)| !words.is_empty()).collect()
     }

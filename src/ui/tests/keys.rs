@@ -471,7 +471,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
         outcome: "verified".into(),
         from: "".into(),
         note: None,
-        seal: None,
+        chain_hash: None,
     };
     for effect in effects {
         let Effect::Query(id, query) = effect else { continue };

@@ -13,7 +13,7 @@ use crate::{
     history::{Answer, Query},
     plant::{
         command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
-        record::{ActionRecord, Seal},
+        record::{ActionRecord, ChainHash},
         role::{Reauthentication, Role},
         sample::Quality,
     },
@@ -560,7 +560,7 @@ fn action(number: u64, by: &str, action: &str, target: &str, change: (&str, &str
         new: told(change.1),
         outcome: outcome.into(),
         note: None,
-        seal: Some(Seal { number, hash: [0xA5; 32] }),
+        chain_hash: Some(ChainHash { number, hash: [0xA5; 32] }),
     }
 }
 

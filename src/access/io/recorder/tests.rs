@@ -15,7 +15,7 @@ use crate::{
     },
     plant::{
         def::Priority,
-        record::{AlarmStep, SEAL_LOG, Seal},
+        record::{AlarmStep, ChainHash, SEAL_LOG},
     },
 };
 
@@ -30,7 +30,7 @@ fn record(what: &str) -> ActionRecord {
         new: Some("x".into()),
         outcome: "verified".into(),
         note: None,
-        seal: None,
+        chain_hash: None,
     }
 }
 
@@ -68,8 +68,8 @@ fn life(history_file: &Path, actions: &[&str]) -> (Vec<ActionRecord>, Recorded, 
     (stored(&mut rows), recorded.borrow().clone(), opened)
 }
 
-fn seals(rows: &[ActionRecord]) -> Vec<Seal> {
-    rows.iter().filter_map(|row| row.seal).collect()
+fn chain_hashes(rows: &[ActionRecord]) -> Vec<ChainHash> {
+    rows.iter().filter_map(|row| row.chain_hash).collect()
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn deeds_of_several_lives_are_one_chain_and_only_the_station_can_read_it() {
     for records in [&["start", "write"][..], &[], &["plant file", "stop"]] {
         rows.extend(life(&history, records).0);
     }
-    let summary = verify(&path, &seals(&rows)).unwrap();
+    let summary = verify(&path, &chain_hashes(&rows)).unwrap();
     assert_eq!((summary.entries, summary.compared), (4, 4));
     assert_eq!(life(&history, &[]).2, Opened { plant_file: Some("x".into()), ..Opened::default() });
     for file in [path.clone(), path.with_extension("head")] {
@@ -127,7 +127,7 @@ fn a_book_that_was_tampered_with_is_said_stays_as_it_is_and_goes_on() {
         for _ in 0..2 {
             let (rows, status, _) = life(&history, &["start"]);
             assert!(status.log.unwrap().contains("tampered"), "{what}");
-            assert!(rows[0].outcome.contains("broken") && rows.iter().all(|row| row.seal.is_some()), "{what}");
+            assert!(rows[0].outcome.contains("broken") && rows.iter().all(|row| row.chain_hash.is_some()), "{what}");
         }
         assert!(fs::read_to_string(&path).unwrap().starts_with(&tampered), "{what}: nothing is ever removed");
         let VerifyError::Bad { bad, .. } = verify(&path, &[]).unwrap_err() else { panic!("{what}") };
@@ -139,7 +139,7 @@ fn a_book_that_was_tampered_with_is_said_stays_as_it_is_and_goes_on() {
 fn without_a_disk_deeds_go_to_the_history_without_a_seal_and_it_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let (rows, status, _) = life(&folder.path().join("gone").join("tank.duckdb"), &["start", "write"]);
-    assert!(rows.len() == 2 && rows.iter().all(|row| row.seal.is_none()), "each once");
+    assert!(rows.len() == 2 && rows.iter().all(|row| row.chain_hash.is_none()), "each once");
     let trouble = status.log.unwrap();
     assert!(trouble.starts_with("the audit log cannot be written: "), "{trouble}");
     assert!(trouble.contains("2 actions are not in it"), "{trouble}");
@@ -172,7 +172,11 @@ fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing
     assert_eq!((status.batches, status.waiting), (0, 1));
     assert!(status.log.unwrap().contains("2 actions are not in it"));
     assert!(status.alarms.unwrap().contains("the state of the alarms cannot be written"));
-    assert_eq!(stored(&mut rows).iter().filter(|row| row.seal.is_none()).count(), 2, "in the history all the same");
+    assert_eq!(
+        stored(&mut rows).iter().filter(|row| row.chain_hash.is_none()).count(),
+        2,
+        "in the history all the same"
+    );
     fs::create_dir(folder.path().join("later")).unwrap();
     recorder.take(batch(&["write"], &[]));
     recorder.write();
@@ -180,12 +184,12 @@ fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing
     recorder.opened_at -= REOPEN;
     recorder.write();
     let status = recorder.status();
-    assert_eq!(status.last.map(|seal| seal.number), Some(3));
+    assert_eq!(status.last.map(|chain_hash| chain_hash.number), Some(3));
     assert_eq!(status, Recorded { batches: 2, last: status.last, ..Recorded::default() });
     let rows = stored(&mut rows);
-    let sealed: Vec<_> = rows.iter().filter(|row| row.seal.is_some()).map(|row| &*row.action).collect();
+    let sealed: Vec<_> = rows.iter().filter(|row| row.chain_hash.is_some()).map(|row| &*row.action).collect();
     assert_eq!(sealed, ["start", "acknowledge", "write"]);
-    assert_eq!(verify(&beside(&history_file), &seals(&rows)).unwrap().compared, 3);
+    assert_eq!(verify(&beside(&history_file), &chain_hashes(&rows)).unwrap().compared, 3);
     let steps = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1.steps.unwrap();
     assert_eq!(steps, batch(&[], &[AlarmStep::Raised, AlarmStep::Acknowledged]).steps);
 }
@@ -268,7 +272,7 @@ fn a_history_that_lacks_entries_of_the_log_is_completed_and_one_that_differs_is_
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
     let (rows, ..) = life(&history_file, &["start", "write", "acknowledge"]);
-    let compared = |known: Vec<Seal>| {
+    let compared = |known: Vec<ChainHash>| {
         let (history, mut stored_rows) = mpsc::channel(64);
         let Handle { batches, recorded, join, .. } = start(&history_file, clock(), history).unwrap();
         batches.send(Message::Stored(known)).unwrap();
@@ -276,16 +280,16 @@ fn a_history_that_lacks_entries_of_the_log_is_completed_and_one_that_differs_is_
         join.join().unwrap();
         (stored(&mut stored_rows), recorded.borrow().log.clone())
     };
-    let (sent, log) = compared(seals(&rows[..1]));
-    assert_eq!(sent[..2], rows[1..], "the very entries, with their seals");
+    let (sent, log) = compared(chain_hashes(&rows[..1]));
+    assert_eq!(sent[..2], rows[1..], "the very entries, with their chain hashes");
     assert!(sent.len() == 3 && sent[2].outcome.contains("2 entries were missing in the history"), "{sent:?}");
     assert_eq!(log, None, "nothing is wrong with the log");
-    let all: Vec<Seal> = seals(&rows).into_iter().chain(seals(&sent[2..])).collect();
+    let all: Vec<ChainHash> = chain_hashes(&rows).into_iter().chain(chain_hashes(&sent[2..])).collect();
     assert_eq!(compared(all.clone()), (Vec::new(), None), "nothing is missing any more");
-    let forged = Seal { hash: [7; 32], ..all[1] };
+    let forged = ChainHash { hash: [7; 32], ..all[1] };
     let (_, log) = compared([&all[..1], &[forged], &all[2..]].concat());
     assert!(log.unwrap().contains("1 entries differ from the history, the first is 2"));
-    let ahead = Seal { number: 99, hash: [7; 32] };
+    let ahead = ChainHash { number: 99, hash: [7; 32] };
     let (_, log) = compared([&all[..], &[ahead]].concat());
     assert!(log.unwrap().contains("lacks 1 entries that the history holds, from 99 on"));
 }
@@ -332,7 +336,10 @@ fn a_log_with_a_key_is_sealed_at_the_start_each_hour_and_at_the_end() {
     let key = sealing::make(&log, at(0)).unwrap();
     assert_eq!(sealed(&log, &key), (0, 1));
     let (rows, ..) = life(&history_file, &["start"]);
-    assert_eq!(rows.iter().filter_map(|row| row.seal).map(|seal| seal.number).collect::<Vec<_>>(), [2, 3]);
+    assert_eq!(
+        rows.iter().filter_map(|row| row.chain_hash).map(|chain_hash| chain_hash.number).collect::<Vec<_>>(),
+        [2, 3]
+    );
     assert_eq!(sealed(&log, &key), (1, 0), "a seal goes to the history as well, and nothing new is not sealed again");
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
@@ -408,7 +415,7 @@ fn a_log_that_can_no_longer_be_sealed_is_said_and_goes_on() {
         fs::remove_file(&path).unwrap();
         text.iter().for_each(|text| fs::write(&path, text).unwrap());
         let (rows, status, _) = life(&history_file, &["write"]);
-        assert!(rows.len() == 1 && rows[0].seal.is_some(), "{what}: it is on record all the same");
+        assert!(rows.len() == 1 && rows[0].chain_hash.is_some(), "{what}: it is on record all the same");
         let said = status.log.unwrap();
         assert!(said.starts_with("the audit log is not sealed: ") && said.contains(what), "{what}: {said}");
         fs::write(&path, text.unwrap_or(b"")).unwrap();

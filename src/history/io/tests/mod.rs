@@ -29,7 +29,7 @@ use crate::{
     plant::{
         def::{LineDef, LineId, PlantDef, Priority, TagId, Transport},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, Record, Seal},
+        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, ChainHash, Record},
         sample::{Cause, Sample},
     },
     report::{
@@ -89,7 +89,7 @@ fn action(at: i64) -> ActionRecord {
         outcome: "verified".into(),
         from: "".into(),
         note: None,
-        seal: None,
+        chain_hash: None,
     }
 }
 
@@ -408,8 +408,8 @@ fn a_report_has_the_last_entry_of_the_audit_log_before_its_end() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let entry = |at: i64, number: u64| {
-        let seal = Some(Seal { number, hash: [number as u8; 32] });
-        Record::Action(ActionRecord { seal, ..action(at) })
+        let chain_hash = Some(ChainHash { number, hash: [number as u8; 32] });
+        Record::Action(ActionRecord { chain_hash, ..action(at) })
     };
     // The clock went back between 3 and 4, 6 was written after the period, and one action is not in the log.
     let log = [entry(10, 1), entry(30, 2), entry(50, 3), entry(40, 4), entry(45, 5), entry(100, 6)];
@@ -574,10 +574,10 @@ fn migrations_are_numbered_and_run_once() {
 
 #[test]
 fn an_action_that_was_stored_without_its_seal_is_there_once_when_it_comes_with_it() {
-    use crate::plant::record::{ActionRecord, Seal};
+    use crate::plant::record::{ActionRecord, ChainHash};
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(&folder.path().join("h.duckdb"), &def(), sec(0)).unwrap().store;
-    let action = |number: i64, seal: Option<Seal>| {
+    let action = |number: i64, chain_hash: Option<ChainHash>| {
         Record::Action(ActionRecord {
             at: sec(number),
             by: "anna".into(),
@@ -588,13 +588,13 @@ fn an_action_that_was_stored_without_its_seal_is_there_once_when_it_comes_with_i
             new: Some("70".into()),
             outcome: "verified".into(),
             note: None,
-            seal,
+            chain_hash,
         })
     };
-    let seal = |number| Seal { number, hash: [number as u8; 32] };
-    store.append(&[action(1, Some(seal(1))), action(2, None), action(3, None)]).unwrap();
-    assert_eq!(store.seals().unwrap(), [seal(1)]);
-    store.append(&[action(2, Some(seal(2))), action(4, Some(seal(4)))]).unwrap();
-    assert_eq!(store.seals().unwrap(), [seal(4), seal(2), seal(1)]);
-    assert_eq!(store.count_rows().unwrap(), 4, "the second was stored twice, the third waits for its seal");
+    let chain_hash = |number| ChainHash { number, hash: [number as u8; 32] };
+    store.append(&[action(1, Some(chain_hash(1))), action(2, None), action(3, None)]).unwrap();
+    assert_eq!(store.chain_hashes().unwrap(), [chain_hash(1)]);
+    store.append(&[action(2, Some(chain_hash(2))), action(4, Some(chain_hash(4)))]).unwrap();
+    assert_eq!(store.chain_hashes().unwrap(), [chain_hash(4), chain_hash(2), chain_hash(1)]);
+    assert_eq!(store.count_rows().unwrap(), 4, "the second was stored twice, the third waits for its chain_hash");
 }

@@ -227,7 +227,7 @@ fn action(seconds: i64, by: &str, action: &str, target: &str, outcome: &str, not
         new: (action == "write").then(|| "70.0 °C".into()),
         outcome: outcome.into(),
         note: note.map(Arc::from),
-        seal: None,
+        chain_hash: None,
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     access::{Durability, SessionRequest},
     plant::{
         def::Priority,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Seal},
+        record::{ActionRecord, AlarmRecord, AlarmStep, ChainHash},
     },
     report::TagFigures,
     ui::{
@@ -138,12 +138,12 @@ fn report(period: Period, full: bool) -> ShiftReport {
         outcome: "verified".into(),
         from: "".into(),
         note: None,
-        seal: None,
+        chain_hash: None,
     };
     ShiftReport {
         period,
         until,
-        audit: full.then_some(Seal { number: 1_042, hash: [0xA5; 32] }),
+        audit: full.then_some(ChainHash { number: 1_042, hash: [0xA5; 32] }),
         unreadable: Vec::new(),
         tags: vec![
             tag("TIC-1.PV", "°C", 1, 26.8, 58.31, 72.6, Some(72.4), 41, 0.989_99),

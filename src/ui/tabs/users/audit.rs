@@ -266,7 +266,7 @@ fn from_width(columns: u16) -> u16 {
 /// An entry in one row; where it is too long, its outcome is kept.
 fn row(cx: &ViewContext, entry: &ActionRecord, columns: u16) -> String {
     let cell = |text: &str, columns: u16| pad(&fit(text, columns - 1), columns);
-    let number = entry.seal.map_or("–".to_owned(), |seal| seal.number.to_string());
+    let number = entry.chain_hash.map_or("–".to_owned(), |chain_hash| chain_hash.number.to_string());
     let at = moment(entry.at, cx.now, &cx.def().time_zone);
     let from = from_width(columns);
     let head = format!(

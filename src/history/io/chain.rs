@@ -1,0 +1,54 @@
+//! The store beside the audit log: which entries it holds, and each of them once.
+
+use duckdb::params;
+
+use super::store::{Store, engine, utc};
+use crate::{
+    history::HistoryError,
+    plant::record::{ChainHash, Record},
+};
+
+/// Entries that are compared with the audit log at a start: the latest.
+pub const CHAIN_HASHES_MAX: usize = 5_000;
+
+/// The chain_hashes of the latest entries, newest first.
+const CHAIN_HASHES: &str = "SELECT number, any_value(hash) FROM operator_action WHERE number IS NOT NULL
+    GROUP BY number ORDER BY number DESC LIMIT ?";
+/// Is an action stored without its chain_hash, because the audit log could not be written?
+const UNCHAINED: &str = "SELECT count(*) FROM (SELECT 1 FROM operator_action WHERE number IS NULL LIMIT 1)";
+/// The action that is about to be stored with its chain_hash.
+const REMOVE_UNSEALED: &str = "DELETE FROM operator_action WHERE number IS NULL AND utc = ? AND by_whom = ?
+    AND action = ? AND target = ? AND outcome = ? AND coalesce(new_value, '') = ?";
+
+impl Store {
+    /// The chain_hashes of the latest entries, at most [`CHAIN_HASHES_MAX`].
+    pub fn chain_hashes(&self) -> Result<Vec<ChainHash>, HistoryError> {
+        let mut statement = self.db.prepare(CHAIN_HASHES).map_err(engine)?;
+        let row = |row: &duckdb::Row| Ok((row.get::<_, u64>(0)?, row.get::<_, Vec<u8>>(1)?));
+        let rows = statement.query_map(params![CHAIN_HASHES_MAX as u64], row).map_err(engine)?;
+        let chain_hash = |row: duckdb::Result<(u64, Vec<u8>)>| {
+            let (number, hash) = row.map_err(engine)?;
+            // A hash of another length is none that the audit log has.
+            Ok(ChainHash { number, hash: hash.try_into().unwrap_or_default() })
+        };
+        rows.map(chain_hash).collect()
+    }
+
+    /// Makes room for actions that come with their chain_hashes and were stored without before. Part of a transaction.
+    pub(super) fn remove_unsealed(&self, records: &[Record]) -> duckdb::Result<()> {
+        let mut chained = records.iter().filter_map(|record| match record {
+            Record::Action(action) => action.chain_hash.and(Some(action)),
+            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
+        });
+        let Some(first) = chained.next() else { return Ok(()) };
+        if self.db.query_row(UNCHAINED, [], |row| row.get::<_, u64>(0))? == 0 {
+            return Ok(());
+        }
+        let mut remove = self.db.prepare(REMOVE_UNSEALED)?;
+        for action in std::iter::once(first).chain(chained) {
+            let new = action.new.as_deref().unwrap_or_default();
+            remove.execute(params![utc(action.at), action.by, action.action, action.target, action.outcome, new])?;
+        }
+        Ok(())
+    }
+}
