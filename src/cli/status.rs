@@ -8,7 +8,7 @@ use crate::plant::{
     alarm::manager::subject_name,
     event::LineState,
     sample::{Quality, Sample},
-    snapshot::{ActiveAlarm, AsideAlarm, DeviceState},
+    snapshot::{ActiveAlarm, DeviceState, SuppressedAlarm},
 };
 
 use super::{CliError, client, in_runtime, say};
@@ -60,7 +60,7 @@ fn in_words(snapshot: &Snapshot) -> Vec<String> {
         times => format!(", epoch {times}"),
     };
     lines.push(format!("history  {trouble}, {} rows, {} lost{epoch}", snapshot.history.rows, snapshot.history.lost));
-    lines.extend(snapshot.aside.iter().map(|alarm| format!("aside    {}", aside_words(snapshot, alarm))));
+    lines.extend(snapshot.suppressed.iter().map(|alarm| format!("suppressed {}", suppressed_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
         lines.push("tag      values are shown after a login: --user NAME".to_owned());
         return lines;
@@ -88,7 +88,7 @@ fn alarm_words(snapshot: &Snapshot, alarm: &ActiveAlarm) -> String {
     format!("{} {:10} {subject} {} since {since}", def.priority.number(), alarm.state.word(), def.text)
 }
 
-fn aside_words(snapshot: &Snapshot, alarm: &AsideAlarm) -> String {
+fn suppressed_words(snapshot: &Snapshot, alarm: &SuppressedAlarm) -> String {
     let def = snapshot.def.alarm(alarm.id);
     let local = |at: Timestamp| at.to_zoned(snapshot.def.time_zone.clone()).strftime("%m-%d %H:%M:%S").to_string();
     let until = alarm.until.map(|at| format!(" until {}", local(at))).unwrap_or_default();
@@ -148,7 +148,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "returned_at": alarm.returned_at.map(|at| at.to_string()), "value": alarm.value,
         })
     });
-    let aside = snapshot.aside.iter().map(|alarm| {
+    let suppressed = snapshot.suppressed.iter().map(|alarm| {
         let found = def.alarm(alarm.id);
         json!({
             "subject": subject_name(def, found.subject), "text": found.text, "priority": found.priority.number(),
@@ -170,7 +170,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
     json!({
         "plant": def.name, "title": def.title, "at": snapshot.at.to_string(), "speed": snapshot.speed,
         "lines": lines.collect::<Vec<_>>(), "devices": devices.collect::<Vec<_>>(),
-        "alarms": alarms.collect::<Vec<_>>(), "aside": aside.collect::<Vec<_>>(),
+        "alarms": alarms.collect::<Vec<_>>(), "suppressed": suppressed.collect::<Vec<_>>(),
         "tags": told.then(|| tags.collect::<Vec<_>>()),
         "history": {
             "rows": snapshot.history.rows, "lost": snapshot.history.lost, "trouble": snapshot.history.trouble,

@@ -13,7 +13,7 @@ use super::{
     event::LineState,
     record::{AlarmRecord, Burst, Record},
     restore::Restore,
-    snapshot::{ActiveAlarm, AsideAlarm, DeviceState, DeviceStatus, LineStatus, Snapshot},
+    snapshot::{ActiveAlarm, DeviceState, DeviceStatus, LineStatus, Snapshot, SuppressedAlarm},
     tuning::Tuning,
 };
 
@@ -76,7 +76,7 @@ impl Snapshot {
         self.lines.iter_mut().for_each(|line| line.shift(by));
         self.devices.iter_mut().for_each(|device| device.shift(by));
         Arc::make_mut(&mut self.alarms).iter_mut().for_each(|alarm| alarm.shift(by));
-        Arc::make_mut(&mut self.aside).iter_mut().for_each(|alarm| alarm.shift(by));
+        Arc::make_mut(&mut self.suppressed).iter_mut().for_each(|alarm| alarm.shift(by));
         self.alarm_metrics.flood_since.iter_mut().for_each(|since| shift(since, by));
         let day = Arc::make_mut(&mut self.alarm_metrics.day);
         shift(&mut day.from, by);
@@ -124,7 +124,7 @@ impl ActiveAlarm {
     }
 }
 
-impl AsideAlarm {
+impl SuppressedAlarm {
     fn shift(&mut self, by: SignedDuration) {
         shift_note(&mut self.note, by);
         self.until.iter_mut().for_each(|until| shift(until, by));

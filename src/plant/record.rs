@@ -45,7 +45,7 @@ pub struct AlarmRecord {
     pub limit: Option<f64>,
     /// Who, for what an operator did.
     pub by: Option<Arc<str>>,
-    /// The note of an acknowledgement, the reason for putting it aside.
+    /// The note of an acknowledgement, the reason for suppressing it.
     pub reason: Option<Arc<str>>,
     /// When a shelved alarm comes back.
     pub until: Option<Timestamp>,
@@ -80,15 +80,15 @@ pub enum AlarmStep {
     Acknowledged,
     /// The condition is gone.
     Returned,
-    /// It became active while it was put aside: nobody was told.
+    /// It became active while suppressed: not annunciated.
     RaisedQuietly,
-    /// The condition went while it was put aside.
+    /// Its condition cleared while suppressed.
     ReturnedQuietly,
     /// Acknowledged long ago and still active: it waits for an acknowledgement again.
     RaisedAgain,
     /// An operator reset it after its condition was gone.
     Reset,
-    /// An operator put it aside for a time.
+    /// An operator shelved it.
     Shelved,
     /// Its time on the shelf is over, or an operator took it back.
     Unshelved,
@@ -96,7 +96,7 @@ pub enum AlarmStep {
     Suppressed,
     /// What enables it is no longer false.
     Released,
-    /// An operator put it aside until somebody puts it back.
+    /// An operator took it out of service.
     OutOfService,
     /// An operator put it back.
     InService,

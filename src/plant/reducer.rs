@@ -281,7 +281,7 @@ impl Plant {
             lines: self.lines.clone(),
             devices: self.diagnosed(),
             alarms: lists.active.clone(),
-            aside: lists.aside.clone(),
+            suppressed: lists.suppressed.clone(),
             sound: lists.sound,
             alarm_metrics: self.alarm_metrics.clone(),
             commands: self.commands.shown(),

@@ -53,8 +53,8 @@ pub struct Snapshot {
     pub devices: Vec<DeviceStatus>,
     /// Alarms that are active, unacknowledged or latched: most urgent first, then latest first.
     pub alarms: Arc<Vec<ActiveAlarm>>,
-    /// Alarms that are put aside, in the order of the plant file: never annunciated, always listed.
-    pub aside: Arc<Vec<AsideAlarm>>,
+    /// Alarms that are suppressed, in the order of the plant file: never annunciated, always listed.
+    pub suppressed: Arc<Vec<SuppressedAlarm>>,
     /// An active alarm that nobody has acknowledged came after the last silence.
     pub sound: bool,
     /// How good the alarm system is: the rates of this moment, and the figures of the last 24 hours.
@@ -94,7 +94,7 @@ impl Snapshot {
             lines: vec![LineStatus::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); devices],
             alarms: Arc::default(),
-            aside: Arc::default(),
+            suppressed: Arc::default(),
             sound: false,
             alarm_metrics: AlarmMetrics::default(),
             commands: Vec::new(),
@@ -258,7 +258,7 @@ pub enum DeviceState {
 pub struct ActiveAlarm {
     /// Which.
     pub id: AlarmId,
-    /// Unacknowledged, acknowledged, returned, latched; never one of those that are put aside.
+    /// Unacknowledged, acknowledged, returned, latched; never one of those that are suppressed.
     pub state: AlarmState,
     /// When it was raised.
     pub raised_at: Timestamp,
@@ -289,14 +289,14 @@ impl ActiveAlarm {
     }
 }
 
-/// An alarm that is put aside.
+/// An alarm that is suppressed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AsideAlarm {
+pub struct SuppressedAlarm {
     /// Which.
     pub id: AlarmId,
     /// Shelved, suppressed or out of service.
     pub state: AlarmState,
-    /// Who put it aside, when and why; nobody, where it is by design.
+    /// Who suppressed it, when and why; no operator if by design.
     pub note: OperatorNote,
     /// When it comes back by itself, if it is shelved.
     pub until: Option<Timestamp>,

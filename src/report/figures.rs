@@ -8,7 +8,7 @@ use std::{
 use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
-    DECIMALS_UNKNOWN, RecordRow, SuppressedAlarm, TagFigures,
+    DECIMALS_UNKNOWN, RecordRow, SuppressedSummary, TagFigures,
     step_series::{Segment, SegmentStats, StepSeries, good_value},
 };
 use crate::plant::{
@@ -175,7 +175,7 @@ pub fn suppressed(
     steps: &[AlarmRecord],
     from: Timestamp,
     until: Timestamp,
-) -> Vec<SuppressedAlarm> {
+) -> Vec<SuppressedSummary> {
     let mut alarms: BTreeMap<(&str, &str), Quiet> = BTreeMap::new();
     let annunciated: HashSet<(&str, &str)> = standing.iter().map(|step| (&*step.subject, &*step.text)).collect();
     for step in active {
@@ -207,13 +207,13 @@ struct Quiet {
     active: bool,
     quiet: bool,
     since: Timestamp,
-    found: SuppressedAlarm,
+    found: SuppressedSummary,
 }
 
 impl Quiet {
     fn new(step: &AlarmRecord) -> Quiet {
         let (subject, text) = (step.subject.clone(), step.text.clone());
-        let found = SuppressedAlarm { subject, text, priority: step.priority, raised: 0, active: Duration::ZERO };
+        let found = SuppressedSummary { subject, text, priority: step.priority, raised: 0, active: Duration::ZERO };
         Quiet { active: false, quiet: false, since: step.at, found }
     }
 

@@ -106,7 +106,7 @@ pub struct ShiftReport {
     /// One row a tag.
     pub tags: Vec<TagFigures>,
     /// Alarms that were active while they were suppressed, shelved or out of service.
-    pub suppressed: Vec<SuppressedAlarm>,
+    pub suppressed: Vec<SuppressedSummary>,
     /// Steps of alarms in the period, oldest first.
     pub alarms: Vec<AlarmRecord>,
     /// How good the alarm system was in the period.
@@ -146,7 +146,7 @@ pub struct TagFigures {
 
 /// An alarm that was active without being annunciated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SuppressedAlarm {
+pub struct SuppressedSummary {
     /// Full name of the tag or device.
     pub subject: Arc<str>,
     /// `temperature high`.

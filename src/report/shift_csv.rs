@@ -3,7 +3,7 @@
 use jiff::tz::TimeZone;
 
 use super::{
-    Gap, ReportFormat, ShiftReport, SuppressedAlarm, TagFigures,
+    Gap, ReportFormat, ShiftReport, SuppressedSummary, TagFigures,
     alarm_metrics::{self, BadActor, Row},
     csv::{Table, floor_percent, iso, iso_millis, number, plain, shortest, text},
     raised, record_csv,
@@ -94,7 +94,7 @@ fn tag_row(tag: &TagFigures, dialect: CsvDialect) -> Vec<String> {
     ]
 }
 
-fn suppressed_row(alarm: &SuppressedAlarm, dialect: CsvDialect) -> Vec<String> {
+fn suppressed_row(alarm: &SuppressedSummary, dialect: CsvDialect) -> Vec<String> {
     vec![
         plain(alarm.priority.word()),
         text(&alarm.subject),

@@ -252,7 +252,7 @@ impl AuditQueue {
         for alarm in Arc::make_mut(&mut snapshot.alarms) {
             alarm.acknowledged.iter_mut().for_each(|note| note.recorded = is_recorded(alarm.id));
         }
-        for alarm in Arc::make_mut(&mut snapshot.aside) {
+        for alarm in Arc::make_mut(&mut snapshot.suppressed) {
             alarm.note.recorded = is_recorded(alarm.id);
         }
     }

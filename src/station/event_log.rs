@@ -69,7 +69,7 @@ fn device_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
 }
 
 fn alarm_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
-    if Arc::ptr_eq(&before.alarms, &after.alarms) && Arc::ptr_eq(&before.aside, &after.aside) {
+    if Arc::ptr_eq(&before.alarms, &after.alarms) && Arc::ptr_eq(&before.suppressed, &after.suppressed) {
         return Vec::new();
     }
     let (before, states) = (states_in(before), states_in(after));
@@ -89,7 +89,7 @@ fn alarm_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
 
 fn states_in(snapshot: &Snapshot) -> HashMap<AlarmId, AlarmState> {
     let active = snapshot.alarms.iter().map(|alarm| (alarm.id, alarm.state));
-    active.chain(snapshot.aside.iter().map(|alarm| (alarm.id, alarm.state))).collect()
+    active.chain(snapshot.suppressed.iter().map(|alarm| (alarm.id, alarm.state))).collect()
 }
 
 /// What has happened to an alarm between two states.

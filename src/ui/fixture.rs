@@ -18,7 +18,7 @@ use crate::plant::{
     parameter_set::StoredSet,
     restore::Restore,
     sample::{Cause, Sample},
-    snapshot::{ActiveAlarm, AsideAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
+    snapshot::{ActiveAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot, SuppressedAlarm},
     station::StationFault,
     tag::*,
     traffic::Exchange,
@@ -39,8 +39,8 @@ pub struct Fixture {
     pub samples: Vec<Sample>,
     /// Alarms that are shown.
     pub alarms: Vec<ActiveAlarm>,
-    /// Alarms that are put aside.
-    pub aside: Vec<AsideAlarm>,
+    /// Alarms that are suppressed.
+    pub suppressed: Vec<SuppressedAlarm>,
     /// The figures of the alarm system.
     pub alarm_metrics: AlarmMetrics,
     /// The line.
@@ -92,7 +92,7 @@ impl Fixture {
             def,
             samples,
             alarms: Vec::new(),
-            aside: Vec::new(),
+            suppressed: Vec::new(),
             alarm_metrics: AlarmMetrics::default(),
             line: LineStatus { state: LineState::Connected, counters, ..LineStatus::default() },
             devices,
@@ -179,7 +179,7 @@ impl Fixture {
             lines: vec![self.line.clone()],
             devices: self.devices.clone(),
             alarms: Arc::new(self.alarms.clone()),
-            aside: Arc::new(self.aside.clone()),
+            suppressed: Arc::new(self.suppressed.clone()),
             sound: self.alarms.iter().any(|alarm| alarm.state == AlarmState::Unacknowledged),
             alarm_metrics: self.alarm_metrics.clone(),
             commands: Vec::new(),

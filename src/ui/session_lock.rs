@@ -97,7 +97,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     }
 }
 
-/// What was under way when the terminal was locked is put aside, so that nothing hides process and alarms, and comes back
+/// What was under way when the terminal was locked is kept, so that nothing hides process and alarms, and comes back
 /// as it was when it is unlocked: then the tab that it stood on.
 fn keep_work(model: &mut Model, before: &SessionStatus, now: &SessionStatus) -> Option<Tab> {
     match (before.locked, now.locked) {

@@ -308,8 +308,8 @@ async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Report
     let mut station = place.station();
     let ((done, mut count), (asked, mut report)) = (watch::channel(0), watch::channel(false));
     let session = place.terminal().await;
-    let aside = session.snapshots.borrow().aside.iter().find_map(|alarm| alarm.note.reason.clone());
-    assert_eq!(aside, before, "round {round}: the alarms are as they were");
+    let suppressed = session.snapshots.borrow().suppressed.iter().find_map(|alarm| alarm.note.reason.clone());
+    assert_eq!(suppressed, before, "round {round}: the alarms are as they were");
     let acting = tokio::spawn(act_on(session, done, round));
     let reporting = tokio::spawn(report_on(place.terminal().await, asked));
     let logging = tokio::spawn(log_in_on(place.terminal().await));

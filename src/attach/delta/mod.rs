@@ -20,7 +20,7 @@ use crate::plant::{
     interlock::ActuatorTracker,
     parameter_set::StoredSet,
     restore::Restore,
-    snapshot::{ActiveAlarm, AsideAlarm, DeviceStatus, HistoryStatus},
+    snapshot::{ActiveAlarm, DeviceStatus, HistoryStatus, SuppressedAlarm},
     station::StationFault,
     tuning::Tuning,
 };
@@ -42,7 +42,7 @@ pub struct Delta {
     lines: Vec<(u16, LineDelta)>,
     devices: List<DeviceStatus>,
     alarms: List<ActiveAlarm>,
-    aside: List<AsideAlarm>,
+    suppressed: List<SuppressedAlarm>,
     sound: bool,
     rates: Option<AlarmRates>,
     /// The figures of the day: they change less often than the rates.
@@ -83,7 +83,7 @@ impl Delta {
             devices,
             alarms,
             alarm_metrics,
-            aside,
+            suppressed,
             sound,
             commands,
             watch,
@@ -109,7 +109,7 @@ impl Delta {
             lines: lines.collect(),
             devices: List::between(&old.devices, devices),
             alarms: shared(&old.alarms, alarms),
-            aside: shared(&old.aside, aside),
+            suppressed: shared(&old.suppressed, suppressed),
             sound: *sound,
             rates: (rates(&old.alarm_metrics) != rates(alarm_metrics)).then(|| rates(alarm_metrics)),
             day: (old.alarm_metrics.day != alarm_metrics.day).then(|| alarm_metrics.day.clone()),
@@ -152,8 +152,8 @@ impl Delta {
         if let Some(alarms) = self.alarms.made_of(&snapshot.alarms)? {
             snapshot.alarms = Arc::new(alarms);
         }
-        if let Some(aside) = self.aside.made_of(&snapshot.aside)? {
-            snapshot.aside = Arc::new(aside);
+        if let Some(suppressed) = self.suppressed.made_of(&snapshot.suppressed)? {
+            snapshot.suppressed = Arc::new(suppressed);
         }
         snapshot.sound = self.sound;
         let quality = &mut snapshot.alarm_metrics;

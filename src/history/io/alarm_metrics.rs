@@ -118,7 +118,7 @@ impl Store {
         }
     }
 
-    /// The raising steps of the alarms that were active at an instant and not put aside: what is aside is not stale.
+    /// The raising steps of the alarms that were active at an instant and not suppressed: a suppressed alarm is not stale.
     pub(super) fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)
     }

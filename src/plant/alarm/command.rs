@@ -34,7 +34,7 @@ pub enum AlarmCommand {
     Silence,
     /// Let go an alarm that latches; nothing happens while its cause lasts.
     Reset(AlarmId),
-    /// Put an alarm aside for a time.
+    /// Shelve an alarm.
     Shelve {
         /// Which.
         alarm: AlarmId,
@@ -43,7 +43,7 @@ pub enum AlarmCommand {
     },
     /// Take an alarm back from the shelf before its time.
     Unshelve(AlarmId),
-    /// Put an alarm aside until somebody puts it back.
+    /// Take an alarm out of service.
     OutOfService(AlarmId),
     /// Put an alarm back in service.
     InService(AlarmId),
@@ -64,7 +64,7 @@ pub enum AlarmRefusal {
     /// The plant file wants a note with the acknowledgement.
     #[error("this alarm needs a note")]
     NoteNeeded,
-    /// Nobody is to put an alarm aside without saying why.
+    /// Shelving and taking out of service need a reason.
     #[error("a reason is needed")]
     ReasonNeeded,
     /// A note or reason is longer than [`WORDS_MAX`] characters.
@@ -180,7 +180,7 @@ impl AlarmManager {
         Ok(self.back(&alarm, AlarmStep::Unshelved, value, at, by))
     }
 
-    /// Puts an alarm aside until somebody puts it back.
+    /// Takes an alarm out of service.
     pub fn out_of_service(
         &mut self,
         id: AlarmId,

@@ -1,4 +1,4 @@
-//! What an operator should see of the manager: alarms in order of urgency, what is put aside, and whether it sounds.
+//! What an operator should see of the manager: alarms in order of urgency, what is suppressed, and whether it sounds.
 
 use std::{cmp::Reverse, sync::Arc};
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::plant::{
     def::AlarmId,
-    snapshot::{ActiveAlarm, AsideAlarm},
+    snapshot::{ActiveAlarm, SuppressedAlarm},
 };
 
 /// What a snapshot shows of the manager. Shared, because most snapshots show the same.
@@ -18,8 +18,8 @@ use crate::plant::{
 pub struct Lists {
     /// Most urgent first; among equals those that wait for an acknowledgement, then the latest.
     pub active: Arc<Vec<ActiveAlarm>>,
-    /// What is put aside, in the order of the plant file.
-    pub aside: Arc<Vec<AsideAlarm>>,
+    /// What is suppressed, in the order of the plant file.
+    pub suppressed: Arc<Vec<SuppressedAlarm>>,
     /// An active alarm that nobody has acknowledged came after the last silence.
     pub sound: bool,
 }
@@ -44,13 +44,13 @@ impl AlarmManager {
     }
 
     fn listed(&self) -> Lists {
-        let (mut active, mut aside, mut sound) = (Vec::new(), Vec::new(), false);
+        let (mut active, mut suppressed, mut sound) = (Vec::new(), Vec::new(), false);
         for (alarm, machine) in self.def.alarms.iter().zip(&self.machines) {
             let state = machine.state();
             match state {
                 AlarmState::Normal => {}
                 AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => {
-                    aside.extend(put_aside(alarm.id, machine));
+                    suppressed.extend(suppressed_alarm(alarm.id, machine));
                 }
                 AlarmState::Unacknowledged
                 | AlarmState::Acknowledged
@@ -66,7 +66,7 @@ impl AlarmManager {
             let waits = alarm.state.needs_acknowledgement();
             (self.def.alarm(alarm.id).priority, !waits, Reverse(alarm.raised_at))
         });
-        Lists { active: Arc::new(active), aside: Arc::new(aside), sound }
+        Lists { active: Arc::new(active), suppressed: Arc::new(suppressed), sound }
     }
 }
 
@@ -86,7 +86,7 @@ fn shown(id: AlarmId, machine: &AlarmStateMachine) -> ActiveAlarm {
     }
 }
 
-fn put_aside(id: AlarmId, machine: &AlarmStateMachine) -> Option<AsideAlarm> {
+fn suppressed_alarm(id: AlarmId, machine: &AlarmStateMachine) -> Option<SuppressedAlarm> {
     let state = machine.state();
     let shelf = machine.shelved().filter(|_| state == AlarmState::Shelved);
     let note = match state {
@@ -100,5 +100,5 @@ fn put_aside(id: AlarmId, machine: &AlarmStateMachine) -> Option<AsideAlarm> {
         | AlarmState::LatchedUnacknowledged
         | AlarmState::LatchedAcknowledged => return None,
     };
-    Some(AsideAlarm { id, state, note, until: shelf.map(|shelving| shelving.until), active: machine.is_active() })
+    Some(SuppressedAlarm { id, state, note, until: shelf.map(|shelving| shelving.until), active: machine.is_active() })
 }

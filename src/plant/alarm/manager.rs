@@ -105,11 +105,11 @@ impl AlarmManager {
         if !is_disabled(alarm, facts) || self.machine(alarm.id).suppressed().is_some() {
             return;
         }
-        if self.machine(alarm.id).is_active() && !self.machine(alarm.id).state().is_aside() {
+        if self.machine(alarm.id).is_active() && !self.machine(alarm.id).state().is_suppressed() {
             records.push(self.step(alarm, AlarmStep::Returned, at, facts.value));
         }
         let machine = self.machine(alarm.id);
-        if machine.state() == AlarmState::Normal || machine.state().is_aside() && !machine.is_latched() {
+        if machine.state() == AlarmState::Normal || machine.state().is_suppressed() && !machine.is_latched() {
             records.push(self.step(alarm, AlarmStep::Suppressed, at, facts.value));
         }
     }
@@ -143,7 +143,7 @@ impl AlarmManager {
         let machine = self.machine(alarm.id);
         let holds = machine.is_active() || machine.is_pending();
         if machine.is_active() {
-            let raised = if machine.state().is_aside() { AlarmStep::RaisedQuietly } else { AlarmStep::Raised };
+            let raised = if machine.state().is_suppressed() { AlarmStep::RaisedQuietly } else { AlarmStep::Raised };
             let step = if alarm.on_delay.is_zero() { raised } else { AlarmStep::ReturnedQuietly };
             records.push(self.step(alarm, step, at, facts.value));
         }
@@ -185,10 +185,10 @@ impl AlarmManager {
         }
     }
 
-    /// An alarm that is active when nothing keeps it aside any more is raised anew: nobody has seen it.
+    /// An alarm that is active when its suppression ends is raised again.
     pub(super) fn raise_anew(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<f64>) -> Option<AlarmRecord> {
         let machine = self.machine(alarm.id);
-        let due = machine.is_active() && !machine.state().is_aside();
+        let due = machine.is_active() && !machine.state().is_suppressed();
         due.then(|| self.step(alarm, AlarmStep::Raised, at, value))
     }
 

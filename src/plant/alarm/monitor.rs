@@ -148,7 +148,7 @@ impl AlarmMonitor {
             AlarmStep::Raised => self.raised(step),
             AlarmStep::Acknowledged => self.alarms.entry(named(step)).or_default().acknowledged = true,
             AlarmStep::Returned => self.returned(step),
-            // What is put aside burdens nobody: it neither stands nor has it come and gone.
+            // A suppressed alarm burdens no operator: it is neither stale nor fleeting.
             AlarmStep::ReturnedQuietly | AlarmStep::Shelved | AlarmStep::Suppressed | AlarmStep::OutOfService => {
                 self.alarms.entry(named(step)).or_default().acknowledged = true;
                 self.returned(step);

@@ -1,4 +1,4 @@
-//! The state machine of one alarm: the memories *active*, *unacknowledged* and *latched*, and why it is put aside.
+//! The state machine of one alarm: the memories *active*, *unacknowledged* and *latched*, and why it is suppressed.
 
 use std::{sync::Arc, time::Duration};
 
@@ -23,11 +23,11 @@ pub enum AlarmState {
     LatchedUnacknowledged,
     /// No longer active, acknowledged, and it waits for a reset.
     LatchedAcknowledged,
-    /// Put aside by an operator for a time.
+    /// Suppressed by an operator for a limited time.
     Shelved,
-    /// Put aside by design: what enables it is false.
+    /// Suppressed by design: its enabling condition is false.
     Suppressed,
-    /// Put aside until somebody puts it back.
+    /// Suppressed by an operator until put back in service.
     OutOfService,
 }
 
@@ -71,8 +71,8 @@ impl AlarmState {
             | AlarmState::OutOfService => false,
         }
     }
-    /// Put aside: still judged and put on record, never annunciated.
-    pub fn is_aside(self) -> bool {
+    /// Shelved, suppressed by design or out of service: evaluated and journaled, not annunciated.
+    pub fn is_suppressed(self) -> bool {
         match self {
             AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => true,
             AlarmState::Normal
@@ -222,8 +222,8 @@ impl AlarmStateMachine {
         if now.saturating_sub(since) < delay {
             return None;
         }
-        let aside = self.state().is_aside();
-        Some(match (holds, aside) {
+        let suppressed = self.state().is_suppressed();
+        Some(match (holds, suppressed) {
             (true, false) => AlarmStep::Raised,
             (true, true) => AlarmStep::RaisedQuietly,
             (false, false) => AlarmStep::Returned,

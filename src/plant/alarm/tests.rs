@@ -1,4 +1,4 @@
-//! The manager as a whole: what is told, acknowledged, put aside, reminded of and restored.
+//! The manager as a whole: what is told, acknowledged, suppressed, reminded of and restored.
 
 use std::{sync::Arc, time::Duration};
 
@@ -142,8 +142,8 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
     manager.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
     assert_eq!(steps(&manager.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
     assert!(!manager.lists().sound && manager.active().is_empty());
-    let aside = manager.lists().aside[0].clone();
-    assert_eq!((aside.until, aside.active, aside.note.reason), (Some(at(60)), true, Some(why())));
+    let suppressed = manager.lists().suppressed[0].clone();
+    assert_eq!((suppressed.until, suppressed.active, suppressed.note.reason), (Some(at(60)), true, Some(why())));
     assert_eq!(steps(&manager.judge(at(59), facts(80.0, true))), []);
     assert_eq!(steps(&manager.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
     assert_eq!((state(&manager), manager.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
@@ -163,7 +163,7 @@ fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
     assert_eq!(steps(&manager.judge(at(104), facts(80.0, true))), [AlarmStep::Raised], "6 s and 4 s");
     manager.shelve(HIGH, Duration::from_secs(600), Some(&why()), at(5_000), &by()).expect("ten minutes");
     assert_eq!(steps(&manager.judge(at(200), facts(80.0, true))), [AlarmStep::Shelved]);
-    assert_eq!(manager.lists().aside[0].until, Some(at(800)));
+    assert_eq!(manager.lists().suppressed[0].until, Some(at(800)));
     assert_eq!(steps(&manager.judge(at(800), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
 }
 
@@ -178,7 +178,7 @@ fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
         Err(AlarmRefusal::OutOfService)
     );
     assert_eq!(steps(&manager.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
-    assert_eq!(manager.lists().aside[0].state, AlarmState::OutOfService);
+    assert_eq!(manager.lists().suppressed[0].state, AlarmState::OutOfService);
     let back = manager.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
     assert_eq!(steps(&back), [AlarmStep::InService, AlarmStep::Raised]);
     assert_eq!(back[1].value, Some(80.0));
@@ -458,7 +458,7 @@ fn lasting(manager: &AlarmManager) -> impl PartialEq + std::fmt::Debug {
         manager.lists().active.iter().map(|alarm| super::super::snapshot::ActiveAlarm { times: 0, ..alarm.clone() });
     let machine = manager.machine(HIGH);
     let kept = (machine.is_active(), machine.is_latched(), machine.suppressed(), machine.shelved().cloned());
-    (active.collect::<Vec<_>>(), manager.lists().aside.clone(), kept)
+    (active.collect::<Vec<_>>(), manager.lists().suppressed.clone(), kept)
 }
 
 proptest! {
@@ -521,11 +521,11 @@ proptest! {
             let raised = new.iter().any(|step| matches!(step.step, AlarmStep::Raised | AlarmStep::RaisedAgain));
             // Who is told is told once, and only where something was raised in the open.
             prop_assert!(!manager.lists().sound || sounded || raised, "it sounds for nothing: {:?}", test_event);
-            prop_assert!(!(machine.state().is_aside() && manager.lists().sound));
+            prop_assert!(!(machine.state().is_suppressed() && manager.lists().sound));
             let shown = manager.active().iter().any(|alarm| alarm.id == HIGH);
-            let aside = manager.lists().aside.iter().any(|alarm| alarm.id == HIGH);
-            prop_assert_eq!(machine.state() == AlarmState::Normal, !shown && !aside, "what is not normal is listed");
-            prop_assert!(!(shown && aside));
+            let suppressed = manager.lists().suppressed.iter().any(|alarm| alarm.id == HIGH);
+            prop_assert_eq!(machine.state() == AlarmState::Normal, !shown && !suppressed, "what is not normal is listed");
+            prop_assert!(!(shown && suppressed));
             // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes, unless its
             // enabling begins or ends.
             let released = new.iter().any(|step| step.step == AlarmStep::Released);

@@ -61,7 +61,7 @@ fn report() -> ShiftReport {
                 good: 1.0,
             },
         ],
-        suppressed: vec![SuppressedAlarm {
+        suppressed: vec![SuppressedSummary {
             subject: "PLC-1.LT-1".into(),
             text: "level low".into(),
             priority: Priority::Low,

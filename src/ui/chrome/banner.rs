@@ -34,9 +34,9 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
             Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
             None => canvas.text(1, 0, "no alarms", cx.theme.dim()),
         };
-        let aside = aside_words(cx);
-        if canvas.is_blank(room.saturating_sub(width(&aside) + 2), 0, width(&aside) + 2) {
-            canvas.text_right(room, 0, &aside, cx.theme.normal());
+        let suppressed = suppressed_words(cx);
+        if canvas.is_blank(room.saturating_sub(width(&suppressed) + 2), 0, width(&suppressed) + 2) {
+            canvas.text_right(room, 0, &suppressed, cx.theme.normal());
         }
         return;
     };
@@ -52,13 +52,13 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let may = rights::missing(cx, &alarm.acknowledge()).is_none();
     let ack = if waiting && meant && may { "a ack " } else { "" };
     let worry = worry_words(model, cx);
-    let (aside, silenced) = (aside_words(cx), if is_silenced(cx) { "silenced   " } else { "" });
-    let aside = if aside.is_empty() { aside } else { format!("{aside}   ") };
+    let (suppressed, silenced) = (suppressed_words(cx), if is_silenced(cx) { "silenced   " } else { "" });
+    let suppressed = if suppressed.is_empty() { suppressed } else { format!("{suppressed}   ") };
     let counts = counts(cx);
     // How many there are, that one waits for somebody, and why to doubt all this must not be what a long text pushes out.
     let tails = [
-        (25, format!("{worry}{counts}   {aside}{silenced}{ack}")),
-        (25, format!("{worry}{counts}   {aside}{ack}")),
+        (25, format!("{worry}{counts}   {suppressed}{silenced}{ack}")),
+        (25, format!("{worry}{counts}   {suppressed}{ack}")),
         (14, format!("{worry}{counts}   {ack}")),
         (8, format!("{worry}{ack}")),
     ];
@@ -85,8 +85,8 @@ fn worry_words(model: &Model, cx: &ViewContext) -> String {
 
 /// `3 suppressed`: shelved or out of service. What is suppressed by design is as it should be, and stands
 /// on the alarms tab only.
-fn aside_words(cx: &ViewContext) -> String {
-    let by_somebody = cx.snapshot.aside.iter().filter(|aside| aside.state != AlarmState::Suppressed);
+fn suppressed_words(cx: &ViewContext) -> String {
+    let by_somebody = cx.snapshot.suppressed.iter().filter(|suppressed| suppressed.state != AlarmState::Suppressed);
     match by_somebody.count() {
         0 => String::new(),
         many => format!("{many} suppressed"),

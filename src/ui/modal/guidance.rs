@@ -10,7 +10,7 @@ use crate::{
         UiAction, ViewContext,
         keys::{self, Hint},
         modal::confirm::subject,
-        tabs::alarms::{aside_words, guidance},
+        tabs::alarms::{guidance, suppressed_words},
         widgets::text::{pad, wrap},
     },
 };
@@ -63,8 +63,8 @@ impl Guidance {
     /// Every row, wrapped, with its name before the first line.
     fn lines(&self, cx: &ViewContext, room: u16) -> Vec<(&'static str, String)> {
         let listed = cx.snapshot.alarms.iter().find(|alarm| alarm.id == self.alarm);
-        let aside = cx.snapshot.aside.iter().find(|aside| aside.id == self.alarm);
-        let now = aside.map_or("no longer active".to_owned(), |aside| aside_words(cx, aside));
+        let suppressed = cx.snapshot.suppressed.iter().find(|suppressed| suppressed.id == self.alarm);
+        let now = suppressed.map_or("no longer active".to_owned(), |suppressed| suppressed_words(cx, suppressed));
         let mut rows = match listed {
             Some(alarm) => guidance::rows(cx, alarm),
             None => guidance::rows_of_any(cx, self.alarm, now),

@@ -1,4 +1,4 @@
-//! Tab 3: what is wrong, how urgent and what to do about it; what is put aside; what was; how good the alarm system is;
+//! Tab 3: what is wrong, how urgent and what to do about it; what is suppressed; what was; how good the alarm system is;
 //! and what the next shift must know.
 
 pub mod actions;
@@ -25,7 +25,7 @@ use crate::{
     plant::{
         alarm::AlarmState,
         def::{AlarmClass, AlarmId, Priority, Subject},
-        snapshot::{ActiveAlarm, AsideAlarm, Snapshot},
+        snapshot::{ActiveAlarm, Snapshot, SuppressedAlarm},
     },
     ui::{
         UiAction, ViewContext,
@@ -36,7 +36,7 @@ use crate::{
 };
 use filter::Filter;
 use handover::Handover;
-pub use handover::aside_words;
+pub use handover::suppressed_words;
 use journal::Journal;
 use keys::Action;
 use metrics::Metrics;
@@ -48,7 +48,7 @@ pub enum Page {
     #[default]
     Active,
     /// Shelved, out of service, suppressed.
-    Aside,
+    Suppressed,
     /// Alarms of what watches the process.
     System,
     /// What was.
@@ -61,13 +61,14 @@ pub enum Page {
 
 impl Page {
     /// Every view, in the order of the key.
-    pub const ALL: [Page; 6] = [Page::Active, Page::Aside, Page::System, Page::Journal, Page::Metrics, Page::Handover];
+    pub const ALL: [Page; 6] =
+        [Page::Active, Page::Suppressed, Page::System, Page::Journal, Page::Metrics, Page::Handover];
 
     /// Its heading.
     pub fn title(self) -> &'static str {
         match self {
             Page::Active => "active",
-            Page::Aside => "suppressed",
+            Page::Suppressed => "suppressed",
             Page::System => "system",
             Page::Journal => "journal",
             Page::Metrics => "metrics",
@@ -119,7 +120,9 @@ impl TabView for Alarms {
             Action::AcknowledgePage => return actions::acknowledge_all(cx, self.seen(cx).into_iter()),
             Action::Shelve => return alarm.map_or_else(Vec::new, |alarm| actions::shelve(cx, alarm.id)),
             Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| actions::out_of_service(cx, alarm.id)),
-            Action::PutBack => return self.aside(cx).map_or_else(Vec::new, |aside| actions::put_back(cx, aside)),
+            Action::PutBack => {
+                return self.suppressed(cx).map_or_else(Vec::new, |suppressed| actions::put_back(cx, suppressed));
+            }
             Action::Reset => return alarm.map_or_else(Vec::new, |alarm| actions::reset(cx, alarm)),
             Action::Why | Action::Open | Action::Mimic | Action::Trend | Action::Controller => {
                 return self.go(cx, action);
@@ -145,8 +148,8 @@ impl TabView for Alarms {
             }),
             "unfold" => alarm.is_some_and(|alarm| alarm.burst.is_some()),
             "put back" => self
-                .aside(cx)
-                .is_some_and(|aside| matches!(aside.state, AlarmState::Shelved | AlarmState::OutOfService)),
+                .suppressed(cx)
+                .is_some_and(|suppressed| matches!(suppressed.state, AlarmState::Shelved | AlarmState::OutOfService)),
             _ => true,
         };
         let mut hints = keys::told(self.page);
@@ -177,10 +180,16 @@ impl TabView for Alarms {
                 let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
                 Rows::of(rows.iter().map(seen), self.place(&rows))
             }
-            Page::Aside => {
-                let place = |aside: &AsideAlarm| Some(aside.id) == self.selected;
-                let place = cx.snapshot.aside.iter().position(place).unwrap_or(0);
-                Rows::of(cx.snapshot.aside.iter().map(|aside| (aside.id, aside.state, aside.note.at)), place)
+            Page::Suppressed => {
+                let place = |suppressed: &SuppressedAlarm| Some(suppressed.id) == self.selected;
+                let place = cx.snapshot.suppressed.iter().position(place).unwrap_or(0);
+                Rows::of(
+                    cx.snapshot
+                        .suppressed
+                        .iter()
+                        .map(|suppressed| (suppressed.id, suppressed.state, suppressed.note.at)),
+                    place,
+                )
             }
             // Nothing is done with a row of these.
             Page::Journal | Page::Metrics | Page::Handover => Rows::default(),
@@ -193,7 +202,7 @@ impl TabView for Alarms {
         };
         self.unfolded.retain(there);
         match self.page {
-            Page::Active | Page::Aside | Page::System => Vec::new(),
+            Page::Active | Page::Suppressed | Page::System => Vec::new(),
             Page::Journal => self.journal.ask(cx, &mut self.asked),
             Page::Metrics => self.metrics.ask(cx, &mut self.asked),
             Page::Handover => self.handover.ask(cx, &mut self.asked),
@@ -215,7 +224,7 @@ impl TabView for Alarms {
         match self.page {
             Page::Active | Page::System => self.filter.type_words(text),
             Page::Journal => self.journal.search(cx, text)?,
-            Page::Aside | Page::Metrics | Page::Handover => {}
+            Page::Suppressed | Page::Metrics | Page::Handover => {}
         }
         Ok(self.on_snapshot(cx))
     }
@@ -268,7 +277,7 @@ impl Alarms {
     /// Rows of the list that the screen has room for.
     fn page_rows(&self, cx: &ViewContext) -> usize {
         match self.page {
-            Page::Active | Page::System | Page::Aside => view::room(cx, cx.area.width, cx.area.height),
+            Page::Active | Page::System | Page::Suppressed => view::room(cx, cx.area.width, cx.area.height),
             Page::Journal | Page::Metrics | Page::Handover => usize::from(cx.area.height.saturating_sub(3)).max(1),
         }
     }
@@ -281,21 +290,21 @@ impl Alarms {
         rows.into_iter().skip(first).take(room).map(|row| row.alarm).collect()
     }
 
-    fn aside<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a AsideAlarm> {
+    fn suppressed<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a SuppressedAlarm> {
         let snapshot = cx.snapshot;
-        let place = snapshot.aside.iter().position(|aside| Some(aside.id) == self.selected).unwrap_or(0);
-        snapshot.aside.get(place).filter(|_| self.page == Page::Aside)
+        let place = snapshot.suppressed.iter().position(|suppressed| Some(suppressed.id) == self.selected).unwrap_or(0);
+        snapshot.suppressed.get(place).filter(|_| self.page == Page::Suppressed)
     }
 
     /// The alarm that the keys of the page are about.
     fn target(&self, cx: &ViewContext) -> Option<AlarmId> {
-        self.selected(cx).map(|alarm| alarm.id).or_else(|| self.aside(cx).map(|aside| aside.id))
+        self.selected(cx).map(|alarm| alarm.id).or_else(|| self.suppressed(cx).map(|suppressed| suppressed.id))
     }
 
     fn step(&mut self, cx: &ViewContext, by: isize) {
         let ids: Vec<AlarmId> = match self.page {
             Page::Active | Page::System => self.rows(cx).iter().map(|row| row.alarm.id).collect(),
-            Page::Aside => cx.snapshot.aside.iter().map(|aside| aside.id).collect(),
+            Page::Suppressed => cx.snapshot.suppressed.iter().map(|suppressed| suppressed.id).collect(),
             Page::Journal => return self.journal.step(cx, by),
             Page::Metrics => return self.metrics.step(cx, by),
             Page::Handover => return self.handover.step(cx, by),
@@ -329,7 +338,7 @@ impl Alarms {
             Page::Journal => self.journal.shift(cx, by),
             Page::Metrics => self.metrics.shift(cx, by),
             Page::Handover => self.handover.shift(cx, by),
-            Page::Active | Page::Aside | Page::System => {}
+            Page::Active | Page::Suppressed | Page::System => {}
         }
     }
 
@@ -346,7 +355,7 @@ impl Alarms {
     fn ask_words(&self) -> Vec<UiAction> {
         let prompt = match self.page {
             Page::Journal => Prompt::new("search the journal", journal::FORMS, &self.journal.typed()),
-            Page::Active | Page::Aside | Page::System | Page::Metrics | Page::Handover => {
+            Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
                 Prompt::new("show only alarms with", filter::FORMS, &self.filter.typed())
             }
         };
@@ -384,7 +393,7 @@ fn is_on(page: Page, def: &crate::plant::def::AlarmDef) -> bool {
     match page {
         Page::Active => def.class == AlarmClass::Process || urgent,
         Page::System => def.class == AlarmClass::System,
-        Page::Aside | Page::Journal | Page::Metrics | Page::Handover => false,
+        Page::Suppressed | Page::Journal | Page::Metrics | Page::Handover => false,
     }
 }
 

@@ -206,7 +206,7 @@ fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
 }
 
 #[test]
-fn an_alarm_that_was_put_aside_before_a_period_is_not_stale_in_it() {
+fn an_alarm_suppressed_before_a_period_is_not_stale_in_it() {
     use AlarmStep::{OutOfService, Raised, RaisedQuietly, Shelved, Suppressed};
     let (_folder, db) = folder();
     let store = open(&db, START);

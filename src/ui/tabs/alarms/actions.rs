@@ -8,7 +8,7 @@ use crate::{
         alarm::{AlarmCommand, AlarmState},
         command::CommandKind,
         def::AlarmId,
-        snapshot::{ActiveAlarm, AsideAlarm},
+        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
         UiAction, ViewContext,
@@ -122,11 +122,11 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     open(Modal::Notice(Notice::new("reset", vec![name(cx, alarm.id), why.to_owned()])))
 }
 
-/// Asks whether to take back what was put aside.
-pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<UiAction> {
-    let (title, alarm_command) = match aside.state {
-        AlarmState::Shelved => ("take back from the shelf", AlarmCommand::Unshelve(aside.id)),
-        AlarmState::OutOfService => ("put in service", AlarmCommand::InService(aside.id)),
+/// Asks whether to unshelve, or to put back in service.
+pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction> {
+    let (title, alarm_command) = match suppressed.state {
+        AlarmState::Shelved => ("take back from the shelf", AlarmCommand::Unshelve(suppressed.id)),
+        AlarmState::OutOfService => ("put in service", AlarmCommand::InService(suppressed.id)),
         AlarmState::Suppressed => {
             let words = "It is suppressed by design, and comes back when its enabling condition holds again.";
             return open(Modal::Notice(Notice::new("suppressed", vec![words.to_owned()])));
@@ -138,9 +138,9 @@ pub fn put_back(cx: &ViewContext, aside: &AsideAlarm) -> Vec<UiAction> {
         | AlarmState::LatchedUnacknowledged
         | AlarmState::LatchedAcknowledged => return Vec::new(),
     };
-    let holds = aside.active.then(|| "Its condition holds: it will be annunciated at once.".to_owned());
+    let holds = suppressed.active.then(|| "Its condition holds: it will be annunciated at once.".to_owned());
     let kind = CommandKind::Alarm(alarm_command);
-    let confirm = Confirm::command(title, name(cx, aside.id), kind.clone());
+    let confirm = Confirm::command(title, name(cx, suppressed.id), kind.clone());
     vec![Notice::or(cx, title, &kind, Modal::Confirm(confirm.with_notes(holds)))]
 }
 

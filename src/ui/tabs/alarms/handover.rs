@@ -16,7 +16,7 @@ use crate::{
         event::LineState,
         record::ActionRecord,
         sample::Quality,
-        snapshot::{AsideAlarm, DeviceState},
+        snapshot::{DeviceState, SuppressedAlarm},
     },
     report::Period,
     ui::{
@@ -167,7 +167,11 @@ impl Handover {
             let rows = rows.into_iter().map(|row| (format!("  {}", fit_words(row.trim_start(), room)), theme.normal()));
             lines.extend(rows);
         };
-        section("suppressed", cx.snapshot.aside.iter().map(|aside| aside_words(cx, aside)).collect(), true);
+        section(
+            "suppressed",
+            cx.snapshot.suppressed.iter().map(|suppressed| suppressed_words(cx, suppressed)).collect(),
+            true,
+        );
         section("not as usual: closed, in manual, on trial", unusual(cx), true);
         section("values in doubt", doubtful(cx), true);
         if self.answered {
@@ -236,16 +240,16 @@ fn folded(cx: &ViewContext, rows: impl Iterator<Item = (Timestamp, String)>) -> 
 }
 
 /// `shelved ‹2›! TIC-1.PV temperature high, 41:00 left, by anna: sensor is cleaned, since 13:20:00`.
-pub fn aside_words(cx: &ViewContext, aside: &AsideAlarm) -> String {
-    let def = cx.def().alarm(aside.id);
+pub fn suppressed_words(cx: &ViewContext, suppressed: &SuppressedAlarm) -> String {
+    let def = cx.def().alarm(suppressed.id);
     let mark = cx.theme.priority_tag(def.priority);
-    let left = aside.until.map(|until| format!(", {} left", running(between(cx.now, until)))).unwrap_or_default();
-    let since = moment(aside.note.at, cx.now, &cx.def().time_zone);
-    let by = aside.note.by.as_ref().map(|by| format!(", by {by}")).unwrap_or_default();
-    let reason = aside.note.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
-    let active = if aside.active { " ACTIVE" } else { "" };
-    let name = subject(cx, aside.id);
-    format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", aside.state.word(), def.text)
+    let left = suppressed.until.map(|until| format!(", {} left", running(between(cx.now, until)))).unwrap_or_default();
+    let since = moment(suppressed.note.at, cx.now, &cx.def().time_zone);
+    let by = suppressed.note.by.as_ref().map(|by| format!(", by {by}")).unwrap_or_default();
+    let reason = suppressed.note.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
+    let active = if suppressed.active { " ACTIVE" } else { "" };
+    let name = subject(cx, suppressed.id);
+    format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", suppressed.state.word(), def.text)
 }
 
 /// Lines and devices that somebody has taken away, sequences in manual, actuators that do not obey.

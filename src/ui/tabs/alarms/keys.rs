@@ -27,11 +27,11 @@ pub enum Action {
     Note,
     /// Acknowledge all that is on this page of the list.
     AcknowledgePage,
-    /// Put aside for a time.
+    /// Shelve.
     Shelve,
-    /// Put aside until somebody puts it back.
+    /// Take out of service.
     OutOfService,
-    /// Take back what was put aside.
+    /// Unshelve, or put back in service.
     PutBack,
     /// Let go an alarm that latches.
     Reset,
@@ -143,7 +143,7 @@ const HANDOVER: [Row; 2] = [
 pub fn table(page: Page) -> Vec<Row> {
     let parts: &[&[Row]] = match page {
         Page::Active | Page::System => &[&OPEN, &ACTIONS, &VIEWS, &MOVE, &GO, &AREA],
-        Page::Aside => &[&BACK, &OPEN, &VIEWS, &MOVE, &GO],
+        Page::Suppressed => &[&BACK, &OPEN, &VIEWS, &MOVE, &GO],
         Page::Journal => &[&SEARCH, &SHIFT, &VIEWS, &MOVE],
         Page::Metrics => &[&SHIFT, &VIEWS, &MOVE],
         Page::Handover => &[&HANDOVER, &SHIFT, &VIEWS, &MOVE],
@@ -159,7 +159,7 @@ pub fn told(page: Page) -> Vec<Hint> {
             Hint::new("a", "ack", "acknowledge the selected alarm").needs(Role::Technician),
             Hint::new("A", "all", "acknowledge all that are listed (asks first)").needs(Role::Technician),
         ],
-        Page::Aside | Page::Journal | Page::Metrics | Page::Handover => Vec::new(),
+        Page::Suppressed | Page::Journal | Page::Metrics | Page::Handover => Vec::new(),
     };
     everywhere.into_iter().chain(hints(&table(page))).collect()
 }

@@ -16,7 +16,7 @@ use crate::{
         def::{AlarmClass, AlarmDef, AlarmId, Priority},
         record::{ActionRecord, Burst},
         role::Role,
-        snapshot::{ActiveAlarm, AsideAlarm},
+        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
         Effect, Model, Msg,
@@ -78,7 +78,7 @@ fn storm() -> Fixture {
 }
 
 /// Shelved, suppressed, out of service.
-fn put_aside() -> Fixture {
+fn suppressed() -> Fixture {
     let mut fixture = storm();
     let note = |seconds, by: Option<&str>, reason: Option<&str>| OperatorNote {
         at: ago(seconds),
@@ -86,22 +86,22 @@ fn put_aside() -> Fixture {
         reason: reason.map(Arc::from),
         recorded: true,
     };
-    let (until, aside) = (Some(now() + SignedDuration::from_secs(2_460)), &mut fixture.aside);
-    aside.push(AsideAlarm {
+    let (until, suppressed) = (Some(now() + SignedDuration::from_secs(2_460)), &mut fixture.suppressed);
+    suppressed.push(SuppressedAlarm {
         id: AlarmId(1),
         state: AlarmState::Shelved,
         note: note(1_140, Some("anna"), Some("sensor is being cleaned")),
         until,
         active: true,
     });
-    aside.push(AsideAlarm {
+    suppressed.push(SuppressedAlarm {
         id: AlarmId(2),
         state: AlarmState::OutOfService,
         note: note(90_000, Some("tech1"), Some("level probe broken, spare part ordered")),
         until: None,
         active: false,
     });
-    aside.push(AsideAlarm {
+    suppressed.push(SuppressedAlarm {
         id: AlarmId(3),
         state: AlarmState::Suppressed,
         note: note(300, None, None),
@@ -178,11 +178,11 @@ fn an_acknowledgement_that_is_not_on_disk_is_marked_in_list_and_guidance() {
 }
 
 #[test]
-fn what_is_put_aside_is_listed_and_counted_on_every_page() {
-    pictures("aside", &put_aside(), "v");
-    let mut model = shown(&put_aside(), Theme::FULL, "");
+fn suppressed_alarms_are_listed_and_counted_on_every_page() {
+    pictures("suppressed", &suppressed(), "v");
+    let mut model = shown(&suppressed(), Theme::FULL, "");
     assert!(screen(&mut model, 120, 40).contains("suppressed 3"));
-    let mut quiet = put_aside();
+    let mut quiet = suppressed();
     quiet.alarms.clear();
     let mut model = super::super::super::tests::model(&quiet, Theme::FULL);
     let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
@@ -233,7 +233,7 @@ fn action(seconds: i64, by: &str, action: &str, target: &str, outcome: &str, not
 
 #[test]
 fn the_handover_tells_what_the_next_shift_must_know() {
-    let mut fixture = put_aside();
+    let mut fixture = suppressed();
     fixture.set("PLC-1.AUTO", 0.0);
     let note = "Pump P-1 draws too much current; electrician comes at 16:00.";
     let rows = vec![
@@ -366,9 +366,9 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
 }
 
 #[test]
-fn what_was_put_aside_is_taken_back() {
+fn a_suppressed_alarm_is_put_back() {
     let back = |keys: &str| {
-        let mut model = shown(&put_aside(), Theme::FULL, "v");
+        let mut model = shown(&suppressed(), Theme::FULL, "v");
         assert_eq!(sent_kind(&type_keys(&mut model, keys)), None, "asks first");
         sent_kind(&type_keys(&mut model, "⏎")).cloned()
     };
@@ -403,11 +403,11 @@ fn the_footer_offers_what_can_be_done_with_the_selected_row() {
         assert_eq!((footer.contains("r reset"), footer.contains("v view")), (reset, true), "{keys}: {footer}");
     }
     for (keys, back) in [("v", true), ("v↓", true), ("v↓↓", false)] {
-        let footer = footer(&put_aside(), keys);
+        let footer = footer(&suppressed(), keys);
         assert_eq!((footer.contains("u put back"), footer.contains("v view")), (back, true), "{keys}: {footer}");
     }
     for keys in ["vv", "vvv", "vvvv", "vvvvv"] {
-        assert!(footer(&put_aside(), keys).contains("v view"), "{keys}");
+        assert!(footer(&suppressed(), keys).contains("v view"), "{keys}");
     }
 }
 
@@ -440,18 +440,18 @@ fn every_priority_in_every_state_looks_different_without_colour() {
             let mut fixture = Fixture::alarm();
             fixture.def.alarms[0].priority = priority;
             let note = OperatorNote { at: now(), by: None, reason: None, recorded: true };
-            if state.is_aside() {
+            if state.is_suppressed() {
                 fixture.alarms.clear();
-                fixture.aside = vec![AsideAlarm { id: AlarmId(0), state, note, until: None, active: true }];
+                fixture.suppressed = vec![SuppressedAlarm { id: AlarmId(0), state, note, until: None, active: true }];
             } else {
                 fixture.alarms.truncate(1);
                 fixture.alarms[0].state = state;
             }
-            let mut model = shown(&fixture, theme, if state.is_aside() { "v" } else { "" });
+            let mut model = shown(&fixture, theme, if state.is_suppressed() { "v" } else { "" });
             let picture = screen(&mut model, 80, 24);
             let row = picture.lines().skip(5).find(|line| line.contains(state.word())).expect("its row").to_owned();
             // The marks at the left alone tell it: nobody has to read the row.
-            let marks: String = if state.is_aside() { row.clone() } else { row.chars().take(7).collect() };
+            let marks: String = if state.is_suppressed() { row.clone() } else { row.chars().take(7).collect() };
             assert!(looks.insert(marks), "{glyphs:?} {priority:?} {state:?} looks like another one: {row}");
         }
     }
@@ -513,14 +513,14 @@ fn in_a_storm_every_alarm_is_counted_and_every_key_works() {
 
 #[test]
 fn a_suppressed_alarm_is_put_back_only_as_it_was_drawn() {
-    type Change = fn(&mut Vec<AsideAlarm>);
-    let first_left: Change = |aside| drop(aside.remove(0));
+    type Change = fn(&mut Vec<SuppressedAlarm>);
+    let first_left: Change = |suppressed| drop(suppressed.remove(0));
     // Back in service and shelved by a colleague: the same alarm, for another reason.
-    let shelved_again: Change = |aside| aside[0].note.at = now();
+    let shelved_again: Change = |suppressed| suppressed[0].note.at = now();
     for change in [first_left, shelved_again] {
-        let mut fixture = put_aside();
+        let mut fixture = suppressed();
         let mut model = shown(&fixture, Theme::FULL, "v");
-        change(&mut fixture.aside);
+        change(&mut fixture.suppressed);
         let change = |model: &mut Model| drop(update(model, Msg::Snapshot(fixture.snapshot())));
         acts_only_on_what_was_drawn(&mut model, change, "u");
     }

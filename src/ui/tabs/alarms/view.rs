@@ -1,12 +1,12 @@
-//! How the alarms tab looks: the views and what is in them, the list, what is put aside, and the guidance below.
+//! How the alarms tab looks: the views and what is in them, the list, what is suppressed, and the guidance below.
 
 use ratatui::{Frame, layout::Rect};
 
-use super::{Alarms, Page, guidance, handover::aside_words, is_on, list::Row};
+use super::{Alarms, Page, guidance, handover::suppressed_words, is_on, list::Row};
 use crate::{
     plant::{
         def::Subject,
-        snapshot::{ActiveAlarm, AsideAlarm},
+        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
         ViewContext,
@@ -31,7 +31,7 @@ pub(super) fn draw(tab: &Alarms, cx: &ViewContext, frame: &mut Frame, area: Rect
     let mut rest = canvas.part(0, top + 1, width, height.saturating_sub(top + 1));
     match tab.page {
         Page::Active | Page::System => list(tab, cx, &mut rest),
-        Page::Aside => aside(tab, cx, &mut rest),
+        Page::Suppressed => suppressed(tab, cx, &mut rest),
         Page::Journal => tab.journal.view(cx, &mut rest),
         Page::Metrics => tab.metrics.view(cx, &mut rest),
         Page::Handover => tab.handover.view(cx, &mut rest),
@@ -83,7 +83,7 @@ fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     };
     let counts = Page::ALL.map(|page| match page {
         Page::Active | Page::System => Some(count(page)),
-        Page::Aside => Some((cx.snapshot.aside.len(), 0)),
+        Page::Suppressed => Some((cx.snapshot.suppressed.len(), 0)),
         Page::Journal | Page::Metrics | Page::Handover => None,
     });
     let names = |word: &str| -> Vec<String> {
@@ -190,33 +190,34 @@ fn filter_line(
     canvas.text_right(end, 0, &more, theme.strong());
 }
 
-fn aside(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
+fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
-    let all: &[AsideAlarm] = &cx.snapshot.aside;
+    let all: &[SuppressedAlarm] = &cx.snapshot.suppressed;
     canvas.text(1, 0, "Evaluated and journaled, but not annunciated. u puts back.", theme.dim());
     if all.is_empty() {
         canvas.text(6, 2, "No alarm is suppressed.", theme.normal());
         return;
     }
-    let place = tab.aside(cx).and_then(|aside| all.iter().position(|other| other.id == aside.id)).unwrap_or(0);
+    let place =
+        tab.suppressed(cx).and_then(|suppressed| all.iter().position(|other| other.id == suppressed.id)).unwrap_or(0);
     let guide = guide(height + 1).min(6);
     let room = usize::from(height.saturating_sub(1 + guide)).max(1);
     let first = first(place, room);
-    for (y, (n, aside)) in all.iter().enumerate().skip(first).take(room).enumerate() {
-        let style = match (n == place, aside.active) {
+    for (y, (n, suppressed)) in all.iter().enumerate().skip(first).take(room).enumerate() {
+        let style = match (n == place, suppressed.active) {
             (true, _) => theme.focus(),
             (false, true) => theme.strong(),
             (false, false) => theme.normal(),
         };
-        let text = format!("{} {}", theme.state_mark(aside.state), aside_words(cx, aside));
+        let text = format!("{} {}", theme.state_mark(suppressed.state), suppressed_words(cx, suppressed));
         canvas.text(1, y as u16 + 1, &fit_words(&text, width.saturating_sub(2)), style);
     }
     if all.len() > first + room {
         let end = width.saturating_sub(1);
         canvas.text_right(end, 0, &format!("{} more below", all.len() - first - room), theme.strong());
     }
-    let now = aside_words(cx, &all[place]);
+    let now = suppressed_words(cx, &all[place]);
     let free = height.saturating_sub(1 + all.len().min(room) as u16);
     let needs = guidance::height(&guidance::rows_of_any(cx, all[place].id, now.clone()), width);
     let guide = guide.max(needs.min(free));

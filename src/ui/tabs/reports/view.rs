@@ -16,7 +16,7 @@ use crate::{
         def::Priority,
         record::{ActionRecord, AlarmRecord, AlarmStep},
     },
-    report::{Period, ShiftReport, SuppressedAlarm, TagFigures, raised, text::mean_or_difference},
+    report::{Period, ShiftReport, SuppressedSummary, TagFigures, raised, text::mean_or_difference},
     ui::{
         ViewContext,
         widgets::text::{Canvas, fit, pad, pad_left, width},
@@ -233,7 +233,7 @@ fn section(cx: &ViewContext, title: &str) -> Line<'static> {
 }
 
 /// An alarm that was active without being annunciated, and for how long.
-fn suppressed_line(cx: &ViewContext, alarm: &SuppressedAlarm) -> Line<'static> {
+fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static> {
     let (theme, room) = (cx.theme, cx.area.width.saturating_sub(46));
     Line::from(vec![
         Span::styled(format!("  {}", theme.priority_mark(alarm.priority)), theme.dim()),
