@@ -79,13 +79,13 @@ pub enum AlarmStep {
     /// An operator acknowledged it.
     Acknowledged,
     /// The condition is gone.
-    Returned,
+    ReturnedToNormal,
     /// It became active while suppressed: not annunciated.
-    RaisedQuietly,
+    RaisedSuppressed,
     /// Its condition cleared while suppressed.
-    ReturnedQuietly,
+    ReturnedSuppressed,
     /// Acknowledged long ago and still active: it waits for an acknowledgement again.
-    RaisedAgain,
+    ReAlarmed,
     /// An operator reset it after its condition was gone.
     Reset,
     /// An operator shelved it.
@@ -93,9 +93,9 @@ pub enum AlarmStep {
     /// Its time on the shelf is over, or an operator took it back.
     Unshelved,
     /// What enables it became false.
-    Suppressed,
+    SuppressedByDesign,
     /// What enables it is no longer false.
-    Released,
+    Unsuppressed,
     /// An operator took it out of service.
     OutOfService,
     /// An operator put it back.
@@ -104,23 +104,23 @@ pub enum AlarmStep {
 
 impl AlarmStep {
     /// Does it belong to an alarm that is not annunciated?
-    pub fn is_quiet(self) -> bool {
-        matches!(self, AlarmStep::RaisedQuietly | AlarmStep::ReturnedQuietly)
+    pub fn is_suppressed(self) -> bool {
+        matches!(self, AlarmStep::RaisedSuppressed | AlarmStep::ReturnedSuppressed)
     }
 
     /// Every step.
     pub const ALL: [AlarmStep; 13] = [
         AlarmStep::Raised,
         AlarmStep::Acknowledged,
-        AlarmStep::Returned,
-        AlarmStep::RaisedQuietly,
-        AlarmStep::ReturnedQuietly,
-        AlarmStep::RaisedAgain,
+        AlarmStep::ReturnedToNormal,
+        AlarmStep::RaisedSuppressed,
+        AlarmStep::ReturnedSuppressed,
+        AlarmStep::ReAlarmed,
         AlarmStep::Reset,
         AlarmStep::Shelved,
         AlarmStep::Unshelved,
-        AlarmStep::Suppressed,
-        AlarmStep::Released,
+        AlarmStep::SuppressedByDesign,
+        AlarmStep::Unsuppressed,
         AlarmStep::OutOfService,
         AlarmStep::InService,
     ];
@@ -129,15 +129,15 @@ impl AlarmStep {
         match self {
             AlarmStep::Raised => "raised",
             AlarmStep::Acknowledged => "acknowledged",
-            AlarmStep::Returned => "returned",
-            AlarmStep::RaisedQuietly => "raised quietly",
-            AlarmStep::ReturnedQuietly => "returned quietly",
-            AlarmStep::RaisedAgain => "raised again",
+            AlarmStep::ReturnedToNormal => "returned",
+            AlarmStep::RaisedSuppressed => "raised quietly",
+            AlarmStep::ReturnedSuppressed => "returned quietly",
+            AlarmStep::ReAlarmed => "raised again",
             AlarmStep::Reset => "reset",
             AlarmStep::Shelved => "shelved",
             AlarmStep::Unshelved => "unshelved",
-            AlarmStep::Suppressed => "suppressed",
-            AlarmStep::Released => "released",
+            AlarmStep::SuppressedByDesign => "suppressed",
+            AlarmStep::Unsuppressed => "released",
             AlarmStep::OutOfService => "out of service",
             AlarmStep::InService => "in service",
         }

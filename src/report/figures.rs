@@ -134,19 +134,19 @@ pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Tim
         }
         since = at;
         match step.step {
-            AlarmStep::Raised | AlarmStep::RaisedQuietly => {
+            AlarmStep::Raised | AlarmStep::RaisedSuppressed => {
                 active.insert(&step.text);
             }
-            AlarmStep::Returned | AlarmStep::ReturnedQuietly => {
+            AlarmStep::ReturnedToNormal | AlarmStep::ReturnedSuppressed => {
                 active.remove(&*step.text);
             }
             AlarmStep::Acknowledged
-            | AlarmStep::RaisedAgain
+            | AlarmStep::ReAlarmed
             | AlarmStep::Reset
             | AlarmStep::Shelved
             | AlarmStep::Unshelved
-            | AlarmStep::Suppressed
-            | AlarmStep::Released
+            | AlarmStep::SuppressedByDesign
+            | AlarmStep::Unsuppressed
             | AlarmStep::OutOfService
             | AlarmStep::InService => {}
         }
@@ -186,13 +186,13 @@ pub fn suppressed(
         let alarm = alarms.entry((&step.subject, &step.text)).or_insert_with(|| Quiet::new(step));
         let (active, quiet) = match step.step {
             AlarmStep::Raised => (true, false),
-            AlarmStep::RaisedQuietly => (true, true),
-            AlarmStep::Returned | AlarmStep::ReturnedQuietly => (false, alarm.quiet),
-            AlarmStep::Shelved | AlarmStep::Suppressed | AlarmStep::OutOfService => (alarm.active, true),
-            AlarmStep::Unshelved | AlarmStep::Released | AlarmStep::InService => (alarm.active, false),
-            AlarmStep::Acknowledged | AlarmStep::RaisedAgain | AlarmStep::Reset => continue,
+            AlarmStep::RaisedSuppressed => (true, true),
+            AlarmStep::ReturnedToNormal | AlarmStep::ReturnedSuppressed => (false, alarm.quiet),
+            AlarmStep::Shelved | AlarmStep::SuppressedByDesign | AlarmStep::OutOfService => (alarm.active, true),
+            AlarmStep::Unshelved | AlarmStep::Unsuppressed | AlarmStep::InService => (alarm.active, false),
+            AlarmStep::Acknowledged | AlarmStep::ReAlarmed | AlarmStep::Reset => continue,
         };
-        alarm.found.raised += u64::from(step.step == AlarmStep::RaisedQuietly);
+        alarm.found.raised += u64::from(step.step == AlarmStep::RaisedSuppressed);
         alarm.set(active, quiet, step.at);
     }
     let ended = alarms.into_values().map(|mut alarm| {

@@ -98,17 +98,19 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
         (_, AlarmState::Unacknowledged) => "RAISED",
         (_, AlarmState::Acknowledged) => "acknowledged",
         (_, AlarmState::LatchedUnacknowledged) => "returned, waits for a reset",
-        (AlarmState::LatchedUnacknowledged | AlarmState::Returned, AlarmState::LatchedAcknowledged) => "acknowledged",
+        (AlarmState::LatchedUnacknowledged | AlarmState::ReturnedToNormal, AlarmState::LatchedAcknowledged) => {
+            "acknowledged"
+        }
         (_, AlarmState::LatchedAcknowledged) => "returned, waits for a reset",
         (_, AlarmState::Shelved) => "shelved",
-        (_, AlarmState::Suppressed) => "suppressed by design",
+        (_, AlarmState::SuppressedByDesign) => "suppressed by design",
         (_, AlarmState::OutOfService) => "out of service",
-        (AlarmState::Returned, AlarmState::Normal | AlarmState::Returned) => "acknowledged",
+        (AlarmState::ReturnedToNormal, AlarmState::Normal | AlarmState::ReturnedToNormal) => "acknowledged",
         (
             AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged,
-            AlarmState::Normal | AlarmState::Returned,
+            AlarmState::Normal | AlarmState::ReturnedToNormal,
         ) => "reset",
-        (AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService, AlarmState::Normal) => {
+        (AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService, AlarmState::Normal) => {
             "no longer suppressed"
         }
         (
@@ -116,9 +118,9 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
             | AlarmState::Unacknowledged
             | AlarmState::Acknowledged
             | AlarmState::Shelved
-            | AlarmState::Suppressed
+            | AlarmState::SuppressedByDesign
             | AlarmState::OutOfService,
-            AlarmState::Normal | AlarmState::Returned,
+            AlarmState::Normal | AlarmState::ReturnedToNormal,
         ) => "returned",
     }
 }

@@ -78,7 +78,7 @@ mod tests {
         let before = vec![step(1, "high", AlarmStep::Raised), step(2, "low", AlarmStep::Raised)];
         let recent = Recent { steps: before.clone(), ..Recent::default() };
         let restored = Restored { steps: before.clone(), recent, chain_hashes: None };
-        let now = step(9, "low", AlarmStep::Returned);
+        let now = step(9, "low", AlarmStep::ReturnedToNormal);
         for from_journal in [true, false] {
             let mut past = Past::new(None, from_journal);
             past.note(&now);

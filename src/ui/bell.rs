@@ -32,21 +32,21 @@ mod tests {
 
     #[test]
     fn it_rings_for_what_is_new_and_never_for_what_goes() {
-        use AlarmState::{Acknowledged, Returned, Unacknowledged};
+        use AlarmState::{Acknowledged, ReturnedToNormal, Unacknowledged};
         let one = |state, sound| {
             let mut fixture = Fixture::alarm();
             fixture.alarms.truncate(1);
             fixture.alarms[0].state = state;
             Snapshot { sound, ..Arc::unwrap_or_clone(fixture.snapshot()) }
         };
-        let none = || Snapshot { alarms: Arc::default(), ..one(Returned, false) };
+        let none = || Snapshot { alarms: Arc::default(), ..one(ReturnedToNormal, false) };
         let check = |before: Snapshot, now: Snapshot, expect, why: &str| {
             assert_eq!(rings(&before, &now), expect, "{why}");
         };
         check(none(), one(Unacknowledged, true), true, "raised");
         check(one(Unacknowledged, true), one(Unacknowledged, true), false, "it rang already");
-        check(one(Unacknowledged, true), one(Returned, true), false, "returned");
-        check(one(Returned, false), none(), false, "gone");
+        check(one(Unacknowledged, true), one(ReturnedToNormal, true), false, "returned");
+        check(one(ReturnedToNormal, false), none(), false, "gone");
         check(none(), one(Unacknowledged, false), false, "silenced");
         check(one(Acknowledged, false), one(Unacknowledged, true), true, "raised again");
         let mut again = one(Unacknowledged, true);

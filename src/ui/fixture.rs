@@ -110,7 +110,7 @@ impl Fixture {
             ActiveAlarm {
                 returned_at: Some(ago(2_400)),
                 value: Some(3.9),
-                ..ActiveAlarm::new(AlarmId(2), AlarmState::Returned, ago(2_540))
+                ..ActiveAlarm::new(AlarmId(2), AlarmState::ReturnedToNormal, ago(2_540))
             },
         ];
         plant

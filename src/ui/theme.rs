@@ -143,8 +143,10 @@ impl Theme {
             AlarmState::Unacknowledged if flash => self.severity(priority).add_modifier(Modifier::REVERSED),
             AlarmState::Unacknowledged => self.severity(priority),
             AlarmState::Acknowledged => self.severity(priority).remove_modifier(Modifier::BOLD),
-            AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => self.dim(),
-            AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => self.dim(),
+            AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
+                self.dim()
+            }
+            AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService => self.dim(),
             AlarmState::Normal => self.normal(),
         }
     }
@@ -189,11 +191,11 @@ impl Theme {
             AlarmState::Normal => " ",
             AlarmState::Unacknowledged => self.pick("■", "#"),
             AlarmState::Acknowledged => self.pick("□", "="),
-            AlarmState::Returned => self.pick("●", "*"),
+            AlarmState::ReturnedToNormal => self.pick("●", "*"),
             AlarmState::LatchedUnacknowledged => "L",
             AlarmState::LatchedAcknowledged => "l",
             AlarmState::Shelved => "z",
-            AlarmState::Suppressed => "-",
+            AlarmState::SuppressedByDesign => "-",
             AlarmState::OutOfService => "x",
         }
     }

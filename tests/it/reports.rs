@@ -90,16 +90,18 @@ fn alarms_that_were_suppressed_are_counted_beside_those_that_were_annunciated() 
     let folder = folder();
     let path = folder.path().join("tank.duckdb");
     history(&path, |_, start| {
-        use AlarmStep::{Raised, RaisedQuietly, Released, Returned, ReturnedQuietly, Suppressed};
+        use AlarmStep::{
+            Raised, RaisedSuppressed, ReturnedSuppressed, ReturnedToNormal, SuppressedByDesign, Unsuppressed,
+        };
         let steps = [
             (10, "temperature high", Raised),
-            (70, "temperature high", Returned),
-            (100, "level low", Suppressed),
-            (120, "level low", RaisedQuietly),
-            (420, "level low", ReturnedQuietly),
-            (500, "level low", RaisedQuietly),
-            (560, "level low", ReturnedQuietly),
-            (600, "level low", Released),
+            (70, "temperature high", ReturnedToNormal),
+            (100, "level low", SuppressedByDesign),
+            (120, "level low", RaisedSuppressed),
+            (420, "level low", ReturnedSuppressed),
+            (500, "level low", RaisedSuppressed),
+            (560, "level low", ReturnedSuppressed),
+            (600, "level low", Unsuppressed),
         ];
         let record = |(at, text, step)| {
             let at = start + SignedDuration::from_secs(at);

@@ -98,7 +98,7 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
             let alarm = ActiveAlarm {
                 returned_at: Some(at),
                 value: Some(f64::from(amount)),
-                ..ActiveAlarm::new(AlarmId(place % 4), AlarmState::Returned, at)
+                ..ActiveAlarm::new(AlarmId(place % 4), AlarmState::ReturnedToNormal, at)
             };
             let place = usize::from(place) % (snapshot.alarms.len() + 1);
             Arc::make_mut(&mut snapshot.alarms).insert(place, alarm);

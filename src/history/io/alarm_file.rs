@@ -195,14 +195,14 @@ mod tests {
         alarms.take([step(1, AlarmStep::Raised)]);
         alarms.write().unwrap();
         for number in 0..3_000 {
-            alarms.take([step(number, AlarmStep::Raised), step(number, AlarmStep::Returned)]);
+            alarms.take([step(number, AlarmStep::Raised), step(number, AlarmStep::ReturnedToNormal)]);
             if number % 10 == 0 {
                 alarms.write().unwrap();
             }
         }
         alarms.write().unwrap();
-        let last =
-            [2_997, 2_998, 2_999].map(|number| [AlarmStep::Raised, AlarmStep::Returned].map(|kind| step(number, kind)));
+        let last = [2_997, 2_998, 2_999]
+            .map(|number| [AlarmStep::Raised, AlarmStep::ReturnedToNormal].map(|kind| step(number, kind)));
         assert_eq!(found(&path), Found { steps: Some(last.concat()), trouble: None });
         let lines = fs::read_to_string(&path).unwrap().lines().count();
         assert!(lines < 2 * SPARE_LINES, "{lines} lines for 6 steps");

@@ -135,9 +135,9 @@ impl AlarmManager {
             AlarmState::Normal
             | AlarmState::Unacknowledged
             | AlarmState::Acknowledged
-            | AlarmState::Returned
+            | AlarmState::ReturnedToNormal
             | AlarmState::Shelved
-            | AlarmState::Suppressed
+            | AlarmState::SuppressedByDesign
             | AlarmState::OutOfService => return Err(AlarmRefusal::NothingToReset),
         }
         Ok(self.record_action(&alarm, AlarmStep::Reset, at, None, by, None))

@@ -49,12 +49,12 @@ impl AlarmManager {
             let state = machine.state();
             match state {
                 AlarmState::Normal => {}
-                AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => {
+                AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService => {
                     suppressed.extend(suppressed_alarm(alarm.id, machine));
                 }
                 AlarmState::Unacknowledged
                 | AlarmState::Acknowledged
-                | AlarmState::Returned
+                | AlarmState::ReturnedToNormal
                 | AlarmState::LatchedUnacknowledged
                 | AlarmState::LatchedAcknowledged => {
                     sound |= state == AlarmState::Unacknowledged && self.silenced < machine.edge;
@@ -92,11 +92,13 @@ fn suppressed_alarm(id: AlarmId, machine: &AlarmStateMachine) -> Option<Suppress
     let note = match state {
         AlarmState::OutOfService => machine.out_of_service()?.clone(),
         AlarmState::Shelved => machine.shelved()?.note.clone(),
-        AlarmState::Suppressed => OperatorNote { at: machine.suppressed()?, by: None, reason: None, recorded: true },
+        AlarmState::SuppressedByDesign => {
+            OperatorNote { at: machine.suppressed()?, by: None, reason: None, recorded: true }
+        }
         AlarmState::Normal
         | AlarmState::Unacknowledged
         | AlarmState::Acknowledged
-        | AlarmState::Returned
+        | AlarmState::ReturnedToNormal
         | AlarmState::LatchedUnacknowledged
         | AlarmState::LatchedAcknowledged => return None,
     };

@@ -106,11 +106,11 @@ impl AlarmManager {
             return;
         }
         if self.machine(alarm.id).is_active() && !self.machine(alarm.id).state().is_suppressed() {
-            records.push(self.step(alarm, AlarmStep::Returned, at, facts.value));
+            records.push(self.step(alarm, AlarmStep::ReturnedToNormal, at, facts.value));
         }
         let machine = self.machine(alarm.id);
         if machine.state() == AlarmState::Normal || machine.state().is_suppressed() && !machine.is_latched() {
-            records.push(self.step(alarm, AlarmStep::Suppressed, at, facts.value));
+            records.push(self.step(alarm, AlarmStep::SuppressedByDesign, at, facts.value));
         }
     }
 
@@ -139,12 +139,12 @@ impl AlarmManager {
         if self.machine(alarm.id).suppressed().is_none() || !self.is_released(alarm, facts) {
             return;
         }
-        records.push(self.step(alarm, AlarmStep::Released, at, facts.value));
+        records.push(self.step(alarm, AlarmStep::Unsuppressed, at, facts.value));
         let machine = self.machine(alarm.id);
         let holds = machine.is_active() || machine.is_pending();
         if machine.is_active() {
-            let raised = if machine.state().is_suppressed() { AlarmStep::RaisedQuietly } else { AlarmStep::Raised };
-            let step = if alarm.on_delay.is_zero() { raised } else { AlarmStep::ReturnedQuietly };
+            let raised = if machine.state().is_suppressed() { AlarmStep::RaisedSuppressed } else { AlarmStep::Raised };
+            let step = if alarm.on_delay.is_zero() { raised } else { AlarmStep::ReturnedSuppressed };
             records.push(self.step(alarm, step, at, facts.value));
         }
         if holds {
@@ -213,7 +213,7 @@ impl AlarmManager {
         let lasts = machine.acknowledged_for.map_or_else(before, |lasts| lasts + passed);
         machine.acknowledged_for = Some(lasts);
         if after <= lasts {
-            records.push(self.step(alarm, AlarmStep::RaisedAgain, at, facts.value));
+            records.push(self.step(alarm, AlarmStep::ReAlarmed, at, facts.value));
         }
     }
 
@@ -234,7 +234,7 @@ impl AlarmManager {
         let latch = self.def.alarm(id).latch;
         let machine = &mut self.machines[id.index()];
         machine.apply(record, latch);
-        if matches!(record.step, AlarmStep::Raised | AlarmStep::RaisedAgain) {
+        if matches!(record.step, AlarmStep::Raised | AlarmStep::ReAlarmed) {
             self.edges += 1;
             machine.edge = self.edges;
         }

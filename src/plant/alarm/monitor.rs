@@ -127,16 +127,16 @@ impl AlarmMonitor {
         match step.step {
             AlarmStep::Raised => (history.active, history.acknowledged) = (Some(step.at), false),
             AlarmStep::Acknowledged => history.acknowledged = true,
-            AlarmStep::Returned
-            | AlarmStep::ReturnedQuietly
+            AlarmStep::ReturnedToNormal
+            | AlarmStep::ReturnedSuppressed
             | AlarmStep::Shelved
-            | AlarmStep::Suppressed
+            | AlarmStep::SuppressedByDesign
             | AlarmStep::OutOfService => history.active = None,
-            AlarmStep::RaisedQuietly
-            | AlarmStep::RaisedAgain
+            AlarmStep::RaisedSuppressed
+            | AlarmStep::ReAlarmed
             | AlarmStep::Reset
             | AlarmStep::Unshelved
-            | AlarmStep::Released
+            | AlarmStep::Unsuppressed
             | AlarmStep::InService => {}
         }
     }
@@ -147,21 +147,24 @@ impl AlarmMonitor {
         match step.step {
             AlarmStep::Raised => self.raised(step),
             AlarmStep::Acknowledged => self.alarms.entry(named(step)).or_default().acknowledged = true,
-            AlarmStep::Returned => self.returned(step),
+            AlarmStep::ReturnedToNormal => self.returned(step),
             // A suppressed alarm burdens no operator: it is neither stale nor fleeting.
-            AlarmStep::ReturnedQuietly | AlarmStep::Shelved | AlarmStep::Suppressed | AlarmStep::OutOfService => {
+            AlarmStep::ReturnedSuppressed
+            | AlarmStep::Shelved
+            | AlarmStep::SuppressedByDesign
+            | AlarmStep::OutOfService => {
                 self.alarms.entry(named(step)).or_default().acknowledged = true;
                 self.returned(step);
             }
-            AlarmStep::RaisedQuietly => {
+            AlarmStep::RaisedSuppressed => {
                 if let Some(sum) = self.sum(step.at) {
                     sum.suppressed += 1;
                 }
             }
-            AlarmStep::RaisedAgain
+            AlarmStep::ReAlarmed
             | AlarmStep::Reset
             | AlarmStep::Unshelved
-            | AlarmStep::Released
+            | AlarmStep::Unsuppressed
             | AlarmStep::InService => {}
         }
     }

@@ -18,7 +18,7 @@ pub enum AlarmState {
     /// Active and acknowledged.
     Acknowledged,
     /// No longer active, but nobody has acknowledged it.
-    Returned,
+    ReturnedToNormal,
     /// No longer active, not acknowledged, and it waits for a reset.
     LatchedUnacknowledged,
     /// No longer active, acknowledged, and it waits for a reset.
@@ -26,7 +26,7 @@ pub enum AlarmState {
     /// Suppressed by an operator for a limited time.
     Shelved,
     /// Suppressed by design: its enabling condition is false.
-    Suppressed,
+    SuppressedByDesign,
     /// Suppressed by an operator until put back in service.
     OutOfService,
 }
@@ -37,11 +37,11 @@ impl AlarmState {
         AlarmState::Normal,
         AlarmState::Unacknowledged,
         AlarmState::Acknowledged,
-        AlarmState::Returned,
+        AlarmState::ReturnedToNormal,
         AlarmState::LatchedUnacknowledged,
         AlarmState::LatchedAcknowledged,
         AlarmState::Shelved,
-        AlarmState::Suppressed,
+        AlarmState::SuppressedByDesign,
         AlarmState::OutOfService,
     ];
 
@@ -51,34 +51,34 @@ impl AlarmState {
             AlarmState::Normal => "normal",
             AlarmState::Unacknowledged => "UNACK",
             AlarmState::Acknowledged => "acked",
-            AlarmState::Returned => "returned",
+            AlarmState::ReturnedToNormal => "returned",
             AlarmState::LatchedUnacknowledged => "LATCHED",
             AlarmState::LatchedAcknowledged => "latched",
             AlarmState::Shelved => "shelved",
-            AlarmState::Suppressed => "suppressed",
+            AlarmState::SuppressedByDesign => "suppressed",
             AlarmState::OutOfService => "out of service",
         }
     }
     /// Waits for an acknowledgement.
     pub fn needs_acknowledgement(self) -> bool {
         match self {
-            AlarmState::Unacknowledged | AlarmState::Returned | AlarmState::LatchedUnacknowledged => true,
+            AlarmState::Unacknowledged | AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged => true,
             AlarmState::Normal
             | AlarmState::Acknowledged
             | AlarmState::LatchedAcknowledged
             | AlarmState::Shelved
-            | AlarmState::Suppressed
+            | AlarmState::SuppressedByDesign
             | AlarmState::OutOfService => false,
         }
     }
     /// Shelved, suppressed by design or out of service: evaluated and journaled, not annunciated.
     pub fn is_suppressed(self) -> bool {
         match self {
-            AlarmState::Shelved | AlarmState::Suppressed | AlarmState::OutOfService => true,
+            AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService => true,
             AlarmState::Normal
             | AlarmState::Unacknowledged
             | AlarmState::Acknowledged
-            | AlarmState::Returned
+            | AlarmState::ReturnedToNormal
             | AlarmState::LatchedUnacknowledged
             | AlarmState::LatchedAcknowledged => false,
         }
@@ -164,14 +164,14 @@ impl AlarmStateMachine {
             return AlarmState::Shelved;
         }
         if self.suppressed.is_some() {
-            return AlarmState::Suppressed;
+            return AlarmState::SuppressedByDesign;
         }
         match (self.active, self.unacknowledged, self.latched) {
             (true, true, _) => AlarmState::Unacknowledged,
             (true, false, _) => AlarmState::Acknowledged,
             (false, true, true) => AlarmState::LatchedUnacknowledged,
             (false, false, true) => AlarmState::LatchedAcknowledged,
-            (false, true, false) => AlarmState::Returned,
+            (false, true, false) => AlarmState::ReturnedToNormal,
             (false, false, false) => AlarmState::Normal,
         }
     }
@@ -225,9 +225,9 @@ impl AlarmStateMachine {
         let suppressed = self.state().is_suppressed();
         Some(match (holds, suppressed) {
             (true, false) => AlarmStep::Raised,
-            (true, true) => AlarmStep::RaisedQuietly,
-            (false, false) => AlarmStep::Returned,
-            (false, true) => AlarmStep::ReturnedQuietly,
+            (true, true) => AlarmStep::RaisedSuppressed,
+            (false, false) => AlarmStep::ReturnedToNormal,
+            (false, true) => AlarmStep::ReturnedSuppressed,
         })
     }
 
@@ -244,7 +244,7 @@ impl AlarmStateMachine {
                 (self.value, self.burst) = (step.value, step.burst);
                 self.times = self.times.saturating_add(1);
             }
-            AlarmStep::RaisedQuietly => {
+            AlarmStep::RaisedSuppressed => {
                 (self.active, self.pending_since) = (true, None);
                 if latch && self.suppressed.is_none() {
                     // It is not annunciated now, but what latches must be acknowledged once it is back. What came while it
@@ -254,11 +254,11 @@ impl AlarmStateMachine {
                     (self.annunciated_at, self.value) = (Some(step.at), step.value);
                 }
             }
-            AlarmStep::RaisedAgain => (self.unacknowledged, self.annunciated_at) = (true, Some(step.at)),
+            AlarmStep::ReAlarmed => (self.unacknowledged, self.annunciated_at) = (true, Some(step.at)),
             AlarmStep::Acknowledged => {
                 (self.unacknowledged, self.acknowledged) = (false, Some(note()));
             }
-            AlarmStep::Returned | AlarmStep::ReturnedQuietly => {
+            AlarmStep::ReturnedToNormal | AlarmStep::ReturnedSuppressed => {
                 (self.active, self.pending_since, self.returned_at) = (false, None, Some(step.at));
             }
             AlarmStep::Reset => self.latched = false,
@@ -268,13 +268,13 @@ impl AlarmStateMachine {
                 self.keep_latched();
             }
             AlarmStep::Unshelved => self.shelved = None,
-            AlarmStep::Suppressed => {
+            AlarmStep::SuppressedByDesign => {
                 self.suppressed = Some(step.at);
                 // Only what is normal is suppressed. The journal remembers the last step of every kind: what came in an
                 // earlier suppression must not latch after a restart.
                 (self.latched, self.unacknowledged) = (false, false);
             }
-            AlarmStep::Released => self.suppressed = None,
+            AlarmStep::Unsuppressed => self.suppressed = None,
             AlarmStep::OutOfService => {
                 self.out_of_service = Some(note());
                 self.keep_latched();
@@ -321,7 +321,7 @@ mod tests {
             (10, Some(true), Some(AlarmStep::Raised), AlarmState::Unacknowledged),
             (11, Some(false), None, AlarmState::Unacknowledged),
             (20, Some(false), None, AlarmState::Unacknowledged),
-            (21, Some(false), Some(AlarmStep::Returned), AlarmState::Returned),
+            (21, Some(false), Some(AlarmStep::ReturnedToNormal), AlarmState::ReturnedToNormal),
         ] {
             assert_eq!(judged(&mut machine, holds, second), step, "at {second} s");
             assert_eq!(machine.state(), state, "at {second} s");
@@ -341,47 +341,54 @@ mod tests {
                 assert_eq!(machine.state(), *state, "{step:?} of {steps:?}");
             }
         };
-        check(false, &[(T::Raised, S::Unacknowledged), (T::Acknowledged, S::Acknowledged), (T::Returned, S::Normal)]);
         check(
             false,
-            &[(T::Raised, S::Unacknowledged), (T::Acknowledged, S::Acknowledged), (T::RaisedAgain, S::Unacknowledged)],
+            &[(T::Raised, S::Unacknowledged), (T::Acknowledged, S::Acknowledged), (T::ReturnedToNormal, S::Normal)],
+        );
+        check(
+            false,
+            &[(T::Raised, S::Unacknowledged), (T::Acknowledged, S::Acknowledged), (T::ReAlarmed, S::Unacknowledged)],
         );
         let latched = [
             (T::Raised, S::Unacknowledged),
-            (T::Returned, S::LatchedUnacknowledged),
+            (T::ReturnedToNormal, S::LatchedUnacknowledged),
             (T::Acknowledged, S::LatchedAcknowledged),
             (T::Reset, S::Normal),
         ];
         check(true, &latched);
         check(
             true,
-            &[(T::Raised, S::Unacknowledged), (T::Returned, S::LatchedUnacknowledged), (T::Reset, S::Returned)],
+            &[
+                (T::Raised, S::Unacknowledged),
+                (T::ReturnedToNormal, S::LatchedUnacknowledged),
+                (T::Reset, S::ReturnedToNormal),
+            ],
         );
         let shelved = [
             (T::Raised, S::Unacknowledged),
             (T::Shelved, S::Shelved),
-            (T::ReturnedQuietly, S::Shelved),
+            (T::ReturnedSuppressed, S::Shelved),
             (T::Unshelved, S::Normal),
         ];
         check(false, &shelved);
         let both = [
             (T::Shelved, S::Shelved),
             (T::OutOfService, S::OutOfService),
-            (T::RaisedQuietly, S::OutOfService),
+            (T::RaisedSuppressed, S::OutOfService),
             (T::InService, S::Shelved),
             (T::Unshelved, S::Acknowledged),
             (T::Raised, S::Unacknowledged),
         ];
         check(false, &both);
         let design = [
-            (T::Suppressed, S::Suppressed),
-            (T::RaisedQuietly, S::Suppressed),
-            (T::ReturnedQuietly, S::Suppressed),
-            (T::Released, S::Normal),
+            (T::SuppressedByDesign, S::SuppressedByDesign),
+            (T::RaisedSuppressed, S::SuppressedByDesign),
+            (T::ReturnedSuppressed, S::SuppressedByDesign),
+            (T::Unsuppressed, S::Normal),
         ];
         check(false, &design);
         check(true, &design);
-        let quiet = [(T::Shelved, S::Shelved), (T::RaisedQuietly, S::Shelved), (T::ReturnedQuietly, S::Shelved)];
+        let quiet = [(T::Shelved, S::Shelved), (T::RaisedSuppressed, S::Shelved), (T::ReturnedSuppressed, S::Shelved)];
         check(true, &[&quiet[..], &[(T::Unshelved, S::LatchedUnacknowledged)]].concat());
         check(false, &[&quiet[..], &[(T::Unshelved, S::Normal)]].concat());
         let longer = [(T::Shelved, S::Shelved), (T::Unshelved, S::LatchedUnacknowledged)];

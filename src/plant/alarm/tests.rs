@@ -140,7 +140,7 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
         assert_eq!(manager.shelve(HIGH, lasts, Some(&reason.into()), at(0), &by()), Err(refusal));
     }
     manager.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
-    assert_eq!(steps(&manager.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
+    assert_eq!(steps(&manager.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedSuppressed]);
     assert!(!manager.lists().sound && manager.active().is_empty());
     let suppressed = manager.lists().suppressed[0].clone();
     assert_eq!((suppressed.until, suppressed.active, suppressed.note.reason), (Some(at(60)), true, Some(why())));
@@ -148,7 +148,7 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
     assert_eq!(steps(&manager.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
     assert_eq!((state(&manager), manager.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
     manager.shelve(HIGH, minute, Some(&why()), at(70), &by()).expect("again");
-    assert_eq!(steps(&manager.judge(at(71), facts(70.0, true))), [AlarmStep::ReturnedQuietly]);
+    assert_eq!(steps(&manager.judge(at(71), facts(70.0, true))), [AlarmStep::ReturnedSuppressed]);
     assert_eq!(steps(&manager.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmStep::Unshelved]);
     assert_eq!(state(&manager), AlarmState::Normal);
     assert_eq!(manager.unshelve(HIGH, None, at(73), &by()), Err(AlarmRefusal::NotShelved));
@@ -177,7 +177,7 @@ fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
         manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()),
         Err(AlarmRefusal::OutOfService)
     );
-    assert_eq!(steps(&manager.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedQuietly]);
+    assert_eq!(steps(&manager.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedSuppressed]);
     assert_eq!(manager.lists().suppressed[0].state, AlarmState::OutOfService);
     let back = manager.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
     assert_eq!(steps(&back), [AlarmStep::InService, AlarmStep::Raised]);
@@ -204,8 +204,11 @@ fn a_latching_alarm_that_came_and_went_while_suppressed_is_normal_on_release() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
     let mut journal = manager.judge(at(0), enabled_with(80.0, false));
     journal.extend(manager.judge(at(1), enabled_with(70.0, false)));
-    assert_eq!(steps(&journal), [AlarmStep::Suppressed, AlarmStep::RaisedQuietly, AlarmStep::ReturnedQuietly]);
-    assert_eq!(steps(&manager.judge(at(2), enabled_with(70.0, true))), [AlarmStep::Released]);
+    assert_eq!(
+        steps(&journal),
+        [AlarmStep::SuppressedByDesign, AlarmStep::RaisedSuppressed, AlarmStep::ReturnedSuppressed]
+    );
+    assert_eq!(steps(&manager.judge(at(2), enabled_with(70.0, true))), [AlarmStep::Unsuppressed]);
     assert_eq!((state(&manager), manager.active().len()), (AlarmState::Normal, 0));
     assert_eq!(steps(&manager.judge(at(3), enabled_with(80.0, true))), [AlarmStep::Raised]);
     manager.judge(at(4), enabled_with(70.0, true));
@@ -217,9 +220,9 @@ fn a_latching_alarm_released_while_shelved_comes_back_latched() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
     manager.judge(at(0), enabled_with(80.0, false));
     manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()).expect("a minute, with a reason");
-    let quietly = [AlarmStep::Released, AlarmStep::RaisedQuietly];
+    let quietly = [AlarmStep::Unsuppressed, AlarmStep::RaisedSuppressed];
     assert_eq!(steps(&manager.judge(at(2), enabled_with(80.0, true))), quietly);
-    assert_eq!(steps(&manager.judge(at(3), enabled_with(70.0, true))), [AlarmStep::ReturnedQuietly]);
+    assert_eq!(steps(&manager.judge(at(3), enabled_with(70.0, true))), [AlarmStep::ReturnedSuppressed]);
     assert_eq!(steps(&manager.judge(at(61), enabled_with(70.0, true))), [AlarmStep::Unshelved]);
     assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
 }
@@ -228,9 +231,9 @@ fn a_latching_alarm_released_while_shelved_comes_back_latched() {
 fn an_on_delay_begins_when_the_suppression_ends() {
     let delay = Duration::from_secs(30);
     let mut manager = AlarmManager::new(enabled_by_design(move |alarm| alarm.on_delay = delay));
-    assert_eq!(steps(&manager.judge(at(0), enabled_with(70.0, false))), [AlarmStep::Suppressed]);
+    assert_eq!(steps(&manager.judge(at(0), enabled_with(70.0, false))), [AlarmStep::SuppressedByDesign]);
     assert_eq!(steps(&manager.judge(at(1), enabled_with(80.0, false))), []);
-    assert_eq!(steps(&manager.judge(at(25), enabled_with(80.0, true))), [AlarmStep::Released]);
+    assert_eq!(steps(&manager.judge(at(25), enabled_with(80.0, true))), [AlarmStep::Unsuppressed]);
     assert_eq!(steps(&manager.judge(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
     assert_eq!(steps(&manager.judge(at(55), enabled_with(80.0, true))), [AlarmStep::Raised]);
 }
@@ -279,16 +282,16 @@ fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_
     let when =
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
     let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
-    let quiet = [AlarmStep::Suppressed, AlarmStep::RaisedQuietly];
+    let quiet = [AlarmStep::SuppressedByDesign, AlarmStep::RaisedSuppressed];
     assert_eq!(steps(&manager.judge(at(0), when(80.0, Some(false)))), quiet);
-    assert_eq!((state(&manager), manager.lists().sound), (AlarmState::Suppressed, false));
-    assert_eq!(steps(&manager.judge(at(1), when(80.0, Some(true)))), [AlarmStep::Released, AlarmStep::Raised]);
+    assert_eq!((state(&manager), manager.lists().sound), (AlarmState::SuppressedByDesign, false));
+    assert_eq!(steps(&manager.judge(at(1), when(80.0, Some(true)))), [AlarmStep::Unsuppressed, AlarmStep::Raised]);
     let mut unknown = AlarmManager::new(enabled_by_design(|_| ()));
     assert_eq!(steps(&unknown.judge(at(0), when(80.0, None))), [AlarmStep::Raised]);
     let mut delayed = AlarmManager::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
     delayed.judge(at(0), when(80.0, Some(false)));
-    assert_eq!(steps(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmStep::RaisedQuietly]);
-    let anew = [AlarmStep::Released, AlarmStep::ReturnedQuietly];
+    assert_eq!(steps(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmStep::RaisedSuppressed]);
+    let anew = [AlarmStep::Unsuppressed, AlarmStep::ReturnedSuppressed];
     assert_eq!(steps(&delayed.judge(at(10), when(80.0, Some(true)))), anew, "the delay begins when the pump starts");
     assert_eq!(steps(&delayed.judge(at(14), when(80.0, Some(true)))), []);
     assert_eq!(steps(&delayed.judge(at(15), when(80.0, Some(true)))), [AlarmStep::Raised]);
@@ -310,14 +313,14 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
         (1_059, Some(false), vec![]),
         (1_060, None, vec![]),
         (1_119, None, vec![]),
-        (1_120, None, vec![AlarmStep::Released, AlarmStep::Raised]),
+        (1_120, None, vec![AlarmStep::Unsuppressed, AlarmStep::Raised]),
         (1_121, None, vec![]),
     ] {
         assert_eq!(steps(&again.judge(at(second), when(80.0, enabled))), expect, "at {second} s");
     }
     let mut free = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     free.restore(&journal);
-    assert_eq!(steps(&free.judge(at(1), facts(70.0, true)))[0], AlarmStep::ReturnedQuietly);
+    assert_eq!(steps(&free.judge(at(1), facts(70.0, true)))[0], AlarmStep::ReturnedSuppressed);
     assert!(free.machine(HIGH).suppressed().is_none(), "the plant file enables it by nothing any more");
 }
 
@@ -329,15 +332,15 @@ fn what_was_annunciated_stays_until_somebody_has_answered_to_it_though_its_enabl
     let latch = |alarm: &mut AlarmDef| (alarm.latch, alarm.on_delay) = (true, Duration::ZERO);
     let mut manager = AlarmManager::new(enabled_by_design(latch));
     assert_eq!(steps(&manager.judge(at(0), when(true))), [AlarmStep::Raised]);
-    assert_eq!(steps(&manager.judge(at(1), when(false))), [AlarmStep::Returned]);
+    assert_eq!(steps(&manager.judge(at(1), when(false))), [AlarmStep::ReturnedToNormal]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::LatchedUnacknowledged, false));
     assert_eq!(steps(&manager.judge(at(2), when(false))), [], "it is neither raised anew nor taken away");
     manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
     assert_eq!(steps(&manager.judge(at(4), when(false))), []);
     assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
     manager.reset(HIGH, at(5), &by()).expect("its cause is gone");
-    assert_eq!(steps(&manager.judge(at(6), when(false)))[0], AlarmStep::Suppressed);
-    assert_eq!(state(&manager), AlarmState::Suppressed);
+    assert_eq!(steps(&manager.judge(at(6), when(false)))[0], AlarmStep::SuppressedByDesign);
+    assert_eq!(state(&manager), AlarmState::SuppressedByDesign);
 }
 
 #[test]
@@ -346,12 +349,12 @@ fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.condition = stuck));
     let when = |enabled| move |_: &AlarmDef| Facts { value: Some(20.0), enabled: Some(enabled), ..Facts::default() };
     for (second, enabled, expect) in [
-        (0, false, vec![AlarmStep::Suppressed]),
+        (0, false, vec![AlarmStep::SuppressedByDesign]),
         (600, false, vec![]),
-        (601, true, vec![AlarmStep::Released]),
+        (601, true, vec![AlarmStep::Unsuppressed]),
         (660, true, vec![]),
         (661, true, vec![AlarmStep::Raised]),
-        (662, false, vec![AlarmStep::Returned]),
+        (662, false, vec![AlarmStep::ReturnedToNormal]),
     ] {
         assert_eq!(steps(&manager.judge(at(second), when(enabled))), expect, "at {second} s");
     }
@@ -369,12 +372,8 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
     assert_eq!(steps(&manager.judge(at(1_809), facts(80.0, true))), []);
     let mut again = AlarmManager::new(with(remind));
     again.restore(&journal);
-    assert_eq!(
-        steps(&again.judge(at(1_810), facts(80.0, true))),
-        [AlarmStep::RaisedAgain],
-        "a restart forgets no time"
-    );
-    assert_eq!(steps(&manager.judge(at(1_810), facts(80.0, true))), [AlarmStep::RaisedAgain]);
+    assert_eq!(steps(&again.judge(at(1_810), facts(80.0, true))), [AlarmStep::ReAlarmed], "a restart forgets no time");
+    assert_eq!(steps(&manager.judge(at(1_810), facts(80.0, true))), [AlarmStep::ReAlarmed]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::Unacknowledged, true));
     assert_eq!(manager.active()[0].raised_at, at(0), "it is the same activation");
     let early = manager.acknowledge(HIGH, at(0), None, at(1_811), &by());
@@ -518,7 +517,7 @@ proptest! {
             });
             journal.extend(told);
             let (machine, new) = (manager.machine(HIGH), &journal[known..]);
-            let raised = new.iter().any(|step| matches!(step.step, AlarmStep::Raised | AlarmStep::RaisedAgain));
+            let raised = new.iter().any(|step| matches!(step.step, AlarmStep::Raised | AlarmStep::ReAlarmed));
             // Who is told is told once, and only where something was raised in the open.
             prop_assert!(!manager.lists().sound || sounded || raised, "it sounds for nothing: {:?}", test_event);
             prop_assert!(!(machine.state().is_suppressed() && manager.lists().sound));
@@ -528,15 +527,15 @@ proptest! {
             prop_assert!(!(shown && suppressed));
             // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes, unless its
             // enabling begins or ends.
-            let released = new.iter().any(|step| step.step == AlarmStep::Released);
+            let released = new.iter().any(|step| step.step == AlarmStep::Unsuppressed);
             if enabled != Some(false) && !released && (74.0..=75.0).contains(&value.unwrap_or(74.5)) {
                 let turned = new.iter().any(|step| matches!(
                     step.step,
-                    AlarmStep::RaisedQuietly | AlarmStep::Returned
+                    AlarmStep::RaisedSuppressed | AlarmStep::ReturnedToNormal
                 ));
                 prop_assert!(!turned || delay > 0, "chatter inside the deadband: {:?}", new);
             }
-            if raised && !new.iter().any(|step| step.step == AlarmStep::RaisedAgain) {
+            if raised && !new.iter().any(|step| step.step == AlarmStep::ReAlarmed) {
                 prop_assert_eq!(machine.state(), AlarmState::Unacknowledged, "nobody has seen it");
             }
             prop_assert!(!latch || !machine.is_latched() || machine.state() != AlarmState::Normal);

@@ -78,8 +78,8 @@ mod tests {
         assert!(snapshot.sound);
         assert_eq!(snapshot.fault_details(snapshot.alarms[0].id), "no space left");
         plant.on_history(HistoryStatus::default());
-        assert_eq!(tick(&mut plant, 5)[0].step, AlarmStep::Returned);
-        assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Returned, "until it is acknowledged");
+        assert_eq!(tick(&mut plant, 5)[0].step, AlarmStep::ReturnedToNormal);
+        assert_eq!(plant.snapshot().alarms[0].state, AlarmState::ReturnedToNormal, "until it is acknowledged");
     }
 
     #[test]
@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(raised[0].reason.as_deref(), Some("7 records lost since the start"));
         plant.on_history(lost(7));
         let steps: Vec<_> = (2..20).flat_map(|second| tick(&mut plant, second)).map(|step| step.step).collect();
-        assert_eq!(steps, [AlarmStep::Returned]);
+        assert_eq!(steps, [AlarmStep::ReturnedToNormal]);
         plant.on_history(lost(8));
         assert_eq!(tick(&mut plant, 20)[0].step, AlarmStep::Raised);
     }

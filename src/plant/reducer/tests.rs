@@ -228,7 +228,7 @@ fn a_silent_device_fails_then_is_down_then_comes_back() {
     );
     assert_eq!(plant.snapshot().alarms[0].id, SILENT);
     plant.on_event(read(9, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
-    assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Returned);
+    assert_eq!(plant.snapshot().alarms[0].state, AlarmState::ReturnedToNormal);
     assert_eq!(plant.snapshot().sample(PV).quality, Quality::Good);
 }
 
@@ -283,7 +283,7 @@ fn an_overloaded_line_is_said_once_and_no_device_is_at_fault() {
     (1..=9).for_each(|second| assert_eq!(report(&mut plant, second, strained), [], "a peak of {second} s"));
     let states: Vec<_> = (10..60).map(|second| report(&mut plant, second, strained)).collect();
     assert_eq!(states[49], [(overloaded, AlarmState::Unacknowledged)], "the line's alarm only");
-    assert_eq!(report(&mut plant, 60, None), [(overloaded, AlarmState::Returned)]);
+    assert_eq!(report(&mut plant, 60, None), [(overloaded, AlarmState::ReturnedToNormal)]);
     let mut fast = Plant::new(def, at(0), 60.0);
     fast.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
     (1..60).for_each(|second| assert_eq!(report(&mut fast, second, strained), [], "only the machine is busy"));

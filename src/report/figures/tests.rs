@@ -76,17 +76,25 @@ fn a_counter_has_a_difference_and_no_mean() {
 
 #[test]
 fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
-    use AlarmStep::{Acknowledged, Raised, RaisedQuietly, Released, Returned, ReturnedQuietly, Shelved, Suppressed};
+    use AlarmStep::{
+        Acknowledged, Raised, RaisedSuppressed, ReturnedSuppressed, ReturnedToNormal, Shelved, SuppressedByDesign,
+        Unsuppressed,
+    };
     for (active, standing, steps, expect) in [
-        (None, None, vec![(10, Raised), (30, Returned)], None),
-        (None, None, vec![(10, Suppressed), (20, RaisedQuietly), (50, ReturnedQuietly), (60, Released)], Some((1, 30))),
+        (None, None, vec![(10, Raised), (30, ReturnedToNormal)], None),
+        (
+            None,
+            None,
+            vec![(10, SuppressedByDesign), (20, RaisedSuppressed), (50, ReturnedSuppressed), (60, Unsuppressed)],
+            Some((1, 30)),
+        ),
         // Shelved while it was active, and active again after that.
-        (None, None, vec![(10, Raised), (20, Shelved), (25, Acknowledged), (70, Returned)], Some((0, 50))),
-        (None, None, vec![(10, RaisedQuietly), (20, Released), (20, Raised)], Some((1, 10))),
+        (None, None, vec![(10, Raised), (20, Shelved), (25, Acknowledged), (70, ReturnedToNormal)], Some((0, 50))),
+        (None, None, vec![(10, RaisedSuppressed), (20, Unsuppressed), (20, Raised)], Some((1, 10))),
         // Active before the period: annunciated, or not.
-        (Some(Raised), Some(Raised), vec![(40, Returned)], None),
-        (Some(Raised), None, vec![(40, Returned)], Some((0, 40))),
-        (Some(RaisedQuietly), None, vec![], Some((0, 100))),
+        (Some(Raised), Some(Raised), vec![(40, ReturnedToNormal)], None),
+        (Some(Raised), None, vec![(40, ReturnedToNormal)], Some((0, 40))),
+        (Some(RaisedSuppressed), None, vec![], Some((0, 100))),
     ] {
         let all =
             |steps: &[(i64, AlarmStep)]| steps.iter().map(|(at, kind)| step(*at, "high", *kind)).collect::<Vec<_>>();
@@ -99,38 +107,38 @@ fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
 
 #[test]
 fn minutes_in_alarm_are_counted_once_however_many_alarms_overlap() {
-    use AlarmStep::{Acknowledged, Raised, Returned};
+    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
     for (steps, expect) in [
         (vec![], 0),
-        (vec![step(10, "high", Raised), step(30, "high", Returned)], 20),
-        (vec![step(10, "high", Raised), step(12, "high", Acknowledged), step(30, "high", Returned)], 20),
+        (vec![step(10, "high", Raised), step(30, "high", ReturnedToNormal)], 20),
+        (vec![step(10, "high", Raised), step(12, "high", Acknowledged), step(30, "high", ReturnedToNormal)], 20),
         // Two that overlap, two that do not.
         (
             vec![
                 step(10, "high", Raised),
                 step(20, "high-high", Raised),
-                step(30, "high-high", Returned),
-                step(40, "high", Returned),
+                step(30, "high-high", ReturnedToNormal),
+                step(40, "high", ReturnedToNormal),
             ],
             30,
         ),
         (
             vec![
                 step(10, "high", Raised),
-                step(20, "high", Returned),
+                step(20, "high", ReturnedToNormal),
                 step(50, "low", Raised),
-                step(55, "low", Returned),
+                step(55, "low", ReturnedToNormal),
             ],
             15,
         ),
         // Active before the period, still active at its end.
-        (vec![step(-50, "high", Raised), step(30, "high", Returned)], 30),
+        (vec![step(-50, "high", Raised), step(30, "high", ReturnedToNormal)], 30),
         (vec![step(90, "high", Raised)], 10),
         (vec![step(-50, "high", Raised)], 100),
         // Raised again without having returned (a restart): one stretch.
-        (vec![step(10, "high", Raised), step(20, "high", Raised), step(30, "high", Returned)], 20),
+        (vec![step(10, "high", Raised), step(20, "high", Raised), step(30, "high", ReturnedToNormal)], 20),
         // After the end nothing counts.
-        (vec![step(90, "high", Raised), step(150, "high", Returned)], 10),
+        (vec![step(90, "high", Raised), step(150, "high", ReturnedToNormal)], 10),
         (vec![step(110, "high", Raised)], 0),
     ] {
         let got = time_in_alarm(steps.iter(), sec(0), sec(100));

@@ -86,7 +86,8 @@ fn worry_words(model: &Model, cx: &ViewContext) -> String {
 /// `3 suppressed`: shelved or out of service. What is suppressed by design is as it should be, and stands
 /// on the alarms tab only.
 fn suppressed_words(cx: &ViewContext) -> String {
-    let by_somebody = cx.snapshot.suppressed.iter().filter(|suppressed| suppressed.state != AlarmState::Suppressed);
+    let by_somebody =
+        cx.snapshot.suppressed.iter().filter(|suppressed| suppressed.state != AlarmState::SuppressedByDesign);
     match by_somebody.count() {
         0 => String::new(),
         many => format!("{many} suppressed"),
@@ -162,14 +163,14 @@ fn what_words(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
 /// `UNACK 00:41`: the state and how long it lasts.
 fn state_words(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
     let since = match alarm.state {
-        AlarmState::Returned | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
+        AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             alarm.returned_at.unwrap_or(alarm.raised_at)
         }
         AlarmState::Normal
         | AlarmState::Unacknowledged
         | AlarmState::Acknowledged
         | AlarmState::Shelved
-        | AlarmState::Suppressed
+        | AlarmState::SuppressedByDesign
         | AlarmState::OutOfService => alarm.raised_at,
     };
     format!("{} {}", alarm.state.word(), running(between(since, cx.now)))

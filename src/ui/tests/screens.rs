@@ -334,7 +334,7 @@ fn without_colour_every_state_and_quality_looks_different() {
     let mut looks = HashSet::new();
     let mut states = 0;
     for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
-        for state in [AlarmState::Unacknowledged, AlarmState::Acknowledged, AlarmState::Returned] {
+        for state in [AlarmState::Unacknowledged, AlarmState::Acknowledged, AlarmState::ReturnedToNormal] {
             let mut fixture = Fixture::alarm();
             fixture.alarms.truncate(1);
             fixture.alarms[0].state = state;
@@ -421,7 +421,7 @@ fn trouble_of_the_store_is_in_the_header() {
 #[test]
 fn only_unacknowledged_alarms_flash() {
     for (state, flashes) in
-        [(AlarmState::Unacknowledged, true), (AlarmState::Acknowledged, false), (AlarmState::Returned, false)]
+        [(AlarmState::Unacknowledged, true), (AlarmState::Acknowledged, false), (AlarmState::ReturnedToNormal, false)]
     {
         let mut fixture = Fixture::alarm();
         fixture.alarms.truncate(1);

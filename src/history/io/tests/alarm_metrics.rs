@@ -119,9 +119,9 @@ fn at(second: f64) -> Timestamp {
 
 /// Some hundred steps of fourteen alarms: bursts, quiet hours, and now and then more than a day of nothing.
 fn journal() -> impl Strategy<Value = Vec<AlarmRecord>> {
-    use AlarmStep::{Acknowledged, Raised, Returned};
+    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
     let gap = prop_oneof![60 => 0.0..15.0, 20 => 15.0..120.0, 8 => 120.0..4_000.0, 1 => 4_000.0..50_000.0f64];
-    let kind = prop_oneof![4 => Just(Raised), 2 => Just(Returned), 1 => Just(Acknowledged)];
+    let kind = prop_oneof![4 => Just(Raised), 2 => Just(ReturnedToNormal), 1 => Just(Acknowledged)];
     let priority =
         prop_oneof![Just(Priority::Critical), Just(Priority::High), Just(Priority::Medium), Just(Priority::Low)];
     // The first few alarms come again and again, the last ones hardly ever.
@@ -169,14 +169,14 @@ proptest! {
 
 #[test]
 fn a_storm_an_alarm_from_the_day_before_and_an_empty_night_are_counted_as_sql_counts_them() {
-    use AlarmStep::{Raised, Returned};
+    use AlarmStep::{Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, START);
     let mut journal = vec![AlarmRecord { at: at(-90_000.0), ..step(0, "old", Raised) }];
     for i in 0..500 {
         let (name, second) = (format!("alarm {:03}", i % 250), f64::from(i) * 0.12);
         journal.push(AlarmRecord { at: at(second), ..step(0, &name, Raised) });
-        journal.push(AlarmRecord { at: at(second + 0.06), ..step(0, &name, Returned) });
+        journal.push(AlarmRecord { at: at(second + 0.06), ..step(0, &name, ReturnedToNormal) });
     }
     store.append(&journal.into_iter().map(Record::Alarm).collect::<Vec<_>>()).unwrap();
     // A station ran all the time but for the last hour.
@@ -207,18 +207,18 @@ fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
 
 #[test]
 fn an_alarm_suppressed_before_a_period_is_not_stale_in_it() {
-    use AlarmStep::{OutOfService, Raised, RaisedQuietly, Shelved, Suppressed};
+    use AlarmStep::{OutOfService, Raised, RaisedSuppressed, Shelved, SuppressedByDesign};
     let (_folder, db) = folder();
     let store = open(&db, START);
     let pair = |second: f64, text: &str, first, then| {
         [(second, first), (second + 1.0, then)]
             .map(|(second, kind)| Record::Alarm(AlarmRecord { at: at(second), ..step(0, text, kind) }))
     };
-    let aside = [("shelved", Shelved), ("suppressed", Suppressed), ("out of service", OutOfService)];
+    let aside = [("shelved", Shelved), ("suppressed", SuppressedByDesign), ("out of service", OutOfService)];
     for (text, kind) in aside {
         store.append(&pair(-200_000.0, text, Raised, kind)).unwrap();
     }
-    store.append(&pair(-200_000.0, "quiet", Suppressed, RaisedQuietly)).unwrap();
+    store.append(&pair(-200_000.0, "quiet", SuppressedByDesign, RaisedSuppressed)).unwrap();
     store.append(&pair(-200_000.0, "back", Shelved, Raised)).unwrap();
     assert_eq!(store.alarm_metrics(at(0.0), at(3_600.0), at(3_600.0)).unwrap().stale, 1);
     assert_eq!(store.recent(at(0.0)).unwrap().active.len(), 1);

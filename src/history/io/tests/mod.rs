@@ -215,12 +215,16 @@ fn a_commit_that_fails_leaves_nothing_behind() {
 
 #[test]
 fn lists_come_newest_first_within_their_span_and_limit() {
-    use AlarmStep::{Acknowledged, Raised, Returned};
+    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, 0);
     // Two steps at one instant keep their order.
-    let steps =
-        [step(1, "high", Raised), step(2, "high", Acknowledged), step(2, "high", Returned), step(9, "low", Raised)];
+    let steps = [
+        step(1, "high", Raised),
+        step(2, "high", Acknowledged),
+        step(2, "high", ReturnedToNormal),
+        step(9, "low", Raised),
+    ];
     let mut records: Vec<_> = steps.iter().cloned().map(Record::Alarm).collect();
     records.extend([action(3), action(4)].map(Record::Action));
     store.append(&records).unwrap();
@@ -357,12 +361,16 @@ fn a_start_before_the_last_record_begins_an_epoch() {
 
 #[test]
 fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
-    use AlarmStep::{Acknowledged, Raised, Returned};
+    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, 0);
-    let old = [step(1, "high", Raised), step(2, "high", Returned), step(3, "high", Acknowledged)];
-    let new =
-        [step(4, "high", Raised), step(5, "low", Raised), step(6, "high", Acknowledged), step(7, "low", Returned)];
+    let old = [step(1, "high", Raised), step(2, "high", ReturnedToNormal), step(3, "high", Acknowledged)];
+    let new = [
+        step(4, "high", Raised),
+        step(5, "low", Raised),
+        step(6, "high", Acknowledged),
+        step(7, "low", ReturnedToNormal),
+    ];
     let shelved = AlarmRecord {
         reason: Some("sensor is being changed".into()),
         until: Some(sec(600)),
@@ -377,11 +385,12 @@ fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
 
 #[test]
 fn a_shift_report_has_figures_alarms_and_actions() {
-    use AlarmStep::{Raised, Returned};
+    use AlarmStep::{Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let samples = (0..12).map(|i| good(PV, i * 10, 20.0 + i as f64)).chain([good(SV, 0, 70.0)]);
-    let alarms = [step(5, "high", Raised), step(30, "high", Returned), step(50, "low", Raised)].map(Record::Alarm);
+    let alarms =
+        [step(5, "high", Raised), step(30, "high", ReturnedToNormal), step(50, "low", Raised)].map(Record::Alarm);
     store.append(&samples.chain(alarms).chain([Record::Action(action(25))]).collect::<Vec<_>>()).unwrap();
     let period = Period { name: "period".into(), from: sec(20), to: sec(200) };
     let query = Query::Report { period: period.clone() };
@@ -394,7 +403,7 @@ fn a_shift_report_has_figures_alarms_and_actions() {
     assert_eq!(pv.in_alarm.as_secs(), 60);
     assert_eq!((sv.mean, sv.good), (Some(70.0), 1.0));
     assert_eq!((mv.mean, mv.good), (None, 0.0));
-    assert_eq!(report.alarms, [step(30, "high", Returned), step(50, "low", Raised)]);
+    assert_eq!(report.alarms, [step(30, "high", ReturnedToNormal), step(50, "low", Raised)]);
     assert_eq!(report.actions, [action(25)]);
     assert_eq!(report.record_of, Some(("TIC-1".into(), "°C".into())));
     assert_eq!(report.record.len(), 8);

@@ -46,7 +46,7 @@ fn names(alarms: &[Named]) -> Vec<&str> {
     alarms.iter().map(|alarm| &*alarm.text).collect()
 }
 
-use AlarmStep::{Acknowledged, Raised, Returned};
+use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
 
 #[test]
 fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
@@ -56,7 +56,7 @@ fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
         (599.9, "first", Raised),
         (600.0, "second window", Raised),
         (700.0, "second window", Acknowledged),
-        (800.0, "second window", Returned),
+        (800.0, "second window", ReturnedToNormal),
         (7_200.0, "after", Raised),
     ];
     let got = figures(7_200.0, &steps);
@@ -104,10 +104,10 @@ fn an_alarm_chatters_with_its_third_activation_within_a_minute() {
 
 #[test]
 fn an_alarm_is_fleeting_if_it_goes_before_anybody_could_read_it() {
-    let gone = |second: f64| figures(3_600.0, &[(1.0, "a", Raised), (second, "a", Returned)]);
+    let gone = |second: f64| figures(3_600.0, &[(1.0, "a", Raised), (second, "a", ReturnedToNormal)]);
     assert_eq!(names(&gone(10.9).fleeting), ["a"]);
     assert_eq!(names(&gone(11.0).fleeting), [""; 0]);
-    let seen = figures(3_600.0, &[(1.0, "a", Raised), (2.0, "a", Acknowledged), (3.0, "a", Returned)]);
+    let seen = figures(3_600.0, &[(1.0, "a", Raised), (2.0, "a", Acknowledged), (3.0, "a", ReturnedToNormal)]);
     assert_eq!(names(&seen.fleeting), [""; 0], "somebody has seen it");
 }
 
@@ -117,9 +117,9 @@ fn alarms_are_stale_after_a_day_and_the_most_at_one_time_count() {
     let steps = [
         (10.0, "a", Raised),
         (20.0, "b", Raised),
-        (day + 15.0, "a", Returned),
+        (day + 15.0, "a", ReturnedToNormal),
         // "b" becomes stale after "a" has gone: never two at once.
-        (day + 40.0, "b", Returned),
+        (day + 40.0, "b", ReturnedToNormal),
         (day + 50.0, "c", Raised),
     ];
     assert_eq!(figures(day + 10.0, &steps[..2]).stale, 0, "active for exactly a day is not over a day");
@@ -147,7 +147,7 @@ fn memory_does_not_grow_with_the_storms_it_has_seen() {
         for second in 0..2_000 {
             let name = format!("alarm {}", second % 500);
             monitor.take(&step(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
-            monitor.take(&step(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, Returned));
+            monitor.take(&step(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, ReturnedToNormal));
         }
     }
     monitor.advance(at(12.0 * 86_400.0));
@@ -158,7 +158,7 @@ fn memory_does_not_grow_with_the_storms_it_has_seen() {
 fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
     // Bursts and quiet: most steps follow within seconds, some after hours.
     let gap = prop_oneof![8 => 0.0..20.0, 2 => 20.0..900.0, 1 => 900.0..20_000.0f64];
-    let kind = prop_oneof![3 => Just(Raised), 2 => Just(Returned), 1 => Just(Acknowledged)];
+    let kind = prop_oneof![3 => Just(Raised), 2 => Just(ReturnedToNormal), 1 => Just(Acknowledged)];
     let priority =
         prop_oneof![Just(Priority::Critical), Just(Priority::High), Just(Priority::Medium), Just(Priority::Low)];
     proptest::collection::vec((gap, 0..6u8, kind, priority), 1..400).prop_map(|rows| {

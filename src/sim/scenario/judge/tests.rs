@@ -96,7 +96,7 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
     let raised = Expectation::Alarm(HIGH, AlarmStep::Raised);
     check(raised, &[(12, AlarmStep::Raised, "")], met(12));
     check(raised, &[(9, AlarmStep::Raised, ""), (21, AlarmStep::Raised, "")], late());
-    check(raised, &[(12, AlarmStep::Returned, "")], late());
+    check(raised, &[(12, AlarmStep::ReturnedToNormal, "")], late());
     check(raised, &[(12, AlarmStep::Raised, "another alarm of this tag")], late());
     check(Expectation::Alarm(HIGH, AlarmStep::Acknowledged), &[(20, AlarmStep::Acknowledged, "")], met(20));
     check(Expectation::NoAlarm(HIGH), &[], met(20));

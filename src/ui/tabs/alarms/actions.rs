@@ -114,9 +114,9 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
         AlarmState::Normal
         | AlarmState::Unacknowledged
         | AlarmState::Acknowledged
-        | AlarmState::Returned
+        | AlarmState::ReturnedToNormal
         | AlarmState::Shelved
-        | AlarmState::Suppressed
+        | AlarmState::SuppressedByDesign
         | AlarmState::OutOfService => "It does not latch: there is nothing to reset.",
     };
     open(Modal::Notice(Notice::new("reset", vec![name(cx, alarm.id), why.to_owned()])))
@@ -127,14 +127,14 @@ pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction>
     let (title, alarm_command) = match suppressed.state {
         AlarmState::Shelved => ("take back from the shelf", AlarmCommand::Unshelve(suppressed.id)),
         AlarmState::OutOfService => ("put in service", AlarmCommand::InService(suppressed.id)),
-        AlarmState::Suppressed => {
+        AlarmState::SuppressedByDesign => {
             let words = "It is suppressed by design, and comes back when its enabling condition holds again.";
             return open(Modal::Notice(Notice::new("suppressed", vec![words.to_owned()])));
         }
         AlarmState::Normal
         | AlarmState::Unacknowledged
         | AlarmState::Acknowledged
-        | AlarmState::Returned
+        | AlarmState::ReturnedToNormal
         | AlarmState::LatchedUnacknowledged
         | AlarmState::LatchedAcknowledged => return Vec::new(),
     };

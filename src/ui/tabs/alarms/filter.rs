@@ -29,7 +29,7 @@ pub struct Filter {
 const STATES: [AlarmState; 5] = [
     AlarmState::Unacknowledged,
     AlarmState::Acknowledged,
-    AlarmState::Returned,
+    AlarmState::ReturnedToNormal,
     AlarmState::LatchedUnacknowledged,
     AlarmState::LatchedAcknowledged,
 ];
@@ -135,7 +135,7 @@ mod tests {
         check(&|filter| filter.type_words("tk-1"), &[], "an area is not shown, and has a key of its own");
         check(&|filter| filter.type_words("process"), &[], "nor is a class");
         check(&|filter| filter.priority = Some(Priority::Medium), &[3], "a priority");
-        check(&|filter| filter.state = Some(AlarmState::Returned), &[2], "a state");
+        check(&|filter| filter.state = Some(AlarmState::ReturnedToNormal), &[2], "a state");
         check(&|filter| filter.next_area(&snapshot.def), &[2], "an area");
         check(
             &|filter| {

@@ -176,11 +176,11 @@ pub fn respond_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> O
             None => (format!("{within}, OVERDUE by {}", running(gone - respond)), true),
         },
         AlarmState::Normal
-        | AlarmState::Returned
+        | AlarmState::ReturnedToNormal
         | AlarmState::LatchedUnacknowledged
         | AlarmState::LatchedAcknowledged
         | AlarmState::Shelved
-        | AlarmState::Suppressed
+        | AlarmState::SuppressedByDesign
         | AlarmState::OutOfService => (within, false),
     })
 }

@@ -182,11 +182,11 @@ impl Metrics {
             let stale = cx.snapshot.alarms.iter().filter(|alarm| match alarm.state {
                 AlarmState::Unacknowledged | AlarmState::Acknowledged => STALE < between(alarm.raised_at, cx.now),
                 AlarmState::Normal
-                | AlarmState::Returned
+                | AlarmState::ReturnedToNormal
                 | AlarmState::LatchedUnacknowledged
                 | AlarmState::LatchedAcknowledged
                 | AlarmState::Shelved
-                | AlarmState::Suppressed
+                | AlarmState::SuppressedByDesign
                 | AlarmState::OutOfService => false,
             });
             lines.extend(stale.map(|alarm| {

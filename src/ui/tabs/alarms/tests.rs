@@ -103,7 +103,7 @@ fn suppressed() -> Fixture {
     });
     suppressed.push(SuppressedAlarm {
         id: AlarmId(3),
-        state: AlarmState::Suppressed,
+        state: AlarmState::SuppressedByDesign,
         note: note(300, None, None),
         until: None,
         active: false,

@@ -124,7 +124,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
     let alarms = vec![
         alarm(12, high, "TIC-1.PV", "temperature high", AlarmStep::Raised, None),
         alarm(31, high, "TIC-1.PV", "temperature high", AlarmStep::Acknowledged, Some("tech1")),
-        alarm(53, high, "TIC-1.PV", "temperature high", AlarmStep::Returned, None),
+        alarm(53, high, "TIC-1.PV", "temperature high", AlarmStep::ReturnedToNormal, None),
         alarm(80, low, "PLC-1", "not answering", AlarmStep::Raised, None),
         alarm(95, high, "TIC-1.PV", "temperature high", AlarmStep::Raised, None),
     ];

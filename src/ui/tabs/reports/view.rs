@@ -164,7 +164,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
         lines.extend(report.suppressed.iter().take(LIST_MAX).map(|alarm| suppressed_line(cx, alarm)));
         lines.extend(report.suppressed.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
     }
-    let annunciated = |alarm: &&AlarmRecord| !alarm.step.is_quiet();
+    let annunciated = |alarm: &&AlarmRecord| !alarm.step.is_suppressed();
     let alarms: Vec<&AlarmRecord> = report.alarms.iter().filter(annunciated).collect();
     if !alarms.is_empty() {
         lines.push(section(cx, "alarms"));
