@@ -144,7 +144,7 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
 
 /// What was done, for people and scripts: one `name value` a line.
 fn summary(last: &Snapshot, report: &ShiftReport) -> Vec<String> {
-    use crate::plant::record::AlarmStep;
+    use crate::plant::record::AlarmEvent;
     let lines = last.lines.iter().map(|line| line.counters);
     let (mut polls, mut ok, mut timeouts, mut corrupt, mut exceptions) = (0, 0, 0, 0, 0);
     for counters in lines {
@@ -155,7 +155,7 @@ fn summary(last: &Snapshot, report: &ShiftReport) -> Vec<String> {
         exceptions += counters.exceptions;
     }
     let values: u64 = last.devices.iter().map(|device| device.values).sum();
-    let raised = report.alarms.iter().filter(|step| step.step == AlarmStep::Raised).count();
+    let raised = report.alarms.iter().filter(|step| step.event == AlarmEvent::Raised).count();
     let span = Duration::try_from(report.until.duration_since(report.period.from)).unwrap_or_default();
     vec![
         format!("plant time     {} s", span.as_secs()),

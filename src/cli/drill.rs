@@ -202,7 +202,7 @@ mod tests {
         let bad = format!("[[expect]]\nnot_good = '{value}'\nafter = '40s'\nwithin = '10s'\n");
         let alarm = |of: &str| {
             let step = |step: &str, after: &str| {
-                format!("[[expect]]\nalarm = '{of}'\nstep = '{step}'\nafter = '{after}'\nwithin = '50s'\n")
+                format!("[[expect]]\nalarm = '{of}'\nevent = '{step}'\nafter = '{after}'\nwithin = '50s'\n")
             };
             step("raised", "40s") + &step("returned", "2m 40s")
         };

@@ -1,7 +1,7 @@
 //! The text of the alarm-state file: of each alarm the last step of every kind, one checked line each, oldest first.
 //!
 //! ```text
-//! sightglass alarm state 1
+//! sightglass alarm state 2
 //! 5f0c9a1be2d34477 {"at":"2026-05-01T12:00:00Z","subject":"TIC-1.PV","text":"high",…}
 //!  └ the first 8 bytes of the SHA-256 of what follows
 //! ```
@@ -17,7 +17,7 @@ use sha2::{Digest, Sha256};
 use crate::plant::record::AlarmRecord;
 
 /// The first line; its number goes up with every change of the others.
-pub const HEADER: &str = "sightglass alarm state 1\n";
+pub const HEADER: &str = "sightglass alarm state 2\n";
 /// Most steps that are kept: thirteen kinds of some thousand alarms, also of those that the plant file no longer has.
 const STEPS_MAX: usize = 50_000;
 /// Hexadecimal digits of a checksum.
@@ -66,7 +66,7 @@ impl LatestSteps {
 type Key = (Arc<str>, Arc<str>, &'static str);
 
 fn key(step: &AlarmRecord) -> Key {
-    (step.subject.clone(), step.text.clone(), step.step.word())
+    (step.subject.clone(), step.text.clone(), step.event.word())
 }
 
 /// A step as a line, with its end.
@@ -113,13 +113,13 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::Priority,
-        record::{AlarmStep, Burst},
+        record::{AlarmEvent, Burst},
     };
 
     fn step() -> impl Strategy<Value = AlarmRecord> {
         let words = || proptest::option::of("\\PC{0,20}").prop_map(|words| words.map(Arc::from));
         let number = || proptest::option::of(-1e9..1e9f64);
-        let kind = (0..AlarmStep::ALL.len()).prop_map(|place| AlarmStep::ALL[place]);
+        let kind = (0..AlarmEvent::ALL.len()).prop_map(|place| AlarmEvent::ALL[place]);
         let time = || (0i64..2_000_000_000_000_000).prop_map(|micros| Timestamp::from_microsecond(micros).unwrap());
         let more = (number(), number(), words(), words(), proptest::option::of(time()));
         (time(), 0..3u8, kind, more, any::<bool>()).prop_map(|(at, subject, step, more, burst)| {

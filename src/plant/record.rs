@@ -1,4 +1,4 @@
-//! What the plant leaves behind for the history: samples, steps of alarms, operator actions, minutes of lines.
+//! What the plant leaves behind for the history: samples, alarm events, operator actions, minutes of lines.
 
 use std::{fmt, sync::Arc};
 
@@ -16,7 +16,7 @@ use super::{
 pub enum Record {
     /// A stored sample.
     Sample(TagId, Sample),
-    /// A step of an alarm.
+    /// An alarm event.
     Alarm(AlarmRecord),
     /// An operator action.
     Action(ActionRecord),
@@ -26,7 +26,7 @@ pub enum Record {
     ClockSet,
 }
 
-/// A step in the life of an alarm. Names, not ids: a journal outlives the plant file.
+/// An alarm event as it is journaled. Names, not ids: a journal outlives the plant file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AlarmRecord {
     /// When.
@@ -37,8 +37,8 @@ pub struct AlarmRecord {
     pub text: Arc<str>,
     /// How urgent.
     pub priority: Priority,
-    /// Which step.
-    pub step: AlarmStep,
+    /// What happened.
+    pub event: AlarmEvent,
     /// The value at that moment, in the tag's unit.
     pub value: Option<f64>,
     /// The limit, in the tag's unit.
@@ -54,11 +54,11 @@ pub struct AlarmRecord {
 }
 
 impl AlarmRecord {
-    /// A step by nobody, without value, limit and all else.
-    pub fn new(at: Timestamp, subject: &str, text: &str, priority: Priority, step: AlarmStep) -> AlarmRecord {
+    /// An event without operator, value and limit.
+    pub fn new(at: Timestamp, subject: &str, text: &str, priority: Priority, event: AlarmEvent) -> AlarmRecord {
         let (subject, text) = (subject.into(), text.into());
         let (value, limit, by, reason, until, burst) = (None, None, None, None, None, None);
-        AlarmRecord { at, subject, text, priority, step, value, limit, by, reason, until, burst }
+        AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, burst }
     }
 }
 
@@ -71,9 +71,9 @@ pub struct Burst {
     pub rank: u32,
 }
 
-/// The steps in the life of an alarm. The words are what the history and CSV hold.
+/// What happens to an alarm. The words are what the history and CSV hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum AlarmStep {
+pub enum AlarmEvent {
     /// It became active and was annunciated.
     Raised,
     /// An operator acknowledged it.
@@ -102,49 +102,49 @@ pub enum AlarmStep {
     InService,
 }
 
-impl AlarmStep {
+impl AlarmEvent {
     /// Does it belong to an alarm that is not annunciated?
     pub fn is_suppressed(self) -> bool {
-        matches!(self, AlarmStep::RaisedSuppressed | AlarmStep::ReturnedSuppressed)
+        matches!(self, AlarmEvent::RaisedSuppressed | AlarmEvent::ReturnedSuppressed)
     }
 
-    /// Every step.
-    pub const ALL: [AlarmStep; 13] = [
-        AlarmStep::Raised,
-        AlarmStep::Acknowledged,
-        AlarmStep::ReturnedToNormal,
-        AlarmStep::RaisedSuppressed,
-        AlarmStep::ReturnedSuppressed,
-        AlarmStep::ReAlarmed,
-        AlarmStep::Reset,
-        AlarmStep::Shelved,
-        AlarmStep::Unshelved,
-        AlarmStep::SuppressedByDesign,
-        AlarmStep::Unsuppressed,
-        AlarmStep::OutOfService,
-        AlarmStep::InService,
+    /// Every event.
+    pub const ALL: [AlarmEvent; 13] = [
+        AlarmEvent::Raised,
+        AlarmEvent::Acknowledged,
+        AlarmEvent::ReturnedToNormal,
+        AlarmEvent::RaisedSuppressed,
+        AlarmEvent::ReturnedSuppressed,
+        AlarmEvent::ReAlarmed,
+        AlarmEvent::Reset,
+        AlarmEvent::Shelved,
+        AlarmEvent::Unshelved,
+        AlarmEvent::SuppressedByDesign,
+        AlarmEvent::Unsuppressed,
+        AlarmEvent::OutOfService,
+        AlarmEvent::InService,
     ];
     /// The word in SQL, CSV and on screen.
     pub fn word(self) -> &'static str {
         match self {
-            AlarmStep::Raised => "raised",
-            AlarmStep::Acknowledged => "acknowledged",
-            AlarmStep::ReturnedToNormal => "returned",
-            AlarmStep::RaisedSuppressed => "raised quietly",
-            AlarmStep::ReturnedSuppressed => "returned quietly",
-            AlarmStep::ReAlarmed => "raised again",
-            AlarmStep::Reset => "reset",
-            AlarmStep::Shelved => "shelved",
-            AlarmStep::Unshelved => "unshelved",
-            AlarmStep::SuppressedByDesign => "suppressed",
-            AlarmStep::Unsuppressed => "released",
-            AlarmStep::OutOfService => "out of service",
-            AlarmStep::InService => "in service",
+            AlarmEvent::Raised => "raised",
+            AlarmEvent::Acknowledged => "acknowledged",
+            AlarmEvent::ReturnedToNormal => "returned",
+            AlarmEvent::RaisedSuppressed => "raised quietly",
+            AlarmEvent::ReturnedSuppressed => "returned quietly",
+            AlarmEvent::ReAlarmed => "raised again",
+            AlarmEvent::Reset => "reset",
+            AlarmEvent::Shelved => "shelved",
+            AlarmEvent::Unshelved => "unshelved",
+            AlarmEvent::SuppressedByDesign => "suppressed",
+            AlarmEvent::Unsuppressed => "released",
+            AlarmEvent::OutOfService => "out of service",
+            AlarmEvent::InService => "in service",
         }
     }
-    /// The step of a stored word.
-    pub fn from_word(word: &str) -> Option<AlarmStep> {
-        AlarmStep::ALL.into_iter().find(|step| step.word() == word)
+    /// The event of a stored word.
+    pub fn from_word(word: &str) -> Option<AlarmEvent> {
+        AlarmEvent::ALL.into_iter().find(|event| event.word() == word)
     }
 }
 

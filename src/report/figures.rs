@@ -13,7 +13,7 @@ use super::{
 };
 use crate::plant::{
     def::TagId,
-    record::{AlarmRecord, AlarmStep},
+    record::{AlarmEvent, AlarmRecord},
     sample::Sample,
     tag::{Decimals, TagDef},
 };
@@ -133,22 +133,22 @@ pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Tim
             total += Duration::try_from(at.duration_since(since)).unwrap_or_default();
         }
         since = at;
-        match step.step {
-            AlarmStep::Raised | AlarmStep::RaisedSuppressed => {
+        match step.event {
+            AlarmEvent::Raised | AlarmEvent::RaisedSuppressed => {
                 active.insert(&step.text);
             }
-            AlarmStep::ReturnedToNormal | AlarmStep::ReturnedSuppressed => {
+            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
                 active.remove(&*step.text);
             }
-            AlarmStep::Acknowledged
-            | AlarmStep::ReAlarmed
-            | AlarmStep::Reset
-            | AlarmStep::Shelved
-            | AlarmStep::Unshelved
-            | AlarmStep::SuppressedByDesign
-            | AlarmStep::Unsuppressed
-            | AlarmStep::OutOfService
-            | AlarmStep::InService => {}
+            AlarmEvent::Acknowledged
+            | AlarmEvent::ReAlarmed
+            | AlarmEvent::Reset
+            | AlarmEvent::Shelved
+            | AlarmEvent::Unshelved
+            | AlarmEvent::SuppressedByDesign
+            | AlarmEvent::Unsuppressed
+            | AlarmEvent::OutOfService
+            | AlarmEvent::InService => {}
         }
     }
     if !active.is_empty() {
@@ -184,15 +184,15 @@ pub fn suppressed(
     }
     for step in steps {
         let alarm = alarms.entry((&step.subject, &step.text)).or_insert_with(|| Quiet::new(step));
-        let (active, quiet) = match step.step {
-            AlarmStep::Raised => (true, false),
-            AlarmStep::RaisedSuppressed => (true, true),
-            AlarmStep::ReturnedToNormal | AlarmStep::ReturnedSuppressed => (false, alarm.quiet),
-            AlarmStep::Shelved | AlarmStep::SuppressedByDesign | AlarmStep::OutOfService => (alarm.active, true),
-            AlarmStep::Unshelved | AlarmStep::Unsuppressed | AlarmStep::InService => (alarm.active, false),
-            AlarmStep::Acknowledged | AlarmStep::ReAlarmed | AlarmStep::Reset => continue,
+        let (active, quiet) = match step.event {
+            AlarmEvent::Raised => (true, false),
+            AlarmEvent::RaisedSuppressed => (true, true),
+            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => (false, alarm.quiet),
+            AlarmEvent::Shelved | AlarmEvent::SuppressedByDesign | AlarmEvent::OutOfService => (alarm.active, true),
+            AlarmEvent::Unshelved | AlarmEvent::Unsuppressed | AlarmEvent::InService => (alarm.active, false),
+            AlarmEvent::Acknowledged | AlarmEvent::ReAlarmed | AlarmEvent::Reset => continue,
         };
-        alarm.found.raised += u64::from(step.step == AlarmStep::RaisedSuppressed);
+        alarm.found.raised += u64::from(step.event == AlarmEvent::RaisedSuppressed);
         alarm.set(active, quiet, step.at);
     }
     let ended = alarms.into_values().map(|mut alarm| {

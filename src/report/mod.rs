@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use crate::plant::{
     alarm::PeriodMetrics,
     def::{CsvDialect, PlantDef, Priority},
-    record::{ActionRecord, AlarmRecord, AlarmStep, ChainHash},
+    record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
 };
 
 /// A format of the shift report. To add one: a file with this trait, and its module and row of [`FORMATS`] here.
@@ -64,7 +64,7 @@ pub fn format(name: &str) -> Result<&'static dyn ReportFormat, String> {
 
 /// Alarms of a priority that were raised.
 pub fn raised(alarms: &[AlarmRecord], priority: Priority) -> usize {
-    alarms.iter().filter(|alarm| alarm.step == AlarmStep::Raised && alarm.priority == priority).count()
+    alarms.iter().filter(|alarm| alarm.event == AlarmEvent::Raised && alarm.priority == priority).count()
 }
 
 /// Decimals to print where the device has not said how many there are.

@@ -70,7 +70,7 @@ fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u
     alarm_metrics::rows(&report.alarm_metrics).iter().for_each(|row| table.row(metric_row(row, dialect)));
     table.section("alarms to look into", &["kind", "subject", "alarm", "raised"]);
     alarm_metrics::bad_actors(&report.alarm_metrics).iter().for_each(|alarm| table.row(bad_actor_row(alarm)));
-    table.section("alarms", &["time", "priority", "subject", "alarm", "step", "value", "limit", "by", "reason"]);
+    table.section("alarms", &["time", "priority", "subject", "alarm", "event", "value", "limit", "by", "reason"]);
     report.alarms.iter().for_each(|alarm| table.row(alarm_row(alarm, zone, dialect)));
     table.section("operator actions", &["time", "by", "action", "target", "old", "new", "outcome"]);
     report.actions.iter().for_each(|action| table.row(action_row(action, zone)));
@@ -125,7 +125,7 @@ fn alarm_row(alarm: &AlarmRecord, zone: &TimeZone, dialect: CsvDialect) -> Vec<S
         plain(alarm.priority.word()),
         text(&alarm.subject),
         text(&alarm.text),
-        plain(alarm.step.word()),
+        plain(alarm.event.word()),
         shortest(alarm.value, dialect),
         shortest(alarm.limit, dialect),
         text(alarm.by.as_deref().unwrap_or("")),

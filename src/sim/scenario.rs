@@ -16,7 +16,7 @@ use crate::plant::{
     Snapshot,
     command::CommandKind,
     def::{AlarmId, TagId},
-    record::AlarmStep,
+    record::AlarmEvent,
     snapshot::ActiveAlarm,
 };
 
@@ -122,7 +122,7 @@ pub struct Expect {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Expectation {
     /// This alarm makes this step.
-    Alarm(AlarmId, AlarmStep),
+    Alarm(AlarmId, AlarmEvent),
     /// This alarm is never raised.
     NoAlarm(AlarmId),
     /// An operator writes this value, and it is verified.

@@ -66,19 +66,19 @@ mod tests {
     use super::*;
     use crate::{
         history::io::alarm_metrics::Recent,
-        plant::{def::Priority, record::AlarmStep},
+        plant::{def::Priority, record::AlarmEvent},
     };
 
-    fn step(second: i64, text: &str, step: AlarmStep) -> AlarmRecord {
+    fn step(second: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
         AlarmRecord::new(Timestamp::from_second(second).unwrap(), "TIC-1.PV", text, Priority::High, step)
     }
 
     #[test]
     fn a_past_that_comes_late_changes_no_alarm_that_has_moved_since() {
-        let before = vec![step(1, "high", AlarmStep::Raised), step(2, "low", AlarmStep::Raised)];
+        let before = vec![step(1, "high", AlarmEvent::Raised), step(2, "low", AlarmEvent::Raised)];
         let recent = Recent { steps: before.clone(), ..Recent::default() };
         let restored = Restored { steps: before.clone(), recent, chain_hashes: None };
-        let now = step(9, "low", AlarmStep::ReturnedToNormal);
+        let now = step(9, "low", AlarmEvent::ReturnedToNormal);
         for from_journal in [true, false] {
             let mut past = Past::new(None, from_journal);
             past.note(&now);

@@ -6,7 +6,7 @@ use sightglass::{
     history::io::store::Store,
     plant::{
         def::Priority,
-        record::{AlarmRecord, AlarmStep, Record},
+        record::{AlarmEvent, AlarmRecord, Record},
         sample::Sample,
     },
     profile::{self, Search},
@@ -114,7 +114,7 @@ fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
             subject: "TIC-1.PV".into(),
             text: "temperature high".into(),
             priority: Priority::High,
-            step: AlarmStep::Raised,
+            event: AlarmEvent::Raised,
             value: Some(76.0),
             limit: Some(75.0),
             by: None,

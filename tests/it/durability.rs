@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use sightglass::{
     history::{HistoryError, io::store::Store},
-    plant::{record::AlarmStep, station::StationFault},
+    plant::{record::AlarmEvent, station::StationFault},
     profile::{self, Search},
 };
 
@@ -169,14 +169,14 @@ fn recorded(disk: &SmallDisk, from: Timestamp, to: Timestamp) -> (u64, u64, u64)
     let within =
         format!("utc BETWEEN make_timestamp({}) AND make_timestamp({})", from.as_microsecond(), to.as_microsecond());
     let count = |sql: &str| db.query_row(sql, [], |row| row.get(0)).unwrap();
-    let (raised, station) = (AlarmStep::Raised.word(), StationFault::NotRecording.message());
+    let (raised, station) = (AlarmEvent::Raised.word(), StationFault::NotRecording.message());
     let samples = count(&format!("SELECT count(*) FROM sample WHERE {within}"));
     let steps = count(&format!(
-        "SELECT count(*) FROM alarm_journal WHERE {within} AND step = '{raised}' AND text = '{station}'"
+        "SELECT count(*) FROM alarm_journal WHERE {within} AND event = '{raised}' AND message = '{station}'"
     ));
     let twice = count(
         "SELECT (SELECT count(*) - count(DISTINCT (utc, tag, value, quality)) FROM sample)
-              + (SELECT count(*) - count(DISTINCT (utc, subject, text, step)) FROM alarm_journal)
+              + (SELECT count(*) - count(DISTINCT (utc, subject, message, event)) FROM alarm_journal)
               + (SELECT count(number) - count(DISTINCT number) FROM operator_action)",
     );
     (samples, steps, twice)

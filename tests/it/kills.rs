@@ -39,7 +39,7 @@ use sightglass::{
         alarm::AlarmCommand,
         command::{CommandId, CommandKind, Outcome},
         def::AlarmId,
-        record::{AlarmRecord, AlarmStep, SEAL_LOG},
+        record::{AlarmEvent, AlarmRecord, SEAL_LOG},
         role::Role,
         snapshot::ActiveAlarm,
     },
@@ -279,11 +279,11 @@ fn number_in(round: u64, note: Option<Arc<str>>) -> u32 {
 }
 
 /// The reason of the last step of this kind, as the next station will find it.
-fn reason_of(history: &Path, kind: AlarmStep, text: Option<&str>) -> Option<Arc<str>> {
+fn reason_of(history: &Path, kind: AlarmEvent, text: Option<&str>) -> Option<Arc<str>> {
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
     assert_eq!(found.trouble, None);
     let steps = found.steps.unwrap_or_default();
-    let is_it = |step: &&AlarmRecord| step.step == kind && text.is_none_or(|text| &*step.text == text);
+    let is_it = |step: &&AlarmRecord| step.event == kind && text.is_none_or(|text| &*step.text == text);
     steps.iter().find(is_it).and_then(|step| step.reason.clone())
 }
 
@@ -304,7 +304,7 @@ async fn log_in_on(session: Session) -> Reported {
 
 /// One life of a station: ends with a kill after so many actions that were answered, and so long after the last of them.
 async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Reported {
-    let before = reason_of(&place.history(), AlarmStep::Shelved, None);
+    let before = reason_of(&place.history(), AlarmEvent::Shelved, None);
     let mut station = place.station();
     let ((done, mut count), (asked, mut report)) = (watch::channel(0), watch::channel(false));
     let session = place.terminal().await;
@@ -351,7 +351,7 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
             );
         }
         let kept = |kind, text| number_in(round, reason_of(&place.history(), kind, text));
-        let (shelved, acknowledged) = (kept(AlarmStep::Shelved, None), kept(AlarmStep::Acknowledged, Some(ALARM)));
+        let (shelved, acknowledged) = (kept(AlarmEvent::Shelved, None), kept(AlarmEvent::Acknowledged, Some(ALARM)));
         assert!(reported.shelved <= shelved, "round {round}: shelving {}, the file has {shelved}", reported.shelved);
         let last = reported.last_acknowledged;
         assert!(last <= acknowledged, "round {round}: acknowledgement {last}, the file has {acknowledged}");

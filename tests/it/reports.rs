@@ -9,7 +9,7 @@ use sightglass::{
     plant::{
         PlantDef,
         def::Priority,
-        record::{AlarmRecord, AlarmStep, Record},
+        record::{AlarmEvent, AlarmRecord, Record},
         sample::Sample,
     },
     profile::{self, Search},
@@ -90,7 +90,7 @@ fn alarms_that_were_suppressed_are_counted_beside_those_that_were_annunciated() 
     let folder = folder();
     let path = folder.path().join("tank.duckdb");
     history(&path, |_, start| {
-        use AlarmStep::{
+        use AlarmEvent::{
             Raised, RaisedSuppressed, ReturnedSuppressed, ReturnedToNormal, SuppressedByDesign, Unsuppressed,
         };
         let steps = [

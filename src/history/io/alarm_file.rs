@@ -174,9 +174,9 @@ fn create(path: &Path) -> io::Result<File> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::plant::{def::Priority, record::AlarmStep};
+    use crate::plant::{def::Priority, record::AlarmEvent};
 
-    fn step(number: i64, step: AlarmStep) -> AlarmRecord {
+    fn step(number: i64, step: AlarmEvent) -> AlarmRecord {
         let at = Timestamp::from_second(number).unwrap();
         AlarmRecord::new(at, &format!("T-{}", number % 3), "high", Priority::High, step)
     }
@@ -192,17 +192,17 @@ mod tests {
         let path = beside(&folder.path().join("tank.duckdb"));
         assert_eq!(found(&path), Found::default(), "no file yet");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmStep::Raised)]);
+        alarms.take([step(1, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         for number in 0..3_000 {
-            alarms.take([step(number, AlarmStep::Raised), step(number, AlarmStep::ReturnedToNormal)]);
+            alarms.take([step(number, AlarmEvent::Raised), step(number, AlarmEvent::ReturnedToNormal)]);
             if number % 10 == 0 {
                 alarms.write().unwrap();
             }
         }
         alarms.write().unwrap();
         let last = [2_997, 2_998, 2_999]
-            .map(|number| [AlarmStep::Raised, AlarmStep::ReturnedToNormal].map(|kind| step(number, kind)));
+            .map(|number| [AlarmEvent::Raised, AlarmEvent::ReturnedToNormal].map(|kind| step(number, kind)));
         assert_eq!(found(&path), Found { steps: Some(last.concat()), trouble: None });
         let lines = fs::read_to_string(&path).unwrap().lines().count();
         assert!(lines < 2 * SPARE_LINES, "{lines} lines for 6 steps");
@@ -214,12 +214,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmStep::Raised)]);
+        alarms.take([step(1, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         fs::remove_file(&path).unwrap();
-        alarms.take([step(1, AlarmStep::Acknowledged)]);
+        alarms.take([step(1, AlarmEvent::Acknowledged)]);
         alarms.write().unwrap();
-        let both = vec![step(1, AlarmStep::Raised), step(1, AlarmStep::Acknowledged)];
+        let both = vec![step(1, AlarmEvent::Raised), step(1, AlarmEvent::Acknowledged)];
         assert_eq!(found(&path).steps, Some(both.clone()));
         fs::write(&path, "nonsense").unwrap();
         alarms.write().unwrap();
@@ -231,9 +231,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("later").join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmStep::Raised)]);
+        alarms.take([step(1, AlarmEvent::Raised)]);
         assert!(alarms.write().is_err());
-        alarms.take([step(1, AlarmStep::Acknowledged)]);
+        alarms.take([step(1, AlarmEvent::Acknowledged)]);
         assert!(alarms.write().is_err());
         fs::create_dir(folder.path().join("later")).unwrap();
         alarms.write().unwrap();
@@ -245,7 +245,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmStep::Raised), step(2, AlarmStep::Raised)]);
+        alarms.take([step(1, AlarmEvent::Raised), step(2, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("T-1", "T-7", 1)).unwrap();

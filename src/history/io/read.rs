@@ -18,7 +18,7 @@ use crate::{
     plant::{
         def::{Priority, TagId},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, ChainHash},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, Burst, ChainHash},
     },
     report::step_series::{AsOf, HeldValue},
 };
@@ -201,7 +201,7 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
             4 => Priority::Low,
             n => return Err(duckdb::Error::IntegralValueOutOfRange(3, i128::from(n))),
         },
-        step: AlarmStep::from_word(&row.get::<_, String>(4)?).ok_or(duckdb::Error::InvalidQuery)?,
+        event: AlarmEvent::from_word(&row.get::<_, String>(4)?).ok_or(duckdb::Error::InvalidQuery)?,
         value: row.get(5)?,
         limit: row.get(6)?,
         by: maybe_shared(row, 7)?,

@@ -16,7 +16,7 @@ use crate::plant::record::ELSEWHERE;
 /// times, rows of two need not be.
 ///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
-pub const MIGRATIONS: [&str; 6] = [
+pub const MIGRATIONS: [&str; 7] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -59,22 +59,28 @@ ALTER TABLE operator_action ADD COLUMN epoch USMALLINT DEFAULT 0;
 ALTER TABLE line_minute ADD COLUMN epoch USMALLINT DEFAULT 0;
 ALTER TABLE last_commit ADD COLUMN epoch USMALLINT DEFAULT 0;
 ",
+    "
+ALTER TABLE alarm_journal RENAME COLUMN step TO event;
+ALTER TABLE alarm_journal RENAME COLUMN text TO message;
+ALTER TABLE alarm_journal RENAME COLUMN burst_utc TO first_out_utc;
+ALTER TABLE alarm_journal RENAME COLUMN burst_rank TO first_out_rank;
+",
 ];
 
-/// Columns of an alarm step, in the order that it is read.
-pub const STEP_COLUMNS: [&str; 12] = [
+/// Columns of an alarm event, in the order that it is read.
+pub const EVENT_COLUMNS: [&str; 12] = [
     "utc",
     "subject",
-    "text",
+    "message",
     "priority",
-    "step",
+    "event",
     "value",
     "limit_value",
     "by_whom",
     "reason",
     "until_utc",
-    "burst_utc",
-    "burst_rank",
+    "first_out_utc",
+    "first_out_rank",
 ];
 
 /// Holds the number of migrations done.
@@ -129,46 +135,46 @@ pub const WATCHED_BY_SAMPLES: &str =
 /// A row if there is any sample in a span.
 pub const ANY_SAMPLE: &str = "SELECT 1 FROM sample WHERE utc >= ? AND utc < ? LIMIT 1";
 
-/// Steps of alarms in a span, newest first.
+/// Alarm events in a span, newest first.
 pub fn journal_newest() -> String {
-    let step = STEP_COLUMNS.join(", ");
-    format!("SELECT {step} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
+    let columns = EVENT_COLUMNS.join(", ");
+    format!("SELECT {columns} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
 }
 
-/// Steps of alarms in a span, oldest first.
+/// Alarm events in a span, oldest first.
 pub fn journal_oldest() -> String {
-    let step = STEP_COLUMNS.join(", ");
-    format!("SELECT {step} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
+    let columns = EVENT_COLUMNS.join(", ");
+    format!("SELECT {columns} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
 }
 
-/// The raising steps of the alarms that were active at an instant, also of those that were suppressed.
+/// The raising events of the alarms that were active at an instant, also of those that were suppressed.
 pub fn active_at() -> String {
-    raised_at("", "step IN ('raised', 'raised quietly')")
+    raised_at("", "event IN ('raised', 'raised quietly')")
 }
 
-/// The raising steps of the alarms that were active at an instant and have not been suppressed since.
+/// The raising events of the alarms that were active at an instant and have not been suppressed since.
 pub fn standing_at() -> String {
-    raised_at(", 'shelved', 'suppressed', 'out of service'", "step = 'raised'")
+    raised_at(", 'shelved', 'suppressed', 'out of service'", "event = 'raised'")
 }
 
-/// The alarms whose latest step before an instant fulfils `is`. Steps that raise or end an alarm count, and `others`.
+/// The alarms whose latest event before an instant fulfils `is`. Events that raise or end an alarm count, and `others`.
 fn raised_at(others: &str, is: &str) -> String {
-    let step = STEP_COLUMNS.join(", ");
+    let columns = EVENT_COLUMNS.join(", ");
     format!(
-        "SELECT {step} FROM (
+        "SELECT {columns} FROM (
             SELECT *, rowid AS place FROM alarm_journal
-            WHERE utc < ? AND step IN ('raised', 'raised quietly', 'returned', 'returned quietly'{others})
-            QUALIFY row_number() OVER (PARTITION BY subject, text ORDER BY utc DESC, rowid DESC) = 1)
+            WHERE utc < ? AND event IN ('raised', 'raised quietly', 'returned', 'returned quietly'{others})
+            QUALIFY row_number() OVER (PARTITION BY subject, message ORDER BY utc DESC, rowid DESC) = 1)
          WHERE {is} ORDER BY utc, place LIMIT ?"
     )
 }
 
-/// Of each alarm the last step of every kind, in the order in which they were written: all that its state depends on.
+/// Of each alarm the last event of every kind, in the order in which they were written: all that its state depends on.
 pub fn restore() -> String {
-    let step = STEP_COLUMNS.join(", ");
+    let columns = EVENT_COLUMNS.join(", ");
     format!(
-        "SELECT {step} FROM alarm_journal
-         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal GROUP BY subject, text, step) ORDER BY rowid LIMIT ?"
+        "SELECT {columns} FROM alarm_journal
+         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal GROUP BY subject, message, event) ORDER BY rowid LIMIT ?"
     )
 }
 

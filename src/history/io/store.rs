@@ -127,7 +127,7 @@ impl Store {
         files::size(&self.path)
     }
 
-    /// Rows of all tables: samples, steps of alarms, operator actions, minutes of lines.
+    /// Rows of all tables: samples, alarm events, operator actions, minutes of lines.
     pub fn count_rows(&self) -> Result<u64, HistoryError> {
         self.db.query_row(sql::COUNT_ROWS, [], |row| row.get(0)).map_err(engine)
     }
@@ -257,7 +257,7 @@ impl Store {
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("alarm_journal")?;
         for alarm in std::iter::once(first).chain(rows) {
-            let AlarmRecord { at, subject, text, priority, step, value, limit, by, reason, until, burst } = alarm;
+            let AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, burst } = alarm;
             let (until, began) = (until.map(utc), burst.map(|burst| utc(burst.began)));
             let (priority, rank) = (priority.number(), burst.map(|burst| burst.rank));
             appender.append_row(params![
@@ -265,7 +265,7 @@ impl Store {
                 subject,
                 text,
                 priority,
-                step.word(),
+                event.word(),
                 value,
                 limit,
                 by,

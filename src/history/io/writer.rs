@@ -375,7 +375,7 @@ mod tests {
     use crate::{
         plant::{
             def::{Priority, TagId},
-            record::{AlarmRecord, AlarmStep},
+            record::{AlarmEvent, AlarmRecord},
             sample::Sample,
         },
         report::testing::sec,
@@ -391,7 +391,7 @@ mod tests {
             subject: "TIC-1.PV".into(),
             text: "high".into(),
             priority: Priority::High,
-            step: AlarmStep::Raised,
+            event: AlarmEvent::Raised,
             value: None,
             limit: None,
             by: None,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{AlarmManager, state::AlarmState};
 use crate::plant::{
     def::{AlarmDef, AlarmId},
-    record::{AlarmRecord, AlarmStep},
+    record::{AlarmEvent, AlarmRecord},
 };
 
 /// Most characters of a note or reason.
@@ -120,7 +120,7 @@ impl AlarmManager {
         }
         check_words(note)?;
         let value = machine.value;
-        Ok(self.record_action(&alarm, AlarmStep::Acknowledged, at, value, by, note))
+        Ok(self.record_action(&alarm, AlarmEvent::Acknowledged, at, value, by, note))
     }
 
     /// Lets go an alarm that latches.
@@ -140,7 +140,7 @@ impl AlarmManager {
             | AlarmState::SuppressedByDesign
             | AlarmState::OutOfService => return Err(AlarmRefusal::NothingToReset),
         }
-        Ok(self.record_action(&alarm, AlarmStep::Reset, at, None, by, None))
+        Ok(self.record_action(&alarm, AlarmEvent::Reset, at, None, by, None))
     }
 
     /// Puts an alarm on the shelf, or one that lies there for another time.
@@ -160,7 +160,7 @@ impl AlarmManager {
         if self.machine(id).out_of_service().is_some() {
             return Err(AlarmRefusal::OutOfService);
         }
-        let record = self.record(&alarm, AlarmStep::Shelved, at, None);
+        let record = self.record(&alarm, AlarmEvent::Shelved, at, None);
         let (by, reason) = (Some(by.clone()), Some(reason.clone()));
         Ok(self.take(id, AlarmRecord { by, reason, until: Some(until), ..record }))
     }
@@ -177,7 +177,7 @@ impl AlarmManager {
         if self.machine(id).shelved().is_none() {
             return Err(AlarmRefusal::NotShelved);
         }
-        Ok(self.back(&alarm, AlarmStep::Unshelved, value, at, by))
+        Ok(self.back(&alarm, AlarmEvent::Unshelved, value, at, by))
     }
 
     /// Takes an alarm out of service.
@@ -193,7 +193,7 @@ impl AlarmManager {
         if self.machine(id).out_of_service().is_some() {
             return Err(AlarmRefusal::OutOfService);
         }
-        Ok(self.record_action(&alarm, AlarmStep::OutOfService, at, None, by, Some(reason)))
+        Ok(self.record_action(&alarm, AlarmEvent::OutOfService, at, None, by, Some(reason)))
     }
 
     /// Puts an alarm back in service; if it is active it is raised anew with its present `value`.
@@ -208,31 +208,31 @@ impl AlarmManager {
         if self.machine(id).out_of_service().is_none() {
             return Err(AlarmRefusal::InService);
         }
-        Ok(self.back(&alarm, AlarmStep::InService, value, at, by))
+        Ok(self.back(&alarm, AlarmEvent::InService, value, at, by))
     }
 
     fn back(
         &mut self,
         alarm: &AlarmDef,
-        step: AlarmStep,
+        event: AlarmEvent,
         value: Option<f64>,
         at: Timestamp,
         by: &Arc<str>,
     ) -> Vec<AlarmRecord> {
-        let back = self.record_action(alarm, step, at, value, by, None);
+        let back = self.record_action(alarm, event, at, value, by, None);
         [Some(back), self.raise_anew(alarm, at, value)].into_iter().flatten().collect()
     }
 
     fn record_action(
         &mut self,
         alarm: &AlarmDef,
-        step: AlarmStep,
+        event: AlarmEvent,
         at: Timestamp,
         value: Option<f64>,
         by: &Arc<str>,
         reason: Option<&Arc<str>>,
     ) -> AlarmRecord {
-        let record = self.record(alarm, step, at, value);
+        let record = self.record(alarm, event, at, value);
         self.take(alarm.id, AlarmRecord { by: Some(by.clone()), reason: reason.cloned(), ..record })
     }
 

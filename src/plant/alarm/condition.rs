@@ -237,10 +237,10 @@ mod tests {
     fn a_fast_change_is_told_once_the_window_is_full_and_not_after_a_gap() {
         let rising = Condition::Rate { limit: 6.0, over: sec(30), deadband: 2.0 };
         let (no, yes) = (Some(false), Some(true));
-        let steps = [(0, 20.0), (15, 21.6), (30, 23.2), (60, 25.4), (90, 27.0)].map(|(at, value)| (at, Some(value)));
-        assert_eq!(over_time(rising, &steps), [None, None, yes, yes, no], "6.4, 4.4, 3.2 a minute");
+        let events = [(0, 20.0), (15, 21.6), (30, 23.2), (60, 25.4), (90, 27.0)].map(|(at, value)| (at, Some(value)));
+        assert_eq!(over_time(rising, &events), [None, None, yes, yes, no], "6.4, 4.4, 3.2 a minute");
         let falling = Condition::Rate { limit: -6.0, over: sec(30), deadband: 2.0 };
-        assert_eq!(over_time(falling, &steps), [None, None, no, no, no], "it rises");
+        assert_eq!(over_time(falling, &events), [None, None, no, no, no], "it rises");
         let fall = [(0, Some(20.0)), (30, Some(10.0)), (60, None), (120, Some(0.0)), (150, Some(0.0))];
         assert_eq!(over_time(falling, &fall), [None, yes, None, None, no]);
     }

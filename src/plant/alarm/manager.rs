@@ -15,7 +15,7 @@ use super::{
 };
 use crate::plant::{
     def::{AlarmDef, AlarmId, PlantDef, Subject},
-    record::{AlarmRecord, AlarmStep, Burst},
+    record::{AlarmEvent, AlarmRecord, Burst},
     station::STATION,
 };
 
@@ -80,15 +80,15 @@ impl AlarmManager {
         records
     }
 
-    /// Takes up the alarms that the journal remembers from before a restart: of each alarm at least the last step of every
+    /// Takes up the alarms that the journal remembers from before a restart: of each alarm at least the last event of every
     /// kind, oldest first. Steps of alarms that the plant no longer has are passed over.
-    pub fn restore(&mut self, steps: &[AlarmRecord]) {
+    pub fn restore(&mut self, events: &[AlarmRecord]) {
         let name = |alarm: &AlarmDef| (subject_name(&self.def, alarm.subject).to_owned(), alarm.text.clone());
         let known: HashMap<(String, String), AlarmId> =
             self.def.alarms.iter().map(|alarm| (name(alarm), alarm.id)).collect();
-        for step in steps {
-            if let Some(id) = known.get(&(step.subject.to_string(), step.text.to_string())) {
-                self.apply(*id, step);
+        for event in events {
+            if let Some(id) = known.get(&(event.subject.to_string(), event.text.to_string())) {
+                self.apply(*id, event);
             }
         }
     }
@@ -106,11 +106,11 @@ impl AlarmManager {
             return;
         }
         if self.machine(alarm.id).is_active() && !self.machine(alarm.id).state().is_suppressed() {
-            records.push(self.step(alarm, AlarmStep::ReturnedToNormal, at, facts.value));
+            records.push(self.event(alarm, AlarmEvent::ReturnedToNormal, at, facts.value));
         }
         let machine = self.machine(alarm.id);
         if machine.state() == AlarmState::Normal || machine.state().is_suppressed() && !machine.is_latched() {
-            records.push(self.step(alarm, AlarmStep::SuppressedByDesign, at, facts.value));
+            records.push(self.event(alarm, AlarmEvent::SuppressedByDesign, at, facts.value));
         }
     }
 
@@ -120,7 +120,7 @@ impl AlarmManager {
         let disabled = is_disabled(alarm, facts) || machine.suppressed().is_some() && facts.enabled != Some(true);
         let begins_anew = disabled && alarm.condition.looks_back();
         let returned = is_disabled(alarm, facts) && machine.suppressed().is_none();
-        let step = if begins_anew {
+        let event = if begins_anew {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
             memory.clear();
             machine.judge(Some(false), self.ran, AlarmDelays::default())
@@ -128,8 +128,8 @@ impl AlarmManager {
             let holds = holds(alarm.condition, facts, machine.is_active(), memory, self.ran);
             machine.judge(if returned { Some(false) } else { holds }, self.ran, delays(alarm))
         };
-        if let Some(step) = step {
-            records.push(self.step(alarm, step, at, facts.value));
+        if let Some(event) = event {
+            records.push(self.event(alarm, event, at, facts.value));
         }
     }
 
@@ -139,13 +139,14 @@ impl AlarmManager {
         if self.machine(alarm.id).suppressed().is_none() || !self.is_released(alarm, facts) {
             return;
         }
-        records.push(self.step(alarm, AlarmStep::Unsuppressed, at, facts.value));
+        records.push(self.event(alarm, AlarmEvent::Unsuppressed, at, facts.value));
         let machine = self.machine(alarm.id);
         let holds = machine.is_active() || machine.is_pending();
         if machine.is_active() {
-            let raised = if machine.state().is_suppressed() { AlarmStep::RaisedSuppressed } else { AlarmStep::Raised };
-            let step = if alarm.on_delay.is_zero() { raised } else { AlarmStep::ReturnedSuppressed };
-            records.push(self.step(alarm, step, at, facts.value));
+            let raised =
+                if machine.state().is_suppressed() { AlarmEvent::RaisedSuppressed } else { AlarmEvent::Raised };
+            let event = if alarm.on_delay.is_zero() { raised } else { AlarmEvent::ReturnedSuppressed };
+            records.push(self.event(alarm, event, at, facts.value));
         }
         if holds {
             self.machines[alarm.id.index()].begin_on_delay(self.ran);
@@ -156,11 +157,11 @@ impl AlarmManager {
     fn end_shelving(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         let Some(shelving) = self.machine(alarm.id).shelved() else { return };
         if shelving.until <= at {
-            records.push(self.step(alarm, AlarmStep::Unshelved, at, facts.value));
+            records.push(self.event(alarm, AlarmEvent::Unshelved, at, facts.value));
             records.extend(self.raise_anew(alarm, at, facts.value));
         } else if let Some(until) = shelving.moved(at) {
             let (by, reason) = (shelving.note.by.clone(), shelving.note.reason.clone());
-            let record = self.record(alarm, AlarmStep::Shelved, at, facts.value);
+            let record = self.record(alarm, AlarmEvent::Shelved, at, facts.value);
             records.push(self.take(alarm.id, AlarmRecord { by, reason, until: Some(until), ..record }));
         }
     }
@@ -189,7 +190,7 @@ impl AlarmManager {
     pub(super) fn raise_anew(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<f64>) -> Option<AlarmRecord> {
         let machine = self.machine(alarm.id);
         let due = machine.is_active() && !machine.state().is_suppressed();
-        due.then(|| self.step(alarm, AlarmStep::Raised, at, value))
+        due.then(|| self.event(alarm, AlarmEvent::Raised, at, value))
     }
 
     /// An alarm that was acknowledged long ago and is still active waits for an acknowledgement again.
@@ -213,18 +214,18 @@ impl AlarmManager {
         let lasts = machine.acknowledged_for.map_or_else(before, |lasts| lasts + passed);
         machine.acknowledged_for = Some(lasts);
         if after <= lasts {
-            records.push(self.step(alarm, AlarmStep::ReAlarmed, at, facts.value));
+            records.push(self.event(alarm, AlarmEvent::ReAlarmed, at, facts.value));
         }
     }
 
-    /// A step by nobody.
-    fn step(&mut self, alarm: &AlarmDef, step: AlarmStep, at: Timestamp, value: Option<f64>) -> AlarmRecord {
-        let burst = (step == AlarmStep::Raised).then(|| self.next_burst(at));
-        let record = self.record(alarm, step, at, value);
+    /// An event without operator.
+    fn event(&mut self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
+        let burst = (event == AlarmEvent::Raised).then(|| self.next_burst(at));
+        let record = self.record(alarm, event, at, value);
         self.take(alarm.id, AlarmRecord { burst, ..record })
     }
 
-    /// Takes a step that was just decided.
+    /// Takes an event that was just decided.
     pub(super) fn take(&mut self, id: AlarmId, record: AlarmRecord) -> AlarmRecord {
         self.apply(id, &record);
         record
@@ -234,7 +235,7 @@ impl AlarmManager {
         let latch = self.def.alarm(id).latch;
         let machine = &mut self.machines[id.index()];
         machine.apply(record, latch);
-        if matches!(record.step, AlarmStep::Raised | AlarmStep::ReAlarmed) {
+        if matches!(record.event, AlarmEvent::Raised | AlarmEvent::ReAlarmed) {
             self.edges += 1;
             machine.edge = self.edges;
         }
@@ -251,8 +252,8 @@ impl AlarmManager {
         burst
     }
 
-    pub(super) fn record(&self, alarm: &AlarmDef, step: AlarmStep, at: Timestamp, value: Option<f64>) -> AlarmRecord {
-        let record = AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.text, alarm.priority, step);
+    pub(super) fn record(&self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
+        let record = AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.text, alarm.priority, event);
         AlarmRecord { value, limit: limit_of(alarm.condition), ..record }
     }
 }

@@ -1,7 +1,7 @@
 //! The figures of an alarm system, and the targets and limits that they are held against: one table in one place.
 //!
 //! Targets and limits are those of ISA-18.2 and IEC 62682 for one operator's position, meant for at least 30 days; the
-//! plant is one position. Only *annunciated* activations count: a step `raised` of an alarm that is not suppressed.
+//! plant is one position. Only *annunciated* activations count: an event `raised` of an alarm that is not suppressed.
 
 use std::{sync::Arc, time::Duration};
 

@@ -1,4 +1,4 @@
-//! The alarm monitor: a fold over the steps of alarms that counts them for the last 24 hours, or for any past period.
+//! The alarm monitor: a fold over the events of alarms that counts them for the last 24 hours, or for any past period.
 //!
 //! One fold for both, so that what the screen shows now is what the report says tomorrow. Memory is bounded: counts per
 //! second of the last hour, at most 24 sums, and a few times for each alarm.
@@ -15,7 +15,7 @@ use super::{
     metrics::{AlarmMetrics, Frequent, Named, PeriodMetrics, TOP, place},
     rate::Rate,
 };
-use crate::plant::record::{AlarmRecord, AlarmStep};
+use crate::plant::record::{AlarmEvent, AlarmRecord};
 
 /// Width of a window, seconds: windows begin at its multiples since 1970 UTC.
 const WINDOW_S: i64 = 600;
@@ -122,55 +122,55 @@ impl AlarmMonitor {
     }
 
     /// Takes up an alarm that was active before anything is counted.
-    pub fn already(&mut self, step: &AlarmRecord) {
-        let history = self.alarms.entry(named(step)).or_default();
-        match step.step {
-            AlarmStep::Raised => (history.active, history.acknowledged) = (Some(step.at), false),
-            AlarmStep::Acknowledged => history.acknowledged = true,
-            AlarmStep::ReturnedToNormal
-            | AlarmStep::ReturnedSuppressed
-            | AlarmStep::Shelved
-            | AlarmStep::SuppressedByDesign
-            | AlarmStep::OutOfService => history.active = None,
-            AlarmStep::RaisedSuppressed
-            | AlarmStep::ReAlarmed
-            | AlarmStep::Reset
-            | AlarmStep::Unshelved
-            | AlarmStep::Unsuppressed
-            | AlarmStep::InService => {}
+    pub fn already(&mut self, event: &AlarmRecord) {
+        let history = self.alarms.entry(named(event)).or_default();
+        match event.event {
+            AlarmEvent::Raised => (history.active, history.acknowledged) = (Some(event.at), false),
+            AlarmEvent::Acknowledged => history.acknowledged = true,
+            AlarmEvent::ReturnedToNormal
+            | AlarmEvent::ReturnedSuppressed
+            | AlarmEvent::Shelved
+            | AlarmEvent::SuppressedByDesign
+            | AlarmEvent::OutOfService => history.active = None,
+            AlarmEvent::RaisedSuppressed
+            | AlarmEvent::ReAlarmed
+            | AlarmEvent::Reset
+            | AlarmEvent::Unshelved
+            | AlarmEvent::Unsuppressed
+            | AlarmEvent::InService => {}
         }
     }
 
-    /// Takes a step.
-    pub fn take(&mut self, step: &AlarmRecord) {
-        self.pass(step.at);
-        match step.step {
-            AlarmStep::Raised => self.raised(step),
-            AlarmStep::Acknowledged => self.alarms.entry(named(step)).or_default().acknowledged = true,
-            AlarmStep::ReturnedToNormal => self.returned(step),
+    /// Takes an event.
+    pub fn take(&mut self, event: &AlarmRecord) {
+        self.pass(event.at);
+        match event.event {
+            AlarmEvent::Raised => self.raised(event),
+            AlarmEvent::Acknowledged => self.alarms.entry(named(event)).or_default().acknowledged = true,
+            AlarmEvent::ReturnedToNormal => self.returned(event),
             // A suppressed alarm burdens no operator: it is neither stale nor fleeting.
-            AlarmStep::ReturnedSuppressed
-            | AlarmStep::Shelved
-            | AlarmStep::SuppressedByDesign
-            | AlarmStep::OutOfService => {
-                self.alarms.entry(named(step)).or_default().acknowledged = true;
-                self.returned(step);
+            AlarmEvent::ReturnedSuppressed
+            | AlarmEvent::Shelved
+            | AlarmEvent::SuppressedByDesign
+            | AlarmEvent::OutOfService => {
+                self.alarms.entry(named(event)).or_default().acknowledged = true;
+                self.returned(event);
             }
-            AlarmStep::RaisedSuppressed => {
-                if let Some(sum) = self.sum(step.at) {
+            AlarmEvent::RaisedSuppressed => {
+                if let Some(sum) = self.sum(event.at) {
                     sum.suppressed += 1;
                 }
             }
-            AlarmStep::ReAlarmed
-            | AlarmStep::Reset
-            | AlarmStep::Unshelved
-            | AlarmStep::Unsuppressed
-            | AlarmStep::InService => {}
+            AlarmEvent::ReAlarmed
+            | AlarmEvent::Reset
+            | AlarmEvent::Unshelved
+            | AlarmEvent::Unsuppressed
+            | AlarmEvent::InService => {}
         }
     }
 
-    /// Time passes. The figures of the day are formed here, between two seconds, so that they hold every step before
-    /// their end and none after it: steps of the new second are taken afterwards.
+    /// Time passes. The figures of the day are formed here, between two seconds, so that they hold every event before
+    /// their end and none after it: events of the new second are taken afterwards.
     pub fn advance(&mut self, at: Timestamp) {
         self.pass(at);
         let now = self.rate.now();
@@ -193,7 +193,7 @@ impl AlarmMonitor {
         }
     }
 
-    /// The alarm system as of the last step; the figures of the day as of some seconds ago.
+    /// The alarm system as of the last event; the figures of the day as of some seconds ago.
     pub fn metrics(&self) -> AlarmMetrics {
         AlarmMetrics {
             last_10_min: self.rate.in_window(),
@@ -203,7 +203,7 @@ impl AlarmMonitor {
         }
     }
 
-    /// The figures of the period, once every step of it has been taken.
+    /// The figures of the period, once every event of it has been taken.
     pub fn figures(mut self) -> PeriodMetrics {
         match self.span {
             Span::Period { from, until } => {
@@ -214,21 +214,21 @@ impl AlarmMonitor {
         }
     }
 
-    fn raised(&mut self, step: &AlarmRecord) {
+    fn raised(&mut self, event: &AlarmRecord) {
         self.rate.raised();
-        let name = named(step);
-        self.end(&name, step.at);
+        let name = named(event);
+        self.end(&name, event.at);
         let history = self.alarms.entry(name.clone()).or_default();
-        (history.active, history.acknowledged) = (Some(step.at), false);
-        history.raised.push_back(step.at);
+        (history.active, history.acknowledged) = (Some(event.at), false);
+        history.raised.push_back(event.at);
         if history.raised.len() > CHATTER {
             history.raised.pop_front();
         }
-        let spread = history.raised.front().map(|first| span(*first, step.at)).unwrap_or_default();
+        let spread = history.raised.front().map(|first| span(*first, event.at)).unwrap_or_default();
         let chatters = history.raised.len() == CHATTER && spread < CHATTER_TIME;
-        let window = second(step.at).div_euclid(WINDOW_S);
-        let Some(sum) = self.sum(step.at) else { return };
-        sum.by_priority[place(step.priority)] += 1;
+        let window = second(event.at).div_euclid(WINDOW_S);
+        let Some(sum) = self.sum(event.at) else { return };
+        sum.by_priority[place(event.priority)] += 1;
         sum.window = if sum.window.0 == window { (window, sum.window.1 + 1) } else { (window, 1) };
         sum.most = sum.most.max(sum.window.1);
         sum.windows_over += u64::from(sum.window.1 == WINDOW_MAX + 1);
@@ -238,12 +238,12 @@ impl AlarmMonitor {
         *sum.raised.entry(name).or_default() += 1;
     }
 
-    fn returned(&mut self, step: &AlarmRecord) {
-        let name = named(step);
+    fn returned(&mut self, event: &AlarmRecord) {
+        let name = named(event);
         let history = self.alarms.entry(name.clone()).or_default();
-        let fleeting = history.active.is_some_and(|since| span(since, step.at) < FLEETING) && !history.acknowledged;
-        self.end(&name, step.at);
-        if let Some(sum) = self.sum(step.at).filter(|_| fleeting) {
+        let fleeting = history.active.is_some_and(|since| span(since, event.at) < FLEETING) && !history.acknowledged;
+        self.end(&name, event.at);
+        if let Some(sum) = self.sum(event.at).filter(|_| fleeting) {
             sum.fleeting.insert(name);
         }
     }
@@ -380,15 +380,15 @@ fn most_at_once(spans: Vec<(i64, i64)>) -> u64 {
     let mut edges: Vec<(i64, i64)> = spans.into_iter().flat_map(|(from, until)| [(from, 1), (until, -1)]).collect();
     edges.sort_unstable();
     let mut now = 0;
-    let most = edges.into_iter().map(|(_, step)| {
-        now += step;
+    let most = edges.into_iter().map(|(_, event)| {
+        now += event;
         now
     });
     most.max().map_or(0, |most| u64::try_from(most).unwrap_or(0))
 }
 
-fn named(step: &AlarmRecord) -> Named {
-    Named { subject: step.subject.clone(), text: step.text.clone() }
+fn named(event: &AlarmRecord) -> Named {
+    Named { subject: event.subject.clone(), text: event.text.clone() }
 }
 
 fn second(at: Timestamp) -> i64 {

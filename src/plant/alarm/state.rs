@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::record::{AlarmRecord, AlarmStep, Burst};
+use crate::plant::record::{AlarmEvent, AlarmRecord, Burst};
 
 /// State of an alarm as an operator sees it, derived from the memories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -208,10 +208,10 @@ impl AlarmStateMachine {
         }
     }
 
-    /// Takes the judgement of an instant, and says which step follows. A condition must hold (or be gone) for the whole
+    /// Takes the judgement of an instant, and says which event follows. A condition must hold (or be gone) for the whole
     /// delay; a flap inside the delay leaves no trace. An unknown judgement (`None`) changes nothing and restarts no delay.
-    /// `now` is an instant of the manager's own clock. The step is to be [applied](AlarmStateMachine::apply).
-    pub fn judge(&mut self, holds: Option<bool>, now: Duration, delays: AlarmDelays) -> Option<AlarmStep> {
+    /// `now` is an instant of the manager's own clock. The event is to be [applied](AlarmStateMachine::apply).
+    pub fn judge(&mut self, holds: Option<bool>, now: Duration, delays: AlarmDelays) -> Option<AlarmEvent> {
         let holds = holds?;
         if holds == self.active {
             self.pending_since = None;
@@ -224,62 +224,62 @@ impl AlarmStateMachine {
         }
         let suppressed = self.state().is_suppressed();
         Some(match (holds, suppressed) {
-            (true, false) => AlarmStep::Raised,
-            (true, true) => AlarmStep::RaisedSuppressed,
-            (false, false) => AlarmStep::ReturnedToNormal,
-            (false, true) => AlarmStep::ReturnedSuppressed,
+            (true, false) => AlarmEvent::Raised,
+            (true, true) => AlarmEvent::RaisedSuppressed,
+            (false, false) => AlarmEvent::ReturnedToNormal,
+            (false, true) => AlarmEvent::ReturnedSuppressed,
         })
     }
 
-    /// Takes a step: one that was just decided, or one that the journal remembers after a restart. Both end in the same
+    /// Takes an event: one that was just decided, or one that the journal remembers after a restart. Both end in the same
     /// state, because this is the only place where it changes.
-    pub fn apply(&mut self, step: &AlarmRecord, latch: bool) {
-        let note = || OperatorNote { at: step.at, by: step.by.clone(), reason: step.reason.clone(), recorded: true };
-        match step.step {
-            AlarmStep::Raised => {
+    pub fn apply(&mut self, event: &AlarmRecord, latch: bool) {
+        let note = || OperatorNote { at: event.at, by: event.by.clone(), reason: event.reason.clone(), recorded: true };
+        match event.event {
+            AlarmEvent::Raised => {
                 (self.active, self.unacknowledged, self.pending_since) = (true, true, None);
-                self.annunciated_at = Some(step.at);
+                self.annunciated_at = Some(event.at);
                 self.latched |= latch;
-                (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
-                (self.value, self.burst) = (step.value, step.burst);
+                (self.raised_at, self.returned_at, self.acknowledged) = (Some(event.at), None, None);
+                (self.value, self.burst) = (event.value, event.burst);
                 self.times = self.times.saturating_add(1);
             }
-            AlarmStep::RaisedSuppressed => {
+            AlarmEvent::RaisedSuppressed => {
                 (self.active, self.pending_since) = (true, None);
                 if latch && self.suppressed.is_none() {
                     // It is not annunciated now, but what latches must be acknowledged once it is back. What came while it
                     // was suppressed by design was no fault.
                     (self.latched, self.unacknowledged) = (true, true);
-                    (self.raised_at, self.returned_at, self.acknowledged) = (Some(step.at), None, None);
-                    (self.annunciated_at, self.value) = (Some(step.at), step.value);
+                    (self.raised_at, self.returned_at, self.acknowledged) = (Some(event.at), None, None);
+                    (self.annunciated_at, self.value) = (Some(event.at), event.value);
                 }
             }
-            AlarmStep::ReAlarmed => (self.unacknowledged, self.annunciated_at) = (true, Some(step.at)),
-            AlarmStep::Acknowledged => {
+            AlarmEvent::ReAlarmed => (self.unacknowledged, self.annunciated_at) = (true, Some(event.at)),
+            AlarmEvent::Acknowledged => {
                 (self.unacknowledged, self.acknowledged) = (false, Some(note()));
             }
-            AlarmStep::ReturnedToNormal | AlarmStep::ReturnedSuppressed => {
-                (self.active, self.pending_since, self.returned_at) = (false, None, Some(step.at));
+            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
+                (self.active, self.pending_since, self.returned_at) = (false, None, Some(event.at));
             }
-            AlarmStep::Reset => self.latched = false,
-            AlarmStep::Shelved => {
+            AlarmEvent::Reset => self.latched = false,
+            AlarmEvent::Shelved => {
                 // Without an end it would stay away for ever: the journal of another program, or a damaged one.
-                self.shelved = Some(Shelving { note: note(), until: step.until.unwrap_or(step.at) });
+                self.shelved = Some(Shelving { note: note(), until: event.until.unwrap_or(event.at) });
                 self.keep_latched();
             }
-            AlarmStep::Unshelved => self.shelved = None,
-            AlarmStep::SuppressedByDesign => {
-                self.suppressed = Some(step.at);
-                // Only what is normal is suppressed. The journal remembers the last step of every kind: what came in an
+            AlarmEvent::Unshelved => self.shelved = None,
+            AlarmEvent::SuppressedByDesign => {
+                self.suppressed = Some(event.at);
+                // Only what is normal is suppressed. The journal remembers the last event of every kind: what came in an
                 // earlier suppression must not latch after a restart.
                 (self.latched, self.unacknowledged) = (false, false);
             }
-            AlarmStep::Unsuppressed => self.suppressed = None,
-            AlarmStep::OutOfService => {
+            AlarmEvent::Unsuppressed => self.suppressed = None,
+            AlarmEvent::OutOfService => {
                 self.out_of_service = Some(note());
                 self.keep_latched();
             }
-            AlarmStep::InService => self.out_of_service = None,
+            AlarmEvent::InService => self.out_of_service = None,
         }
     }
 
@@ -297,48 +297,48 @@ mod tests {
 
     const DELAYS: AlarmDelays = AlarmDelays { on_delay: Duration::from_secs(5), off_delay: Duration::from_secs(10) };
 
-    fn record(step: AlarmStep, second: i64) -> AlarmRecord {
+    fn record(event: AlarmEvent, second: i64) -> AlarmRecord {
         let at = Timestamp::from_second(second).expect("a small number");
-        let record = AlarmRecord::new(at, "TIC-1.PV", "temperature high", Priority::High, step);
+        let record = AlarmRecord::new(at, "TIC-1.PV", "temperature high", Priority::High, event);
         AlarmRecord { until: Some(at + Duration::from_secs(60)), ..record }
     }
 
     /// The judgement of an instant, with what follows from it.
-    fn judged(machine: &mut AlarmStateMachine, holds: Option<bool>, second: u64) -> Option<AlarmStep> {
-        let step = machine.judge(holds, Duration::from_secs(second), DELAYS)?;
-        machine.apply(&record(step, second as i64), false);
-        Some(step)
+    fn judged(machine: &mut AlarmStateMachine, holds: Option<bool>, second: u64) -> Option<AlarmEvent> {
+        let event = machine.judge(holds, Duration::from_secs(second), DELAYS)?;
+        machine.apply(&record(event, second as i64), false);
+        Some(event)
     }
 
     #[test]
     fn the_life_of_an_alarm() {
         let mut machine = AlarmStateMachine::default();
-        for (second, holds, step, state) in [
+        for (second, holds, event, state) in [
             (0, Some(true), None, AlarmState::Normal),
             (4, Some(false), None, AlarmState::Normal),
             (5, Some(true), None, AlarmState::Normal),
             (7, None, None, AlarmState::Normal),
-            (10, Some(true), Some(AlarmStep::Raised), AlarmState::Unacknowledged),
+            (10, Some(true), Some(AlarmEvent::Raised), AlarmState::Unacknowledged),
             (11, Some(false), None, AlarmState::Unacknowledged),
             (20, Some(false), None, AlarmState::Unacknowledged),
-            (21, Some(false), Some(AlarmStep::ReturnedToNormal), AlarmState::ReturnedToNormal),
+            (21, Some(false), Some(AlarmEvent::ReturnedToNormal), AlarmState::ReturnedToNormal),
         ] {
-            assert_eq!(judged(&mut machine, holds, second), step, "at {second} s");
+            assert_eq!(judged(&mut machine, holds, second), event, "at {second} s");
             assert_eq!(machine.state(), state, "at {second} s");
         }
-        machine.apply(&record(AlarmStep::Acknowledged, 22), false);
+        machine.apply(&record(AlarmEvent::Acknowledged, 22), false);
         assert_eq!(machine.state(), AlarmState::Normal);
     }
 
     #[test]
     fn what_an_operator_does_leads_from_state_to_state() {
+        use AlarmEvent as T;
         use AlarmState as S;
-        use AlarmStep as T;
-        let check = |latch: bool, steps: &[(T, S)]| {
+        let check = |latch: bool, events: &[(T, S)]| {
             let mut machine = AlarmStateMachine::default();
-            for (step, state) in steps {
-                machine.apply(&record(*step, 0), latch);
-                assert_eq!(machine.state(), *state, "{step:?} of {steps:?}");
+            for (event, state) in events {
+                machine.apply(&record(*event, 0), latch);
+                assert_eq!(machine.state(), *state, "{event:?} of {events:?}");
             }
         };
         check(

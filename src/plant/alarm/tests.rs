@@ -9,7 +9,7 @@ use super::{AlarmManager, AlarmRefusal, AlarmState, condition::Facts};
 use crate::plant::{
     def::{AlarmDef, AlarmId, Condition, Level, PlantDef, Subject},
     fixture::{self, HIGH, PV, SILENT},
-    record::{AlarmRecord, AlarmStep},
+    record::{AlarmEvent, AlarmRecord},
 };
 
 fn at(second: i64) -> Timestamp {
@@ -39,20 +39,20 @@ fn state(manager: &AlarmManager) -> AlarmState {
     manager.machine(HIGH).state()
 }
 
-fn steps(records: &[AlarmRecord]) -> Vec<AlarmStep> {
-    records.iter().map(|record| record.step).collect()
+fn events(records: &[AlarmRecord]) -> Vec<AlarmEvent> {
+    records.iter().map(|record| record.event).collect()
 }
 
 #[test]
 fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
     let mut manager = AlarmManager::new(fixture::shared());
     assert!(manager.judge(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
-    let steps = manager.judge(at(2), facts(81.0, true));
-    assert_eq!(steps.len(), 1);
-    assert_eq!((&*steps[0].subject, steps[0].value, steps[0].limit), ("TIC-1.PV", Some(81.0), Some(75.0)));
+    let events = manager.judge(at(2), facts(81.0, true));
+    assert_eq!(events.len(), 1);
+    assert_eq!((&*events[0].subject, events[0].value, events[0].limit), ("TIC-1.PV", Some(81.0), Some(75.0)));
 
     let mut again = AlarmManager::new(fixture::shared());
-    again.restore(&steps);
+    again.restore(&events);
     assert_eq!(again.lists(), manager.lists());
     let ack = again.acknowledge(HIGH, at(2), Some(&why()), at(3), &by()).expect("it waits for an acknowledgement");
     assert_eq!((ack.by, ack.reason), (Some(by()), Some(why())));
@@ -140,16 +140,16 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
         assert_eq!(manager.shelve(HIGH, lasts, Some(&reason.into()), at(0), &by()), Err(refusal));
     }
     manager.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
-    assert_eq!(steps(&manager.judge(at(10), facts(80.0, true))), [AlarmStep::RaisedSuppressed]);
+    assert_eq!(events(&manager.judge(at(10), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
     assert!(!manager.lists().sound && manager.active().is_empty());
     let suppressed = manager.lists().suppressed[0].clone();
     assert_eq!((suppressed.until, suppressed.active, suppressed.note.reason), (Some(at(60)), true, Some(why())));
-    assert_eq!(steps(&manager.judge(at(59), facts(80.0, true))), []);
-    assert_eq!(steps(&manager.judge(at(60), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
+    assert_eq!(events(&manager.judge(at(59), facts(80.0, true))), []);
+    assert_eq!(events(&manager.judge(at(60), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
     assert_eq!((state(&manager), manager.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
     manager.shelve(HIGH, minute, Some(&why()), at(70), &by()).expect("again");
-    assert_eq!(steps(&manager.judge(at(71), facts(70.0, true))), [AlarmStep::ReturnedSuppressed]);
-    assert_eq!(steps(&manager.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmStep::Unshelved]);
+    assert_eq!(events(&manager.judge(at(71), facts(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
+    assert_eq!(events(&manager.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmEvent::Unshelved]);
     assert_eq!(state(&manager), AlarmState::Normal);
     assert_eq!(manager.unshelve(HIGH, None, at(73), &by()), Err(AlarmRefusal::NotShelved));
 }
@@ -160,11 +160,11 @@ fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
     manager.judge(at(10_000), facts(80.0, true));
     manager.judge(at(10_006), facts(80.0, true));
     manager.judge(at(100), facts(80.0, true));
-    assert_eq!(steps(&manager.judge(at(104), facts(80.0, true))), [AlarmStep::Raised], "6 s and 4 s");
+    assert_eq!(events(&manager.judge(at(104), facts(80.0, true))), [AlarmEvent::Raised], "6 s and 4 s");
     manager.shelve(HIGH, Duration::from_secs(600), Some(&why()), at(5_000), &by()).expect("ten minutes");
-    assert_eq!(steps(&manager.judge(at(200), facts(80.0, true))), [AlarmStep::Shelved]);
+    assert_eq!(events(&manager.judge(at(200), facts(80.0, true))), [AlarmEvent::Shelved]);
     assert_eq!(manager.lists().suppressed[0].until, Some(at(800)));
-    assert_eq!(steps(&manager.judge(at(800), facts(80.0, true))), [AlarmStep::Unshelved, AlarmStep::Raised]);
+    assert_eq!(events(&manager.judge(at(800), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
 }
 
 #[test]
@@ -177,10 +177,10 @@ fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
         manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()),
         Err(AlarmRefusal::OutOfService)
     );
-    assert_eq!(steps(&manager.judge(at(100_000), facts(80.0, true))), [AlarmStep::RaisedSuppressed]);
+    assert_eq!(events(&manager.judge(at(100_000), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
     assert_eq!(manager.lists().suppressed[0].state, AlarmState::OutOfService);
     let back = manager.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
-    assert_eq!(steps(&back), [AlarmStep::InService, AlarmStep::Raised]);
+    assert_eq!(events(&back), [AlarmEvent::InService, AlarmEvent::Raised]);
     assert_eq!(back[1].value, Some(80.0));
 }
 
@@ -205,12 +205,12 @@ fn a_latching_alarm_that_came_and_went_while_suppressed_is_normal_on_release() {
     let mut journal = manager.judge(at(0), enabled_with(80.0, false));
     journal.extend(manager.judge(at(1), enabled_with(70.0, false)));
     assert_eq!(
-        steps(&journal),
-        [AlarmStep::SuppressedByDesign, AlarmStep::RaisedSuppressed, AlarmStep::ReturnedSuppressed]
+        events(&journal),
+        [AlarmEvent::SuppressedByDesign, AlarmEvent::RaisedSuppressed, AlarmEvent::ReturnedSuppressed]
     );
-    assert_eq!(steps(&manager.judge(at(2), enabled_with(70.0, true))), [AlarmStep::Unsuppressed]);
+    assert_eq!(events(&manager.judge(at(2), enabled_with(70.0, true))), [AlarmEvent::Unsuppressed]);
     assert_eq!((state(&manager), manager.active().len()), (AlarmState::Normal, 0));
-    assert_eq!(steps(&manager.judge(at(3), enabled_with(80.0, true))), [AlarmStep::Raised]);
+    assert_eq!(events(&manager.judge(at(3), enabled_with(80.0, true))), [AlarmEvent::Raised]);
     manager.judge(at(4), enabled_with(70.0, true));
     assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged, "it still latches");
 }
@@ -220,10 +220,10 @@ fn a_latching_alarm_released_while_shelved_comes_back_latched() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
     manager.judge(at(0), enabled_with(80.0, false));
     manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()).expect("a minute, with a reason");
-    let quietly = [AlarmStep::Unsuppressed, AlarmStep::RaisedSuppressed];
-    assert_eq!(steps(&manager.judge(at(2), enabled_with(80.0, true))), quietly);
-    assert_eq!(steps(&manager.judge(at(3), enabled_with(70.0, true))), [AlarmStep::ReturnedSuppressed]);
-    assert_eq!(steps(&manager.judge(at(61), enabled_with(70.0, true))), [AlarmStep::Unshelved]);
+    let quietly = [AlarmEvent::Unsuppressed, AlarmEvent::RaisedSuppressed];
+    assert_eq!(events(&manager.judge(at(2), enabled_with(80.0, true))), quietly);
+    assert_eq!(events(&manager.judge(at(3), enabled_with(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
+    assert_eq!(events(&manager.judge(at(61), enabled_with(70.0, true))), [AlarmEvent::Unshelved]);
     assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
 }
 
@@ -231,11 +231,11 @@ fn a_latching_alarm_released_while_shelved_comes_back_latched() {
 fn an_on_delay_begins_when_the_suppression_ends() {
     let delay = Duration::from_secs(30);
     let mut manager = AlarmManager::new(enabled_by_design(move |alarm| alarm.on_delay = delay));
-    assert_eq!(steps(&manager.judge(at(0), enabled_with(70.0, false))), [AlarmStep::SuppressedByDesign]);
-    assert_eq!(steps(&manager.judge(at(1), enabled_with(80.0, false))), []);
-    assert_eq!(steps(&manager.judge(at(25), enabled_with(80.0, true))), [AlarmStep::Unsuppressed]);
-    assert_eq!(steps(&manager.judge(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
-    assert_eq!(steps(&manager.judge(at(55), enabled_with(80.0, true))), [AlarmStep::Raised]);
+    assert_eq!(events(&manager.judge(at(0), enabled_with(70.0, false))), [AlarmEvent::SuppressedByDesign]);
+    assert_eq!(events(&manager.judge(at(1), enabled_with(80.0, false))), []);
+    assert_eq!(events(&manager.judge(at(25), enabled_with(80.0, true))), [AlarmEvent::Unsuppressed]);
+    assert_eq!(events(&manager.judge(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
+    assert_eq!(events(&manager.judge(at(55), enabled_with(80.0, true))), [AlarmEvent::Raised]);
 }
 
 #[test]
@@ -249,7 +249,7 @@ fn the_on_delay_of_a_rate_begins_when_the_suppression_ends() {
         // The delay has run for 9 s when the alarm is suppressed.
         let enabled = !(20..40).contains(&second);
         let records = manager.judge(at(second), enabled_with(second as f64, enabled));
-        raised.extend(records.iter().filter(|record| record.step == AlarmStep::Raised).map(|_| second));
+        raised.extend(records.iter().filter(|record| record.event == AlarmEvent::Raised).map(|_| second));
     }
     assert_eq!(raised, [80], "40 s, 10 s of window, 30 s of delay");
 }
@@ -282,19 +282,19 @@ fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_
     let when =
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
     let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
-    let quiet = [AlarmStep::SuppressedByDesign, AlarmStep::RaisedSuppressed];
-    assert_eq!(steps(&manager.judge(at(0), when(80.0, Some(false)))), quiet);
+    let quiet = [AlarmEvent::SuppressedByDesign, AlarmEvent::RaisedSuppressed];
+    assert_eq!(events(&manager.judge(at(0), when(80.0, Some(false)))), quiet);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::SuppressedByDesign, false));
-    assert_eq!(steps(&manager.judge(at(1), when(80.0, Some(true)))), [AlarmStep::Unsuppressed, AlarmStep::Raised]);
+    assert_eq!(events(&manager.judge(at(1), when(80.0, Some(true)))), [AlarmEvent::Unsuppressed, AlarmEvent::Raised]);
     let mut unknown = AlarmManager::new(enabled_by_design(|_| ()));
-    assert_eq!(steps(&unknown.judge(at(0), when(80.0, None))), [AlarmStep::Raised]);
+    assert_eq!(events(&unknown.judge(at(0), when(80.0, None))), [AlarmEvent::Raised]);
     let mut delayed = AlarmManager::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
     delayed.judge(at(0), when(80.0, Some(false)));
-    assert_eq!(steps(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmStep::RaisedSuppressed]);
-    let anew = [AlarmStep::Unsuppressed, AlarmStep::ReturnedSuppressed];
-    assert_eq!(steps(&delayed.judge(at(10), when(80.0, Some(true)))), anew, "the delay begins when the pump starts");
-    assert_eq!(steps(&delayed.judge(at(14), when(80.0, Some(true)))), []);
-    assert_eq!(steps(&delayed.judge(at(15), when(80.0, Some(true)))), [AlarmStep::Raised]);
+    assert_eq!(events(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmEvent::RaisedSuppressed]);
+    let anew = [AlarmEvent::Unsuppressed, AlarmEvent::ReturnedSuppressed];
+    assert_eq!(events(&delayed.judge(at(10), when(80.0, Some(true)))), anew, "the delay begins when the pump starts");
+    assert_eq!(events(&delayed.judge(at(14), when(80.0, Some(true)))), []);
+    assert_eq!(events(&delayed.judge(at(15), when(80.0, Some(true)))), [AlarmEvent::Raised]);
 }
 
 #[test]
@@ -303,8 +303,8 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
     let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
     let journal = manager.judge(at(0), when(80.0, Some(false)));
-    assert_eq!(steps(&manager.judge(at(1), when(80.0, None))), [], "a lost frame");
-    assert_eq!(steps(&manager.judge(at(2), when(80.0, Some(false)))), []);
+    assert_eq!(events(&manager.judge(at(1), when(80.0, None))), [], "a lost frame");
+    assert_eq!(events(&manager.judge(at(2), when(80.0, Some(false)))), []);
     let mut again = AlarmManager::new(enabled_by_design(|_| ()));
     again.restore(&journal);
     for (second, enabled, expect) in [
@@ -313,14 +313,14 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
         (1_059, Some(false), vec![]),
         (1_060, None, vec![]),
         (1_119, None, vec![]),
-        (1_120, None, vec![AlarmStep::Unsuppressed, AlarmStep::Raised]),
+        (1_120, None, vec![AlarmEvent::Unsuppressed, AlarmEvent::Raised]),
         (1_121, None, vec![]),
     ] {
-        assert_eq!(steps(&again.judge(at(second), when(80.0, enabled))), expect, "at {second} s");
+        assert_eq!(events(&again.judge(at(second), when(80.0, enabled))), expect, "at {second} s");
     }
     let mut free = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     free.restore(&journal);
-    assert_eq!(steps(&free.judge(at(1), facts(70.0, true)))[0], AlarmStep::ReturnedSuppressed);
+    assert_eq!(events(&free.judge(at(1), facts(70.0, true)))[0], AlarmEvent::ReturnedSuppressed);
     assert!(free.machine(HIGH).suppressed().is_none(), "the plant file enables it by nothing any more");
 }
 
@@ -331,15 +331,15 @@ fn what_was_annunciated_stays_until_somebody_has_answered_to_it_though_its_enabl
     };
     let latch = |alarm: &mut AlarmDef| (alarm.latch, alarm.on_delay) = (true, Duration::ZERO);
     let mut manager = AlarmManager::new(enabled_by_design(latch));
-    assert_eq!(steps(&manager.judge(at(0), when(true))), [AlarmStep::Raised]);
-    assert_eq!(steps(&manager.judge(at(1), when(false))), [AlarmStep::ReturnedToNormal]);
+    assert_eq!(events(&manager.judge(at(0), when(true))), [AlarmEvent::Raised]);
+    assert_eq!(events(&manager.judge(at(1), when(false))), [AlarmEvent::ReturnedToNormal]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::LatchedUnacknowledged, false));
-    assert_eq!(steps(&manager.judge(at(2), when(false))), [], "it is neither raised anew nor taken away");
+    assert_eq!(events(&manager.judge(at(2), when(false))), [], "it is neither raised anew nor taken away");
     manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
-    assert_eq!(steps(&manager.judge(at(4), when(false))), []);
+    assert_eq!(events(&manager.judge(at(4), when(false))), []);
     assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
     manager.reset(HIGH, at(5), &by()).expect("its cause is gone");
-    assert_eq!(steps(&manager.judge(at(6), when(false)))[0], AlarmStep::SuppressedByDesign);
+    assert_eq!(events(&manager.judge(at(6), when(false)))[0], AlarmEvent::SuppressedByDesign);
     assert_eq!(state(&manager), AlarmState::SuppressedByDesign);
 }
 
@@ -349,14 +349,14 @@ fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.condition = stuck));
     let when = |enabled| move |_: &AlarmDef| Facts { value: Some(20.0), enabled: Some(enabled), ..Facts::default() };
     for (second, enabled, expect) in [
-        (0, false, vec![AlarmStep::SuppressedByDesign]),
+        (0, false, vec![AlarmEvent::SuppressedByDesign]),
         (600, false, vec![]),
-        (601, true, vec![AlarmStep::Unsuppressed]),
+        (601, true, vec![AlarmEvent::Unsuppressed]),
         (660, true, vec![]),
-        (661, true, vec![AlarmStep::Raised]),
-        (662, false, vec![AlarmStep::ReturnedToNormal]),
+        (661, true, vec![AlarmEvent::Raised]),
+        (662, false, vec![AlarmEvent::ReturnedToNormal]),
     ] {
-        assert_eq!(steps(&manager.judge(at(second), when(enabled))), expect, "at {second} s");
+        assert_eq!(events(&manager.judge(at(second), when(enabled))), expect, "at {second} s");
     }
 }
 
@@ -369,11 +369,15 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
     let mut journal = manager.judge(at(0), facts(80.0, true));
     journal.push(manager.acknowledge(HIGH, at(0), None, at(10), &by()).expect("it waits"));
     manager.silence();
-    assert_eq!(steps(&manager.judge(at(1_809), facts(80.0, true))), []);
+    assert_eq!(events(&manager.judge(at(1_809), facts(80.0, true))), []);
     let mut again = AlarmManager::new(with(remind));
     again.restore(&journal);
-    assert_eq!(steps(&again.judge(at(1_810), facts(80.0, true))), [AlarmStep::ReAlarmed], "a restart forgets no time");
-    assert_eq!(steps(&manager.judge(at(1_810), facts(80.0, true))), [AlarmStep::ReAlarmed]);
+    assert_eq!(
+        events(&again.judge(at(1_810), facts(80.0, true))),
+        [AlarmEvent::ReAlarmed],
+        "a restart forgets no time"
+    );
+    assert_eq!(events(&manager.judge(at(1_810), facts(80.0, true))), [AlarmEvent::ReAlarmed]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::Unacknowledged, true));
     assert_eq!(manager.active()[0].raised_at, at(0), "it is the same activation");
     let early = manager.acknowledge(HIGH, at(0), None, at(1_811), &by());
@@ -442,10 +446,10 @@ fn test_event() -> impl Strategy<Value = TestEvent> {
     ]
 }
 
-/// What the journal restores: of each alarm the last step of every kind, in their order.
+/// What the journal restores: of each alarm the last event of every kind, in their order.
 fn remembered(journal: &[AlarmRecord]) -> Vec<AlarmRecord> {
     let last = |(place, record): &(usize, &AlarmRecord)| {
-        let same = |later: &AlarmRecord| later.step == record.step && later.text == record.text;
+        let same = |later: &AlarmRecord| later.event == record.event && later.text == record.text;
         !journal[place + 1..].iter().any(same)
     };
     journal.iter().enumerate().filter(last).map(|(_, record)| record.clone()).collect()
@@ -517,7 +521,7 @@ proptest! {
             });
             journal.extend(told);
             let (machine, new) = (manager.machine(HIGH), &journal[known..]);
-            let raised = new.iter().any(|step| matches!(step.step, AlarmStep::Raised | AlarmStep::ReAlarmed));
+            let raised = new.iter().any(|event| matches!(event.event, AlarmEvent::Raised | AlarmEvent::ReAlarmed));
             // Who is told is told once, and only where something was raised in the open.
             prop_assert!(!manager.lists().sound || sounded || raised, "it sounds for nothing: {:?}", test_event);
             prop_assert!(!(machine.state().is_suppressed() && manager.lists().sound));
@@ -527,15 +531,15 @@ proptest! {
             prop_assert!(!(shown && suppressed));
             // Beyond the limit for longer than its delay it is active; inside the deadband nothing changes, unless its
             // enabling begins or ends.
-            let released = new.iter().any(|step| step.step == AlarmStep::Unsuppressed);
+            let released = new.iter().any(|event| event.event == AlarmEvent::Unsuppressed);
             if enabled != Some(false) && !released && (74.0..=75.0).contains(&value.unwrap_or(74.5)) {
-                let turned = new.iter().any(|step| matches!(
-                    step.step,
-                    AlarmStep::RaisedSuppressed | AlarmStep::ReturnedToNormal
+                let turned = new.iter().any(|event| matches!(
+                    event.event,
+                    AlarmEvent::RaisedSuppressed | AlarmEvent::ReturnedToNormal
                 ));
                 prop_assert!(!turned || delay > 0, "chatter inside the deadband: {:?}", new);
             }
-            if raised && !new.iter().any(|step| step.step == AlarmStep::ReAlarmed) {
+            if raised && !new.iter().any(|event| event.event == AlarmEvent::ReAlarmed) {
                 prop_assert_eq!(machine.state(), AlarmState::Unacknowledged, "nobody has seen it");
             }
             prop_assert!(!latch || !machine.is_latched() || machine.state() != AlarmState::Normal);

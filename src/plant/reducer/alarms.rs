@@ -10,7 +10,7 @@ use crate::plant::{
     event::LineState,
     ne107::Signal,
     process_image::ProcessImage,
-    record::{ActionRecord, AlarmRecord, AlarmStep, Record},
+    record::{ActionRecord, AlarmEvent, AlarmRecord, Record},
     snapshot::{DeviceState, DeviceStatus, LineStatus},
     station::{STATION, StationFault, StationFaults},
 };
@@ -94,7 +94,7 @@ impl Plant {
 
 /// The journal tells with a fault of the station what exactly it was.
 fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
-    if step.step != AlarmStep::Raised || &*step.subject != STATION {
+    if step.event != AlarmEvent::Raised || &*step.subject != STATION {
         return;
     }
     let fault = StationFault::ALL.into_iter().find(|fault| fault.message() == &*step.text);

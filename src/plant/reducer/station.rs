@@ -42,7 +42,7 @@ mod tests {
         def::AlarmId,
         event::Event,
         fixture,
-        record::{AlarmRecord, AlarmStep, Record},
+        record::{AlarmEvent, AlarmRecord, Record},
     };
 
     fn at(second: i64) -> Timestamp {
@@ -73,12 +73,12 @@ mod tests {
         assert_eq!(tick(&mut plant, 1), [], "one failed commit raises no alarm");
         let raised = tick(&mut plant, 4);
         assert_eq!((raised.len(), &*raised[0].text), (1, "history not recording"));
-        assert_eq!((raised[0].step, raised[0].reason.as_deref()), (AlarmStep::Raised, Some("no space left")));
+        assert_eq!((raised[0].event, raised[0].reason.as_deref()), (AlarmEvent::Raised, Some("no space left")));
         let snapshot = plant.snapshot();
         assert!(snapshot.sound);
         assert_eq!(snapshot.fault_details(snapshot.alarms[0].id), "no space left");
         plant.on_history(HistoryStatus::default());
-        assert_eq!(tick(&mut plant, 5)[0].step, AlarmStep::ReturnedToNormal);
+        assert_eq!(tick(&mut plant, 5)[0].event, AlarmEvent::ReturnedToNormal);
         assert_eq!(plant.snapshot().alarms[0].state, AlarmState::ReturnedToNormal, "until it is acknowledged");
     }
 
@@ -90,10 +90,10 @@ mod tests {
         let raised = tick(&mut plant, 1);
         assert_eq!(raised[0].reason.as_deref(), Some("7 records lost since the start"));
         plant.on_history(lost(7));
-        let steps: Vec<_> = (2..20).flat_map(|second| tick(&mut plant, second)).map(|step| step.step).collect();
-        assert_eq!(steps, [AlarmStep::ReturnedToNormal]);
+        let steps: Vec<_> = (2..20).flat_map(|second| tick(&mut plant, second)).map(|step| step.event).collect();
+        assert_eq!(steps, [AlarmEvent::ReturnedToNormal]);
         plant.on_history(lost(8));
-        assert_eq!(tick(&mut plant, 20)[0].step, AlarmStep::Raised);
+        assert_eq!(tick(&mut plant, 20)[0].event, AlarmEvent::Raised);
     }
 
     #[test]

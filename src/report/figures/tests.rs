@@ -43,7 +43,7 @@ fn the_figures_count_good_time_only() {
     check(&[(0, Some(10.0)), (120, Some(99.0))], (Some([10.0; 4]), 1.0));
 }
 
-fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
+fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
     AlarmRecord::new(sec(at), "TIC-1.PV", text, Priority::High, step)
 }
 
@@ -76,7 +76,7 @@ fn a_counter_has_a_difference_and_no_mean() {
 
 #[test]
 fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
-    use AlarmStep::{
+    use AlarmEvent::{
         Acknowledged, Raised, RaisedSuppressed, ReturnedSuppressed, ReturnedToNormal, Shelved, SuppressedByDesign,
         Unsuppressed,
     };
@@ -97,8 +97,8 @@ fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
         (Some(RaisedSuppressed), None, vec![], Some((0, 100))),
     ] {
         let all =
-            |steps: &[(i64, AlarmStep)]| steps.iter().map(|(at, kind)| step(*at, "high", *kind)).collect::<Vec<_>>();
-        let before = |kind: Option<AlarmStep>| all(&kind.map(|kind| (-50, kind)).into_iter().collect::<Vec<_>>());
+            |steps: &[(i64, AlarmEvent)]| steps.iter().map(|(at, kind)| step(*at, "high", *kind)).collect::<Vec<_>>();
+        let before = |kind: Option<AlarmEvent>| all(&kind.map(|kind| (-50, kind)).into_iter().collect::<Vec<_>>());
         let got = suppressed(&before(active), &before(standing), &all(&steps), sec(0), sec(100));
         let got: Vec<_> = got.iter().map(|alarm| (alarm.raised, alarm.active.as_secs())).collect();
         assert_eq!(got, expect.into_iter().collect::<Vec<_>>(), "{steps:?}");
@@ -107,7 +107,7 @@ fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
 
 #[test]
 fn minutes_in_alarm_are_counted_once_however_many_alarms_overlap() {
-    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
+    use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
     for (steps, expect) in [
         (vec![], 0),
         (vec![step(10, "high", Raised), step(30, "high", ReturnedToNormal)], 20),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::{
-    plant::record::{AlarmStep, ChainHash},
+    plant::record::{AlarmEvent, ChainHash},
     report::{
         Period, RecordRow,
         record_csv::RecordCsv,
@@ -73,7 +73,7 @@ fn report() -> ShiftReport {
             subject: "TIC-1.PV".into(),
             text: "temperature high; \"check\" heater".into(),
             priority: Priority::High,
-            step: AlarmStep::Raised,
+            event: AlarmEvent::Raised,
             value: Some(-85.25),
             limit: Some(85.0),
             by: None,
@@ -160,7 +160,7 @@ frequent,TIC-1.PV,temperature high,6,,,,,
 chattering,TIC-1.PV,temperature high,,,,,,
 ,,,,,,,,
 alarms,,,,,,,,
-time,priority,subject,alarm,step,value,limit,by,reason
+time,priority,subject,alarm,event,value,limit,by,reason
 2026-11-21T06:12:45.500+07:00,high,TIC-1.PV,\"temperature high; \"\"check\"\" heater\",raised,-85.25,85,,
 ,,,,,,,,
 operator actions,,,,,,,,

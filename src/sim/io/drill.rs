@@ -229,7 +229,7 @@ mod tests {
     use crate::plant::{
         event::Fault,
         fixture::{self, TIC},
-        record::AlarmStep,
+        record::AlarmEvent,
     };
 
     #[test]
@@ -245,7 +245,7 @@ mod tests {
             exchange: None,
         };
         let raised = plant.on_event(down).records;
-        let is_step = |record: &&Record| matches!(record, Record::Alarm(step) if step.step == AlarmStep::Raised);
+        let is_step = |record: &&Record| matches!(record, Record::Alarm(step) if step.event == AlarmEvent::Raised);
         assert_eq!(raised.iter().filter(is_step).count(), 1, "{raised:?}");
         observe(&[]);
         observe(&raised);

@@ -10,7 +10,7 @@ use crate::plant::{
     alarm::manager::subject_name,
     command::{CommandKind, CommandStatus, Outcome},
     def::{AlarmId, PlantDef, TagId},
-    record::{AlarmRecord, AlarmStep, Record},
+    record::{AlarmEvent, AlarmRecord, Record},
 };
 
 /// What is really so in the simulated plant, in the units of the tags.
@@ -139,11 +139,11 @@ impl Judge {
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let inside = expect.from <= at && at <= expect.until;
             match expect.expectation {
-                Expectation::Alarm(alarm, wanted) if inside && wanted == step.step && is(&self.def, alarm, step) => {
+                Expectation::Alarm(alarm, wanted) if inside && wanted == step.event && is(&self.def, alarm, step) => {
                     mark.met.get_or_insert(at);
                 }
                 Expectation::NoAlarm(alarm)
-                    if inside && step.step == AlarmStep::Raised && is(&self.def, alarm, step) =>
+                    if inside && step.event == AlarmEvent::Raised && is(&self.def, alarm, step) =>
                 {
                     mark.broken.get_or_insert((at, step.value));
                 }

@@ -10,7 +10,7 @@ use std::{path::Path, sync::Arc, time::Duration};
 use self::names::{alarm, tag, unknown, value};
 use super::{Expect, FaultEvent, OperatorAction, OperatorStep, Scenario, Start, judge::clock};
 use crate::{
-    plant::{PlantDef, record::AlarmStep},
+    plant::{PlantDef, record::AlarmEvent},
     profile::{
         self, Errors, Search,
         diagnostic::{Problems, Span},
@@ -73,7 +73,7 @@ table!(
         opt "within" within: Duration,
         opt "alarm" alarm: String,
         opt "text" text: String,
-        opt "step" step: AlarmStep,
+        opt "event" event: AlarmEvent,
         opt "never" never: bool,
         opt "written" written: String,
         opt "value" value: Choice,
@@ -92,20 +92,20 @@ words!(Start, "start" {
     "rest" => Start::Rest,
 });
 
-words!(AlarmStep, "step of an alarm" {
-    "raised" => AlarmStep::Raised,
-    "acknowledged" => AlarmStep::Acknowledged,
-    "returned" => AlarmStep::ReturnedToNormal,
-    "raised quietly" => AlarmStep::RaisedSuppressed,
-    "returned quietly" => AlarmStep::ReturnedSuppressed,
-    "raised again" => AlarmStep::ReAlarmed,
-    "reset" => AlarmStep::Reset,
-    "shelved" => AlarmStep::Shelved,
-    "unshelved" => AlarmStep::Unshelved,
-    "suppressed" => AlarmStep::SuppressedByDesign,
-    "released" => AlarmStep::Unsuppressed,
-    "out of service" => AlarmStep::OutOfService,
-    "in service" => AlarmStep::InService,
+words!(AlarmEvent, "alarm event" {
+    "raised" => AlarmEvent::Raised,
+    "acknowledged" => AlarmEvent::Acknowledged,
+    "returned" => AlarmEvent::ReturnedToNormal,
+    "raised quietly" => AlarmEvent::RaisedSuppressed,
+    "returned quietly" => AlarmEvent::ReturnedSuppressed,
+    "raised again" => AlarmEvent::ReAlarmed,
+    "reset" => AlarmEvent::Reset,
+    "shelved" => AlarmEvent::Shelved,
+    "unshelved" => AlarmEvent::Unshelved,
+    "suppressed" => AlarmEvent::SuppressedByDesign,
+    "released" => AlarmEvent::Unsuppressed,
+    "out of service" => AlarmEvent::OutOfService,
+    "in service" => AlarmEvent::InService,
 });
 
 impl Value for Fault {

@@ -13,7 +13,7 @@ use crate::{
         def::{AlarmId, TagId},
         event::Fault,
         fixture,
-        record::{AlarmStep, ChainHash},
+        record::{AlarmEvent, ChainHash},
     },
 };
 
@@ -92,10 +92,10 @@ impl Station {
     }
 }
 
-fn steps(history: &Path) -> Vec<AlarmStep> {
+fn steps(history: &Path) -> Vec<AlarmEvent> {
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
     let steps = found.steps.unwrap_or_default();
-    steps.iter().filter(|step| &*step.subject == "TIC-1").map(|step| step.step).collect()
+    steps.iter().filter(|step| &*step.subject == "TIC-1").map(|step| step.event).collect()
 }
 
 #[tokio::test]
@@ -107,7 +107,7 @@ async fn an_acknowledgement_that_is_shown_is_on_disk_also_while_the_history_take
     let snapshot = station.ended(|_| true).await;
     assert!(snapshot.commands[0].recorded);
     // A kill at this very moment leaves these files.
-    assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
+    assert_eq!(steps(&history), [AlarmEvent::Raised, AlarmEvent::Acknowledged]);
     let log = fs::read_to_string(audit_log::beside(&history)).unwrap();
     assert!(log.contains("\"who\":\"anna\"") && log.contains("\"action\":\"acknowledge\""), "{log}");
     station.stop().await;
@@ -134,7 +134,7 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
     let snapshot = station.ended(|recorded| recorded).await;
     let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
     assert!(silent.acknowledged.as_ref().unwrap().recorded);
-    assert_eq!(steps(&history), [AlarmStep::Raised, AlarmStep::Acknowledged]);
+    assert_eq!(steps(&history), [AlarmEvent::Raised, AlarmEvent::Acknowledged]);
     station.stop().await;
 }
 

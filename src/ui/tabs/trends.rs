@@ -21,7 +21,7 @@ use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
         def::{Pen, TagId, TrendGroup},
-        record::{AlarmRecord, AlarmStep},
+        record::{AlarmEvent, AlarmRecord},
         snapshot::Snapshot,
     },
     ui::{
@@ -155,7 +155,7 @@ impl TabView for Trends {
                 }
             }
             Answer::Journal(records) if raised.is_some() => {
-                self.data.raised = records.into_iter().filter(|record| record.step == AlarmStep::Raised).collect();
+                self.data.raised = records.into_iter().filter(|record| record.event == AlarmEvent::Raised).collect();
             }
             Answer::Journal(_)
             | Answer::Actions(_)

@@ -13,7 +13,7 @@ use crate::{
         command::{CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
         def::{AlarmId, Priority},
         event::{Fault, LineState},
-        record::{ActionRecord, AlarmRecord, AlarmStep},
+        record::{ActionRecord, AlarmEvent, AlarmRecord},
         sample::{Cause, Sample},
         snapshot::DeviceState,
     },
@@ -453,7 +453,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
         subject: "TIC-1.PV".into(),
         text: "temperature high".into(),
         priority: Priority::High,
-        step,
+        event: step,
         value: Some(72.1),
         limit: Some(72.0),
         by: by.map(Arc::from),
@@ -477,9 +477,9 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
         let Effect::Query(id, query) = effect else { continue };
         let answer = match query {
             Query::Journal { .. } => Answer::Journal(vec![
-                step(100, AlarmStep::Acknowledged, Some("tech1")),
-                step(800, AlarmStep::Raised, None),
-                step(90_000, AlarmStep::Raised, None),
+                step(100, AlarmEvent::Acknowledged, Some("tech1")),
+                step(800, AlarmEvent::Raised, None),
+                step(90_000, AlarmEvent::Raised, None),
             ]),
             Query::Actions { .. } => Answer::Actions(vec![action.clone()]),
             Query::Series { .. }

@@ -15,7 +15,7 @@ use crate::{
     },
     plant::{
         def::Priority,
-        record::{AlarmStep, ChainHash, SEAL_LOG},
+        record::{AlarmEvent, ChainHash, SEAL_LOG},
     },
 };
 
@@ -38,9 +38,9 @@ fn clock() -> Clock {
     Clock::starting_at(jiff::Timestamp::from_second(1_000_000).unwrap(), 1.0)
 }
 
-fn batch(actions: &[&str], steps: &[AlarmStep]) -> Batch {
+fn batch(actions: &[&str], steps: &[AlarmEvent]) -> Batch {
     let at = jiff::Timestamp::from_second(1_000_000).unwrap();
-    let step = |kind: &AlarmStep| AlarmRecord::new(at, "TIC-1.PV", "high", Priority::High, *kind);
+    let step = |kind: &AlarmEvent| AlarmRecord::new(at, "TIC-1.PV", "high", Priority::High, *kind);
     Batch { actions: actions.iter().map(|what| record(what)).collect(), steps: steps.iter().map(step).collect() }
 }
 
@@ -166,7 +166,7 @@ fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing
     let (mut recorder, found) = Recorder::new(&history_file, clock(), history);
     assert_eq!(found, Found::default());
     recorder.open();
-    recorder.take(batch(&["start", "acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged]));
+    recorder.take(batch(&["start", "acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
     recorder.write();
     let status = recorder.status();
     assert_eq!((status.batches, status.waiting), (0, 1));
@@ -191,7 +191,7 @@ fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing
     assert_eq!(sealed, ["start", "acknowledge", "write"]);
     assert_eq!(verify(&beside(&history_file), &chain_hashes(&rows)).unwrap().compared, 3);
     let steps = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1.steps.unwrap();
-    assert_eq!(steps, batch(&[], &[AlarmStep::Raised, AlarmStep::Acknowledged]).steps);
+    assert_eq!(steps, batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).steps);
 }
 
 #[test]
@@ -255,13 +255,13 @@ fn what_was_acknowledged_is_found_by_the_next_station_without_any_history() {
     let (history, rows) = mpsc::channel(1);
     drop(rows);
     let Handle { batches, mut recorded, join, .. } = start(&history_file, clock(), history).unwrap();
-    let done = batch(&["acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged]);
+    let done = batch(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]);
     batches.send(Message::Batch(done)).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     runtime.block_on(recorded.wait_for(|recorded| recorded.batches == 1)).unwrap();
     // Killed here: only what is on disk counts.
     let found = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1;
-    assert_eq!(found.steps.unwrap(), batch(&[], &[AlarmStep::Raised, AlarmStep::Acknowledged]).steps);
+    assert_eq!(found.steps.unwrap(), batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).steps);
     drop(batches);
     join.join().unwrap();
 }
@@ -305,7 +305,7 @@ fn files_that_another_process_writes_are_left_alone_until_it_ends() {
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
-    recorder.take(batch(&["acknowledge"], &[AlarmStep::Raised, AlarmStep::Acknowledged]));
+    recorder.take(batch(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
     recorder.write();
     let status = recorder.status();
     assert!(status.log.unwrap().contains(IN_USE) && status.alarms.unwrap().contains(IN_USE));

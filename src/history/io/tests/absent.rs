@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     bus::io::clock::Clock,
-    plant::record::{AlarmStep, Record},
+    plant::record::{AlarmEvent, Record},
     report::testing::sec,
 };
 
@@ -63,7 +63,7 @@ fn whatever_stands_in_the_way_records_wait_and_are_caught_up() {
         let db = folder.path().join("state").join("tank.duckdb");
         block(&db);
         let mut writer = without_store(&db, why);
-        writer.accept(vec![good(PV, 0, 27.0), Record::Alarm(step(0, "high", AlarmStep::Raised))]);
+        writer.accept(vec![good(PV, 0, 27.0), Record::Alarm(step(0, "high", AlarmEvent::Raised))]);
         let second = retry(&mut writer, 0);
         assert_eq!((writer.status().rows, writer.status().waiting, writer.status().lost), (0, 2, 0), "{why}");
         assert!(writer.status().words().unwrap().starts_with("not recording: 2 records waiting (0 %)"));
@@ -81,7 +81,7 @@ fn what_exceeds_the_buffer_is_counted_and_alarms_outlive_samples() {
     let (folder, db) = folder();
     fs::create_dir(&db).unwrap();
     let mut writer = without_store(&db, "Is a directory");
-    writer.accept(vec![Record::Alarm(step(0, "high", AlarmStep::Raised))]);
+    writer.accept(vec![Record::Alarm(step(0, "high", AlarmEvent::Raised))]);
     for second in 0..PENDING_MAX as i64 {
         writer.accept(vec![good(SV, second, 1.0)]);
     }
@@ -90,7 +90,7 @@ fn what_exceeds_the_buffer_is_counted_and_alarms_outlive_samples() {
     assert_eq!((status.waiting, status.waiting_max), (PENDING_MAX as u64 * 3 / 4, PENDING_MAX as u64));
     fs::remove_dir(&db).unwrap();
     retry(&mut writer, 0);
-    assert_eq!(writer.store().unwrap().restore().unwrap(), [step(0, "high", AlarmStep::Raised)]);
+    assert_eq!(writer.store().unwrap().restore().unwrap(), [step(0, "high", AlarmEvent::Raised)]);
     assert_eq!(writer.status().rows, status.waiting);
     drop(folder);
 }

@@ -20,7 +20,7 @@ const START: i64 = 1_795_240_800;
 /// Activations of each priority, the most urgent first.
 const BY_PRIORITY: &str = "SELECT count(*) FILTER (priority = 1), count(*) FILTER (priority = 2),
         count(*) FILTER (priority = 3), count(*) FILTER (priority = 4)
-    FROM alarm_journal WHERE step = 'raised' AND utc >= $1 AND utc < $2";
+    FROM alarm_journal WHERE event = 'raised' AND utc >= $1 AND utc < $2";
 
 /// All windows of ten minutes with anything in them, those with more than ten alarms, the worst, and their microseconds.
 const WINDOWS: &str = "WITH ten AS (
@@ -28,7 +28,7 @@ const WINDOWS: &str = "WITH ten AS (
         FROM (SELECT utc FROM sample UNION ALL SELECT utc FROM alarm_journal) WHERE utc >= $1 AND utc < $2),
     counts AS (
         SELECT begins, count(j.utc) AS raised FROM ten
-        LEFT JOIN (SELECT utc FROM alarm_journal WHERE step = 'raised' AND utc >= $1 AND utc < $2) j
+        LEFT JOIN (SELECT utc FROM alarm_journal WHERE event = 'raised' AND utc >= $1 AND utc < $2) j
             ON time_bucket(INTERVAL 10 MINUTES, j.utc) = begins GROUP BY begins)
     SELECT count(*), count(*) FILTER (raised > 10), coalesce(max(raised), 0),
         coalesce(sum(epoch_us(least(begins + INTERVAL 10 MINUTES, $2::TIMESTAMP))
@@ -39,7 +39,7 @@ const FLOOD: &str = "WITH seconds AS (
         SELECT unnest(range(epoch_us($1::TIMESTAMP) // 1000000 - 86400, epoch_us($2::TIMESTAMP) // 1000000)) AS s),
     raised AS (
         SELECT epoch_us(utc) // 1000000 AS s, count(*) AS n FROM alarm_journal
-        WHERE step = 'raised' AND utc >= $1::TIMESTAMP - INTERVAL 24 HOURS AND utc < $2 GROUP BY 1),
+        WHERE event = 'raised' AND utc >= $1::TIMESTAMP - INTERVAL 24 HOURS AND utc < $2 GROUP BY 1),
     rates AS (
         SELECT s, sum(coalesce(n, 0)) OVER (ORDER BY s ROWS BETWEEN 599 PRECEDING AND CURRENT ROW) AS rate
         FROM seconds LEFT JOIN raised USING (s)),
@@ -49,35 +49,35 @@ const FLOOD: &str = "WITH seconds AS (
         FROM rates)
     SELECT count(*) FROM states WHERE above > coalesce(below, -1) AND s >= epoch_us($1::TIMESTAMP) // 1000000";
 
-const TOP_TEN: &str = "SELECT subject, text, count(*) FROM alarm_journal
-    WHERE step = 'raised' AND utc >= $1 AND utc < $2 GROUP BY ALL ORDER BY 3 DESC, 1, 2 LIMIT 10";
+const TOP_TEN: &str = "SELECT subject, message, count(*) FROM alarm_journal
+    WHERE event = 'raised' AND utc >= $1 AND utc < $2 GROUP BY ALL ORDER BY 3 DESC, 1, 2 LIMIT 10";
 
-const CHATTERING: &str = "SELECT DISTINCT subject, text FROM (
-        SELECT *, lag(utc, 2) OVER (PARTITION BY subject, text ORDER BY utc, rowid) AS third
-        FROM alarm_journal WHERE step = 'raised')
+const CHATTERING: &str = "SELECT DISTINCT subject, message FROM (
+        SELECT *, lag(utc, 2) OVER (PARTITION BY subject, message ORDER BY utc, rowid) AS third
+        FROM alarm_journal WHERE event = 'raised')
     WHERE utc - third < INTERVAL 60 SECONDS AND utc >= $1 AND utc < $2 ORDER BY ALL";
 
-const FLEETING: &str = "SELECT DISTINCT subject, text FROM (
-        SELECT *, rowid AS place, lag(step) OVER alarm AS before, lag(utc) OVER alarm AS began, lag(rowid) OVER alarm AS first
-        FROM alarm_journal WHERE step IN ('raised', 'returned') WINDOW alarm AS (PARTITION BY subject, text ORDER BY rowid)) r
-    WHERE step = 'returned' AND before = 'raised' AND utc - began < INTERVAL 10 SECONDS AND utc >= $1 AND utc < $2
-        AND NOT EXISTS (SELECT 1 FROM alarm_journal a WHERE a.step = 'acknowledged' AND a.subject = r.subject
-            AND a.text = r.text AND a.rowid BETWEEN first AND place) ORDER BY ALL";
+const FLEETING: &str = "SELECT DISTINCT subject, message FROM (
+        SELECT *, rowid AS place, lag(event) OVER alarm AS before, lag(utc) OVER alarm AS began, lag(rowid) OVER alarm AS first
+        FROM alarm_journal WHERE event IN ('raised', 'returned') WINDOW alarm AS (PARTITION BY subject, message ORDER BY rowid)) r
+    WHERE event = 'returned' AND before = 'raised' AND utc - began < INTERVAL 10 SECONDS AND utc >= $1 AND utc < $2
+        AND NOT EXISTS (SELECT 1 FROM alarm_journal a WHERE a.event = 'acknowledged' AND a.subject = r.subject
+            AND a.message = r.message AND a.rowid BETWEEN first AND place) ORDER BY ALL";
 
 /// The most alarms at one second that had been active for over a day.
 const STALE: &str = "WITH activations AS (
-        SELECT step, epoch_us(utc) // 1000000 AS began,
-            epoch_us(least(lead(utc) OVER (PARTITION BY subject, text ORDER BY rowid), $2::TIMESTAMP)) // 1000000 AS ended
-        FROM alarm_journal WHERE step IN ('raised', 'returned') AND utc < $2),
+        SELECT event, epoch_us(utc) // 1000000 AS began,
+            epoch_us(least(lead(utc) OVER (PARTITION BY subject, message ORDER BY rowid), $2::TIMESTAMP)) // 1000000 AS ended
+        FROM alarm_journal WHERE event IN ('raised', 'returned') AND utc < $2),
     stale AS (
         SELECT greatest(began + 86400, epoch_us($1::TIMESTAMP) // 1000000) AS a,
-            coalesce(ended, epoch_us($2::TIMESTAMP) // 1000000) AS z FROM activations WHERE step = 'raised'),
+            coalesce(ended, epoch_us($2::TIMESTAMP) // 1000000) AS z FROM activations WHERE event = 'raised'),
     spans AS (SELECT * FROM stale WHERE a < z)
     SELECT coalesce(max(n), 0) FROM (
         SELECT (SELECT count(*) FROM spans o WHERE o.a <= s.a AND s.a < o.z) AS n FROM spans s)";
 
 /// Activations that were not annunciated.
-const SUPPRESSED: &str = "SELECT count(*) FROM alarm_journal WHERE step = 'raised quietly' AND utc >= $1 AND utc < $2";
+const SUPPRESSED: &str = "SELECT count(*) FROM alarm_journal WHERE event = 'raised quietly' AND utc >= $1 AND utc < $2";
 
 /// The figures as SQL counts them.
 fn counted(store: &Store, from: Timestamp, until: Timestamp) -> PeriodMetrics {
@@ -119,7 +119,7 @@ fn at(second: f64) -> Timestamp {
 
 /// Some hundred steps of fourteen alarms: bursts, quiet hours, and now and then more than a day of nothing.
 fn journal() -> impl Strategy<Value = Vec<AlarmRecord>> {
-    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
+    use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
     let gap = prop_oneof![60 => 0.0..15.0, 20 => 15.0..120.0, 8 => 120.0..4_000.0, 1 => 4_000.0..50_000.0f64];
     let kind = prop_oneof![4 => Just(Raised), 2 => Just(ReturnedToNormal), 1 => Just(Acknowledged)];
     let priority =
@@ -139,7 +139,7 @@ fn journal() -> impl Strategy<Value = Vec<AlarmRecord>> {
     })
 }
 
-/// An instant of the journal: that of a step itself, or anywhere.
+/// An instant of the journal: that of an event itself, or anywhere.
 fn instant(journal: &[AlarmRecord], share: f64, on_a_step: bool) -> Timestamp {
     if on_a_step {
         return journal[(share * (journal.len() - 1) as f64) as usize].at;
@@ -169,7 +169,7 @@ proptest! {
 
 #[test]
 fn a_storm_an_alarm_from_the_day_before_and_an_empty_night_are_counted_as_sql_counts_them() {
-    use AlarmStep::{Raised, ReturnedToNormal};
+    use AlarmEvent::{Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, START);
     let mut journal = vec![AlarmRecord { at: at(-90_000.0), ..step(0, "old", Raised) }];
@@ -195,7 +195,7 @@ fn a_storm_an_alarm_from_the_day_before_and_an_empty_night_are_counted_as_sql_co
 
 #[test]
 fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
-    use AlarmStep::Raised;
+    use AlarmEvent::Raised;
     let (_folder, db) = folder();
     let store = open(&db, START);
     let [old, before, late] = [-100_000.0, -80_000.0, -1.0].map(|second| (second, format!("alarm at {second}")));
@@ -207,7 +207,7 @@ fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
 
 #[test]
 fn an_alarm_suppressed_before_a_period_is_not_stale_in_it() {
-    use AlarmStep::{OutOfService, Raised, RaisedSuppressed, Shelved, SuppressedByDesign};
+    use AlarmEvent::{OutOfService, Raised, RaisedSuppressed, Shelved, SuppressedByDesign};
     let (_folder, db) = folder();
     let store = open(&db, START);
     let pair = |second: f64, text: &str, first, then| {

@@ -10,7 +10,7 @@ use std::{
 use super::{super::files::beside, super::store::Store, PV, def, folder, good, means, open, series, step};
 use crate::{
     history::HistoryError,
-    plant::record::{AlarmStep, Record},
+    plant::record::{AlarmEvent, Record},
     report::testing::sec,
 };
 
@@ -187,7 +187,7 @@ fn job_of_a_child_process() {
                     store.checkpoint().unwrap();
                 }
                 store
-                    .append(&[good(PV, second, 27.0), Record::Alarm(step(second, "high", AlarmStep::Raised))])
+                    .append(&[good(PV, second, 27.0), Record::Alarm(step(second, "high", AlarmEvent::Raised))])
                     .unwrap();
             }
             std::process::abort();

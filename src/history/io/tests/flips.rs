@@ -16,7 +16,7 @@ use super::{
     def, good, step,
 };
 use crate::{
-    plant::record::{AlarmStep, Record},
+    plant::record::{AlarmEvent, Record},
     report::testing::sec,
 };
 
@@ -135,11 +135,11 @@ fn fill(db: &Path) -> Store {
     let store = Store::open(db, &def(), sec(0)).unwrap().store;
     let rows = (0..FILED).flat_map(|i| [good(PV, i, value(i)), good(SV, i, 70.0)]);
     store.append(&rows.collect::<Vec<_>>()).unwrap();
-    let others = (0..500).flat_map(|i| [Record::Alarm(step(i, "high", AlarmStep::Raised)), Record::Action(action(i))]);
+    let others = (0..500).flat_map(|i| [Record::Alarm(step(i, "high", AlarmEvent::Raised)), Record::Action(action(i))]);
     store.append(&others.collect::<Vec<_>>()).unwrap();
     store.checkpoint().unwrap();
     for i in FILED..FILED + LOGGED {
-        store.append(&[good(PV, i, value(i)), Record::Alarm(step(i, "low", AlarmStep::Raised))]).unwrap();
+        store.append(&[good(PV, i, value(i)), Record::Alarm(step(i, "low", AlarmEvent::Raised))]).unwrap();
     }
     store
 }
@@ -152,7 +152,7 @@ fn value(i: i64) -> f64 {
 fn survive(db: &Path) -> String {
     let now = FILED + LOGGED + 10;
     let records =
-        [good(PV, now, 1.0), Record::Alarm(step(now, "high", AlarmStep::Raised)), Record::Action(action(now))];
+        [good(PV, now, 1.0), Record::Alarm(step(now, "high", AlarmEvent::Raised)), Record::Action(action(now))];
     let record = || {
         let opened = Store::open_at_start(db, &def(), sec(now)).unwrap();
         opened.store.append(&records).and_then(|()| opened.store.checkpoint()).map(|()| opened)

@@ -29,7 +29,7 @@ use crate::{
     plant::{
         def::{LineDef, LineId, PlantDef, Priority, TagId, Transport},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, AlarmStep, Burst, ChainHash, Record},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, Burst, ChainHash, Record},
         sample::{Cause, Sample},
     },
     report::{
@@ -62,16 +62,16 @@ fn good(tag: TagId, at: i64, value: f64) -> Record {
     Record::Sample(tag, Sample::good(value, sec(at)))
 }
 
-fn step(at: i64, text: &str, step: AlarmStep) -> AlarmRecord {
+fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
     AlarmRecord {
         at: sec(at),
         subject: "TIC-1.PV".into(),
         text: text.into(),
         priority: Priority::High,
-        step,
+        event: step,
         value: Some(85.5),
         limit: Some(85.0),
-        by: (step == AlarmStep::Acknowledged).then(|| "somchai".into()),
+        by: (step == AlarmEvent::Acknowledged).then(|| "somchai".into()),
         reason: None,
         until: None,
         burst: None,
@@ -203,7 +203,7 @@ fn a_commit_that_fails_leaves_nothing_behind() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     store.db.execute_batch("DROP TABLE operator_action").unwrap();
-    let records = [good(PV, 0, 27.0), Record::Alarm(step(0, "high", AlarmStep::Raised)), Record::Action(action(0))];
+    let records = [good(PV, 0, 27.0), Record::Alarm(step(0, "high", AlarmEvent::Raised)), Record::Action(action(0))];
     assert!(matches!(store.append(&records), Err(HistoryError::Engine(_))));
     for table in ["sample", "alarm_journal"] {
         let sql = format!("SELECT count(*) FROM {table}");
@@ -215,7 +215,7 @@ fn a_commit_that_fails_leaves_nothing_behind() {
 
 #[test]
 fn lists_come_newest_first_within_their_span_and_limit() {
-    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
+    use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, 0);
     // Two steps at one instant keep their order.
@@ -331,7 +331,7 @@ fn epochs(store: &Store, table: &str) -> Vec<u16> {
 #[test]
 fn each_record_has_the_epoch_of_its_clock() {
     let (_folder, db) = folder();
-    let raised = |at| Record::Alarm(step(at, "high", AlarmStep::Raised));
+    let raised = |at| Record::Alarm(step(at, "high", AlarmEvent::Raised));
     let store = open(&db, 0);
     store.append(&[good(PV, 10, 1.0), raised(10), Record::ClockSet, good(PV, 5, 2.0)]).unwrap();
     store.append(&[Record::ClockSet, Record::ClockSet]).unwrap();
@@ -361,7 +361,7 @@ fn a_start_before_the_last_record_begins_an_epoch() {
 
 #[test]
 fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
-    use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
+    use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let old = [step(1, "high", Raised), step(2, "high", ReturnedToNormal), step(3, "high", Acknowledged)];
@@ -375,7 +375,7 @@ fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
         reason: Some("sensor is being changed".into()),
         until: Some(sec(600)),
         burst: Some(Burst { began: sec(4), rank: 2 }),
-        ..step(8, "low", AlarmStep::Shelved)
+        ..step(8, "low", AlarmEvent::Shelved)
     };
     let last = [&old[1..2], &new, &[shelved]].concat();
     let all = old[..1].iter().chain([&old[2]]).chain(&last).cloned();
@@ -385,7 +385,7 @@ fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
 
 #[test]
 fn a_shift_report_has_figures_alarms_and_actions() {
-    use AlarmStep::{Raised, ReturnedToNormal};
+    use AlarmEvent::{Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let samples = (0..12).map(|i| good(PV, i * 10, 20.0 + i as f64)).chain([good(SV, 0, 70.0)]);
@@ -496,7 +496,7 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
     let clock = Clock::starting_at(sec(10), 1.0);
     let mut handle = thread::start(&db, def(), clock).unwrap();
     assert_eq!(handle.restored.take().unwrap().blocking_recv().unwrap().steps, []);
-    handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmStep::Raised))]).unwrap();
+    handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmEvent::Raised))]).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
     handle.queries.blocking_send((1, QueryRequest { query: Query::Report { period }, reply })).unwrap();
@@ -505,7 +505,7 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
     assert_eq!(handle.status.borrow().lost, 0);
     handle.stop();
     let store = open(&db, 100);
-    assert_eq!(store.restore().unwrap(), [step(6, "high", AlarmStep::Raised)]);
+    assert_eq!(store.restore().unwrap(), [step(6, "high", AlarmEvent::Raised)]);
     let (last, quality): (i64, u8) = store
         .db
         .query_row("SELECT utc, quality FROM sample ORDER BY rowid DESC LIMIT 1", [], |row| {
@@ -536,8 +536,8 @@ fn a_question_behind_which_too_much_lies_is_refused_before_anything_is_read() {
 fn what_an_operator_does_with_an_alarm_is_committed_at_once() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
-    assert!(!writer.accept(vec![Record::Alarm(AlarmRecord { by: None, ..step(6, "high", AlarmStep::Raised) })]));
-    let acknowledged = AlarmRecord { by: Some("anna".into()), ..step(7, "high", AlarmStep::Acknowledged) };
+    assert!(!writer.accept(vec![Record::Alarm(AlarmRecord { by: None, ..step(6, "high", AlarmEvent::Raised) })]));
+    let acknowledged = AlarmRecord { by: Some("anna".into()), ..step(7, "high", AlarmEvent::Acknowledged) };
     assert!(writer.accept(vec![Record::Alarm(acknowledged)]), "it asks for a commit");
     writer.commit(sec(7));
     assert_eq!(writer.status().rows, 2);
@@ -549,7 +549,7 @@ fn what_an_operator_does_with_an_alarm_is_committed_at_once() {
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let mut status = handle.status.clone();
     for n in 1..=20 {
-        let acknowledged = AlarmRecord { by: Some("anna".into()), ..step(n, "high", AlarmStep::Acknowledged) };
+        let acknowledged = AlarmRecord { by: Some("anna".into()), ..step(n, "high", AlarmEvent::Acknowledged) };
         handle.records.blocking_send(vec![Record::Alarm(acknowledged)]).unwrap();
         runtime.block_on(status.wait_for(|status| status.rows == n as u64)).unwrap();
     }

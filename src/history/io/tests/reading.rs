@@ -104,7 +104,7 @@ fn alarms_and_actions_have_room_when_samples_have_filled_the_queue() {
         sent += 1;
     }
     assert!(lost == 1 && queue.capacity() > 0);
-    let alarm = Record::Alarm(step(sent, "high", AlarmStep::Raised));
+    let alarm = Record::Alarm(step(sent, "high", AlarmEvent::Raised));
     assert_eq!(thread::offer(&queue, vec![good(PV, sent, 27.0), alarm.clone()]), 1, "the sample alone is lost");
     assert_eq!(thread::offer(&queue, vec![Record::Action(action(sent))]), 0);
     assert_eq!(thread::offer(&queue, vec![]), 0);
@@ -258,7 +258,7 @@ fn a_question_that_takes_all_memory_costs_no_record() {
     let mut at = 0;
     while !working.is_finished() {
         at += 1;
-        writer.accept(vec![good(PV, at, 27.0), Record::Alarm(step(at, "high", AlarmStep::Raised))]);
+        writer.accept(vec![good(PV, at, 27.0), Record::Alarm(step(at, "high", AlarmEvent::Raised))]);
         writer.commit(sec(at));
     }
     let (why, reader) = working.join().unwrap();

@@ -12,13 +12,13 @@ fn at(second: f64) -> Timestamp {
     Timestamp::from_microsecond(START * 1_000_000 + (second * 1e6) as i64).expect("within the calendar")
 }
 
-fn step(second: f64, name: &str, step: AlarmStep) -> AlarmRecord {
+fn event(second: f64, name: &str, event: AlarmEvent) -> AlarmRecord {
     AlarmRecord {
         at: at(second),
         subject: "TIC-1.PV".into(),
         text: name.into(),
         priority: Priority::High,
-        step,
+        event,
         value: None,
         limit: None,
         by: None,
@@ -36,9 +36,9 @@ fn of_period(from: f64, until: f64) -> AlarmMonitor {
 }
 
 /// The figures of 06:00 to a second after it.
-fn figures(until: f64, steps: &[(f64, &str, AlarmStep)]) -> PeriodMetrics {
+fn figures(until: f64, events: &[(f64, &str, AlarmEvent)]) -> PeriodMetrics {
     let mut monitor = of_period(0.0, until);
-    steps.iter().for_each(|(second, name, kind)| monitor.take(&step(*second, name, *kind)));
+    events.iter().for_each(|(second, name, kind)| monitor.take(&event(*second, name, *kind)));
     monitor.figures()
 }
 
@@ -46,11 +46,11 @@ fn names(alarms: &[Named]) -> Vec<&str> {
     alarms.iter().map(|alarm| &*alarm.text).collect()
 }
 
-use AlarmStep::{Acknowledged, Raised, ReturnedToNormal};
+use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
 
 #[test]
 fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
-    let steps = [
+    let events = [
         (-0.001, "before", Raised),
         (0.0, "first", Raised),
         (599.9, "first", Raised),
@@ -59,13 +59,13 @@ fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
         (800.0, "second window", ReturnedToNormal),
         (7_200.0, "after", Raised),
     ];
-    let got = figures(7_200.0, &steps);
+    let got = figures(7_200.0, &events);
     assert_eq!((got.annunciated(), got.windows, got.most, got.windows_over), (3, 12, 2, 0));
     assert_eq!(got.value(Metric::PerWindow), Some(0.25));
     assert_eq!(got.top.iter().map(|alarm| (&*alarm.alarm.text, alarm.raised)).collect::<Vec<_>>()[0], ("first", 2));
     // A period that begins and ends within windows touches 14 of them.
     let mut monitor = of_period(-1.0, 7_200.5);
-    steps.iter().for_each(|(second, name, kind)| monitor.take(&step(*second, name, *kind)));
+    events.iter().for_each(|(second, name, kind)| monitor.take(&event(*second, name, *kind)));
     let got = monitor.figures();
     assert_eq!((got.annunciated(), got.windows), (5, 14));
 }
@@ -74,7 +74,7 @@ fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
 fn time_in_which_no_station_ran_thins_no_figure_out() {
     let mut monitor = AlarmMonitor::of_period(at(300.0), at(86_400.0));
     [0, 1, 2].into_iter().for_each(|window| monitor.watched(START / WINDOW_S + window));
-    monitor.take(&step(400.0, "x", Raised));
+    monitor.take(&event(400.0, "x", Raised));
     let got = monitor.figures();
     assert_eq!((got.windows, got.watched.as_secs()), (3, 1_500));
     let mut running = AlarmMonitor::running(at(0.0));
@@ -114,7 +114,7 @@ fn an_alarm_is_fleeting_if_it_goes_before_anybody_could_read_it() {
 #[test]
 fn alarms_are_stale_after_a_day_and_the_most_at_one_time_count() {
     let day = 86_400.0;
-    let steps = [
+    let events = [
         (10.0, "a", Raised),
         (20.0, "b", Raised),
         (day + 15.0, "a", ReturnedToNormal),
@@ -122,12 +122,12 @@ fn alarms_are_stale_after_a_day_and_the_most_at_one_time_count() {
         (day + 40.0, "b", ReturnedToNormal),
         (day + 50.0, "c", Raised),
     ];
-    assert_eq!(figures(day + 10.0, &steps[..2]).stale, 0, "active for exactly a day is not over a day");
-    assert_eq!(figures(day + 11.0, &steps[..2]).stale, 1);
-    assert_eq!(figures(day + 60.0, &steps).stale, 1);
-    assert_eq!(figures(day + 60.0, &steps[..2]).stale, 2);
+    assert_eq!(figures(day + 10.0, &events[..2]).stale, 0, "active for exactly a day is not over a day");
+    assert_eq!(figures(day + 11.0, &events[..2]).stale, 1);
+    assert_eq!(figures(day + 60.0, &events).stale, 1);
+    assert_eq!(figures(day + 60.0, &events[..2]).stale, 2);
     let mut monitor = AlarmMonitor::of_period(at(0.0), at(600.0));
-    monitor.already(&step(-100_000.0, "old", Raised));
+    monitor.already(&event(-100_000.0, "old", Raised));
     let got = monitor.figures();
     assert_eq!((got.stale, got.annunciated()), (1, 0), "what was there before the period is stale, not new");
 }
@@ -146,8 +146,8 @@ fn memory_does_not_grow_with_the_storms_it_has_seen() {
     for day in 0..10 {
         for second in 0..2_000 {
             let name = format!("alarm {}", second % 500);
-            monitor.take(&step(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
-            monitor.take(&step(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, ReturnedToNormal));
+            monitor.take(&event(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
+            monitor.take(&event(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, ReturnedToNormal));
         }
     }
     monitor.advance(at(12.0 * 86_400.0));
@@ -155,8 +155,8 @@ fn memory_does_not_grow_with_the_storms_it_has_seen() {
     assert_eq!(monitor.watched.len(), 1);
 }
 
-fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
-    // Bursts and quiet: most steps follow within seconds, some after hours.
+fn events() -> impl Strategy<Value = Vec<AlarmRecord>> {
+    // Bursts and quiet: most events follow within seconds, some after hours.
     let gap = prop_oneof![8 => 0.0..20.0, 2 => 20.0..900.0, 1 => 900.0..20_000.0f64];
     let kind = prop_oneof![3 => Just(Raised), 2 => Just(ReturnedToNormal), 1 => Just(Acknowledged)];
     let priority =
@@ -166,7 +166,7 @@ fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
         let mut list = Vec::new();
         for (gap, name, kind, priority) in rows {
             now += gap;
-            list.push(AlarmRecord { priority, ..step(now, &format!("alarm {name}"), kind) });
+            list.push(AlarmRecord { priority, ..event(now, &format!("alarm {name}"), kind) });
         }
         list
     })
@@ -174,10 +174,10 @@ fn steps() -> impl Strategy<Value = Vec<AlarmRecord>> {
 
 proptest! {
     #[test]
-    fn what_the_screen_shows_now_is_what_the_report_of_the_same_span_says(steps in steps(), rest in 0.0..5_000.0f64) {
+    fn what_the_screen_shows_now_is_what_the_report_of_the_same_span_says(events in events(), rest in 0.0..5_000.0f64) {
         let mut running = AlarmMonitor::running(at(0.0));
-        steps.iter().for_each(|step| running.take(step));
-        let now = steps.last().map_or(at(0.0), |step| step.at) + Duration::from_secs_f64(rest);
+        events.iter().for_each(|event| running.take(event));
+        let now = events.last().map_or(at(0.0), |event| event.at) + Duration::from_secs_f64(rest);
         // The running figures are of whole seconds.
         let now = Timestamp::from_second(second(now) + 1).expect("within the calendar");
         running.advance(now);
@@ -185,9 +185,9 @@ proptest! {
         let mut period = AlarmMonitor::of_period(metrics.day.from, metrics.day.until);
         let known = metrics.day.from - LEAD;
         running.watched.iter().for_each(|window| period.watched(*window));
-        steps.iter().filter(|step| step.at < known).for_each(|step| period.already(step));
-        steps.iter().filter(|step| known <= step.at).for_each(|step| period.take(step));
-        let in_window = steps.iter().filter(|step| step.step == Raised && second(now) - 600 < second(step.at));
+        events.iter().filter(|event| event.at < known).for_each(|event| period.already(event));
+        events.iter().filter(|event| known <= event.at).for_each(|event| period.take(event));
+        let in_window = events.iter().filter(|event| event.event == Raised && second(now) - 600 < second(event.at));
         prop_assert_eq!(metrics.last_10_min as usize, in_window.count());
         prop_assert_eq!(&*metrics.day, &period.figures());
     }

@@ -71,7 +71,7 @@ fn late() -> ExpectationStatus {
 
 #[test]
 fn an_alarm_counts_in_its_time_and_in_its_step_only() {
-    let check = |expectation: Expectation, steps: &[(u64, AlarmStep, &str)], expect: ExpectationStatus| {
+    let check = |expectation: Expectation, steps: &[(u64, AlarmEvent, &str)], expect: ExpectationStatus| {
         let mut judge = judge(expectation);
         let text = judge.def.alarm(HIGH).text.clone();
         let subject: Arc<str> = judge.def.tag(PV).name.as_str().into();
@@ -82,7 +82,7 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
                 subject: subject.clone(),
                 text: text.into(),
                 priority: Priority::High,
-                step: *step,
+                event: *step,
                 value: Some(76.0),
                 limit: None,
                 by: None,
@@ -93,16 +93,16 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
         }
         assert_eq!(is_over(&mut judge), expect, "{expectation:?} {steps:?}");
     };
-    let raised = Expectation::Alarm(HIGH, AlarmStep::Raised);
-    check(raised, &[(12, AlarmStep::Raised, "")], met(12));
-    check(raised, &[(9, AlarmStep::Raised, ""), (21, AlarmStep::Raised, "")], late());
-    check(raised, &[(12, AlarmStep::ReturnedToNormal, "")], late());
-    check(raised, &[(12, AlarmStep::Raised, "another alarm of this tag")], late());
-    check(Expectation::Alarm(HIGH, AlarmStep::Acknowledged), &[(20, AlarmStep::Acknowledged, "")], met(20));
+    let raised = Expectation::Alarm(HIGH, AlarmEvent::Raised);
+    check(raised, &[(12, AlarmEvent::Raised, "")], met(12));
+    check(raised, &[(9, AlarmEvent::Raised, ""), (21, AlarmEvent::Raised, "")], late());
+    check(raised, &[(12, AlarmEvent::ReturnedToNormal, "")], late());
+    check(raised, &[(12, AlarmEvent::Raised, "another alarm of this tag")], late());
+    check(Expectation::Alarm(HIGH, AlarmEvent::Acknowledged), &[(20, AlarmEvent::Acknowledged, "")], met(20));
     check(Expectation::NoAlarm(HIGH), &[], met(20));
     check(
         Expectation::NoAlarm(HIGH),
-        &[(12, AlarmStep::Raised, "")],
+        &[(12, AlarmEvent::Raised, "")],
         ExpectationStatus::Missed("raised at 00:12: 76.0".to_owned()),
     );
 }

@@ -8,7 +8,7 @@ use super::{
     names::{alarm, tag, value},
 };
 use crate::{
-    plant::{PlantDef, def::TagId, record::AlarmStep},
+    plant::{PlantDef, def::TagId, record::AlarmEvent},
     profile::{
         diagnostic::Problems,
         reader::{At, text},
@@ -67,7 +67,7 @@ fn expected(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Opt
         if table.never.is_some_and(|never| never.value) {
             return Some((Expectation::NoAlarm(alarm), format!("no alarm {} {words}", name.value)));
         }
-        let step = table.step.map_or(AlarmStep::Raised, |step| step.value);
+        let step = table.event.map_or(AlarmEvent::Raised, |event| event.value);
         return Some((Expectation::Alarm(alarm, step), format!("alarm {} {words} {}", name.value, step.word())));
     }
     let tag = tag(name, def, problems)?;

@@ -10,7 +10,7 @@ use crate::{
     access::{Durability, SessionRequest},
     plant::{
         def::Priority,
-        record::{ActionRecord, AlarmRecord, AlarmStep, ChainHash},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
     },
     report::TagFigures,
     ui::{
@@ -112,7 +112,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         subject: subject.into(),
         text: text.into(),
         priority,
-        step,
+        event: step,
         value: (subject == "TIC-1.PV").then_some(72.44),
         limit: None,
         by: by.map(Into::into),
@@ -122,11 +122,11 @@ fn report(period: Period, full: bool) -> ShiftReport {
     };
     let (high, low) = (Priority::High, Priority::Low);
     let alarms = vec![
-        alarm(12, high, "TIC-1.PV", "temperature high", AlarmStep::Raised, None),
-        alarm(31, high, "TIC-1.PV", "temperature high", AlarmStep::Acknowledged, Some("tech1")),
-        alarm(53, high, "TIC-1.PV", "temperature high", AlarmStep::ReturnedToNormal, None),
-        alarm(80, low, "PLC-1", "not answering", AlarmStep::Raised, None),
-        alarm(95, high, "TIC-1.PV", "temperature high", AlarmStep::Raised, None),
+        alarm(12, high, "TIC-1.PV", "temperature high", AlarmEvent::Raised, None),
+        alarm(31, high, "TIC-1.PV", "temperature high", AlarmEvent::Acknowledged, Some("tech1")),
+        alarm(53, high, "TIC-1.PV", "temperature high", AlarmEvent::ReturnedToNormal, None),
+        alarm(80, low, "PLC-1", "not answering", AlarmEvent::Raised, None),
+        alarm(95, high, "TIC-1.PV", "temperature high", AlarmEvent::Raised, None),
     ];
     let action = ActionRecord {
         at: at(20),

@@ -14,7 +14,7 @@ use super::{Export, Reports};
 use crate::{
     plant::{
         def::Priority,
-        record::{ActionRecord, AlarmRecord, AlarmStep},
+        record::{ActionRecord, AlarmEvent, AlarmRecord},
     },
     report::{Period, ShiftReport, SuppressedSummary, TagFigures, raised, text::mean_or_difference},
     ui::{
@@ -164,7 +164,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
         lines.extend(report.suppressed.iter().take(LIST_MAX).map(|alarm| suppressed_line(cx, alarm)));
         lines.extend(report.suppressed.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
     }
-    let annunciated = |alarm: &&AlarmRecord| !alarm.step.is_suppressed();
+    let annunciated = |alarm: &&AlarmRecord| !alarm.event.is_suppressed();
     let alarms: Vec<&AlarmRecord> = report.alarms.iter().filter(annunciated).collect();
     if !alarms.is_empty() {
         lines.push(section(cx, "alarms"));
@@ -216,7 +216,7 @@ fn counts(cx: &ViewContext, report: &ShiftReport) -> Line<'static> {
         text.push_str(&format!(", {suppressed} more while suppressed"));
     }
     let mut subjects: BTreeMap<&str, usize> = BTreeMap::new();
-    for alarm in report.alarms.iter().filter(|alarm| alarm.step == AlarmStep::Raised) {
+    for alarm in report.alarms.iter().filter(|alarm| alarm.event == AlarmEvent::Raised) {
         *subjects.entry(&alarm.subject).or_default() += 1;
     }
     if let Some((subject, n)) = subjects.into_iter().max_by_key(|(_, n)| *n).filter(|(_, n)| *n > 1) {
@@ -249,7 +249,7 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
         Some(tag) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
         None => format!("{value}"),
     };
-    let active = alarm.step == AlarmStep::Raised;
+    let active = alarm.event == AlarmEvent::Raised;
     let style: Style = if active { theme.normal() } else { theme.dim() };
     let detail = match (&alarm.by, alarm.value) {
         (Some(by), _) => format!("by {by}"),
@@ -264,7 +264,7 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
             if active { theme.severity(alarm.priority) } else { theme.dim() },
         ),
         Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.text, text)), style),
-        Span::styled(format!("{} {detail}", pad(alarm.step.word(), 13)), style),
+        Span::styled(format!("{} {detail}", pad(alarm.event.word(), 13)), style),
     ])
 }
 

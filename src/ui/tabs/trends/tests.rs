@@ -101,7 +101,7 @@ impl Stand {
                 subject: "TIC-1.PV".into(),
                 text: "temperature high".into(),
                 priority: Priority::High,
-                step: AlarmStep::Raised,
+                event: AlarmEvent::Raised,
                 value: Some(72.1),
                 limit: Some(72.0),
                 by: None,
