@@ -113,7 +113,7 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::Priority,
-        record::{AlarmEvent, Burst},
+        record::{AlarmEvent, FirstOut},
     };
 
     fn step() -> impl Strategy<Value = AlarmRecord> {
@@ -122,11 +122,11 @@ mod tests {
         let kind = (0..AlarmEvent::ALL.len()).prop_map(|place| AlarmEvent::ALL[place]);
         let time = || (0i64..2_000_000_000_000_000).prop_map(|micros| Timestamp::from_microsecond(micros).unwrap());
         let more = (number(), number(), words(), words(), proptest::option::of(time()));
-        (time(), 0..3u8, kind, more, any::<bool>()).prop_map(|(at, subject, step, more, burst)| {
+        (time(), 0..3u8, kind, more, any::<bool>()).prop_map(|(at, subject, step, more, first_out)| {
             let (value, limit, by, reason, until) = more;
             let record = AlarmRecord::new(at, &format!("TIC-{subject}.PV"), "high", Priority::High, step);
-            let burst = burst.then_some(Burst { began: at, rank: 7 });
-            AlarmRecord { value, limit, by, reason, until, burst, ..record }
+            let first_out = first_out.then_some(FirstOut { began: at, rank: 7 });
+            AlarmRecord { value, limit, by, reason, until, first_out, ..record }
         })
     }
 

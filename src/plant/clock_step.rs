@@ -11,7 +11,7 @@ use super::{
     alarm::{AlarmCommand, state::OperatorNote},
     command::CommandKind,
     event::LineState,
-    record::{AlarmRecord, Burst, Record},
+    record::{AlarmRecord, FirstOut, Record},
     restore::Restore,
     snapshot::{ActiveAlarm, DeviceState, DeviceStatus, LineStatus, Snapshot, SuppressedAlarm},
     tuning::Tuning,
@@ -39,12 +39,12 @@ impl AlarmRecord {
     fn shift(&mut self, by: SignedDuration) {
         shift(&mut self.at, by);
         self.until.iter_mut().for_each(|until| shift(until, by));
-        shift_burst(&mut self.burst, by);
+        shift_first_out(&mut self.first_out, by);
     }
 }
 
-fn shift_burst(burst: &mut Option<Burst>, by: SignedDuration) {
-    burst.iter_mut().for_each(|burst| shift(&mut burst.began, by));
+fn shift_first_out(first_out: &mut Option<FirstOut>, by: SignedDuration) {
+    first_out.iter_mut().for_each(|first_out| shift(&mut first_out.began, by));
 }
 
 fn shift_note(note: &mut OperatorNote, by: SignedDuration) {
@@ -120,7 +120,7 @@ impl ActiveAlarm {
         let times = [&mut self.raised_at, &mut self.annunciated_at].into_iter().chain(&mut self.returned_at);
         times.for_each(|at| shift(at, by));
         self.acknowledged.iter_mut().for_each(|note| shift_note(note, by));
-        shift_burst(&mut self.burst, by);
+        shift_first_out(&mut self.first_out, by);
     }
 }
 

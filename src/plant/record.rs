@@ -50,22 +50,22 @@ pub struct AlarmRecord {
     /// When a shelved alarm comes back.
     pub until: Option<Timestamp>,
     /// Its place among the alarms that were raised together.
-    pub burst: Option<Burst>,
+    pub first_out: Option<FirstOut>,
 }
 
 impl AlarmRecord {
     /// An event without operator, value and limit.
     pub fn new(at: Timestamp, subject: &str, text: &str, priority: Priority, event: AlarmEvent) -> AlarmRecord {
         let (subject, text) = (subject.into(), text.into());
-        let (value, limit, by, reason, until, burst) = (None, None, None, None, None, None);
-        AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, burst }
+        let (value, limit, by, reason, until, first_out) = (None, None, None, None, None, None);
+        AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, first_out }
     }
 }
 
 /// The place of an alarm among those that were raised within a short time of each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Burst {
-    /// When the first of them was raised; tells one burst from another.
+pub struct FirstOut {
+    /// When the first of them was raised; identifies the group.
     pub began: Timestamp,
     /// From 1: the first-out, which is likely to be the cause of the others.
     pub rank: u32,

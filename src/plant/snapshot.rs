@@ -18,7 +18,7 @@ use super::{
     line_report::LineReport,
     ne107,
     parameter_set::StoredSet,
-    record::{Burst, ChainHash},
+    record::{ChainHash, FirstOut},
     restore::Restore,
     sample::{Cause, Sample},
     scale,
@@ -273,15 +273,15 @@ pub struct ActiveAlarm {
     /// Activations since the station started.
     pub times: u32,
     /// Its place among the alarms that were raised together.
-    pub burst: Option<Burst>,
+    pub first_out: Option<FirstOut>,
 }
 
 impl ActiveAlarm {
-    /// An alarm without value, actions and burst.
+    /// An alarm without value, actions and first-out group.
     pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
-        let (returned_at, value, acknowledged, times, burst) = (None, None, None, 1, None);
+        let (returned_at, value, acknowledged, times, first_out) = (None, None, None, 1, None);
         let annunciated_at = raised_at;
-        ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, times, burst }
+        ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, times, first_out }
     }
     /// The command to acknowledge it, as it is seen here.
     pub fn acknowledge(&self) -> CommandKind {

@@ -87,7 +87,9 @@ pub(super) fn rules(file: &PlantFile, problems: &mut Problems) -> AlarmRules {
     }
     AlarmRules {
         shelve_max: table.shelve_max.map_or(usual.shelve_max, |max| max.value),
-        burst: table.burst.map_or(usual.burst, |burst| burst.value),
+        first_out_window: table
+            .first_out_window
+            .map_or(usual.first_out_window, |first_out_window| first_out_window.value),
     }
 }
 

@@ -29,6 +29,7 @@ const RENAMED: &[(&str, &str, &str)] = &[
     ("simulate", "leg", "reactive"),
     ("simulate", "per", "time_base"),
     ("an alarm", "respond", "response_time"),
+    ("the rules for alarms", "burst", "first_out_window"),
     ("a tag", "class", "poll_class"),
     ("poll class", "hard", "critical"),
     ("poll class", "soft", "normal"),

@@ -334,7 +334,7 @@ table!(
     /// What holds for all alarms, `[alarms]`.
     AlarmRulesTable, "the rules for alarms" {
         opt "shelve_max" shelve_max: Duration,
-        opt "burst" burst: Duration,
+        opt "first_out_window" first_out_window: Duration,
     }
 );
 

@@ -120,7 +120,7 @@ fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
             by: None,
             reason: None,
             until: None,
-            burst: None,
+            first_out: None,
         })
     };
     let store = Store::open(&path, &def, at(0)).unwrap().store;

@@ -18,7 +18,7 @@ use crate::{
     plant::{
         def::{Priority, TagId},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmEvent, AlarmRecord, Burst, ChainHash},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut},
     },
     report::step_series::{AsOf, HeldValue},
 };
@@ -207,8 +207,8 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
         by: maybe_shared(row, 7)?,
         reason: maybe_shared(row, 8)?,
         until: maybe_time(row, 9)?,
-        burst: match (maybe_time(row, 10)?, row.get(11)?) {
-            (Some(began), Some(rank)) => Some(Burst { began, rank }),
+        first_out: match (maybe_time(row, 10)?, row.get(11)?) {
+            (Some(began), Some(rank)) => Some(FirstOut { began, rank }),
             (_, None) | (None, _) => None,
         },
     })

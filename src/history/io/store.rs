@@ -257,9 +257,9 @@ impl Store {
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("alarm_journal")?;
         for alarm in std::iter::once(first).chain(rows) {
-            let AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, burst } = alarm;
-            let (until, began) = (until.map(utc), burst.map(|burst| utc(burst.began)));
-            let (priority, rank) = (priority.number(), burst.map(|burst| burst.rank));
+            let AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, first_out } = alarm;
+            let (until, began) = (until.map(utc), first_out.map(|first_out| utc(first_out.began)));
+            let (priority, rank) = (priority.number(), first_out.map(|first_out| first_out.rank));
             appender.append_row(params![
                 utc(*at),
                 subject,

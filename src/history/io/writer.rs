@@ -397,7 +397,7 @@ mod tests {
             by: None,
             reason: None,
             until: None,
-            burst: None,
+            first_out: None,
         })
     }
 

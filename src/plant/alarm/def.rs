@@ -71,14 +71,14 @@ impl AlarmDef {
 pub struct AlarmRules {
     /// An alarm can be shelved for at most this long.
     pub shelve_max: Duration,
-    /// An alarm that is raised within this time after another belongs to the same burst.
-    pub burst: Duration,
+    /// An alarm that is raised within this time after another belongs to the same first-out group.
+    pub first_out_window: Duration,
 }
 
 impl Default for AlarmRules {
     /// A shift of eight hours, and ten seconds.
     fn default() -> Self {
-        AlarmRules { shelve_max: Duration::from_secs(8 * 3600), burst: Duration::from_secs(10) }
+        AlarmRules { shelve_max: Duration::from_secs(8 * 3600), first_out_window: Duration::from_secs(10) }
     }
 }
 

@@ -82,7 +82,7 @@ fn shown(id: AlarmId, machine: &AlarmStateMachine) -> ActiveAlarm {
         value: machine.value,
         acknowledged: machine.acknowledged.clone(),
         times: machine.times,
-        burst: machine.burst,
+        first_out: machine.first_out,
     }
 }
 

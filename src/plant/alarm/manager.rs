@@ -15,7 +15,7 @@ use super::{
 };
 use crate::plant::{
     def::{AlarmDef, AlarmId, PlantDef, Subject},
-    record::{AlarmEvent, AlarmRecord, Burst},
+    record::{AlarmEvent, AlarmRecord, FirstOut},
     station::STATION,
 };
 
@@ -35,8 +35,8 @@ pub struct AlarmManager {
     /// The manager's own clock: what has passed while it was judged. It never goes back, whatever the station's clock does.
     ran: Duration,
     judged_at: Option<Timestamp>,
-    /// The latest burst, and when its last alarm was raised on the manager's own clock.
-    burst: Option<(Burst, Duration)>,
+    /// The latest first-out group, and when its last alarm was raised on the manager's own clock.
+    first_out: Option<(FirstOut, Duration)>,
     /// Counts what sounds, so that silence ends what was before it and nothing else.
     pub(super) edges: u64,
     pub(super) silenced: u64,
@@ -54,7 +54,7 @@ impl AlarmManager {
             def,
             ran: Duration::ZERO,
             judged_at: None,
-            burst: None,
+            first_out: None,
             edges: 0,
             silenced: 0,
             lists: OnceLock::new(),
@@ -220,9 +220,9 @@ impl AlarmManager {
 
     /// An event without operator.
     fn event(&mut self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
-        let burst = (event == AlarmEvent::Raised).then(|| self.next_burst(at));
+        let first_out = (event == AlarmEvent::Raised).then(|| self.next_first_out(at));
         let record = self.record(alarm, event, at, value);
-        self.take(alarm.id, AlarmRecord { burst, ..record })
+        self.take(alarm.id, AlarmRecord { first_out, ..record })
     }
 
     /// Takes an event that was just decided.
@@ -242,14 +242,15 @@ impl AlarmManager {
         self.lists = OnceLock::new();
     }
 
-    fn next_burst(&mut self, at: Timestamp) -> Burst {
-        let near = |(_, last): &(Burst, Duration)| self.ran.saturating_sub(*last) <= self.def.alarm_rules.burst;
-        let burst = match self.burst.filter(near) {
-            Some((burst, _)) => Burst { rank: burst.rank.saturating_add(1), ..burst },
-            None => Burst { began: at, rank: 1 },
+    fn next_first_out(&mut self, at: Timestamp) -> FirstOut {
+        let near =
+            |(_, last): &(FirstOut, Duration)| self.ran.saturating_sub(*last) <= self.def.alarm_rules.first_out_window;
+        let first_out = match self.first_out.filter(near) {
+            Some((first_out, _)) => FirstOut { rank: first_out.rank.saturating_add(1), ..first_out },
+            None => FirstOut { began: at, rank: 1 },
         };
-        self.burst = Some((burst, self.ran));
-        burst
+        self.first_out = Some((first_out, self.ran));
+        first_out
     }
 
     pub(super) fn record(&self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::record::{AlarmEvent, AlarmRecord, Burst};
+use crate::plant::record::{AlarmEvent, AlarmRecord, FirstOut};
 
 /// State of an alarm as an operator sees it, derived from the memories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -145,7 +145,7 @@ pub struct AlarmStateMachine {
     /// The value that raised it.
     pub value: Option<f64>,
     /// Its place among the alarms that were raised together.
-    pub burst: Option<Burst>,
+    pub first_out: Option<FirstOut>,
     /// Activations since the station started.
     pub times: u32,
     /// For how long it has been acknowledged and active.
@@ -241,7 +241,7 @@ impl AlarmStateMachine {
                 self.annunciated_at = Some(event.at);
                 self.latched |= latch;
                 (self.raised_at, self.returned_at, self.acknowledged) = (Some(event.at), None, None);
-                (self.value, self.burst) = (event.value, event.burst);
+                (self.value, self.first_out) = (event.value, event.first_out);
                 self.times = self.times.saturating_add(1);
             }
             AlarmEvent::RaisedSuppressed => {

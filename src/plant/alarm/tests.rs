@@ -406,11 +406,14 @@ fn of_a_storm_none_is_lost_and_the_first_out_is_marked() {
     }
     assert_eq!(raised.len(), 501);
     assert_eq!(manager.active().len(), 501);
-    assert!(raised.iter().all(|record| record.burst.is_some_and(|burst| burst.began == at(0))), "one burst");
-    let ranks: Vec<u32> = raised.iter().filter_map(|record| record.burst.map(|burst| burst.rank)).collect();
+    assert!(
+        raised.iter().all(|record| record.first_out.is_some_and(|first_out| first_out.began == at(0))),
+        "one first_out"
+    );
+    let ranks: Vec<u32> = raised.iter().filter_map(|record| record.first_out.map(|first_out| first_out.rank)).collect();
     assert_eq!(ranks, (1..=501).collect::<Vec<u32>>());
     let later = manager.judge(at(80), facts(501.5, true));
-    assert_eq!(later[0].burst.map(|burst| (burst.began, burst.rank)), Some((at(80), 1)), "another one");
+    assert_eq!(later[0].first_out.map(|first_out| (first_out.began, first_out.rank)), Some((at(80), 1)), "another one");
 }
 
 /// One thing that happens in the property test.

@@ -79,7 +79,7 @@ fn report() -> ShiftReport {
             by: None,
             reason: None,
             until: None,
-            burst: None,
+            first_out: None,
         }],
         alarm_metrics: alarm_metrics::tests::figures(),
         actions: vec![ActionRecord {

@@ -83,7 +83,7 @@ pub struct Alarms {
     page: Page,
     /// The selected alarm; it stays selected when the list moves.
     selected: Option<AlarmId>,
-    /// Bursts whose consequences are shown, by their beginning; only those that are in the list.
+    /// First-out groups whose consequences are shown, by their beginning; only those that are in the list.
     unfolded: Vec<Timestamp>,
     filter: Filter,
     journal: Journal,
@@ -146,7 +146,7 @@ impl TabView for Alarms {
             "reset" => alarm.is_some_and(|alarm| {
                 matches!(alarm.state, AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged)
             }),
-            "unfold" => alarm.is_some_and(|alarm| alarm.burst.is_some()),
+            "unfold" => alarm.is_some_and(|alarm| alarm.first_out.is_some()),
             "put back" => self
                 .suppressed(cx)
                 .is_some_and(|suppressed| matches!(suppressed.state, AlarmState::Shelved | AlarmState::OutOfService)),
@@ -198,7 +198,7 @@ impl TabView for Alarms {
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let there = |began: &Timestamp| {
-            cx.snapshot.alarms.iter().any(|alarm| alarm.burst.is_some_and(|burst| burst.began == *began))
+            cx.snapshot.alarms.iter().any(|alarm| alarm.first_out.is_some_and(|first_out| first_out.began == *began))
         };
         self.unfolded.retain(there);
         match self.page {
@@ -318,17 +318,18 @@ impl Alarms {
         self.page = Page::ALL[(place + by).rem_euclid(Page::ALL.len() as isize) as usize];
     }
 
-    /// Shows what is folded under the selected alarm, or folds the burst that it belongs to.
+    /// Shows what is folded under the selected alarm, or folds the first-out group that it belongs to.
     fn fold(&mut self, cx: &ViewContext) {
-        let Some(burst) = self.selected(cx).and_then(|alarm| alarm.burst) else { return };
-        match self.unfolded.iter().position(|began| *began == burst.began) {
+        let Some(first_out) = self.selected(cx).and_then(|alarm| alarm.first_out) else { return };
+        match self.unfolded.iter().position(|began| *began == first_out.began) {
             Some(place) => drop(self.unfolded.remove(place)),
-            None => self.unfolded.push(burst.began),
+            None => self.unfolded.push(first_out.began),
         }
-        // Folded away with its burst, it is the first of it that is selected.
+        // Folded away with its first-out group, it is the first of it that is selected.
         let rows = self.rows(cx);
         if !rows.iter().any(|row| Some(row.alarm.id) == self.selected) {
-            let leader = rows.iter().find(|row| row.folded && row.alarm.burst.map(|b| b.began) == Some(burst.began));
+            let leader =
+                rows.iter().find(|row| row.folded && row.alarm.first_out.map(|b| b.began) == Some(first_out.began));
             self.selected = leader.map(|row| row.alarm.id);
         }
     }

@@ -459,7 +459,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
         by: by.map(Arc::from),
         reason: None,
         until: None,
-        burst: None,
+        first_out: None,
     };
     let action = ActionRecord {
         at: ago(700),

@@ -117,7 +117,7 @@ fn at(second: f64) -> Timestamp {
     Timestamp::from_microsecond(START * 1_000_000 + (second * 1e6) as i64).unwrap()
 }
 
-/// Some hundred steps of fourteen alarms: bursts, quiet hours, and now and then more than a day of nothing.
+/// Some hundred steps of fourteen alarms: floods, quiet hours, and now and then more than a day of nothing.
 fn journal() -> impl Strategy<Value = Vec<AlarmRecord>> {
     use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
     let gap = prop_oneof![60 => 0.0..15.0, 20 => 15.0..120.0, 8 => 120.0..4_000.0, 1 => 4_000.0..50_000.0f64];

@@ -29,7 +29,7 @@ use crate::{
     plant::{
         def::{LineDef, LineId, PlantDef, Priority, TagId, Transport},
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmEvent, AlarmRecord, Burst, ChainHash, Record},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut, Record},
         sample::{Cause, Sample},
     },
     report::{
@@ -74,7 +74,7 @@ fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
         by: (step == AlarmEvent::Acknowledged).then(|| "somchai".into()),
         reason: None,
         until: None,
-        burst: None,
+        first_out: None,
     }
 }
 
@@ -374,7 +374,7 @@ fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
     let shelved = AlarmRecord {
         reason: Some("sensor is being changed".into()),
         until: Some(sec(600)),
-        burst: Some(Burst { began: sec(4), rank: 2 }),
+        first_out: Some(FirstOut { began: sec(4), rank: 2 }),
         ..step(8, "low", AlarmEvent::Shelved)
     };
     let last = [&old[1..2], &new, &[shelved]].concat();

@@ -24,7 +24,7 @@ fn event(second: f64, name: &str, event: AlarmEvent) -> AlarmRecord {
         by: None,
         reason: None,
         until: None,
-        burst: None,
+        first_out: None,
     }
 }
 
@@ -156,7 +156,7 @@ fn memory_does_not_grow_with_the_storms_it_has_seen() {
 }
 
 fn events() -> impl Strategy<Value = Vec<AlarmRecord>> {
-    // Bursts and quiet: most events follow within seconds, some after hours.
+    // Floods and quiet: most events follow within seconds, some after hours.
     let gap = prop_oneof![8 => 0.0..20.0, 2 => 20.0..900.0, 1 => 900.0..20_000.0f64];
     let kind = prop_oneof![3 => Just(Raised), 2 => Just(ReturnedToNormal), 1 => Just(Acknowledged)];
     let priority =

@@ -88,7 +88,7 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
                 by: None,
                 reason: None,
                 until: None,
-                burst: None,
+                first_out: None,
             })]);
         }
         assert_eq!(is_over(&mut judge), expect, "{expectation:?} {steps:?}");

@@ -21,7 +21,7 @@ pub enum Action {
     Bell,
     /// Open the guidance of the alarm, whole.
     Open,
-    /// Fold or unfold the burst of the alarm.
+    /// Fold or unfold the first-out group of the alarm.
     Fold,
     /// Acknowledge with a note.
     Note,
@@ -86,7 +86,7 @@ const ACTIONS: [Row; 9] = [
     Key::new(char('/'), "filter", "show only alarms with these words; Esc shows all again", Action::Words),
     Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage)
         .needs(Role::Technician),
-    Key::new(char(' '), "unfold", "show or fold away the consequences of a burst", Action::Fold),
+    Key::new(char(' '), "unfold", "show or fold away the consequences of a first-out group", Action::Fold),
     Key::new(char('r'), "reset", "reset a latched alarm whose cause is gone (asks first)", Action::Reset)
         .needs(Role::Technician),
     Key::new(

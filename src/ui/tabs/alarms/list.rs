@@ -1,4 +1,4 @@
-//! The rows of the list: in order of urgency, a burst folded under the alarm that came first; pure.
+//! The rows of the list: in order of urgency, a first-out group folded under the alarm that came first; pure.
 
 use std::collections::HashMap;
 
@@ -14,11 +14,11 @@ use crate::plant::{
 pub struct Row<'a> {
     /// The alarm that stands there.
     pub alarm: &'a ActiveAlarm,
-    /// It was the first of its burst, and others of the burst are in the list.
+    /// It is the first-out alarm, and others of its group are in the list.
     pub first: bool,
-    /// It stands under the one that its burst is folded under.
+    /// It stands under the one that its first-out group is folded under.
     pub under: bool,
-    /// So many alarms of its burst are folded under it, or can be.
+    /// So many alarms of its first-out group are folded under it, or can be.
     pub more: usize,
     /// So many of those wait for an acknowledgement.
     pub more_waiting: usize,
@@ -26,7 +26,7 @@ pub struct Row<'a> {
     pub folded: bool,
 }
 
-/// A burst, as far as it is in the list.
+/// A first-out group, as far as it is in the list.
 struct Group<'a> {
     /// The earliest of it that is in the list.
     leader: &'a ActiveAlarm,
@@ -37,17 +37,17 @@ struct Group<'a> {
     told: bool,
 }
 
-/// The rows of these alarms, which come in order of urgency. The first of a burst stands where the most urgent of it
+/// The rows of these alarms, which come in order of urgency. The first of a first-out group stands where the most urgent of it
 /// would, the less urgent others below it, unless they are folded; alarms of high and critical priority are never folded.
 pub fn rows<'a>(def: &PlantDef, alarms: impl Iterator<Item = &'a ActiveAlarm>, unfolded: &[Timestamp]) -> Vec<Row<'a>> {
     let alarms: Vec<&ActiveAlarm> = alarms.collect();
     let mut groups: HashMap<Timestamp, Group> = HashMap::new();
     for alarm in &alarms {
-        let Some(burst) = alarm.burst else { continue };
-        let new = || Group { leader: alarm, rank: burst.rank, below: Vec::new(), count: 0, told: false };
-        let group = groups.entry(burst.began).or_insert_with(new);
-        if burst.rank < group.rank {
-            (group.leader, group.rank) = (alarm, burst.rank);
+        let Some(first_out) = alarm.first_out else { continue };
+        let new = || Group { leader: alarm, rank: first_out.rank, below: Vec::new(), count: 0, told: false };
+        let group = groups.entry(first_out.began).or_insert_with(new);
+        if first_out.rank < group.rank {
+            (group.leader, group.rank) = (alarm, first_out.rank);
         }
         group.count += 1;
         if may_fold(def, alarm) {
@@ -57,7 +57,7 @@ pub fn rows<'a>(def: &PlantDef, alarms: impl Iterator<Item = &'a ActiveAlarm>, u
     let plain = |alarm| Row { alarm, first: false, under: false, more: 0, more_waiting: 0, folded: false };
     let mut rows = Vec::with_capacity(alarms.len());
     for alarm in &alarms {
-        let group = alarm.burst.and_then(|burst| Some((burst.began, groups.get_mut(&burst.began)?)));
+        let group = alarm.first_out.and_then(|first_out| Some((first_out.began, groups.get_mut(&first_out.began)?)));
         let Some((began, group)) = group.filter(|(_, group)| 1 < group.count) else {
             rows.push(plain(alarm));
             continue;
@@ -92,24 +92,24 @@ mod tests {
 
     use super::*;
     use crate::{
-        plant::{alarm::AlarmState, def::AlarmId, record::Burst},
+        plant::{alarm::AlarmState, def::AlarmId, record::FirstOut},
         ui::fixture::{Fixture, now},
     };
 
     const PRIORITIES: [Priority; 4] = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low];
 
-    /// Alarms of these priorities, each with the number of its burst and its rank in it.
+    /// Alarms of these priorities, each with the number of its first-out group and its rank in it.
     fn book(rows: &[(Priority, i64, u32)]) -> (PlantDef, Vec<ActiveAlarm>) {
         let mut def = Fixture::normal().def;
         let pattern = def.alarms[0].clone();
         def.alarms.clear();
         let mut alarms = Vec::new();
-        for (n, (priority, burst, rank)) in rows.iter().enumerate() {
+        for (n, (priority, first_out, rank)) in rows.iter().enumerate() {
             let id = AlarmId(n as u16);
             def.alarms.push(crate::plant::def::AlarmDef { id, priority: *priority, ..pattern.clone() });
-            let began = now() + jiff::SignedDuration::from_secs(*burst);
-            let burst = (*burst > 0).then_some(Burst { began, rank: *rank });
-            alarms.push(ActiveAlarm { burst, ..ActiveAlarm::new(id, AlarmState::Unacknowledged, now()) });
+            let began = now() + jiff::SignedDuration::from_secs(*first_out);
+            let first_out = (*first_out > 0).then_some(FirstOut { began, rank: *rank });
+            alarms.push(ActiveAlarm { first_out, ..ActiveAlarm::new(id, AlarmState::Unacknowledged, now()) });
         }
         alarms.sort_by_key(|alarm| def.alarm(alarm.id).priority);
         (def, alarms)
@@ -124,9 +124,9 @@ mod tests {
         use Priority::{High, Low, Medium};
         let (def, alarms) = book(&[(Low, 7, 1), (High, 7, 2), (Medium, 7, 3), (Low, 7, 4), (Medium, 0, 1)]);
         let folded = rows(&def, alarms.iter(), &[]);
-        assert_eq!(ids(&folded), [0, 1, 4], "the cause stands above the urgent one of its burst");
+        assert_eq!(ids(&folded), [0, 1, 4], "the cause stands above the urgent one of its first-out group");
         assert!(folded[0].first && folded[0].folded && (folded[0].more, folded[0].more_waiting) == (2, 2));
-        let began = alarms[0].burst.expect("it is in a burst").began;
+        let began = alarms[0].first_out.expect("it is in a first-out group").began;
         let open = rows(&def, alarms.iter(), &[began]);
         assert_eq!(ids(&open), [0, 2, 3, 1, 4]);
         assert_eq!(open.iter().map(|row| row.under).collect::<Vec<_>>(), [false, true, true, false, false]);
@@ -144,12 +144,12 @@ mod tests {
             open in any::<bool>(),
         ) {
             let mut ranks = [0u32; 4];
-            let seeds: Vec<_> = seeds.into_iter().map(|(priority, burst)| {
-                ranks[burst as usize] += 1;
-                (PRIORITIES[priority], burst, ranks[burst as usize])
+            let seeds: Vec<_> = seeds.into_iter().map(|(priority, first_out)| {
+                ranks[first_out as usize] += 1;
+                (PRIORITIES[priority], first_out, ranks[first_out as usize])
             }).collect();
             let (def, alarms) = book(&seeds);
-            let unfolded: Vec<_> = alarms.iter().filter_map(|alarm| Some(alarm.burst?.began)).filter(|_| open).collect();
+            let unfolded: Vec<_> = alarms.iter().filter_map(|alarm| Some(alarm.first_out?.began)).filter(|_| open).collect();
             let rows = rows(&def, alarms.iter(), &unfolded);
             let hidden: usize = rows.iter().filter(|row| row.folded).map(|row| row.more).sum();
             prop_assert_eq!(rows.len() + hidden, alarms.len());

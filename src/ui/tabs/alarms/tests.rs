@@ -14,7 +14,7 @@ use crate::{
         },
         command::CommandKind,
         def::{AlarmClass, AlarmDef, AlarmId, Priority},
-        record::{ActionRecord, Burst},
+        record::{ActionRecord, FirstOut},
         role::Role,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
@@ -55,9 +55,9 @@ fn storm() -> Fixture {
             area: "TK-1".to_owned(),
             ..pattern.clone()
         });
-        let burst = Some(Burst { began: ago(60), rank: u32::from(n) + 1 });
+        let first_out = Some(FirstOut { began: ago(60), rank: u32::from(n) + 1 });
         let mut alarm = ActiveAlarm::new(id, AlarmState::Unacknowledged, ago(60 - i64::from(n) / 2));
-        (alarm.burst, alarm.value) = (burst, Some(3.8));
+        (alarm.first_out, alarm.value) = (first_out, Some(3.8));
         if n == 2 {
             alarm.state = AlarmState::Acknowledged;
             let reason = Some("pump is looked at".into());
@@ -68,7 +68,7 @@ fn storm() -> Fixture {
         }
         fixture.alarms.push(alarm);
     }
-    fixture.alarms[0].burst = Some(Burst { began: ago(60), rank: 20 });
+    fixture.alarms[0].first_out = Some(FirstOut { began: ago(60), rank: 20 });
     let def = fixture.def.clone();
     fixture.alarms.sort_by_key(|alarm| {
         let waits = alarm.state.needs_acknowledgement();
@@ -482,7 +482,7 @@ fn silence_is_one_key_on_every_tab_and_acknowledges_nothing() {
     assert!(screen(&mut model, 120, 40).lines().nth(2).is_some_and(|banner| banner.contains("silenced")));
 }
 
-/// Ten thousand alarms in the audit log, and so many active in one burst.
+/// Ten thousand alarms in the audit log, and so many active in one first_out.
 fn flood(active: u16) -> Model {
     let mut fixture = Fixture::alarm();
     let pattern = fixture.def.alarms[2].clone();
@@ -492,7 +492,7 @@ fn flood(active: u16) -> Model {
         .collect();
     let alarm = |n: u16| {
         let alarm = ActiveAlarm::new(AlarmId(n * (10_000 / active)), AlarmState::Unacknowledged, ago(60));
-        ActiveAlarm { burst: Some(Burst { began: ago(60), rank: u32::from(n) + 1 }), ..alarm }
+        ActiveAlarm { first_out: Some(FirstOut { began: ago(60), rank: u32::from(n) + 1 }), ..alarm }
     };
     fixture.alarms = (0..active).map(alarm).collect();
     shown(&fixture, Theme::FULL, "")

@@ -179,7 +179,7 @@ fn filter_line(
     }
     if tab.filter.is_off() && words.is_empty() && all > 0 {
         let sorted = match rows.iter().any(|row| row.first || row.under) {
-            true => "a burst under its first alarm",
+            true => "grouped under the first-out alarm",
             false => "the most urgent first",
         };
         words.push(format!("{all} shown, {sorted}"));

@@ -118,7 +118,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         by: by.map(Into::into),
         reason: None,
         until: None,
-        burst: None,
+        first_out: None,
     };
     let (high, low) = (Priority::High, Priority::Low);
     let alarms = vec![

@@ -107,7 +107,7 @@ impl Stand {
                 by: None,
                 reason: None,
                 until: None,
-                burst: None,
+                first_out: None,
             }]),
             other => panic!("the trends never ask {other:?}"),
         }
