@@ -89,7 +89,7 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
         for (number, seen) in (1..).zip(&waiting) {
             let (alarm, kind) = (snapshot.def.alarm(seen.id), seen.acknowledge());
             let status = actor.send_command(number, kind).await?;
-            let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.text);
+            let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.message);
             if status.outcome != Outcome::Verified {
                 return Err(CliError::Failed(line + &outcome_words(&status.outcome)));
             }

@@ -85,7 +85,7 @@ fn alarm_words(snapshot: &Snapshot, alarm: &ActiveAlarm) -> String {
     let def = snapshot.def.alarm(alarm.id);
     let since = alarm.raised_at.to_zoned(snapshot.def.time_zone.clone()).strftime("%m-%d %H:%M:%S");
     let subject = subject_name(&snapshot.def, def.subject);
-    format!("{} {:10} {subject} {} since {since}", def.priority.number(), alarm.state.word(), def.text)
+    format!("{} {:10} {subject} {} since {since}", def.priority.number(), alarm.state.word(), def.message)
 }
 
 fn suppressed_words(snapshot: &Snapshot, alarm: &SuppressedAlarm) -> String {
@@ -94,7 +94,7 @@ fn suppressed_words(snapshot: &Snapshot, alarm: &SuppressedAlarm) -> String {
     let until = alarm.until.map(|at| format!(" until {}", local(at))).unwrap_or_default();
     let active = if alarm.active { ", ACTIVE" } else { "" };
     let subject = subject_name(&snapshot.def, def.subject);
-    format!("{} {:10} {subject} {}{until}{active}", def.priority.number(), alarm.state.word(), def.text)
+    format!("{} {:10} {subject} {}{until}{active}", def.priority.number(), alarm.state.word(), def.message)
 }
 
 fn line_words(state: &LineState) -> String {
@@ -143,7 +143,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
     let alarms = snapshot.alarms.iter().map(|alarm| {
         let found = def.alarm(alarm.id);
         json!({
-            "subject": subject_name(def, found.subject), "text": found.text, "priority": found.priority.number(),
+            "subject": subject_name(def, found.subject), "message": found.message, "priority": found.priority.number(),
             "state": alarm.state.word(), "raised_at": alarm.raised_at.to_string(),
             "returned_at": alarm.returned_at.map(|at| at.to_string()), "value": alarm.value,
         })
@@ -151,7 +151,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
     let suppressed = snapshot.suppressed.iter().map(|alarm| {
         let found = def.alarm(alarm.id);
         json!({
-            "subject": subject_name(def, found.subject), "text": found.text, "priority": found.priority.number(),
+            "subject": subject_name(def, found.subject), "message": found.message, "priority": found.priority.number(),
             "state": alarm.state.word(), "active": alarm.active, "until": alarm.until.map(|at| at.to_string()),
         })
     });

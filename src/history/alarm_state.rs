@@ -66,7 +66,7 @@ impl LatestSteps {
 type Key = (Arc<str>, Arc<str>, &'static str);
 
 fn key(step: &AlarmRecord) -> Key {
-    (step.subject.clone(), step.text.clone(), step.event.word())
+    (step.subject.clone(), step.message.clone(), step.event.word())
 }
 
 /// A step as a line, with its end.

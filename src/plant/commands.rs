@@ -311,7 +311,7 @@ impl CommandTracker {
             return refuse(Refusal::NotAChoice);
         }
         if let Some(lock) = self.def.logic.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {
-            return refuse(Refusal::Interlock(lock.text.clone()));
+            return refuse(Refusal::Interlock(lock.message.clone()));
         }
         let bound = |bound: Option<super::tag::Bound>| bound.map(|bound| image.bound(bound)).transpose();
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
@@ -439,7 +439,7 @@ fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImage) -> Actio
 /// Action, target and new state of an action on alarms.
 pub fn alarm_words(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static str, String, Option<String>) {
     let name = |alarm: &AlarmId| match def.alarms.get(alarm.index()) {
-        Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.text),
+        Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.message),
         None => format!("alarm {}", alarm.0),
     };
     match alarm_command {

@@ -35,7 +35,7 @@ pub struct InterlockDef {
     /// When it blocks.
     pub when: InterlockCondition,
     /// `no heating below 5 cm of water`.
-    pub text: String,
+    pub message: String,
     /// The station refuses the command while it is certainly blocked; else the operator is only told.
     pub refuse: bool,
 }
@@ -204,9 +204,9 @@ mod tests {
     }
 
     fn logic(refuse: bool) -> ControlLogic {
-        let text = "no heating below 5 cm".to_owned();
+        let message = "no heating below 5 cm".to_owned();
         let lock =
-            InterlockDef { tag: COMMAND, value: 1.0, of: LEVEL, when: InterlockCondition::Below(5.0), text, refuse };
+            InterlockDef { tag: COMMAND, value: 1.0, of: LEVEL, when: InterlockCondition::Below(5.0), message, refuse };
         let travel = Some(Duration::from_secs(5));
         let actuator = ActuatorDef { output: OUTPUT, command: COMMAND, off: 0.0, needs: vec![(AUTO, 0.0)], travel };
         ControlLogic { interlocks: vec![lock], actuators: vec![actuator], sequences: Vec::new() }

@@ -34,7 +34,7 @@ pub struct AlarmRecord {
     /// Full name of the tag or device: `TIC-1.PV`.
     pub subject: Arc<str>,
     /// `temperature high`.
-    pub text: Arc<str>,
+    pub message: Arc<str>,
     /// How urgent.
     pub priority: Priority,
     /// What happened.
@@ -55,10 +55,10 @@ pub struct AlarmRecord {
 
 impl AlarmRecord {
     /// An event without operator, value and limit.
-    pub fn new(at: Timestamp, subject: &str, text: &str, priority: Priority, event: AlarmEvent) -> AlarmRecord {
-        let (subject, text) = (subject.into(), text.into());
+    pub fn new(at: Timestamp, subject: &str, message: &str, priority: Priority, event: AlarmEvent) -> AlarmRecord {
+        let (subject, message) = (subject.into(), message.into());
         let (value, limit, by, reason, until, first_out) = (None, None, None, None, None, None);
-        AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, first_out }
+        AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out }
     }
 }
 

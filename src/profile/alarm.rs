@@ -42,7 +42,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     let of_lines = defs.lines.iter().map(|line| (&line.name, overloaded(line)));
     for (name, alarm) in of_devices.chain(of_lines) {
         if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
-            check_generated(tables, name, &alarm.text, problems);
+            check_generated(tables, name, &alarm.message, problems);
             alarms.push(AlarmDef { id: AlarmId(alarms.len() as u16), ..alarm });
         }
     }
@@ -57,7 +57,7 @@ fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
     let mut seen = Unique::default();
     for table in tables.iter().map(|table| &table.value) {
         let (Some(subject), Some(text)) =
-            (table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref()), &table.text)
+            (table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref()), &table.message)
         else {
             continue;
         };
@@ -71,7 +71,7 @@ fn check_generated(tables: &[At<AlarmTable>], name: &str, generated: &str, probl
     for table in tables.iter().map(|table| &table.value) {
         let subject = table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref());
         let same = subject.is_some_and(|subject| subject.value == name);
-        if let Some(text) = table.text.as_ref().filter(|text| same && text.value == generated) {
+        if let Some(text) = table.message.as_ref().filter(|text| same && text.value == generated) {
             let problem = problems.add(text.at, format!("duplicate alarm `{generated}` of {name}"));
             problem.label("the station adds one of this name by itself: expected another text");
         }
@@ -115,7 +115,7 @@ fn alarm(
         off_delay: time(table.off_delay),
         re_alarm: table.re_alarm.map(|re_alarm| re_alarm.value),
         latch: flag(table.latch),
-        note: table.note.is_some_and(|note| note.value == Need::Required),
+        ack_comment: table.ack_comment.is_some_and(|note| note.value == Need::Required),
         enabled_when: table.enabled_when.as_ref().and_then(|words| expr::expr(words, defs, problems)),
         guidance: Guidance {
             cause: text(&table.cause),
@@ -123,7 +123,7 @@ fn alarm(
             action: text(&table.action),
             response_time: table.response_time.map(|time| time.value),
         },
-        ..AlarmDef::new(id, subject, condition, text(&table.text))
+        ..AlarmDef::new(id, subject, condition, text(&table.message))
     }
 }
 

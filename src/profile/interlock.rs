@@ -43,7 +43,7 @@ fn interlock(
             .help("a stop must always be possible; the operator is told all the same");
     }
     let refuse = table.refuse.map_or(!off && !stops.is_empty(), |refuse| refuse.value);
-    Some(InterlockDef { tag: tag.id, value, of: of.id, when, text: text(&table.text), refuse })
+    Some(InterlockDef { tag: tag.id, value, of: of.id, when, message: text(&table.message), refuse })
 }
 
 /// Exactly one of the four conditions.

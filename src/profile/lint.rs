@@ -119,11 +119,11 @@ fn split(tables: &[&AlarmTable], problems: &mut Problems) {
 fn name(table: &AlarmTable) -> String {
     let words = |words: &Option<At<String>>| words.as_ref().map(|words| words.value.clone());
     let subject = words(&table.tag).or_else(|| words(&table.device)).unwrap_or_default();
-    format!("the alarm `{}` of {subject}", words(&table.text).unwrap_or_default())
+    format!("the alarm `{}` of {subject}", words(&table.message).unwrap_or_default())
 }
 
 fn place(table: &AlarmTable) -> Span {
-    table.text.as_ref().map_or(table.at, |text| text.at)
+    table.message.as_ref().map_or(table.at, |text| text.at)
 }
 
 #[cfg(test)]
@@ -164,13 +164,13 @@ mod tests {
     }
 
     const HOT: &str =
-        "tag = \"D1.T\"\nhigh = 80.0\ndeadband = 1.0\non_delay = \"5s\"\npriority = \"high\"\ntext = \"hot\"";
+        "tag = \"D1.T\"\nhigh = 80.0\ndeadband = 1.0\non_delay = \"5s\"\npriority = \"high\"\nmessage = \"hot\"";
 
     #[test]
     fn a_complete_alarm_is_left_in_peace() {
         check(&alarm(HOT), &[]);
-        check(&alarm("device = \"D1\"\npriority = \"low\"\ntext = \"silent\""), &[]);
-        check(&alarm("tag = \"D1.MODE\"\nis = \"on\"\npriority = \"low\"\ntext = \"runs\""), &[]);
+        check(&alarm("device = \"D1\"\npriority = \"low\"\nmessage = \"silent\""), &[]);
+        check(&alarm("tag = \"D1.MODE\"\nis = \"on\"\npriority = \"low\"\nmessage = \"runs\""), &[]);
     }
 
     #[test]
@@ -200,7 +200,7 @@ mod tests {
         let again = HOT.replace("80.0", "85.0").replace("hot", "hotter");
         check(&(alarm(HOT) + &alarm(&again)), &["D1.T has two alarms for `high`"]);
         let is = |state: &str| {
-            alarm(&format!("tag = \"D1.MODE\"\nis = \"{state}\"\npriority = \"low\"\ntext = \"{state}!\""))
+            alarm(&format!("tag = \"D1.MODE\"\nis = \"{state}\"\npriority = \"low\"\nmessage = \"{state}!\""))
         };
         check(&(is("on") + &is("off")), &[]);
         let both = is("on") + &is("on").replace("on!", "runs");
@@ -213,7 +213,7 @@ mod tests {
             let one = |i: usize| {
                 let priority = if i < urgent { "high" } else { "low" };
                 let state = ["on", "off"][i % 2];
-                let text = format!("tag = \"D1.MODE\"\nis = \"{state}\"\npriority = \"{priority}\"\ntext = \"{i}\"");
+                let text = format!("tag = \"D1.MODE\"\nis = \"{state}\"\npriority = \"{priority}\"\nmessage = \"{i}\"");
                 alarm(&text)
             };
             (0..all).map(one).collect()

@@ -316,13 +316,13 @@ table!(
         opt "class" class: AlarmClass,
         opt "area" area: String,
         opt "latch" latch: bool,
-        opt "note" note: Need,
+        opt "ack_comment" ack_comment: Need,
         opt "re_alarm" re_alarm: Duration,
         opt "deadband" deadband: f64,
         opt "on_delay" on_delay: Duration,
         opt "off_delay" off_delay: Duration,
         need "priority" priority: Priority,
-        need "text" text: String,
+        need "message" message: String,
         opt "cause" cause: String,
         opt "effect" effect: String,
         opt "action" action: String,
@@ -348,7 +348,7 @@ table!(
         opt "above" above: f64,
         opt "is" is: Choice,
         opt "bit" bit: u8,
-        need "text" text: String,
+        need "message" message: String,
         opt "refuse" refuse: bool,
     }
 );
@@ -524,7 +524,7 @@ pub(super) enum Need {
     Optional,
 }
 
-words!(Need, "need for a note" {
+words!(Need, "need for a comment" {
     "required" => Need::Required, "optional" => Need::Optional,
 });
 words!(Priority, "priority" {

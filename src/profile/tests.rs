@@ -43,7 +43,7 @@ tag = "D1.T"
 high = 80.0
 deadband = 1.0
 priority = "high"
-text = "hot"
+message = "hot"
 
 [mimic]
 item = [
@@ -373,7 +373,7 @@ fn interlocked(tables: &str) -> Result<PlantDef, Errors> {
 
 #[test]
 fn an_interlock_says_what_blocks_which_value() {
-    let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"too hot\"\n";
+    let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\nmessage = \"too hot\"\n";
     let plant = interlocked(lock).unwrap();
     let found = &plant.logic.interlocks[0];
     assert_eq!((found.value, found.when, found.refuse), (1.0, InterlockCondition::Above(80.0), false));
@@ -387,7 +387,7 @@ fn an_interlock_says_what_blocks_which_value() {
         ("above = 80", "bit = 16", "D1.T has no bit 16"),
         ("of = \"D1.T\"", "of = \"D1.X\"", "unknown tag `D1.X`"),
         ("tag = \"D1.MODE\"", "tag = \"D1.T\"", "D1.T cannot be commanded"),
-        ("text = \"too hot\"", "", "an interlock needs `text`"),
+        ("message = \"too hot\"", "", "an interlock needs `message`"),
     ] {
         let text = interlocked(&lock.replace(from, to)).expect_err(to).to_string();
         assert!(text.contains(expect), "{to}: {text}");
@@ -396,7 +396,7 @@ fn an_interlock_says_what_blocks_which_value() {
 
 #[test]
 fn only_a_binary_number_that_is_not_scaled_has_bits() {
-    let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.W\"\nbit = 3\ntext = \"locked\"\n";
+    let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.W\"\nbit = 3\nmessage = \"locked\"\n";
     let plant = PLANT.replace("[mimic]", &format!("{lock}\n[mimic]"));
     for (kind, fits) in [
         ("type = \"int16\"", true),
@@ -426,7 +426,7 @@ fn an_actuator_has_one_command_and_one_output() {
     let plant = interlocked(table).unwrap();
     assert_eq!(plant.logic.actuators[0].needs, [(plant.tag_named("PLC.STEP").unwrap(), 1.0)]);
     assert_eq!(plant.logic.actuators[0].travel, None);
-    let unsaid = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\n";
+    let unsaid = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\nmessage = \"hot\"\n";
     for (tables, refuse) in [
         (unsaid.to_owned(), false),
         (format!("{unsaid}refuse = true\n"), true),
@@ -437,8 +437,7 @@ fn an_actuator_has_one_command_and_one_output() {
         assert_eq!(interlocked(&tables).unwrap().logic.interlocks[0].refuse, refuse, "{tables}");
     }
     // Where another value switches off, that one is never refused.
-    let lock =
-        "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\ntext = \"hot\"\nrefuse = true\n";
+    let lock = "[[interlock]]\ntag = \"D1.MODE\"\nvalue = \"on\"\nof = \"D1.T\"\nabove = 80\nmessage = \"hot\"\nrefuse = true\n";
     let text = interlocked(&format!("{table}off = \"on\"\n{lock}")).expect_err("off is on").to_string();
     assert!(text.contains("switching off is never refused"), "{text}");
     assert!(interlocked(&format!("{table}{lock}")).is_ok());
@@ -464,10 +463,10 @@ fn an_alarm_that_could_never_come_or_never_go_is_refused() {
 
 #[test]
 fn the_alarm_of_an_overloaded_line_may_be_written() {
-    let own = "[[alarm]]\nline = \"L1\"\noverloaded = true\npriority = \"high\"\ntext = \"slow\"\n[mimic]";
+    let own = "[[alarm]]\nline = \"L1\"\noverloaded = true\npriority = \"high\"\nmessage = \"slow\"\n[mimic]";
     let plant = load(PLANT.replacen("[mimic]", own, 1).as_bytes(), METER, PLC).expect("a good plant");
     let found: Vec<_> = plant.alarms.iter().filter(|alarm| alarm.condition == Condition::Overloaded).collect();
-    assert!(matches!(found[..], [alarm] if alarm.text == "slow" && alarm.subject == Subject::Line(LineId(0))));
+    assert!(matches!(found[..], [alarm] if alarm.message == "slow" && alarm.subject == Subject::Line(LineId(0))));
     check("[mimic]", &own.replace("true", "false"), &["only a `line` can be overloaded", "expected `true`"]);
     check("[mimic]", &own.replace("line = \"L1\"", "device = \"D1\""), &["only a `line` can be overloaded"]);
     let own = own.replace("overloaded = true\n", "").replace("slow", "line overloaded");
@@ -476,9 +475,9 @@ fn the_alarm_of_an_overloaded_line_may_be_written() {
 
 #[test]
 fn two_alarms_of_one_name_would_share_their_state_and_are_refused() {
-    let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\ntext = \"hot\"\n[mimic]";
+    let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\nmessage = \"hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:36:8]", "duplicate alarm `hot` of D1.T", "first here"]);
-    let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\ntext = \"gives no values\"\n[mimic]";
+    let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\nmessage = \"gives no values\"\n[mimic]";
     check("[mimic]", own, &["duplicate alarm `gives no values` of D1", "expected another text"]);
 }
 
@@ -542,12 +541,12 @@ fn what_enables_an_alarm_is_read_and_every_slip_is_shown_at_its_place() {
 
 #[test]
 fn limits_of_one_tag_stand_in_order() {
-    let second = "[[alarm]]\ntag = \"D1.T\"\nhigh_high = 70.0\ndeadband = 1.0\npriority = \"critical\"\ntext = \"very hot\"\n[mimic]";
+    let second = "[[alarm]]\ntag = \"D1.T\"\nhigh_high = 70.0\ndeadband = 1.0\npriority = \"critical\"\nmessage = \"very hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:26:8]", "high 80 is not below high_high 70 of D1.T"]);
     // However many there are, each is named once for each level above it.
     let alarm = |level: &str, limit: f64, n: i32| {
         format!(
-            "[[alarm]]\ntag = \"D1.T\"\n{level} = {limit:.1}\ndeadband = 1.0\npriority = \"low\"\ntext = \"{level} {n}\"\n"
+            "[[alarm]]\ntag = \"D1.T\"\n{level} = {limit:.1}\ndeadband = 1.0\npriority = \"low\"\nmessage = \"{level} {n}\"\n"
         )
     };
     let many =
@@ -762,7 +761,7 @@ fn characters_that_hide_or_move_the_cursor_are_refused_where_they_stand() {
         assert!(!text.contains(['\u{1b}', '\u{202E}', '\u{2066}']), "{text:?}");
     }
     check("priority = \"high\"", "priority = \"high\"\n\"a\\u0007\" = 1", &["[small.toml:", "U+0007"]);
-    check("text = \"hot\"", "text = \"hot\\u200f\"", &["[small.toml:29:8]", "U+200F"]);
+    check("message = \"hot\"", "message = \"hot\\u200f\"", &["[small.toml:29:8]", "U+200F"]);
     let meter = METER.replace("ACME", "AC\\u009BME");
     let text = load(PLANT.as_bytes(), &meter, PLC).expect_err("a profile too").to_string();
     assert!(text.contains("U+009B") && text.contains("[meter.toml:1:10]"), "{text}");

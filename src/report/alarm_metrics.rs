@@ -90,7 +90,7 @@ pub fn bad_actors(figures: &PeriodMetrics) -> Vec<BadActor> {
     let bad_actor = |kind, alarm: &Named, raised| BadActor {
         kind,
         subject: alarm.subject.to_string(),
-        alarm: alarm.text.to_string(),
+        alarm: alarm.message.to_string(),
         raised,
     };
     let frequent = figures.top.iter().map(|frequent| bad_actor("frequent", &frequent.alarm, Some(frequent.raised)));
@@ -175,7 +175,7 @@ pub(super) mod tests {
 
     /// Eight hours with 24 alarms, six of them of one that chatters.
     pub fn figures() -> PeriodMetrics {
-        let name = |subject: &str, text: &str| Named { subject: subject.into(), text: text.into() };
+        let name = |subject: &str, text: &str| Named { subject: subject.into(), message: text.into() };
         let high = name("TIC-1.PV", "temperature high");
         PeriodMetrics {
             from: at("2026-11-21T06:00+07"),

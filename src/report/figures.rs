@@ -135,10 +135,10 @@ pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Tim
         since = at;
         match step.event {
             AlarmEvent::Raised | AlarmEvent::RaisedSuppressed => {
-                active.insert(&step.text);
+                active.insert(&step.message);
             }
             AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
-                active.remove(&*step.text);
+                active.remove(&*step.message);
             }
             AlarmEvent::Acknowledged
             | AlarmEvent::ReAlarmed
@@ -177,13 +177,13 @@ pub fn suppressed(
     until: Timestamp,
 ) -> Vec<SuppressedSummary> {
     let mut alarms: BTreeMap<(&str, &str), Quiet> = BTreeMap::new();
-    let annunciated: HashSet<(&str, &str)> = standing.iter().map(|step| (&*step.subject, &*step.text)).collect();
+    let annunciated: HashSet<(&str, &str)> = standing.iter().map(|step| (&*step.subject, &*step.message)).collect();
     for step in active {
-        let name = (&*step.subject, &*step.text);
+        let name = (&*step.subject, &*step.message);
         alarms.entry(name).or_insert_with(|| Quiet::new(step)).set(true, !annunciated.contains(&name), from);
     }
     for step in steps {
-        let alarm = alarms.entry((&step.subject, &step.text)).or_insert_with(|| Quiet::new(step));
+        let alarm = alarms.entry((&step.subject, &step.message)).or_insert_with(|| Quiet::new(step));
         let (active, quiet) = match step.event {
             AlarmEvent::Raised => (true, false),
             AlarmEvent::RaisedSuppressed => (true, true),
@@ -212,8 +212,8 @@ struct Quiet {
 
 impl Quiet {
     fn new(step: &AlarmRecord) -> Quiet {
-        let (subject, text) = (step.subject.clone(), step.text.clone());
-        let found = SuppressedSummary { subject, text, priority: step.priority, raised: 0, active: Duration::ZERO };
+        let (subject, message) = (step.subject.clone(), step.message.clone());
+        let found = SuppressedSummary { subject, message, priority: step.priority, raised: 0, active: Duration::ZERO };
         Quiet { active: false, quiet: false, since: step.at, found }
     }
 

@@ -150,7 +150,7 @@ pub struct SuppressedSummary {
     /// Full name of the tag or device.
     pub subject: Arc<str>,
     /// `temperature high`.
-    pub text: Arc<str>,
+    pub message: Arc<str>,
     /// Its priority.
     pub priority: Priority,
     /// Activations in the period that were not annunciated.

@@ -98,7 +98,7 @@ fn suppressed_row(alarm: &SuppressedSummary, dialect: CsvDialect) -> Vec<String>
     vec![
         plain(alarm.priority.word()),
         text(&alarm.subject),
-        text(&alarm.text),
+        text(&alarm.message),
         plain(alarm.raised.to_string()),
         number(Some(alarm.active.as_secs_f64() / 60.0), 1, dialect),
     ]
@@ -124,7 +124,7 @@ fn alarm_row(alarm: &AlarmRecord, zone: &TimeZone, dialect: CsvDialect) -> Vec<S
         plain(iso_millis(zone, alarm.at)),
         plain(alarm.priority.word()),
         text(&alarm.subject),
-        text(&alarm.text),
+        text(&alarm.message),
         plain(alarm.event.word()),
         shortest(alarm.value, dialect),
         shortest(alarm.limit, dialect),

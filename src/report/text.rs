@@ -54,7 +54,7 @@ fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
     for alarm in &report.suppressed {
         let (subject, minutes) = (&alarm.subject, alarm.active.as_secs_f64() / 60.0);
         let raised = alarm.raised;
-        lines.push(format!("suppressed: {subject} {}, active {minutes:.1} min, raised {raised} times", alarm.text));
+        lines.push(format!("suppressed: {subject} {}, active {minutes:.1} min, raised {raised} times", alarm.message));
     }
     lines.push(format!("operator actions: {}", report.actions.len()));
     lines.join("\n") + "\n"

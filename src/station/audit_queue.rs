@@ -153,7 +153,7 @@ impl AuditQueue {
             self.needed = self.sent + 1;
         }
         let by_operators = steps.iter().filter(|step| step.by.is_some());
-        self.steps.extend(by_operators.map(|step| ((step.subject.clone(), step.text.clone()), self.needed)));
+        self.steps.extend(by_operators.map(|step| ((step.subject.clone(), step.message.clone()), self.needed)));
         self.backlog.extend(actions);
         steps.into_iter().for_each(|step| self.backlog_steps.take(step));
         self.send()
@@ -246,7 +246,7 @@ impl AuditQueue {
         }
         let is_recorded = |id: AlarmId| {
             let alarm = snapshot.def.alarm(id);
-            let name = (subject_name(&snapshot.def, alarm.subject).into(), alarm.text.as_str().into());
+            let name = (subject_name(&snapshot.def, alarm.subject).into(), alarm.message.as_str().into());
             !self.steps.contains_key(&name)
         };
         for alarm in Arc::make_mut(&mut snapshot.alarms) {

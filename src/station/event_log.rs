@@ -82,7 +82,7 @@ fn alarm_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
         }
         let subject = subject_name(&after.def, alarm.subject);
         let word = alarm_word(old, new);
-        lines.push(format!("alarm {} {word}: {subject} {}", alarm.priority.number(), alarm.text));
+        lines.push(format!("alarm {} {word}: {subject} {}", alarm.priority.number(), alarm.message));
     }
     lines
 }

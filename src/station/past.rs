@@ -50,7 +50,7 @@ impl Past {
 
     /// Joins the past with what has happened since: the steps to restore leave out alarms that have changed meanwhile.
     pub fn join(self, mut restored: Restored) -> Restored {
-        let name = |step: &AlarmRecord| (step.subject.clone(), step.text.clone());
+        let name = |step: &AlarmRecord| (step.subject.clone(), step.message.clone());
         let changed: HashSet<_> = self.early.iter().map(name).collect();
         restored.steps.retain(|step| self.from_journal && !changed.contains(&name(step)));
         restored.recent.steps.extend(self.early);

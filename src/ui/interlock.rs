@@ -80,17 +80,17 @@ pub fn interlock_words(cx: &ViewContext, lock: &InterlockDef) -> Option<(String,
     match (lock.status(cx.snapshot.sample(lock.of)), lock.when) {
         (InterlockStatus::Free, _) => None,
         (InterlockStatus::Blocked, InterlockCondition::Bit(_)) => {
-            Some((format!("{mark} {}: {name} says so", lock.text), cx.theme.strong()))
+            Some((format!("{mark} {}: {name} says so", lock.message), cx.theme.strong()))
         }
         (
             InterlockStatus::Blocked,
             InterlockCondition::Below(_) | InterlockCondition::Above(_) | InterlockCondition::Is(_),
         ) => {
             let now = value::show(cx, lock.of).with_unit();
-            Some((format!("{mark} {}: {name} is {now}", lock.text), cx.theme.strong()))
+            Some((format!("{mark} {}: {name} is {now}", lock.message), cx.theme.strong()))
         }
         (InterlockStatus::Unknown(cause), _) => {
-            let words = format!("? cannot be told: {name} is not good ({}): {}", cause.words(), lock.text);
+            let words = format!("? cannot be told: {name} is not good ({}): {}", cause.words(), lock.message);
             Some((words, cx.theme.trouble()))
         }
     }

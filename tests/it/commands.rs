@@ -112,7 +112,7 @@ fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
         Record::Alarm(AlarmRecord {
             at: at(second),
             subject: "TIC-1.PV".into(),
-            text: "temperature high".into(),
+            message: "temperature high".into(),
             priority: Priority::High,
             event: AlarmEvent::Raised,
             value: Some(76.0),

@@ -250,7 +250,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
 
 /// The command to acknowledge [`ALARM`], if it waits for that.
 fn to_acknowledge(snapshot: &Snapshot) -> Option<CommandKind> {
-    let is_it = |alarm: &&ActiveAlarm| snapshot.def.alarm(alarm.id).text == ALARM;
+    let is_it = |alarm: &&ActiveAlarm| snapshot.def.alarm(alarm.id).message == ALARM;
     let alarm = snapshot.alarms.iter().find(is_it).filter(|alarm| alarm.state.needs_acknowledgement())?;
     Some(alarm.acknowledge())
 }
@@ -283,7 +283,7 @@ fn reason_of(history: &Path, kind: AlarmEvent, text: Option<&str>) -> Option<Arc
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
     assert_eq!(found.trouble, None);
     let steps = found.steps.unwrap_or_default();
-    let is_it = |step: &&AlarmRecord| step.event == kind && text.is_none_or(|text| &*step.text == text);
+    let is_it = |step: &&AlarmRecord| step.event == kind && text.is_none_or(|text| &*step.message == text);
     steps.iter().find(is_it).and_then(|step| step.reason.clone())
 }
 

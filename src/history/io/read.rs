@@ -193,7 +193,7 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
     Ok(AlarmRecord {
         at: time(row)?,
         subject: shared(row, 1)?,
-        text: shared(row, 2)?,
+        message: shared(row, 2)?,
         priority: match row.get::<_, u8>(3)? {
             1 => Priority::Critical,
             2 => Priority::High,

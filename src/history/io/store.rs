@@ -257,13 +257,14 @@ impl Store {
         let Some(first) = rows.next() else { return Ok(()) };
         let mut appender = self.db.appender("alarm_journal")?;
         for alarm in std::iter::once(first).chain(rows) {
-            let AlarmRecord { at, subject, text, priority, event, value, limit, by, reason, until, first_out } = alarm;
+            let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out } =
+                alarm;
             let (until, began) = (until.map(utc), first_out.map(|first_out| utc(first_out.began)));
             let (priority, rank) = (priority.number(), first_out.map(|first_out| first_out.rank));
             appender.append_row(params![
                 utc(*at),
                 subject,
-                text,
+                message,
                 priority,
                 event.word(),
                 value,

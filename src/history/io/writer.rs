@@ -389,7 +389,7 @@ mod tests {
         Record::Alarm(AlarmRecord {
             at: sec(at),
             subject: "TIC-1.PV".into(),
-            text: "high".into(),
+            message: "high".into(),
             priority: Priority::High,
             event: AlarmEvent::Raised,
             value: None,

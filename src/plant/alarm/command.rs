@@ -115,7 +115,7 @@ impl AlarmManager {
             return Err(AlarmRefusal::RaisedSince);
         }
         let note = note.filter(|note| !note.trim().is_empty());
-        if alarm.note && note.is_none() {
+        if alarm.ack_comment && note.is_none() {
             return Err(AlarmRefusal::NoteNeeded);
         }
         check_words(note)?;

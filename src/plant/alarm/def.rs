@@ -35,18 +35,18 @@ pub struct AlarmDef {
     /// Once raised it stays in the list until it is reset, also when the condition is gone.
     pub latch: bool,
     /// Whoever acknowledges it must write a note.
-    pub note: bool,
+    pub ack_comment: bool,
     /// While this is certainly false the alarm is suppressed by design.
     pub enabled_when: Option<Expr>,
     /// `temperature high`.
-    pub text: String,
+    pub message: String,
     /// Cause, effect, action.
     pub guidance: Guidance,
 }
 
 impl AlarmDef {
     /// A process alarm of high priority without delays, latch, suppression or guidance.
-    pub fn new(id: AlarmId, subject: Subject, condition: Condition, text: impl Into<String>) -> AlarmDef {
+    pub fn new(id: AlarmId, subject: Subject, condition: Condition, message: impl Into<String>) -> AlarmDef {
         AlarmDef {
             id,
             subject,
@@ -58,9 +58,9 @@ impl AlarmDef {
             off_delay: Duration::ZERO,
             re_alarm: None,
             latch: false,
-            note: false,
+            ack_comment: false,
             enabled_when: None,
-            text: text.into(),
+            message: message.into(),
             guidance: Guidance::default(),
         }
     }

@@ -83,11 +83,11 @@ impl AlarmManager {
     /// Takes up the alarms that the journal remembers from before a restart: of each alarm at least the last event of every
     /// kind, oldest first. Steps of alarms that the plant no longer has are passed over.
     pub fn restore(&mut self, events: &[AlarmRecord]) {
-        let name = |alarm: &AlarmDef| (subject_name(&self.def, alarm.subject).to_owned(), alarm.text.clone());
+        let name = |alarm: &AlarmDef| (subject_name(&self.def, alarm.subject).to_owned(), alarm.message.clone());
         let known: HashMap<(String, String), AlarmId> =
             self.def.alarms.iter().map(|alarm| (name(alarm), alarm.id)).collect();
         for event in events {
-            if let Some(id) = known.get(&(event.subject.to_string(), event.text.to_string())) {
+            if let Some(id) = known.get(&(event.subject.to_string(), event.message.to_string())) {
                 self.apply(*id, event);
             }
         }
@@ -254,7 +254,8 @@ impl AlarmManager {
     }
 
     pub(super) fn record(&self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
-        let record = AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.text, alarm.priority, event);
+        let record =
+            AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.message, alarm.priority, event);
         AlarmRecord { value, limit: limit_of(alarm.condition), ..record }
     }
 }

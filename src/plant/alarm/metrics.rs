@@ -69,7 +69,7 @@ pub struct Named {
     /// Full name of the tag or device: `TIC-1.PV`.
     pub subject: Arc<str>,
     /// `temperature high`.
-    pub text: Arc<str>,
+    pub message: Arc<str>,
 }
 
 /// An alarm and how often it was raised.

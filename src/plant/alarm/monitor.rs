@@ -388,7 +388,7 @@ fn most_at_once(spans: Vec<(i64, i64)>) -> u64 {
 }
 
 fn named(event: &AlarmRecord) -> Named {
-    Named { subject: event.subject.clone(), text: event.text.clone() }
+    Named { subject: event.subject.clone(), message: event.message.clone() }
 }
 
 fn second(at: Timestamp) -> i64 {

@@ -86,7 +86,7 @@ fn what_was_raised_after_the_operator_looked_stays_unacknowledged() {
 
 #[test]
 fn a_note_is_asked_for_where_the_plant_wants_one() {
-    let def = with(|alarm| (alarm.on_delay, alarm.note) = (Duration::ZERO, true));
+    let def = with(|alarm| (alarm.on_delay, alarm.ack_comment) = (Duration::ZERO, true));
     let mut manager = AlarmManager::new(def);
     manager.judge(at(0), facts(80.0, true));
     for note in [None, Some("".into()), Some("  ".into())] {
@@ -452,7 +452,7 @@ fn test_event() -> impl Strategy<Value = TestEvent> {
 /// What the journal restores: of each alarm the last event of every kind, in their order.
 fn remembered(journal: &[AlarmRecord]) -> Vec<AlarmRecord> {
     let last = |(place, record): &(usize, &AlarmRecord)| {
-        let same = |later: &AlarmRecord| later.event == record.event && later.text == record.text;
+        let same = |later: &AlarmRecord| later.event == record.event && later.message == record.message;
         !journal[place + 1..].iter().any(same)
     };
     journal.iter().enumerate().filter(last).map(|(_, record)| record.clone()).collect()

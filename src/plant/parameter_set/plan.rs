@@ -179,7 +179,7 @@ fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, t
     }
     let held = decimals(tag, trusted).and_then(|decimals| scale::held(tag, change.new, decimals));
     if let Some(lock) = def.logic.refusal(tag.id, held.unwrap_or(change.new), |tag| as_sample(trusted(tag))) {
-        return Some(Problem::Interlock { tag: tag.short.clone(), text: lock.text.clone() });
+        return Some(Problem::Interlock { tag: tag.short.clone(), text: lock.message.clone() });
     }
     let (min, max) = match (bound(tag.min, then), bound(tag.max, then)) {
         (Ok(min), Ok(max)) => (min, max),

@@ -180,7 +180,7 @@ fn what_an_interlock_forbids_is_told_before_anything_is_written() {
         value: 1.0,
         of: SV,
         when: InterlockCondition::Above(40.0),
-        text: "no FUZZY above 40".into(),
+        message: "no FUZZY above 40".into(),
         refuse: true,
     });
     let set = set([0., 100., 60., 1.]);

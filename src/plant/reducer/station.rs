@@ -72,7 +72,7 @@ mod tests {
         plant.on_history(failing);
         assert_eq!(tick(&mut plant, 1), [], "one failed commit raises no alarm");
         let raised = tick(&mut plant, 4);
-        assert_eq!((raised.len(), &*raised[0].text), (1, "history not recording"));
+        assert_eq!((raised.len(), &*raised[0].message), (1, "history not recording"));
         assert_eq!((raised[0].event, raised[0].reason.as_deref()), (AlarmEvent::Raised, Some("no space left")));
         let snapshot = plant.snapshot();
         assert!(snapshot.sound);
@@ -102,7 +102,7 @@ mod tests {
         let behind = HistoryStatus { clock: Some("the clock is behind".into()), ..HistoryStatus::default() };
         plant.on_history(behind.clone());
         let raised = tick(&mut plant, 1);
-        assert_eq!((raised.len(), &*raised[0].text), (1, StationFault::Clock.message()));
+        assert_eq!((raised.len(), &*raised[0].message), (1, StationFault::Clock.message()));
         plant.on_history(behind);
         assert_eq!(tick(&mut plant, 2), [], "once");
     }
@@ -113,6 +113,6 @@ mod tests {
         let fault = |state| Event::Station { at: at(1), fault: StationFault::LineTask, state };
         let effects = plant.on_event(fault(FaultState::Occurred("line L1 was started again".into())));
         let Some(Record::Alarm(step)) = effects.records.last() else { panic!("no alarm: {effects:?}") };
-        assert_eq!((&*step.subject, &*step.text), ("station", "line task restarted"));
+        assert_eq!((&*step.subject, &*step.message), ("station", "line task restarted"));
     }
 }

@@ -320,13 +320,13 @@ fn a_full_queue_is_told_to_the_operator() {
 fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
     use crate::plant::interlock::ControlLogic;
     let mut def = fixture::plant();
-    let text = "not above 60 °C".to_owned();
+    let message = "not above 60 °C".to_owned();
     let lock = InterlockDef {
         tag: fixture::RUN,
         value: 1.0,
         of: PV,
         when: InterlockCondition::Above(60.0),
-        text,
+        message,
         refuse: true,
     };
     def.logic = ControlLogic { interlocks: vec![lock], ..ControlLogic::default() };
@@ -424,9 +424,9 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
 fn what_will_be_sent_is_blocked_whatever_was_typed() {
     let mut def = fixture::plant();
     def.tags[RUN.index()].labels.clear();
-    let text = "not while it is hot".to_owned();
+    let message = "not while it is hot".to_owned();
     let when = InterlockCondition::Above(60.0);
-    def.logic.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, text, refuse: true }];
+    def.logic.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, message, refuse: true }];
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
     for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {

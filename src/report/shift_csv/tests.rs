@@ -63,7 +63,7 @@ fn report() -> ShiftReport {
         ],
         suppressed: vec![SuppressedSummary {
             subject: "PLC-1.LT-1".into(),
-            text: "level low".into(),
+            message: "level low".into(),
             priority: Priority::Low,
             raised: 2,
             active: Duration::from_secs(486),
@@ -71,7 +71,7 @@ fn report() -> ShiftReport {
         alarms: vec![AlarmRecord {
             at: at("2026-11-21T06:12:45.5+07"),
             subject: "TIC-1.PV".into(),
-            text: "temperature high; \"check\" heater".into(),
+            message: "temperature high; \"check\" heater".into(),
             priority: Priority::High,
             event: AlarmEvent::Raised,
             value: Some(-85.25),

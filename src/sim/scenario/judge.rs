@@ -193,7 +193,7 @@ impl Judge {
 /// Whether a step of the journal is of an alarm: the journal has names, not numbers.
 fn is(def: &PlantDef, alarm: AlarmId, step: &AlarmRecord) -> bool {
     let alarm = def.alarm(alarm);
-    *subject_name(def, alarm.subject) == *step.subject && *alarm.text == *step.text
+    *subject_name(def, alarm.subject) == *step.subject && *alarm.message == *step.message
 }
 
 impl Mark {

@@ -56,7 +56,7 @@ table!(
     OperatorTable, "an operator action" {
         need "at" at_time: Duration,
         opt "acknowledge" acknowledge: String,
-        opt "text" text: String,
+        opt "message" message: String,
         opt "write" write: String,
         opt "value" value: Choice,
     }
@@ -72,7 +72,7 @@ table!(
         /// How long after that, until the end if left out.
         opt "within" within: Duration,
         opt "alarm" alarm: String,
-        opt "text" text: String,
+        opt "message" message: String,
         opt "event" event: AlarmEvent,
         opt "never" never: bool,
         opt "written" written: String,
@@ -245,7 +245,7 @@ fn step(table: &OperatorTable, duration: Duration, def: &PlantDef, problems: &mu
     let at = in_time(table.at_time, duration, problems);
     let action = match (&table.acknowledge, &table.write) {
         (Some(all), None) if all.value == "all" => OperatorAction::AcknowledgeAll,
-        (Some(subject), None) => OperatorAction::Acknowledge(alarm(subject, &table.text, def, problems)?),
+        (Some(subject), None) => OperatorAction::Acknowledge(alarm(subject, &table.message, def, problems)?),
         (None, Some(name)) => {
             let tag = tag(name, def, problems)?;
             let value = value(&table.value, name, tag, def, problems)?;

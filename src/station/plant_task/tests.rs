@@ -174,7 +174,7 @@ async fn a_clock_that_is_set_while_the_station_runs_is_followed_recorded_and_ala
     let wrong = clock.utc();
     let mut station = Station::start_with(&history, clock).await;
     let stepped = |snapshot: &Arc<Snapshot>| {
-        snapshot.alarms.iter().any(|alarm| snapshot.def.alarm(alarm.id).text == StationFault::Clock.message())
+        snapshot.alarms.iter().any(|alarm| snapshot.def.alarm(alarm.id).message == StationFault::Clock.message())
     };
     let snapshot = station.snapshots.wait_for(stepped).await.unwrap().clone();
     let right = jiff::Timestamp::now();

@@ -157,7 +157,7 @@ fn what_words(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
         Subject::Line(line) => line_state_words(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
-    (format!("{} {}", subject(cx, alarm.id), def.text), now)
+    (format!("{} {}", subject(cx, alarm.id), def.message), now)
 }
 
 /// `UNACK 00:41`: the state and how long it lasts.

@@ -199,7 +199,7 @@ fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String
     ]);
     for alarm in cx.snapshot.alarms_of(tag) {
         let def = cx.def().alarm(alarm.id);
-        let text = format!("{} {} {}", theme.priority_mark(def.priority), def.text, alarm.state.word());
+        let text = format!("{} {} {}", theme.priority_mark(def.priority), def.message, alarm.state.word());
         rows.push(("alarm", text, theme.alarm(def.priority, alarm.state, cx.flash())));
     }
     let meaning = wrap(&def.meaning, room.saturating_sub(9));

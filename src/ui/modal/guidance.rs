@@ -85,7 +85,7 @@ impl Guidance {
         let lines = self.lines(cx, room);
         let def = cx.def().alarm(self.alarm);
         let condition = guidance::condition_words(cx, def.id);
-        let title = format!("{} {} {} {condition}", theme.priority_tag(def.priority), subject(cx, def.id), def.text);
+        let title = format!("{} {} {} {condition}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
         let mut canvas = window(cx, frame, body, title.trim_end(), (room + NAMES, lines.len() as u16 + 2));
         let rows = canvas.height().saturating_sub(2);
         let first = usize::from(self.first.min((lines.len() as u16).saturating_sub(rows)));

@@ -100,8 +100,9 @@ pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
             Level::Low | Level::LowLow => limit - value,
         };
         let place = if beyond > 0.0 { "beyond" } else { "at" };
-        (beyond >= 0.0)
-            .then(|| format!("! {place} the alarm limit of {} {} ({})", subject(cx, alarm.id), alarm.text, text(limit)))
+        (beyond >= 0.0).then(|| {
+            format!("! {place} the alarm limit of {} {} ({})", subject(cx, alarm.id), alarm.message, text(limit))
+        })
     });
     large.into_iter().chain(limits).collect()
 }

@@ -451,7 +451,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
     let step = |seconds, step, by: Option<&str>| AlarmRecord {
         at: ago(seconds),
         subject: "TIC-1.PV".into(),
-        text: "temperature high".into(),
+        message: "temperature high".into(),
         priority: Priority::High,
         event: step,
         value: Some(72.1),
@@ -709,7 +709,7 @@ fn a_history_without_answer_is_said_so() {
 /// An alarm fixture whose acknowledgement asks for no note.
 fn plain_alarms() -> Fixture {
     let mut fixture = Fixture::alarm();
-    fixture.def.alarms.iter_mut().for_each(|alarm| alarm.note = false);
+    fixture.def.alarms.iter_mut().for_each(|alarm| alarm.ack_comment = false);
     fixture
 }
 

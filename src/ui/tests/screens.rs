@@ -208,7 +208,7 @@ fn nobody_says_no_alarms_who_cannot_see_them() {
 fn a_long_alarm_text_pushes_neither_state_nor_counts_out_of_the_banner() {
     let mut fixture = Fixture::alarm();
     let text = "the outlet of the second heat exchanger is much warmer than its jacket permits for this product at all";
-    fixture.def.alarms[0].text = text.to_owned();
+    fixture.def.alarms[0].message = text.to_owned();
     for (width, height, counts) in [(60, 16, false), (80, 24, true), (120, 40, true)] {
         let mut model = model(&fixture, Theme::FULL);
         type_keys(&mut model, "3");

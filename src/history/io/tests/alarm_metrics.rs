@@ -86,7 +86,7 @@ fn counted(store: &Store, from: Timestamp, until: Timestamp) -> PeriodMetrics {
     let number = |sql: &str| db.query_row(sql, span, |row| row.get::<_, u64>(0)).unwrap();
     let named = |row: &duckdb::Row| {
         let column = |n| row.get::<_, String>(n).map(Arc::<str>::from);
-        Ok(Named { subject: column(0)?, text: column(1)? })
+        Ok(Named { subject: column(0)?, message: column(1)? })
     };
     let names = |sql: &str| -> Vec<Named> {
         db.prepare(sql).unwrap().query_map(span, named).unwrap().map(Result::unwrap).collect()

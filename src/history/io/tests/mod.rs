@@ -66,7 +66,7 @@ fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
     AlarmRecord {
         at: sec(at),
         subject: "TIC-1.PV".into(),
-        text: text.into(),
+        message: text.into(),
         priority: Priority::High,
         event: step,
         value: Some(85.5),

@@ -16,7 +16,7 @@ fn event(second: f64, name: &str, event: AlarmEvent) -> AlarmRecord {
     AlarmRecord {
         at: at(second),
         subject: "TIC-1.PV".into(),
-        text: name.into(),
+        message: name.into(),
         priority: Priority::High,
         event,
         value: None,
@@ -43,7 +43,7 @@ fn figures(until: f64, events: &[(f64, &str, AlarmEvent)]) -> PeriodMetrics {
 }
 
 fn names(alarms: &[Named]) -> Vec<&str> {
-    alarms.iter().map(|alarm| &*alarm.text).collect()
+    alarms.iter().map(|alarm| &*alarm.message).collect()
 }
 
 use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
@@ -62,7 +62,7 @@ fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
     let got = figures(7_200.0, &events);
     assert_eq!((got.annunciated(), got.windows, got.most, got.windows_over), (3, 12, 2, 0));
     assert_eq!(got.value(Metric::PerWindow), Some(0.25));
-    assert_eq!(got.top.iter().map(|alarm| (&*alarm.alarm.text, alarm.raised)).collect::<Vec<_>>()[0], ("first", 2));
+    assert_eq!(got.top.iter().map(|alarm| (&*alarm.alarm.message, alarm.raised)).collect::<Vec<_>>()[0], ("first", 2));
     // A period that begins and ends within windows touches 14 of them.
     let mut monitor = of_period(-1.0, 7_200.5);
     events.iter().for_each(|(second, name, kind)| monitor.take(&event(*second, name, *kind)));

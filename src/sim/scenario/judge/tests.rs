@@ -73,14 +73,14 @@ fn late() -> ExpectationStatus {
 fn an_alarm_counts_in_its_time_and_in_its_step_only() {
     let check = |expectation: Expectation, steps: &[(u64, AlarmEvent, &str)], expect: ExpectationStatus| {
         let mut judge = judge(expectation);
-        let text = judge.def.alarm(HIGH).text.clone();
+        let text = judge.def.alarm(HIGH).message.clone();
         let subject: Arc<str> = judge.def.tag(PV).name.as_str().into();
         for (second, step, by_text) in steps {
             let text = if by_text.is_empty() { text.as_str() } else { by_text };
             judge.on_records(&[Record::Alarm(AlarmRecord {
                 at: at(*second),
                 subject: subject.clone(),
-                text: text.into(),
+                message: text.into(),
                 priority: Priority::High,
                 event: *step,
                 value: Some(76.0),

@@ -62,8 +62,8 @@ fn expected(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Opt
         return None;
     }
     if key == "alarm" {
-        let alarm = alarm(name, &table.text, def, problems)?;
-        let words = &def.alarm(alarm).text;
+        let alarm = alarm(name, &table.message, def, problems)?;
+        let words = &def.alarm(alarm).message;
         if table.never.is_some_and(|never| never.value) {
             return Some((Expectation::NoAlarm(alarm), format!("no alarm {} {words}", name.value)));
         }

@@ -48,9 +48,9 @@ pub(super) fn alarm(
     let mut known: Vec<&str> = def.alarms.iter().map(|alarm| name(alarm.subject)).collect();
     known.dedup();
     unknown(of_subject.first(), "alarm of", subject, known.into_iter(), problems)?;
-    let fits = |alarm: &&&AlarmDef| words.as_ref().is_none_or(|words| words.value == alarm.text);
+    let fits = |alarm: &&&AlarmDef| words.as_ref().is_none_or(|words| words.value == alarm.message);
     let found: Vec<_> = of_subject.iter().filter(fits).collect();
-    let texts = || of_subject.iter().map(|alarm| alarm.text.as_str());
+    let texts = || of_subject.iter().map(|alarm| alarm.message.as_str());
     match (found.as_slice(), words) {
         ([one], _) => Some(one.id),
         ([], Some(words)) => {

@@ -24,7 +24,7 @@ fn everything_in_a_file_is_understood() {
          [[operator]]\nat = '3m'\nacknowledge = 'all'\n\
          [[operator]]\nat = '2m 30s'\nwrite = 'PLC-1.RUN'\nvalue = 'STOP'\n\
          [[expect]]\nalarm = 'TIC-1.FAULT'\nafter = '2m'\nwithin = '10s'\npoints = 7\n\
-         [[expect]]\nalarm = 'TIC-1.PV'\ntext = 'temperature high'\nnever = true\n{EXPECT}"
+         [[expect]]\nalarm = 'TIC-1.PV'\nmessage = 'temperature high'\nnever = true\n{EXPECT}"
     );
     let scenario = read_text(&text).expect("a good scenario");
     let events: Vec<(u64, String, bool)> =

@@ -24,7 +24,7 @@ const NAMED: usize = 6;
 
 /// Acknowledges one alarm; where the plant file wants a note it is asked for.
 pub fn acknowledge(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
-    match cx.def().alarm(alarm.id).note {
+    match cx.def().alarm(alarm.id).ack_comment {
         true => note(cx, alarm),
         false => vec![UiAction::Command(alarm.acknowledge())],
     }
@@ -45,7 +45,7 @@ pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     if !alarm.state.needs_acknowledgement() {
         return Vec::new();
     }
-    let needed = cx.def().alarm(alarm.id).note;
+    let needed = cx.def().alarm(alarm.id).ack_comment;
     let notes = vec![name(cx, alarm.id)];
     let reason = Reason::new("acknowledge with a note", "acknowledge", notes, alarm.acknowledge(), needed);
     open(Modal::Reason(Box::new(reason)))
@@ -54,7 +54,7 @@ pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
 /// Asks whether to acknowledge all of these, exactly as they are seen now; where one of them needs a note it is asked for.
 pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<UiAction> {
     let waiting: Vec<_> = alarms.filter(|alarm| alarm.state.needs_acknowledgement()).collect();
-    let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).note);
+    let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).ack_comment);
     if waiting.is_empty() {
         return Vec::new();
     }
@@ -171,11 +171,11 @@ fn open(modal: Modal) -> Vec<UiAction> {
 /// The same with the mark as wide as all others, for lists.
 fn marked(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
-    format!("{} {} {}", cx.theme.priority_mark(def.priority), subject(cx, alarm), def.text)
+    format!("{} {} {}", cx.theme.priority_mark(def.priority), subject(cx, alarm), def.message)
 }
 
 /// `‹2›! TIC-1.PV temperature high`.
 fn name(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
-    format!("{} {} {}", cx.theme.priority_tag(def.priority), subject(cx, alarm), def.text)
+    format!("{} {} {}", cx.theme.priority_tag(def.priority), subject(cx, alarm), def.message)
 }

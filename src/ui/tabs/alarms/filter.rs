@@ -97,7 +97,7 @@ impl Filter {
 /// All that is looked through for words, in small letters: what the view shows, nothing that is hidden.
 fn text_of(cx: &ViewContext, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
     let by = alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default();
-    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.text, alarm.state.word()).to_lowercase()
+    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.message, alarm.state.word()).to_lowercase()
 }
 
 /// The one after `now`, nothing after the last one.

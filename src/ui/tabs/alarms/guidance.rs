@@ -85,7 +85,7 @@ fn title(
         alarm.state.needs_acknowledgement() && rights::missing(cx, &alarm.acknowledge()).is_none()
     });
     let ack = if mine { "a ack " } else { "" };
-    let name = format!(" {ack}{} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.text);
+    let name = format!(" {ack}{} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
     let whole = format!("{name} {}", condition_words(cx, def.id));
     let room = end.saturating_sub(text::width(&words) + 3);
     let shown =

@@ -249,7 +249,7 @@ pub fn suppressed_words(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Strin
     let reason = suppressed.note.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let active = if suppressed.active { " ACTIVE" } else { "" };
     let name = subject(cx, suppressed.id);
-    format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", suppressed.state.word(), def.text)
+    format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", suppressed.state.word(), def.message)
 }
 
 /// Lines and devices that somebody has taken away, sequences in manual, actuators that do not obey.
@@ -309,7 +309,7 @@ fn doubtful(cx: &ViewContext) -> Vec<String> {
     });
     let stale = stale.map(|alarm| {
         let lasts = running(between(alarm.raised_at, cx.now));
-        format!("{} {} active for {lasts}", subject(cx, alarm.id), cx.def().alarm(alarm.id).text)
+        format!("{} {} active for {lasts}", subject(cx, alarm.id), cx.def().alarm(alarm.id).message)
     });
     let more = (more > 0).then(|| format!("… and {more} more values"));
     bad.into_iter().take(NAMED).chain(more).chain(stale).collect()

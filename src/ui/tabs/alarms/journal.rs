@@ -214,7 +214,12 @@ fn alarm_words(cx: &ViewContext, row: &AlarmRecord) -> String {
     let by = row.by.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
     let reason = row.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let mark = cx.theme.priority_mark(row.priority);
-    format!("{mark} {} {} {}{number}{by}{reason}", pad(&row.subject, 12), pad(&row.text, 22), pad(row.event.word(), 12))
+    format!(
+        "{mark} {} {} {}{number}{by}{reason}",
+        pad(&row.subject, 12),
+        pad(&row.message, 22),
+        pad(row.event.word(), 12)
+    )
 }
 
 /// An action in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.

@@ -191,7 +191,7 @@ impl Metrics {
             });
             lines.extend(stale.map(|alarm| {
                 let (since, name) = (running(between(alarm.raised_at, cx.now)), subject(cx, alarm.id));
-                let text = format!("{} {since:11}  {name}  {}", pad("stale", 10), cx.def().alarm(alarm.id).text);
+                let text = format!("{} {since:11}  {name}  {}", pad("stale", 10), cx.def().alarm(alarm.id).message);
                 (fit_words(&text, TABLE), style)
             }));
         }

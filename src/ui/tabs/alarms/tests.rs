@@ -48,7 +48,7 @@ fn storm() -> Fixture {
         let text = if system { "answers late" } else { texts[usize::from(n) % texts.len()] };
         fixture.def.alarms.push(AlarmDef {
             id,
-            text: text.to_owned(),
+            message: text.to_owned(),
             priority: if n % 5 == 3 { Priority::Medium } else { Priority::Low },
             class: if system { AlarmClass::System } else { AlarmClass::Process },
             subject: if system { device } else { pattern.subject },
@@ -113,7 +113,7 @@ fn suppressed() -> Fixture {
 
 /// A day with a flood behind it.
 fn figures() -> PeriodMetrics {
-    let named = |subject: &str, text: &str| Named { subject: subject.into(), text: text.into() };
+    let named = |subject: &str, text: &str| Named { subject: subject.into(), message: text.into() };
     let frequent = |subject, text, raised| Frequent { alarm: named(subject, text), raised };
     PeriodMetrics {
         from: ago(86_400),
@@ -338,7 +338,7 @@ fn a_note_is_asked_for_where_the_plant_wants_one() {
     };
     assert_eq!(command(&fixture, "nSV was raised⏎").0, Some((alarm.acknowledge(), Some("SV was raised".into()))));
     assert_eq!(command(&fixture, "n⏎").0, Some((alarm.acknowledge(), None)), "here it may be left out");
-    fixture.def.alarms[0].note = true;
+    fixture.def.alarms[0].ack_comment = true;
     assert!(matches!(command(&fixture, "a"), (None, Some(Modal::Reason(_)))), "asks before it is refused");
     assert!(matches!(command(&fixture, "a  ⏎"), (None, Some(Modal::Reason(_)))), "blanks are no note");
     assert_eq!(command(&fixture, "adoor was open⏎").0, Some((alarm.acknowledge(), Some("door was open".into()))));

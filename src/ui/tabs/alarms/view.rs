@@ -291,7 +291,7 @@ fn what_words(cx: &ViewContext, row: &Row, room: u16) -> String {
     let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|note| !note.recorded);
     let unrecorded = if unrecorded { " NOT RECORDED" } else { "" };
     let (long, short) = (long + unrecorded, short + unrecorded);
-    let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).text);
+    let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).message);
     let text = format!("{name} {}", guidance::condition_words(cx, row.alarm.id));
     let text = text.trim_end();
     let choices = [(text, &long), (text, &short), (&name, &short)];

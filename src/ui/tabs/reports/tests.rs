@@ -110,7 +110,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
     let alarm = |seconds, priority, subject: &str, text: &str, step, by: Option<&str>| AlarmRecord {
         at: at(seconds),
         subject: subject.into(),
-        text: text.into(),
+        message: text.into(),
         priority,
         event: step,
         value: (subject == "TIC-1.PV").then_some(72.44),

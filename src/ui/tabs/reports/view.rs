@@ -237,7 +237,10 @@ fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static>
     let (theme, room) = (cx.theme, cx.area.width.saturating_sub(46));
     Line::from(vec![
         Span::styled(format!("  {}", theme.priority_mark(alarm.priority)), theme.dim()),
-        Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.text, room.clamp(12, 41))), theme.normal()),
+        Span::styled(
+            format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.message, room.clamp(12, 41))),
+            theme.normal(),
+        ),
         Span::styled(format!("active {}, raised {}", long(alarm.active), alarm.raised), theme.normal()),
     ])
 }
@@ -263,7 +266,7 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
             theme.priority_mark(alarm.priority),
             if active { theme.severity(alarm.priority) } else { theme.dim() },
         ),
-        Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.text, text)), style),
+        Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.message, text)), style),
         Span::styled(format!("{} {detail}", pad(alarm.event.word(), 13)), style),
     ])
 }

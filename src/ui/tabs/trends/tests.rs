@@ -99,7 +99,7 @@ impl Stand {
             Query::Journal { .. } => Answer::Journal(vec![AlarmRecord {
                 at: ago(240),
                 subject: "TIC-1.PV".into(),
-                text: "temperature high".into(),
+                message: "temperature high".into(),
                 priority: Priority::High,
                 event: AlarmEvent::Raised,
                 value: Some(72.1),
