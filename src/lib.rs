@@ -1,6 +1,6 @@
 //! **sightglass**: the control room of a small plant in a terminal.
 //!
-//! A plant has Modbus controllers on an RS-485 line or on TCP. sightglass polls them, judges alarms, keeps everything
+//! A plant has Modbus controllers on an RS-485 line or on TCP. sightglass polls them, evaluates alarms, keeps everything
 //! in DuckDB, draws the process as a living mimic, sets controllers with verified writes and writes shift reports.
 //! It never shows a wrong value as a right one.
 //!

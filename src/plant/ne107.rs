@@ -146,7 +146,7 @@ pub const NO_VALUES_AFTER: u32 = 12;
 const CORRUPT_PERCENT: u64 = 1;
 
 /// The worst that can be said of a device; `None` while it is well, or nothing is known.
-pub fn judge(input: DiagnosisInput) -> Option<Reason> {
+pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
     match input.line {
         LineState::Disconnected => return Some(Reason::LineClosed),
         LineState::Testing => return Some(Reason::LineTesting),
@@ -220,7 +220,7 @@ mod tests {
 
     fn check(line: &LineState, device: DeviceState, settling: bool, lately: &RequestStats, expect: &str) {
         let timeout = Duration::from_millis(300);
-        let reason = judge(DiagnosisInput { device, line, settling, lately, timeout });
+        let reason = evaluate(DiagnosisInput { device, line, settling, lately, timeout });
         let words = reason.map(|reason| format!("{} {reason}", reason.signal().letter()));
         assert_eq!(words.as_deref().unwrap_or(""), expect);
     }

@@ -398,7 +398,7 @@ impl Plant {
         action
     }
 
-    /// Judges the alarms and gathers what must be stored.
+    /// Evaluates the alarms and gathers what must be stored.
     fn settle(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
         let asked = self.watch_controllers();

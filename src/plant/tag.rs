@@ -354,7 +354,7 @@ pub enum Poll {
 /// shed, then the periods of normal polls are stretched; critical polls keep theirs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum PollClass {
-    /// An alarm is judged by it.
+    /// An alarm is evaluated from it.
     Critical,
     /// A process value.
     Normal,

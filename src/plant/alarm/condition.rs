@@ -7,7 +7,7 @@ use crate::plant::def::{Condition, Level};
 /// Points that the memory of a rate keeps: finer than any window needs.
 const POINTS_MAX: u32 = 32;
 
-/// What a condition is judged by. `None` is "not known now".
+/// What a condition is evaluated by. `None` is "not known now".
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
     /// The trusted value of the tag, in its unit.
@@ -92,7 +92,7 @@ impl Memory {
 }
 
 /// Whether the condition holds; while an alarm is already active the limit moves inwards by the deadband, so that
-/// a value that hovers at the limit does not chatter. `None`: it cannot be judged, nothing changes. `now` is an instant of
+/// a value that hovers at the limit does not chatter. `None`: it cannot be evaluated, nothing changes. `now` is an instant of
 /// the manager's own clock.
 pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memory, now: Duration) -> Option<bool> {
     let back = |deadband: f64| if active { deadband } else { 0.0 };

@@ -1,4 +1,4 @@
-//! The manager of all alarms: judges them against the plant and lists what an operator should see.
+//! The manager of all alarms: evaluates them against the plant and lists what an operator should see.
 
 use std::{
     collections::HashMap,
@@ -32,9 +32,9 @@ pub struct AlarmManager {
     memories: Vec<Memory>,
     /// Since when it is unknown whether an alarm is enabled, on the manager's own clock, by [`AlarmId`].
     unknown: Vec<Option<Duration>>,
-    /// The manager's own clock: what has passed while it was judged. It never goes back, whatever the station's clock does.
+    /// The manager's own clock: what has passed while it was evaluated. It never goes back, whatever the station's clock does.
     ran: Duration,
-    judged_at: Option<Timestamp>,
+    evaluated_at: Option<Timestamp>,
     /// The latest first-out group, and when its last alarm was raised on the manager's own clock.
     first_out: Option<(FirstOut, Duration)>,
     /// Counts what sounds, so that silence ends what was before it and nothing else.
@@ -53,7 +53,7 @@ impl AlarmManager {
             unknown: vec![None; def.alarms.len()],
             def,
             ran: Duration::ZERO,
-            judged_at: None,
+            evaluated_at: None,
             first_out: None,
             edges: 0,
             silenced: 0,
@@ -61,9 +61,9 @@ impl AlarmManager {
         }
     }
 
-    /// Judges every alarm at an instant; `facts` tells what is known for an alarm.
-    pub fn judge(&mut self, at: Timestamp, facts: impl Fn(&AlarmDef) -> Facts) -> Vec<AlarmRecord> {
-        let passed = self.judged_at.replace(at).map(|before| at.duration_since(before));
+    /// Evaluates every alarm at an instant; `facts` tells what is known for an alarm.
+    pub fn evaluate(&mut self, at: Timestamp, facts: impl Fn(&AlarmDef) -> Facts) -> Vec<AlarmRecord> {
+        let passed = self.evaluated_at.replace(at).map(|before| at.duration_since(before));
         // A clock that was set back lets no time pass; delays go on from where they were.
         let passed = passed.and_then(|passed| Duration::try_from(passed).ok()).unwrap_or_default();
         self.ran += passed;
@@ -72,7 +72,7 @@ impl AlarmManager {
         for alarm in &def.alarms {
             let facts = facts(alarm);
             self.suppress(alarm, facts, at, &mut records);
-            self.judge_condition(alarm, facts, at, &mut records);
+            self.evaluate_condition(alarm, facts, at, &mut records);
             self.release(alarm, facts, at, &mut records);
             self.end_shelving(alarm, facts, at, &mut records);
             self.remind(alarm, facts, passed, at, &mut records);
@@ -114,19 +114,19 @@ impl AlarmManager {
         }
     }
 
-    fn judge_condition(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
+    fn evaluate_condition(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         let (machine, memory) = (&mut self.machines[alarm.id.index()], &mut self.memories[alarm.id.index()]);
-        // What is not known to be enabled again is still not judged by what it remembers.
+        // What is not known to be enabled again is still not evaluated by what it remembers.
         let disabled = is_disabled(alarm, facts) || machine.suppressed().is_some() && facts.enabled != Some(true);
         let begins_anew = disabled && alarm.condition.looks_back();
         let returned = is_disabled(alarm, facts) && machine.suppressed().is_none();
         let event = if begins_anew {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
             memory.clear();
-            machine.judge(Some(false), self.ran, AlarmDelays::default())
+            machine.evaluate(Some(false), self.ran, AlarmDelays::default())
         } else {
             let holds = holds(alarm.condition, facts, machine.is_active(), memory, self.ran);
-            machine.judge(if returned { Some(false) } else { holds }, self.ran, delays(alarm))
+            machine.evaluate(if returned { Some(false) } else { holds }, self.ran, delays(alarm))
         };
         if let Some(event) = event {
             records.push(self.event(alarm, event, at, facts.value));

@@ -12,10 +12,10 @@ use crate::plant::def::Priority;
 
 /// How many of the most frequent alarms are named.
 pub const TOP: usize = 10;
-/// Shares of fewer activations than this say nothing and are not judged.
+/// Shares of fewer activations than this say nothing and are not evaluated.
 pub const SHARED_MIN: u64 = 20;
 
-/// Rates of less watched time than this say nothing and are not judged.
+/// Rates of less watched time than this say nothing and are not evaluated.
 pub const WATCHED_MIN: Duration = Duration::from_secs(3_600);
 
 /// The alarm system as it is now: the rates of this moment, and the figures of the last 24 hours.
@@ -199,7 +199,7 @@ pub enum Verdict {
     Beyond,
     /// Beyond the limit.
     Over,
-    /// There is too little to judge.
+    /// There is too little to evaluate.
     TooFew,
     /// A station ran for too little time, see [`WATCHED_MIN`].
     TooShort,

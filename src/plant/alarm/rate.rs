@@ -60,7 +60,7 @@ impl Rate {
     pub fn advance(&mut self, to: i64) -> Vec<(i64, i64)> {
         let mut flooded: Vec<(i64, i64)> = Vec::new();
         while self.now < to {
-            // A second is judged when it is over: only then is it known how many came in it.
+            // A second is evaluated when it is over: only then is it known how many came in it.
             self.flood = match self.flood {
                 Some(_) if self.in_window < FLOOD_BELOW => None,
                 None if FLOOD_ABOVE < self.in_window => Some(self.now),

@@ -208,10 +208,10 @@ impl AlarmStateMachine {
         }
     }
 
-    /// Takes the judgement of an instant, and says which event follows. A condition must hold (or be gone) for the whole
-    /// delay; a flap inside the delay leaves no trace. An unknown judgement (`None`) changes nothing and restarts no delay.
+    /// Takes the evaluation of an instant, and says which event follows. A condition must hold (or be gone) for the whole
+    /// delay; a flap inside the delay leaves no trace. An unknown evaluation (`None`) changes nothing and restarts no delay.
     /// `now` is an instant of the manager's own clock. The event is to be [applied](AlarmStateMachine::apply).
-    pub fn judge(&mut self, holds: Option<bool>, now: Duration, delays: AlarmDelays) -> Option<AlarmEvent> {
+    pub fn evaluate(&mut self, holds: Option<bool>, now: Duration, delays: AlarmDelays) -> Option<AlarmEvent> {
         let holds = holds?;
         if holds == self.active {
             self.pending_since = None;
@@ -303,9 +303,9 @@ mod tests {
         AlarmRecord { until: Some(at + Duration::from_secs(60)), ..record }
     }
 
-    /// The judgement of an instant, with what follows from it.
-    fn judged(machine: &mut AlarmStateMachine, holds: Option<bool>, second: u64) -> Option<AlarmEvent> {
-        let event = machine.judge(holds, Duration::from_secs(second), DELAYS)?;
+    /// The evaluation of an instant, with what follows from it.
+    fn evaluated(machine: &mut AlarmStateMachine, holds: Option<bool>, second: u64) -> Option<AlarmEvent> {
+        let event = machine.evaluate(holds, Duration::from_secs(second), DELAYS)?;
         machine.apply(&record(event, second as i64), false);
         Some(event)
     }
@@ -323,7 +323,7 @@ mod tests {
             (20, Some(false), None, AlarmState::Unacknowledged),
             (21, Some(false), Some(AlarmEvent::ReturnedToNormal), AlarmState::ReturnedToNormal),
         ] {
-            assert_eq!(judged(&mut machine, holds, second), event, "at {second} s");
+            assert_eq!(evaluated(&mut machine, holds, second), event, "at {second} s");
             assert_eq!(machine.state(), state, "at {second} s");
         }
         machine.apply(&record(AlarmEvent::Acknowledged, 22), false);

@@ -46,8 +46,8 @@ fn events(records: &[AlarmRecord]) -> Vec<AlarmEvent> {
 #[test]
 fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
     let mut manager = AlarmManager::new(fixture::shared());
-    assert!(manager.judge(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
-    let events = manager.judge(at(2), facts(81.0, true));
+    assert!(manager.evaluate(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
+    let events = manager.evaluate(at(2), facts(81.0, true));
     assert_eq!(events.len(), 1);
     assert_eq!((&*events[0].subject, events[0].value, events[0].limit), ("TIC-1.PV", Some(81.0), Some(75.0)));
 
@@ -64,8 +64,8 @@ fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
 #[test]
 fn the_list_puts_what_waits_before_what_is_known() {
     let mut manager = AlarmManager::new(fixture::shared());
-    manager.judge(at(0), facts(80.0, false));
-    manager.judge(at(2), facts(80.0, false));
+    manager.evaluate(at(0), facts(80.0, false));
+    manager.evaluate(at(2), facts(80.0, false));
     assert_eq!(manager.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [HIGH, SILENT], "latest first");
     manager.acknowledge(HIGH, at(2), None, at(3), &by()).expect("it waits");
     assert_eq!(manager.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT, HIGH]);
@@ -75,10 +75,10 @@ fn the_list_puts_what_waits_before_what_is_known() {
 fn what_was_raised_after_the_operator_looked_stays_unacknowledged() {
     let def = with(|alarm| alarm.on_delay = Duration::ZERO);
     let mut manager = AlarmManager::new(def);
-    manager.judge(at(0), facts(80.0, true));
+    manager.evaluate(at(0), facts(80.0, true));
     let seen = manager.active()[0].raised_at;
-    manager.judge(at(1), facts(70.0, true));
-    manager.judge(at(2), facts(80.0, true));
+    manager.evaluate(at(1), facts(70.0, true));
+    manager.evaluate(at(2), facts(80.0, true));
     assert_eq!(manager.acknowledge(HIGH, seen, None, at(3), &by()), Err(AlarmRefusal::RaisedSince));
     assert_eq!(state(&manager), AlarmState::Unacknowledged);
     assert!(manager.acknowledge(HIGH, at(2), None, at(3), &by()).is_ok());
@@ -88,7 +88,7 @@ fn what_was_raised_after_the_operator_looked_stays_unacknowledged() {
 fn a_note_is_asked_for_where_the_plant_wants_one() {
     let def = with(|alarm| (alarm.on_delay, alarm.ack_comment) = (Duration::ZERO, true));
     let mut manager = AlarmManager::new(def);
-    manager.judge(at(0), facts(80.0, true));
+    manager.evaluate(at(0), facts(80.0, true));
     for note in [None, Some("".into()), Some("  ".into())] {
         assert_eq!(manager.acknowledge(HIGH, at(0), note.as_ref(), at(1), &by()), Err(AlarmRefusal::NoteNeeded));
     }
@@ -101,15 +101,15 @@ fn a_note_is_asked_for_where_the_plant_wants_one() {
 fn silence_ends_what_sounds_and_a_return_never_sounds() {
     let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     assert!(!manager.silence(), "nothing sounds");
-    manager.judge(at(0), facts(80.0, true));
+    manager.evaluate(at(0), facts(80.0, true));
     assert!(manager.lists().sound);
     assert!(manager.silence());
     assert!(!manager.lists().sound);
     assert_eq!(state(&manager), AlarmState::Unacknowledged, "silence acknowledges nothing");
-    manager.judge(at(1), facts(80.0, false));
+    manager.evaluate(at(1), facts(80.0, false));
     assert!(manager.lists().sound, "a new alarm sounds");
     manager.silence();
-    manager.judge(at(2), facts(70.0, true));
+    manager.evaluate(at(2), facts(70.0, true));
     assert!(!manager.lists().sound, "both have returned");
 }
 
@@ -117,9 +117,9 @@ fn silence_ends_what_sounds_and_a_return_never_sounds() {
 fn a_reset_does_nothing_while_the_cause_lasts() {
     let mut manager = AlarmManager::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
     assert_eq!(manager.reset(HIGH, at(0), &by()), Err(AlarmRefusal::NothingToReset));
-    manager.judge(at(0), facts(80.0, true));
+    manager.evaluate(at(0), facts(80.0, true));
     assert_eq!(manager.reset(HIGH, at(1), &by()), Err(AlarmRefusal::CauseLasts));
-    manager.judge(at(2), facts(70.0, true));
+    manager.evaluate(at(2), facts(70.0, true));
     assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
     manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
     assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
@@ -140,15 +140,15 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
         assert_eq!(manager.shelve(HIGH, lasts, Some(&reason.into()), at(0), &by()), Err(refusal));
     }
     manager.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
-    assert_eq!(events(&manager.judge(at(10), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
+    assert_eq!(events(&manager.evaluate(at(10), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
     assert!(!manager.lists().sound && manager.active().is_empty());
     let suppressed = manager.lists().suppressed[0].clone();
     assert_eq!((suppressed.until, suppressed.active, suppressed.note.reason), (Some(at(60)), true, Some(why())));
-    assert_eq!(events(&manager.judge(at(59), facts(80.0, true))), []);
-    assert_eq!(events(&manager.judge(at(60), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
+    assert_eq!(events(&manager.evaluate(at(59), facts(80.0, true))), []);
+    assert_eq!(events(&manager.evaluate(at(60), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
     assert_eq!((state(&manager), manager.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
     manager.shelve(HIGH, minute, Some(&why()), at(70), &by()).expect("again");
-    assert_eq!(events(&manager.judge(at(71), facts(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
+    assert_eq!(events(&manager.evaluate(at(71), facts(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
     assert_eq!(events(&manager.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmEvent::Unshelved]);
     assert_eq!(state(&manager), AlarmState::Normal);
     assert_eq!(manager.unshelve(HIGH, None, at(73), &by()), Err(AlarmRefusal::NotShelved));
@@ -157,14 +157,14 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
 #[test]
 fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
     let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::from_secs(10)));
-    manager.judge(at(10_000), facts(80.0, true));
-    manager.judge(at(10_006), facts(80.0, true));
-    manager.judge(at(100), facts(80.0, true));
-    assert_eq!(events(&manager.judge(at(104), facts(80.0, true))), [AlarmEvent::Raised], "6 s and 4 s");
+    manager.evaluate(at(10_000), facts(80.0, true));
+    manager.evaluate(at(10_006), facts(80.0, true));
+    manager.evaluate(at(100), facts(80.0, true));
+    assert_eq!(events(&manager.evaluate(at(104), facts(80.0, true))), [AlarmEvent::Raised], "6 s and 4 s");
     manager.shelve(HIGH, Duration::from_secs(600), Some(&why()), at(5_000), &by()).expect("ten minutes");
-    assert_eq!(events(&manager.judge(at(200), facts(80.0, true))), [AlarmEvent::Shelved]);
+    assert_eq!(events(&manager.evaluate(at(200), facts(80.0, true))), [AlarmEvent::Shelved]);
     assert_eq!(manager.lists().suppressed[0].until, Some(at(800)));
-    assert_eq!(events(&manager.judge(at(800), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
+    assert_eq!(events(&manager.evaluate(at(800), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
         manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()),
         Err(AlarmRefusal::OutOfService)
     );
-    assert_eq!(events(&manager.judge(at(100_000), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
+    assert_eq!(events(&manager.evaluate(at(100_000), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
     assert_eq!(manager.lists().suppressed[0].state, AlarmState::OutOfService);
     let back = manager.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
     assert_eq!(events(&back), [AlarmEvent::InService, AlarmEvent::Raised]);
@@ -202,28 +202,28 @@ fn enabled_with(value: f64, enabled: bool) -> impl Fn(&AlarmDef) -> Facts {
 #[test]
 fn a_latching_alarm_that_came_and_went_while_suppressed_is_normal_on_release() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
-    let mut journal = manager.judge(at(0), enabled_with(80.0, false));
-    journal.extend(manager.judge(at(1), enabled_with(70.0, false)));
+    let mut journal = manager.evaluate(at(0), enabled_with(80.0, false));
+    journal.extend(manager.evaluate(at(1), enabled_with(70.0, false)));
     assert_eq!(
         events(&journal),
         [AlarmEvent::SuppressedByDesign, AlarmEvent::RaisedSuppressed, AlarmEvent::ReturnedSuppressed]
     );
-    assert_eq!(events(&manager.judge(at(2), enabled_with(70.0, true))), [AlarmEvent::Unsuppressed]);
+    assert_eq!(events(&manager.evaluate(at(2), enabled_with(70.0, true))), [AlarmEvent::Unsuppressed]);
     assert_eq!((state(&manager), manager.active().len()), (AlarmState::Normal, 0));
-    assert_eq!(events(&manager.judge(at(3), enabled_with(80.0, true))), [AlarmEvent::Raised]);
-    manager.judge(at(4), enabled_with(70.0, true));
+    assert_eq!(events(&manager.evaluate(at(3), enabled_with(80.0, true))), [AlarmEvent::Raised]);
+    manager.evaluate(at(4), enabled_with(70.0, true));
     assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged, "it still latches");
 }
 
 #[test]
 fn a_latching_alarm_released_while_shelved_comes_back_latched() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
-    manager.judge(at(0), enabled_with(80.0, false));
+    manager.evaluate(at(0), enabled_with(80.0, false));
     manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()).expect("a minute, with a reason");
     let quietly = [AlarmEvent::Unsuppressed, AlarmEvent::RaisedSuppressed];
-    assert_eq!(events(&manager.judge(at(2), enabled_with(80.0, true))), quietly);
-    assert_eq!(events(&manager.judge(at(3), enabled_with(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
-    assert_eq!(events(&manager.judge(at(61), enabled_with(70.0, true))), [AlarmEvent::Unshelved]);
+    assert_eq!(events(&manager.evaluate(at(2), enabled_with(80.0, true))), quietly);
+    assert_eq!(events(&manager.evaluate(at(3), enabled_with(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
+    assert_eq!(events(&manager.evaluate(at(61), enabled_with(70.0, true))), [AlarmEvent::Unshelved]);
     assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
 }
 
@@ -231,11 +231,11 @@ fn a_latching_alarm_released_while_shelved_comes_back_latched() {
 fn an_on_delay_begins_when_the_suppression_ends() {
     let delay = Duration::from_secs(30);
     let mut manager = AlarmManager::new(enabled_by_design(move |alarm| alarm.on_delay = delay));
-    assert_eq!(events(&manager.judge(at(0), enabled_with(70.0, false))), [AlarmEvent::SuppressedByDesign]);
-    assert_eq!(events(&manager.judge(at(1), enabled_with(80.0, false))), []);
-    assert_eq!(events(&manager.judge(at(25), enabled_with(80.0, true))), [AlarmEvent::Unsuppressed]);
-    assert_eq!(events(&manager.judge(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
-    assert_eq!(events(&manager.judge(at(55), enabled_with(80.0, true))), [AlarmEvent::Raised]);
+    assert_eq!(events(&manager.evaluate(at(0), enabled_with(70.0, false))), [AlarmEvent::SuppressedByDesign]);
+    assert_eq!(events(&manager.evaluate(at(1), enabled_with(80.0, false))), []);
+    assert_eq!(events(&manager.evaluate(at(25), enabled_with(80.0, true))), [AlarmEvent::Unsuppressed]);
+    assert_eq!(events(&manager.evaluate(at(54), enabled_with(80.0, true))), [], "enabled for 29 s");
+    assert_eq!(events(&manager.evaluate(at(55), enabled_with(80.0, true))), [AlarmEvent::Raised]);
 }
 
 #[test]
@@ -248,7 +248,7 @@ fn the_on_delay_of_a_rate_begins_when_the_suppression_ends() {
     for second in 0..100 {
         // The delay has run for 9 s when the alarm is suppressed.
         let enabled = !(20..40).contains(&second);
-        let records = manager.judge(at(second), enabled_with(second as f64, enabled));
+        let records = manager.evaluate(at(second), enabled_with(second as f64, enabled));
         raised.extend(records.iter().filter(|record| record.event == AlarmEvent::Raised).map(|_| second));
     }
     assert_eq!(raised, [80], "40 s, 10 s of window, 30 s of delay");
@@ -258,8 +258,8 @@ fn the_on_delay_of_a_rate_begins_when_the_suppression_ends() {
 fn shelving_and_out_of_service_acknowledge_no_latched_alarm() {
     for shelved in [true, false] {
         let mut manager = AlarmManager::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
-        let mut journal = manager.judge(at(0), facts(80.0, true));
-        journal.extend(manager.judge(at(1), facts(70.0, true)));
+        let mut journal = manager.evaluate(at(0), facts(80.0, true));
+        journal.extend(manager.evaluate(at(1), facts(70.0, true)));
         assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
         let back = if shelved {
             journal.extend(manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(2), &by()));
@@ -283,18 +283,25 @@ fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
     let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
     let quiet = [AlarmEvent::SuppressedByDesign, AlarmEvent::RaisedSuppressed];
-    assert_eq!(events(&manager.judge(at(0), when(80.0, Some(false)))), quiet);
+    assert_eq!(events(&manager.evaluate(at(0), when(80.0, Some(false)))), quiet);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::SuppressedByDesign, false));
-    assert_eq!(events(&manager.judge(at(1), when(80.0, Some(true)))), [AlarmEvent::Unsuppressed, AlarmEvent::Raised]);
+    assert_eq!(
+        events(&manager.evaluate(at(1), when(80.0, Some(true)))),
+        [AlarmEvent::Unsuppressed, AlarmEvent::Raised]
+    );
     let mut unknown = AlarmManager::new(enabled_by_design(|_| ()));
-    assert_eq!(events(&unknown.judge(at(0), when(80.0, None))), [AlarmEvent::Raised]);
+    assert_eq!(events(&unknown.evaluate(at(0), when(80.0, None))), [AlarmEvent::Raised]);
     let mut delayed = AlarmManager::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
-    delayed.judge(at(0), when(80.0, Some(false)));
-    assert_eq!(events(&delayed.judge(at(5), when(80.0, Some(false)))), [AlarmEvent::RaisedSuppressed]);
+    delayed.evaluate(at(0), when(80.0, Some(false)));
+    assert_eq!(events(&delayed.evaluate(at(5), when(80.0, Some(false)))), [AlarmEvent::RaisedSuppressed]);
     let anew = [AlarmEvent::Unsuppressed, AlarmEvent::ReturnedSuppressed];
-    assert_eq!(events(&delayed.judge(at(10), when(80.0, Some(true)))), anew, "the delay begins when the pump starts");
-    assert_eq!(events(&delayed.judge(at(14), when(80.0, Some(true)))), []);
-    assert_eq!(events(&delayed.judge(at(15), when(80.0, Some(true)))), [AlarmEvent::Raised]);
+    assert_eq!(
+        events(&delayed.evaluate(at(10), when(80.0, Some(true)))),
+        anew,
+        "the delay begins when the pump starts"
+    );
+    assert_eq!(events(&delayed.evaluate(at(14), when(80.0, Some(true)))), []);
+    assert_eq!(events(&delayed.evaluate(at(15), when(80.0, Some(true)))), [AlarmEvent::Raised]);
 }
 
 #[test]
@@ -302,9 +309,9 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
     let when =
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
     let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
-    let journal = manager.judge(at(0), when(80.0, Some(false)));
-    assert_eq!(events(&manager.judge(at(1), when(80.0, None))), [], "a lost frame");
-    assert_eq!(events(&manager.judge(at(2), when(80.0, Some(false)))), []);
+    let journal = manager.evaluate(at(0), when(80.0, Some(false)));
+    assert_eq!(events(&manager.evaluate(at(1), when(80.0, None))), [], "a lost frame");
+    assert_eq!(events(&manager.evaluate(at(2), when(80.0, Some(false)))), []);
     let mut again = AlarmManager::new(enabled_by_design(|_| ()));
     again.restore(&journal);
     for (second, enabled, expect) in [
@@ -316,11 +323,11 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
         (1_120, None, vec![AlarmEvent::Unsuppressed, AlarmEvent::Raised]),
         (1_121, None, vec![]),
     ] {
-        assert_eq!(events(&again.judge(at(second), when(80.0, enabled))), expect, "at {second} s");
+        assert_eq!(events(&again.evaluate(at(second), when(80.0, enabled))), expect, "at {second} s");
     }
     let mut free = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     free.restore(&journal);
-    assert_eq!(events(&free.judge(at(1), facts(70.0, true)))[0], AlarmEvent::ReturnedSuppressed);
+    assert_eq!(events(&free.evaluate(at(1), facts(70.0, true)))[0], AlarmEvent::ReturnedSuppressed);
     assert!(free.machine(HIGH).suppressed().is_none(), "the plant file enables it by nothing any more");
 }
 
@@ -331,15 +338,15 @@ fn what_was_annunciated_stays_until_somebody_has_answered_to_it_though_its_enabl
     };
     let latch = |alarm: &mut AlarmDef| (alarm.latch, alarm.on_delay) = (true, Duration::ZERO);
     let mut manager = AlarmManager::new(enabled_by_design(latch));
-    assert_eq!(events(&manager.judge(at(0), when(true))), [AlarmEvent::Raised]);
-    assert_eq!(events(&manager.judge(at(1), when(false))), [AlarmEvent::ReturnedToNormal]);
+    assert_eq!(events(&manager.evaluate(at(0), when(true))), [AlarmEvent::Raised]);
+    assert_eq!(events(&manager.evaluate(at(1), when(false))), [AlarmEvent::ReturnedToNormal]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::LatchedUnacknowledged, false));
-    assert_eq!(events(&manager.judge(at(2), when(false))), [], "it is neither raised anew nor taken away");
+    assert_eq!(events(&manager.evaluate(at(2), when(false))), [], "it is neither raised anew nor taken away");
     manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
-    assert_eq!(events(&manager.judge(at(4), when(false))), []);
+    assert_eq!(events(&manager.evaluate(at(4), when(false))), []);
     assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
     manager.reset(HIGH, at(5), &by()).expect("its cause is gone");
-    assert_eq!(events(&manager.judge(at(6), when(false)))[0], AlarmEvent::SuppressedByDesign);
+    assert_eq!(events(&manager.evaluate(at(6), when(false)))[0], AlarmEvent::SuppressedByDesign);
     assert_eq!(state(&manager), AlarmState::SuppressedByDesign);
 }
 
@@ -356,7 +363,7 @@ fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
         (661, true, vec![AlarmEvent::Raised]),
         (662, false, vec![AlarmEvent::ReturnedToNormal]),
     ] {
-        assert_eq!(events(&manager.judge(at(second), when(enabled))), expect, "at {second} s");
+        assert_eq!(events(&manager.evaluate(at(second), when(enabled))), expect, "at {second} s");
     }
 }
 
@@ -366,18 +373,18 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
         (alarm.on_delay, alarm.re_alarm) = (Duration::ZERO, Some(Duration::from_secs(1_800)));
     };
     let mut manager = AlarmManager::new(with(remind));
-    let mut journal = manager.judge(at(0), facts(80.0, true));
+    let mut journal = manager.evaluate(at(0), facts(80.0, true));
     journal.push(manager.acknowledge(HIGH, at(0), None, at(10), &by()).expect("it waits"));
     manager.silence();
-    assert_eq!(events(&manager.judge(at(1_809), facts(80.0, true))), []);
+    assert_eq!(events(&manager.evaluate(at(1_809), facts(80.0, true))), []);
     let mut again = AlarmManager::new(with(remind));
     again.restore(&journal);
     assert_eq!(
-        events(&again.judge(at(1_810), facts(80.0, true))),
+        events(&again.evaluate(at(1_810), facts(80.0, true))),
         [AlarmEvent::ReAlarmed],
         "a restart forgets no time"
     );
-    assert_eq!(events(&manager.judge(at(1_810), facts(80.0, true))), [AlarmEvent::ReAlarmed]);
+    assert_eq!(events(&manager.evaluate(at(1_810), facts(80.0, true))), [AlarmEvent::ReAlarmed]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::Unacknowledged, true));
     assert_eq!(manager.active()[0].raised_at, at(0), "it is the same activation");
     let early = manager.acknowledge(HIGH, at(0), None, at(1_811), &by());
@@ -402,7 +409,7 @@ fn of_a_storm_none_is_lost_and_the_first_out_is_marked() {
     let mut manager = AlarmManager::new(many(10_000));
     let mut raised = Vec::new();
     for second in 0..60 {
-        raised.extend(manager.judge(at(second), facts(second as f64 * 500.0 / 59.0 + 0.5, true)));
+        raised.extend(manager.evaluate(at(second), facts(second as f64 * 500.0 / 59.0 + 0.5, true)));
     }
     assert_eq!(raised.len(), 501);
     assert_eq!(manager.active().len(), 501);
@@ -412,7 +419,7 @@ fn of_a_storm_none_is_lost_and_the_first_out_is_marked() {
     );
     let ranks: Vec<u32> = raised.iter().filter_map(|record| record.first_out.map(|first_out| first_out.rank)).collect();
     assert_eq!(ranks, (1..=501).collect::<Vec<u32>>());
-    let later = manager.judge(at(80), facts(501.5, true));
+    let later = manager.evaluate(at(80), facts(501.5, true));
     assert_eq!(later[0].first_out.map(|first_out| (first_out.began, first_out.rank)), Some((at(80), 1)), "another one");
 }
 
@@ -516,7 +523,7 @@ proptest! {
                     continue;
                 }
             }
-            let told = manager.judge(at(now), |alarm| Facts {
+            let told = manager.evaluate(at(now), |alarm| Facts {
                 value,
                 ill: Some(false),
                 enabled: enabled.filter(|_| alarm.enabled_when.is_some()),

@@ -1,4 +1,4 @@
-//! Alarms in the plant: what they are judged by, what operators do with them, what a restart takes up.
+//! Alarms in the plant: what they are evaluated by, what operators do with them, what a restart takes up.
 
 use jiff::Timestamp;
 
@@ -86,7 +86,7 @@ impl Plant {
             (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),
             (Subject::Tag(_) | Subject::Station, _) => None,
         };
-        let mut steps = self.alarm_manager.judge(self.at, |alarm| facts(image, ill(alarm), alarm));
+        let mut steps = self.alarm_manager.evaluate(self.at, |alarm| facts(image, ill(alarm), alarm));
         steps.iter_mut().for_each(|step| explain(step, faults));
         steps
     }
@@ -145,7 +145,7 @@ fn is_lost(line: &LineStatus) -> Option<bool> {
     }
 }
 
-/// A line that is not polled has no load that could be judged.
+/// A line that is not polled has no load that could be evaluated.
 fn is_overloaded(line: &LineStatus) -> Option<bool> {
     let report = line.report.as_ref().filter(|_| line.state == LineState::Connected);
     report.map(|report| report.strain.is_some())

@@ -53,7 +53,7 @@ impl Plant {
             let timeout = report.map_or(self.def.line(def.line).timeout, |report| report.settings.timeout);
             let settling = self.settling(def.id);
             let input = DiagnosisInput { device: status.state, line: &line.state, settling, lately: &lately, timeout };
-            DeviceStatus { diagnosis: ne107::judge(input), ..*status }
+            DeviceStatus { diagnosis: ne107::evaluate(input), ..*status }
         };
         self.def.devices.iter().zip(&self.devices).map(diagnosed).collect()
     }
