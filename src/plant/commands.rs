@@ -279,7 +279,7 @@ impl CommandTracker {
         checked: Checked,
     ) -> Result<Checked, Outcome> {
         let def = self.def.tag(tag);
-        let now = image.trusted_raw(tag).zip(image.scaling_decimals(def)).filter(|_| !checked.urgent);
+        let now = image.good_raw(tag).zip(image.scaling_decimals(def)).filter(|_| !checked.urgent);
         let Some((raw, decimals)) = now else { return Ok(checked) };
         let now = scale::to_value(def, raw, decimals);
         let same_raw = |seen| scale::to_raw(def, seen, decimals).is_some_and(|seen| scale::same_raw(def, seen, raw));
@@ -328,7 +328,7 @@ impl CommandTracker {
             return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
         };
         // What was read before the write under way says nothing about the time after it.
-        if !is_busy && image.trusted_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
+        if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
             return Err(Outcome::Unchanged);
         }
         let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
@@ -336,7 +336,7 @@ impl CommandTracker {
         // A key that is turned already stays so, unless somebody is just turning it.
         let unlock = unlock.filter(|(key, turned)| {
             let moving = self.writes.iter().any(|write| write.2 == *key);
-            let now = image.trusted_raw(*key).filter(|_| !moving);
+            let now = image.good_raw(*key).filter(|_| !moving);
             now.is_none_or(|now| !scale::same_raw(self.def.tag(*key), now, *turned))
         });
         Ok(Checked { raw, unlock, urgent })

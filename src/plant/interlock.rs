@@ -67,7 +67,7 @@ pub enum InterlockStatus {
 impl InterlockDef {
     /// How it stands with this sample of the tag that decides.
     pub fn status(&self, sample: Sample) -> InterlockStatus {
-        let Some(value) = sample.trusted() else {
+        let Some(value) = sample.good_value() else {
             return InterlockStatus::Unknown(sample.quality.cause().unwrap_or(Cause::NotRead));
         };
         let blocked = match self.when {
@@ -128,11 +128,12 @@ impl ControlLogic {
 
     /// Is the actuator in this place certainly not doing what it is certainly told to do?
     fn differs(&self, actuator: &ActuatorDef, sample: &impl Fn(TagId) -> Sample) -> bool {
-        let (Some(command), Some(output)) = (sample(actuator.command).trusted(), sample(actuator.output).trusted())
+        let (Some(command), Some(output)) =
+            (sample(actuator.command).good_value(), sample(actuator.output).good_value())
         else {
             return false;
         };
-        let listens = actuator.needs.iter().all(|(tag, state)| sample(*tag).trusted() == Some(*state));
+        let listens = actuator.needs.iter().all(|(tag, state)| sample(*tag).good_value() == Some(*state));
         let mut locks = self.interlocks_of(actuator.command, command);
         let blocked = locks.any(|lock| lock.status(sample(lock.of)) == InterlockStatus::Blocked);
         actuator.travel.is_some() && listens && !blocked && (command != actuator.off) != (output != 0.0)
@@ -229,7 +230,7 @@ mod tests {
             (InterlockCondition::Bit(14), good(-32_768.0), Free),
             (InterlockCondition::Bit(200), good(4.0), Free),
             (InterlockCondition::Below(5.0), bad(), Unknown(Cause::Timeout)),
-            (InterlockCondition::Below(5.0), good(1.0).doubted(Cause::Stale), Unknown(Cause::Stale)),
+            (InterlockCondition::Below(5.0), good(1.0).uncertain(Cause::Stale), Unknown(Cause::Stale)),
         ] {
             let lock = InterlockDef { when, ..logic(true).interlocks[0].clone() };
             assert_eq!(lock.status(sample), expect, "{when:?} {sample:?}");

@@ -203,7 +203,7 @@ impl ProcessImage {
             Decimals::From(from) => {
                 // A register that holds anything else would scale every value to nothing.
                 let known =
-                    self.sample(from).trusted().filter(|n| n.fract() == 0.0 && (0.0..=DECIMALS_MAX).contains(n));
+                    self.sample(from).good_value().filter(|n| n.fract() == 0.0 && (0.0..=DECIMALS_MAX).contains(n));
                 known.map(|decimals| decimals as u8)
             }
         }
@@ -221,13 +221,13 @@ impl ProcessImage {
     pub fn bound(&self, bound: Bound) -> Result<f64, TagId> {
         match bound {
             Bound::Fixed(value) => Ok(value),
-            Bound::From(from) => self.sample(from).trusted().ok_or(from),
+            Bound::From(from) => self.sample(from).good_value().ok_or(from),
         }
     }
 
     /// The raw number last read, if the sample still stands on it.
-    pub fn trusted_raw(&self, tag: TagId) -> Option<f64> {
-        self.sample(tag).trusted()?;
+    pub fn good_raw(&self, tag: TagId) -> Option<f64> {
+        self.sample(tag).good_value()?;
         self.raw[tag.index()].map(|reading| reading.raw)
     }
 
@@ -239,7 +239,7 @@ impl ProcessImage {
         // A text is kept beside the sample, which has no number to show for it.
         let doubted = match self.texts[tag.index()] {
             Some(_) => Sample { quality: Quality::Uncertain(cause), ..sample },
-            None => sample.doubted(cause),
+            None => sample.uncertain(cause),
         };
         self.set(tag, doubted);
     }
@@ -269,7 +269,7 @@ impl ProcessImage {
         if let Some(decimals) = self.scaling_decimals(tag) {
             self.decimals_seen[tag.id.index()] = decimals;
         }
-        let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), self.trusted_raw(from), mask));
+        let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), self.good_raw(from), mask));
         let no_value = tag.bad_if.iter().any(|bad| *bad as f64 == raw);
         let sample = match (no_value, self.scaling_decimals(tag)) {
             (true, _) => Sample::bad(Cause::SensorFault, at),
@@ -282,11 +282,11 @@ impl ProcessImage {
             Some((word, bits, mask)) => match bits {
                 Some(bits) if bits as i64 as u64 & mask != 0 => Sample::bad(Cause::SensorFault, at),
                 Some(_) => sample,
-                None => sample.doubted(word.quality.cause().unwrap_or(Cause::NotRead)),
+                None => sample.uncertain(word.quality.cause().unwrap_or(Cause::NotRead)),
             },
         };
         let sample = match doubt {
-            Some(cause) if !sample.quality.is_bad() => sample.doubted(cause),
+            Some(cause) if !sample.quality.is_bad() => sample.uncertain(cause),
             Some(_) | None => sample,
         };
         self.set(tag.id, sample);

@@ -5,7 +5,7 @@ use std::fmt;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-/// How far a value can be trusted. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
+/// Quality of a value, as in OPC UA. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Quality {
     /// Read in time, in shape and in range.
@@ -144,7 +144,7 @@ pub struct Sample {
     /// In the tag's unit; bits are 0 or 1, enumerations their number. `None` exactly when the quality is bad; a tag that
     /// holds text never has a number, its text stands in the snapshot.
     pub value: Option<f64>,
-    /// How far to trust it.
+    /// Its quality.
     pub quality: Quality,
     /// When the answer arrived; for a value never read, when that was found.
     pub at: Timestamp,
@@ -161,8 +161,8 @@ impl Sample {
         Sample { value: None, quality: Quality::Bad(cause), at }
     }
 
-    /// The last value kept, but no longer trusted; a sample without a value becomes bad.
-    pub fn doubted(self, cause: Cause) -> Sample {
+    /// The last value kept, as uncertain; a sample without a value becomes bad.
+    pub fn uncertain(self, cause: Cause) -> Sample {
         match self.value {
             Some(_) => Sample { quality: Quality::Uncertain(cause), ..self },
             None => Sample { quality: Quality::Bad(cause), ..self },
@@ -170,7 +170,7 @@ impl Sample {
     }
 
     /// The value only if it is good.
-    pub fn trusted(self) -> Option<f64> {
+    pub fn good_value(self) -> Option<f64> {
         self.value.filter(|_| self.quality.is_good())
     }
 }
@@ -190,10 +190,10 @@ mod tests {
     }
 
     #[test]
-    fn a_doubted_value_is_kept_and_a_missing_one_stays_missing() {
+    fn an_uncertain_value_is_kept_and_a_missing_one_stays_missing() {
         let at = Timestamp::UNIX_EPOCH;
-        assert_eq!(Sample::good(1.5, at).doubted(Cause::Timeout).value, Some(1.5));
-        assert_eq!(Sample::bad(Cause::NotRead, at).doubted(Cause::Timeout).quality, Quality::Bad(Cause::Timeout));
-        assert_eq!(Sample::good(1.5, at).doubted(Cause::Stale).trusted(), None);
+        assert_eq!(Sample::good(1.5, at).uncertain(Cause::Timeout).value, Some(1.5));
+        assert_eq!(Sample::bad(Cause::NotRead, at).uncertain(Cause::Timeout).quality, Quality::Bad(Cause::Timeout));
+        assert_eq!(Sample::good(1.5, at).uncertain(Cause::Stale).good_value(), None);
     }
 }

@@ -109,7 +109,7 @@ impl TuningWatch {
         at: Timestamp,
     ) -> Noticed {
         let Some(plate) = &device.faceplate else { return Noticed::Nothing };
-        let Some(on) = plate.tune.and_then(|tune| sample(tune).trusted()).map(|value| value != 0.0) else {
+        let Some(on) = plate.tune.and_then(|tune| sample(tune).good_value()).map(|value| value != 0.0) else {
             return Noticed::Nothing;
         };
         let before = self.on.replace(on);
@@ -129,11 +129,11 @@ impl TuningWatch {
 }
 
 fn begin(plate: &Faceplate, sample: &dyn Fn(TagId) -> Sample, span: Option<f64>, seen: bool, at: Timestamp) -> Tuning {
-    let found = plate.tunes.iter().map(|tag| Found { tag: *tag, old: sample(*tag).trusted(), new: None });
+    let found = plate.tunes.iter().map(|tag| Found { tag: *tag, old: sample(*tag).good_value(), new: None });
     let mut tuning = Tuning {
         began: at,
         seen,
-        sv: sample(plate.sv).trusted(),
+        sv: sample(plate.sv).good_value(),
         ended: None,
         found: found.collect(),
         extrema: Vec::new(),
@@ -148,7 +148,7 @@ fn begin(plate: &Faceplate, sample: &dyn Fn(TagId) -> Sample, span: Option<f64>,
 impl Tuning {
     /// A extremum is an extreme that PV has left by more than noise.
     fn follow(&mut self, pv: Sample) {
-        let Some(value) = pv.trusted() else { return };
+        let Some(value) = pv.good_value() else { return };
         let here = |high| Extremum { at: pv.at, pv: value, high };
         let Some(extreme) = self.extreme else {
             // Which way it goes is known when it has moved: around SV it rises to it first.
@@ -174,7 +174,7 @@ impl Tuning {
         let Some(ended) = self.ended else { return };
         for found in self.found.iter_mut().filter(|found| found.new.is_none()) {
             let now = sample(found.tag);
-            found.new = now.trusted().filter(|_| ended < now.at);
+            found.new = now.good_value().filter(|_| ended < now.at);
         }
     }
 }

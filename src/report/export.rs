@@ -79,7 +79,7 @@ mod tests {
             decimals: 1,
             values: values.to_vec(),
         };
-        let doubted = Some(HeldValue::from(Sample::good(20.0, sec(0)).doubted(Cause::Stale)));
+        let doubted = Some(HeldValue::from(Sample::good(20.0, sec(0)).uncertain(Cause::Stale)));
         let bad = Some(HeldValue::from(Sample::bad(Cause::Timeout, sec(0))));
         let columns = [column("TIC-1.PV", "°C", &[good(20.04), bad]), column("=RUN", "", &[doubted, None])];
         let from = at("2026-11-21T06:00+07");

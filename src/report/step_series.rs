@@ -154,7 +154,7 @@ impl SegmentStats {
 
 /// A good value that is a number. A stored NaN or infinity is no value, whatever its quality says.
 pub fn good_value(sample: Sample) -> Option<f64> {
-    sample.trusted().filter(|value| value.is_finite())
+    sample.good_value().filter(|value| value.is_finite())
 }
 
 fn expiry(sample: Sample) -> Timestamp {
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn an_uncertain_value_is_not_counted_as_good() {
-        let samples = [Sample::good(5.0, sec(0)), Sample::good(5.0, sec(4)).doubted(Cause::Stale)];
+        let samples = [Sample::good(5.0, sec(0)), Sample::good(5.0, sec(4)).uncertain(Cause::Stale)];
         assert_eq!(held(samples.into_iter(), sec(0), sec(10)), [Segment { from: sec(0), to: sec(4), value: 5.0 }]);
     }
 

@@ -125,7 +125,7 @@ impl Fixture {
         for (tag, sample) in plant.def.tags.iter().zip(&mut plant.samples) {
             sample.at = at;
             *sample = if tag.device == DeviceId(0) {
-                sample.doubted(Cause::NotConnected)
+                sample.uncertain(Cause::NotConnected)
             } else {
                 Sample::bad(Cause::NotConnected, at)
             };

@@ -25,7 +25,7 @@ const FAILED_S: f64 = 60.0;
 /// The other of two states, if the tag has two and is in one of them for certain.
 pub fn other_state(cx: &ViewContext, tag: TagId) -> Option<f64> {
     let (one, other) = two_states(cx.def().tag(tag))?;
-    match cx.snapshot.sample(tag).trusted()? {
+    match cx.snapshot.sample(tag).good_value()? {
         now if now == one => Some(other),
         now if now == other => Some(one),
         _ => None,
@@ -67,7 +67,7 @@ pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, St
 /// `First TIC-2.UNLOCK := ON; it stays so.`, where a write needs a key that is not certainly turned.
 pub fn key_words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let (key, turned) = cx.def().tag(tag).write_unlock?;
-    if cx.snapshot.sample(key).trusted() == Some(turned) {
+    if cx.snapshot.sample(key).good_value() == Some(turned) {
         return None;
     }
     Some(format!("First {} := {}; it stays so.", cx.def().tag(key).name, cx.snapshot.format(key, turned)))
@@ -98,14 +98,14 @@ pub fn interlock_words(cx: &ViewContext, lock: &InterlockDef) -> Option<(String,
 
 /// The first state that a command needs and that is not there: the tag, and the state.
 pub fn unmet(cx: &ViewContext, actuator: &ActuatorDef) -> Option<(TagId, f64)> {
-    actuator.needs.iter().find(|(tag, state)| cx.snapshot.sample(*tag).trusted() != Some(*state)).copied()
+    actuator.needs.iter().find(|(tag, state)| cx.snapshot.sample(*tag).good_value() != Some(*state)).copied()
 }
 
 /// `acts in MANUAL only, and PLC-1.AUTO is AUTO`, for the command of an actuator.
 pub fn unmet_words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let actuator = &cx.def().logic.actuators.iter().find(|actuator| actuator.command == tag)?;
     let (need, state) = unmet(cx, actuator)?;
-    let now = match cx.snapshot.sample(need).trusted() {
+    let now = match cx.snapshot.sample(need).good_value() {
         Some(now) => format!("is {}", cx.snapshot.format(need, now)),
         None => "is not known".to_owned(),
     };
@@ -125,12 +125,12 @@ fn sequence_words(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let Some(sequence) = sequences.iter().find(|sequence| sequence.run == tag) else { return Vec::new() };
     let step = |number: f64| cx.snapshot.format(sequence.step, number);
     if value == 0.0 {
-        let now = cx.snapshot.sample(sequence.step).trusted();
+        let now = cx.snapshot.sample(sequence.step).good_value();
         let at =
             now.map_or_else(|| "The sequence stops.".to_owned(), |now| format!("The sequence stops in {}.", step(now)));
         return vec![at, switched_off(cx)];
     }
-    let by_itself = sequence.auto.map(|(auto, state)| (cx.snapshot.sample(auto).trusted(), state, auto));
+    let by_itself = sequence.auto.map(|(auto, state)| (cx.snapshot.sample(auto).good_value(), state, auto));
     match by_itself {
         Some((Some(now), state, _)) if now != state => {
             vec!["In manual no step starts: the commands by hand act from now on.".to_owned()]
@@ -167,7 +167,7 @@ fn switched_off(cx: &ViewContext) -> String {
 
 /// What the commands by hand will change at once when this value lets them act.
 fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
-    let sample = |tag: TagId| cx.snapshot.sample(tag).trusted();
+    let sample = |tag: TagId| cx.snapshot.sample(tag).good_value();
     let acts = |actuator: &&ActuatorDef| {
         let needs =
             |(need, state): &(TagId, f64)| if *need == tag { value == *state } else { sample(*need) == Some(*state) };
@@ -257,7 +257,7 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
 
 /// Is the output certainly as commanded? One that need not follow its command counts as such.
 fn obeys(cx: &ViewContext, actuator: &ActuatorDef) -> bool {
-    let command = cx.snapshot.sample(actuator.command).trusted().map(|command| command != actuator.off);
+    let command = cx.snapshot.sample(actuator.command).good_value().map(|command| command != actuator.off);
     actuator.travel.is_none() || (command.is_some() && value::is_on(cx, actuator.output) == command)
 }
 

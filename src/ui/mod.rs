@@ -172,7 +172,7 @@ impl Model {
         if self.snapshot.samples.iter().any(|sample| sample.quality.is_good()) {
             let doubted = Arc::make_mut(&mut self.snapshot);
             for sample in doubted.samples.iter_mut().filter(|sample| sample.quality.is_good()) {
-                *sample = sample.doubted(Cause::Stale);
+                *sample = sample.uncertain(Cause::Stale);
             }
         }
     }

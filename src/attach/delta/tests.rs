@@ -78,7 +78,7 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
     match kind {
         0 => snapshot.samples[tag] = Sample::good(f64::from(amount) / 8.0, at),
         1 => snapshot.samples[tag] = Sample::bad(Cause::Timeout, at),
-        2 => snapshot.samples.iter_mut().for_each(|sample| *sample = sample.doubted(Cause::Stale)),
+        2 => snapshot.samples.iter_mut().for_each(|sample| *sample = sample.uncertain(Cause::Stale)),
         3 => Arc::make_mut(&mut snapshot.texts)[tag] = (amount % 2 == 0).then(|| format!("{amount}").into()),
         4 => {
             let exchange = Arc::new(Exchange {

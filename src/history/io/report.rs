@@ -40,7 +40,7 @@ impl Gathered {
         if let Some(record) = &mut self.record {
             record.next(sample);
         }
-        self.latest_good = sample.trusted().or(self.latest_good);
+        self.latest_good = sample.good_value().or(self.latest_good);
     }
 }
 

@@ -10,9 +10,9 @@ const POINTS_MAX: u32 = 32;
 /// What a condition is evaluated by. `None` is "not known now".
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
-    /// The trusted value of the tag, in its unit.
+    /// The good value of the tag, in its unit.
     pub value: Option<f64>,
-    /// The trusted value of the tag that a deviation is measured from.
+    /// The good value of the tag that a deviation is measured from.
     pub reference: Option<f64>,
     /// For a device or line: whether it is in the state that the alarm tells.
     pub ill: Option<bool>,

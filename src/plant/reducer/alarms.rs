@@ -103,7 +103,7 @@ fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
 
 /// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
 fn facts(image: &ProcessImage, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
-    let trusted = |tag| image.sample(tag).trusted();
+    let trusted = |tag| image.sample(tag).good_value();
     let value = match alarm.subject {
         Subject::Tag(tag) => trusted(tag),
         Subject::Device(_) | Subject::Line(_) | Subject::Station => None,

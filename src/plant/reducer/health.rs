@@ -36,7 +36,7 @@ impl Plant {
                 asked.push((device.line, BusRequest::Refresh { device: device.id, command: None }));
             }
             if let Some(program) = &device.program {
-                let (position, command) = (sample(program.position).trusted(), sample(program.command).trusted());
+                let (position, command) = (sample(program.position).good_value(), sample(program.command).good_value());
                 self.programs[device.id.index()].take(program, position, command, at);
             }
         }

@@ -233,12 +233,12 @@ impl Plant {
 
 /// What is trusted now.
 fn trusted(image: &ProcessImage) -> impl Fn(TagId) -> Option<f64> + '_ {
-    |tag| image.sample(tag).trusted()
+    |tag| image.sample(tag).good_value()
 }
 
 /// Why a step would write over something else than what was confirmed.
 fn overtaken(step: &Step, image: &ProcessImage) -> Option<Refusal> {
-    match image.sample(step.change.tag).trusted() {
+    match image.sample(step.change.tag).good_value() {
         None => Some(Refusal::NotKnownNow),
         Some(now) if now != step.change.old => Some(Refusal::ChangedSince),
         Some(_) => None,

@@ -410,7 +410,7 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
     let Some(Record::Action(action)) = effects.records.last() else { panic!("no line for the key") };
     assert_eq!((&*action.by, &*action.target, action.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
     assert_eq!(&*action.outcome, "not confirmed: accepted, not read back; for TIC-1.SV");
-    assert!(plant.snapshot().sample(FAULT).trusted().is_none(), "the key is not as it was read before");
+    assert!(plant.snapshot().sample(FAULT).good_value().is_none(), "the key is not as it was read before");
     plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::Refused(ExceptionCode(3)) });
     // Not read again yet: nobody can tell, so it is sent again.
     let (id, unlock) = keyed(&mut plant, 2, 71.0);

@@ -205,7 +205,7 @@ proptest! {
         // Naive: what stood in each second, by searching the whole list.
         let stood = |second: i64| samples.iter().rev().find(|sample| sample.at <= sec(second))
             .filter(|sample| sec(second).duration_since(sample.at).as_secs() < 150)
-            .and_then(|sample| sample.trusted());
+            .and_then(|sample| sample.good_value());
         let values: Vec<f64> = (from..until).filter_map(stood).collect();
         let good = values.len() as f64 / length as f64;
         prop_assert!((got.good - good).abs() < 1e-9);

@@ -214,7 +214,7 @@ impl Mark {
                 }
             }
             Expectation::True(tag, allowed) => {
-                let (shown, truth) = (snapshot.sample(tag).trusted(), actual.get(&tag).copied());
+                let (shown, truth) = (snapshot.sample(tag).good_value(), actual.get(&tag).copied());
                 self.seen |= truth.is_some();
                 match (shown, truth) {
                     (Some(shown), Some(truth)) if (shown - truth).abs() > allowed => {

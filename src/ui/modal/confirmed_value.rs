@@ -26,7 +26,7 @@ impl ConfirmedValue {
 
     /// Is it another value than was seen? Then that is what was seen from now on, and its author should be asked again.
     pub fn changed(&mut self, cx: &ViewContext) -> bool {
-        let now = cx.snapshot.sample(self.tag).trusted();
+        let now = cx.snapshot.sample(self.tag).good_value();
         // What has become unknown is not another value: the window shows it, and the station checks.
         if now.is_none() || now == self.value || self.asked >= ASKED_MAX {
             return false;
@@ -45,7 +45,7 @@ impl ConfirmedValue {
 
     /// What the window says of a change that its reader may not have noticed; `None` while it is as he saw it.
     pub fn news(&self, cx: &ViewContext) -> Option<String> {
-        let now = cx.snapshot.sample(self.tag).trusted();
+        let now = cx.snapshot.sample(self.tag).good_value();
         let other = now.is_some() && now != self.value && self.asked < ASKED_MAX;
         match (other, self.asked) {
             (true, _) => Some(format!("{}; ⏎ asks again", self.words(cx, self.value, now))),

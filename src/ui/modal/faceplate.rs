@@ -96,7 +96,7 @@ impl Faceplate {
         let refused = interlock::is_refused(cx, command, value);
         let missing = interlock::unmet(cx, actuator).filter(|(need, _)| {
             // A state that nobody knows is no reason to change it.
-            cx.def().tag(*need).writable() && cx.snapshot.sample(*need).trusted().is_some() && !refused
+            cx.def().tag(*need).writable() && cx.snapshot.sample(*need).good_value().is_some() && !refused
         });
         let confirm = match missing {
             Some((need, state)) => {

@@ -54,7 +54,7 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
 pub fn relative_words(cx: &ViewContext, tag: TagId, text: &str) -> Option<String> {
     let (Number::Step(by), _) = parse(text.trim())? else { return None };
     let text = |value| cx.snapshot.format(tag, value);
-    Some(format!("{} → {}", text(cx.snapshot.sample(tag).trusted()?), text(stepped(cx, tag, by)?)))
+    Some(format!("{} → {}", text(cx.snapshot.sample(tag).good_value()?), text(stepped(cx, tag, by)?)))
 }
 
 /// How to type a change.
@@ -126,7 +126,7 @@ pub fn range_words(cx: &ViewContext, tag: TagId) -> String {
 
 /// The present value and a step from it.
 fn stepped(cx: &ViewContext, tag: TagId, by: f64) -> Option<f64> {
-    let now = cx.snapshot.sample(tag).trusted()?;
+    let now = cx.snapshot.sample(tag).good_value()?;
     // As many decimals as are shown: 0.1 + 0.2 is 0.3.
     format!("{:.*}", usize::from(cx.snapshot.decimals[tag.index()]), now + by).parse().ok()
 }

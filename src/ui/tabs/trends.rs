@@ -374,7 +374,7 @@ impl Trends {
     fn push_live(&mut self, cx: &ViewContext) {
         for pen in self.pens(cx) {
             let sample = cx.snapshot.sample(pen.tag);
-            let value = sample.trusted();
+            let value = sample.good_value();
             let at = if value.is_some() { sample.at } else { cx.now };
             self.data.traces.entry(pen.tag).or_default().push(at, value);
         }

@@ -357,7 +357,7 @@ fn without_colour_every_state_and_quality_looks_different() {
     let at = fixture::now();
     let looks: HashSet<String> = Cause::ALL
         .into_iter()
-        .flat_map(|cause| [Sample::bad(cause, at), Sample::good(64.2, at).doubted(cause)])
+        .flat_map(|cause| [Sample::bad(cause, at), Sample::good(64.2, at).uncertain(cause)])
         .chain([Sample::good(64.2, at)])
         .map(|sample| {
             let mut fixture = good.clone();

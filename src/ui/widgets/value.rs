@@ -95,7 +95,7 @@ impl Shown {
 
 /// `on` for a good value that is not zero; `None` when nobody can say.
 pub fn is_on(cx: &ViewContext, tag: TagId) -> Option<bool> {
-    cx.snapshot.sample(tag).trusted().map(|value| value != 0.0)
+    cx.snapshot.sample(tag).good_value().map(|value| value != 0.0)
 }
 
 #[cfg(test)]

@@ -173,7 +173,7 @@ fn a_value_is_stored_to_its_last_digit_and_every_quality_comes_back() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     store.append(&[good(PV, 0, 123_456.7), Record::Sample(PV, Sample::bad(Cause::SensorFault, sec(10)))]).unwrap();
-    let last = Sample::good(1.0, sec(20)).doubted(Cause::Timeout);
+    let last = Sample::good(1.0, sec(20)).uncertain(Cause::Timeout);
     store.append(&[Record::Sample(PV, Sample { at: sec(20), ..last })]).unwrap();
     assert_eq!(means(&store, PV, 0, 30, 3), [Some(123_456.7), None, None]);
     let codes: Vec<u8> = {

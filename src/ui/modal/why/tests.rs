@@ -100,7 +100,7 @@ fn cases() -> Vec<(&'static str, Fixture)> {
     let good = fixture();
     let mut timeout = fixture();
     asked(&mut timeout, Err(Fault::Timeout), Vec::new(), 1);
-    doubt(&mut timeout, |sample| sample.doubted(Cause::Timeout));
+    doubt(&mut timeout, |sample| sample.uncertain(Cause::Timeout));
     timeout.devices[0].state = DeviceState::Failing(2);
     timeout.devices[0].last_fault = Some((ago(420), Fault::Timeout));
     timeout.devices[0].diagnosis = Some(Reason::Failing { failed: 8, of: 64 });
@@ -109,7 +109,7 @@ fn cases() -> Vec<(&'static str, Fixture)> {
     corrupt[5] ^= 0x40;
     let fault = frame::without_crc(&corrupt).expect_err("a corrupt frame");
     asked(&mut crc, Err(fault), corrupt, 2);
-    doubt(&mut crc, |sample| sample.doubted(Cause::Corrupt));
+    doubt(&mut crc, |sample| sample.uncertain(Cause::Corrupt));
     crc.devices[0].last_fault = Some((ago(420), fault));
     let mut exception = fixture();
     let fault = Fault::Exception(ExceptionCode(2));

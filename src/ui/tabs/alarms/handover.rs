@@ -282,7 +282,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
     });
     let sequences = def.logic.sequences.iter().filter_map(|sequence| {
         let (tag, auto) = sequence.auto?;
-        let now = snapshot.sample(tag).trusted().filter(|now| *now != auto)?;
+        let now = snapshot.sample(tag).good_value().filter(|now| *now != auto)?;
         Some(format!("{} {}", def.tag(tag).name, snapshot.format(tag, now)))
     });
     let stubborn = def.logic.actuators.iter().enumerate().filter_map(|(n, actuator)| {

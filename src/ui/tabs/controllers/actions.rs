@@ -61,7 +61,7 @@ fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
     let Some(tune) = device.faceplate.as_ref().and_then(|faceplate| faceplate.tune) else {
         return notice(device, "this device has no auto-tuning");
     };
-    let on = cx.snapshot.sample(tune).trusted().is_some_and(|value| value != 0.0);
+    let on = cx.snapshot.sample(tune).good_value().is_some_and(|value| value != 0.0);
     if on { confirm(cx, tune, 0.0) } else { write(cx, Some(tune)) }
 }
 

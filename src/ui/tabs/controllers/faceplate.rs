@@ -143,7 +143,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId,
         let share = (value - min) / (max - min);
         share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
     };
-    let now = cx.snapshot.sample(tag).trusted();
+    let now = cx.snapshot.sample(tag).good_value();
     if tag == faceplate.aim() {
         if let Some((low, high)) =
             cx.snapshot.range(faceplate.sv).and_then(|(low, high)| Some((column(low)?, column(high)?)))
@@ -166,7 +166,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId,
         }
     }
     if scale == faceplate.pv
-        && let Some(x) = cx.snapshot.sample(faceplate.aim()).trusted().and_then(column)
+        && let Some(x) = cx.snapshot.sample(faceplate.aim()).good_value().and_then(column)
     {
         canvas.glyph(x, 0, '▼', theme.set_value());
     }
@@ -217,7 +217,7 @@ pub fn tuning_words(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) ->
         let turns: Vec<String> = turns.map(|turn| format!("{}{}", arrow(turn.high), number(turn.pv))).collect();
         let swings = if turns.is_empty() { "no swing yet".to_owned() } else { format!("swings {}", turns.join(" ")) };
         let period = tuning.period().map_or(String::new(), |period| format!(", {} s each", period.as_secs()));
-        let known = faceplate.tune.is_some_and(|tune| cx.snapshot.sample(tune).trusted().is_some());
+        let known = faceplate.tune.is_some_and(|tune| cx.snapshot.sample(tune).good_value().is_some());
         let how = if known { "AUTO-TUNING" } else { "not known now; when last heard AUTO-TUNING" };
         return vec![format!("{how} {least}{elapsed}{around} (T stops)"), format!("{swings}{period}")];
     };

@@ -88,12 +88,12 @@ fn now_words(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Stri
 }
 
 fn place(cx: &ViewContext, program: &ProgramDef) -> Option<ProgramPosition> {
-    cx.snapshot.sample(program.position).trusted().map(|position| program.place(position))
+    cx.snapshot.sample(program.position).good_value().map(|position| program.place(position))
 }
 
 /// The steps that the pattern runs, from 0.
 fn chosen(cx: &ViewContext, program: &ProgramDef) -> Option<(usize, usize)> {
-    program.steps_of(program.pattern.and_then(|pattern| cx.snapshot.sample(pattern).trusted()))
+    program.steps_of(program.pattern.and_then(|pattern| cx.snapshot.sample(pattern).good_value()))
 }
 
 fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell) {
@@ -159,7 +159,7 @@ struct Segment {
 /// The way of the set value, from PV as it is now; `None` while a part of it is not known.
 fn segments(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Segment>> {
     let (first, last) = chosen(cx, program)?;
-    let trusted = |tag: TagId| cx.snapshot.sample(tag).trusted();
+    let trusted = |tag: TagId| cx.snapshot.sample(tag).good_value();
     // A ramp begins where the step before has ended; the first at PV as it is at the start. Once it runs that is past,
     // and the device does not tell it: the first ramp is a gap then.
     let resting = matches!(place(cx, program), Some(ProgramPosition::Off | ProgramPosition::Ended));

@@ -49,7 +49,7 @@ impl Source {
 
 /// What is trusted now.
 pub fn trusted<'a>(cx: &'a ViewContext) -> impl Fn(TagId) -> Option<f64> + 'a {
-    |tag| cx.snapshot.sample(tag).trusted()
+    |tag| cx.snapshot.sample(tag).good_value()
 }
 
 /// Every source that can be compared with a device: its sets, files that cannot be used, other devices of its profile.

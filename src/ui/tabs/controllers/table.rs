@@ -140,7 +140,7 @@ impl Table {
 
 /// Is the value known, and another than the maker delivers?
 pub fn differs(cx: &ViewContext, tag: &TagDef) -> bool {
-    let now = cx.snapshot.sample(tag.id).trusted();
+    let now = cx.snapshot.sample(tag.id).good_value();
     // Half of the last digit shown: what looks the same is the same.
     let least = 0.5 * 10f64.powi(-i32::from(cx.snapshot.decimals[tag.id.index()]));
     tag.default.zip(now).is_some_and(|(default, now)| least <= (default - now).abs())

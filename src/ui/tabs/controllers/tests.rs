@@ -143,7 +143,7 @@ fn a_tuning_at_work_is_stopped_by_the_key_that_starts_one() {
 /// A restore of two changes whose first is done.
 fn half_done(fixture: &Fixture, state: State) -> Restore {
     let set = fixture.sets[1].set.clone().expect("a good set");
-    let trusted = |tag: crate::plant::def::TagId| fixture.samples[tag.index()].trusted();
+    let trusted = |tag: crate::plant::def::TagId| fixture.samples[tag.index()].good_value();
     let changes = crate::plant::parameter_set::plan(&fixture.def, DeviceId(0), &set, &trusted).expect("it fits");
     let request = RestoreRequest { device: DeviceId(0), from: "set winter".into(), set, changes };
     let id = CommandId { terminal: 1, number: 9 };

@@ -171,7 +171,7 @@ fn compare(cx: &ViewContext, status: &Status, target: FaultTarget) -> Vec<Compar
         .iter()
         .filter(|(tag, _)| of_place(**tag))
         .map(|(tag, truth)| {
-            let comparison = match cx.snapshot.sample(*tag).trusted() {
+            let comparison = match cx.snapshot.sample(*tag).good_value() {
                 None => TruthComparison::Unknown,
                 Some(shown) if (shown - truth).abs() > allowed(cx, *tag) => TruthComparison::Wrong,
                 Some(_) => TruthComparison::Same,

@@ -52,7 +52,7 @@ pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &De
 
 /// `set 70.0`, where the controller works towards something else: a program or a ramp moves it.
 pub fn set_apart(cx: &ViewContext, faceplate: &Faceplate) -> Option<String> {
-    let value = |tag| cx.snapshot.sample(tag).trusted();
+    let value = |tag| cx.snapshot.sample(tag).good_value();
     let set = value(faceplate.sv).filter(|set| value(faceplate.aim()) != Some(*set))?;
     Some(format!("set {}", cx.snapshot.format(faceplate.sv, set)))
 }
@@ -86,10 +86,10 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, faceplate: &Faceplate) {
             canvas.glyph(x, y, '┃', theme.normal());
         }
     }
-    if let Some(x) = cx.snapshot.sample(faceplate.aim()).trusted().and_then(column) {
+    if let Some(x) = cx.snapshot.sample(faceplate.aim()).good_value().and_then(column) {
         canvas.glyph(x, y, '▼', theme.set_value());
     }
-    if let Some(x) = cx.snapshot.sample(faceplate.pv).trusted().and_then(column) {
+    if let Some(x) = cx.snapshot.sample(faceplate.pv).good_value().and_then(column) {
         // Never reversed: a reversed full block is an empty one.
         let style =
             alarm_mark(cx, faceplate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
@@ -125,9 +125,9 @@ impl Sequence<'_> {
         let shown = value::show(cx, self.step);
         let x = canvas.text(x + 2, 0, &shown.text, if shown.note.is_empty() { theme.strong() } else { shown.style });
         // A step without a time of its own has nothing left to tell.
-        let untimed = |left: &TagId| cx.snapshot.sample(*left).trusted() == Some(0.0);
+        let untimed = |left: &TagId| cx.snapshot.sample(*left).good_value() == Some(0.0);
         if let Some(left) = self.remaining.filter(|left| !untimed(left)) {
-            let text = match cx.snapshot.sample(left).trusted() {
+            let text = match cx.snapshot.sample(left).good_value() {
                 Some(seconds) if seconds >= 0.0 => {
                     format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7))))
                 }
@@ -145,7 +145,7 @@ impl Sequence<'_> {
     /// Draws the steps; returns the rows that they take.
     fn steps(&self, cx: &ViewContext, canvas: &mut Canvas) -> u16 {
         let theme = cx.theme;
-        let now = cx.snapshot.sample(self.step).trusted();
+        let now = cx.snapshot.sample(self.step).good_value();
         let (mut x, mut y) = (0, 0);
         for (number, name) in &cx.def().tag(self.step).labels {
             let present = now == Some(*number as f64);

@@ -131,7 +131,7 @@ impl Tank<'_> {
 
 /// The level in eighths of a row; `None` unless the value is good and its range known.
 fn eighths(cx: &ViewContext, level: TagId, rows: u16) -> Option<u32> {
-    let value = cx.snapshot.sample(level).trusted()?;
+    let value = cx.snapshot.sample(level).good_value()?;
     let (min, max) = cx.snapshot.range(level)?;
     let share = ((value - min) / (max - min)).clamp(0.0, 1.0);
     // A little is not nothing.

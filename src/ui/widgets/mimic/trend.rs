@@ -36,7 +36,7 @@ pub fn view(
     let x = canvas.text(0, 0, &fit(&cx.def().tag(tag).name, at.width), label_style(cx, selected));
     canvas.text(x + 1, 0, &format!("last {span}"), theme.dim());
     // A good value now will be a curve soon, whatever the past lacks.
-    let soon = series.is_none() || cx.snapshot.sample(tag).trusted().is_some();
+    let soon = series.is_none() || cx.snapshot.sample(tag).good_value().is_some();
     let Some((series, (low, _, high))) = series.and_then(|series| Some((series, series.summary?))) else {
         canvas.text(0, 1, if soon { "no curve yet" } else { "no good value" }, theme.dim());
         return;
