@@ -204,7 +204,7 @@ mod tests {
             let step = |step: &str, after: &str| {
                 format!("[[expect]]\nalarm = '{of}'\nevent = '{step}'\nafter = '{after}'\nwithin = '50s'\n")
             };
-            step("raised", "40s") + &step("returned", "2m 40s")
+            step("raised", "40s") + &step("RTN", "2m 40s")
         };
         match fault {
             // A device that refuses everything is as good as silent.

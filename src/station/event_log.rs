@@ -97,11 +97,11 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
     match (old, new) {
         (_, AlarmState::Unacknowledged) => "RAISED",
         (_, AlarmState::Acknowledged) => "acknowledged",
-        (_, AlarmState::LatchedUnacknowledged) => "returned, waits for a reset",
+        (_, AlarmState::LatchedUnacknowledged) => "returned to normal, waits for a reset",
         (AlarmState::LatchedUnacknowledged | AlarmState::ReturnedToNormal, AlarmState::LatchedAcknowledged) => {
             "acknowledged"
         }
-        (_, AlarmState::LatchedAcknowledged) => "returned, waits for a reset",
+        (_, AlarmState::LatchedAcknowledged) => "returned to normal, waits for a reset",
         (_, AlarmState::Shelved) => "shelved",
         (_, AlarmState::SuppressedByDesign) => "suppressed by design",
         (_, AlarmState::OutOfService) => "out of service",
@@ -121,7 +121,7 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
             | AlarmState::SuppressedByDesign
             | AlarmState::OutOfService,
             AlarmState::Normal | AlarmState::ReturnedToNormal,
-        ) => "returned",
+        ) => "returned to normal",
     }
 }
 

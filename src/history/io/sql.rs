@@ -16,7 +16,7 @@ use crate::plant::record::ELSEWHERE;
 /// times, rows of two need not be.
 ///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
-pub const MIGRATIONS: [&str; 7] = [
+pub const MIGRATIONS: [&str; 8] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -64,6 +64,12 @@ ALTER TABLE alarm_journal RENAME COLUMN step TO event;
 ALTER TABLE alarm_journal RENAME COLUMN text TO message;
 ALTER TABLE alarm_journal RENAME COLUMN burst_utc TO first_out_utc;
 ALTER TABLE alarm_journal RENAME COLUMN burst_rank TO first_out_rank;
+",
+    "
+UPDATE alarm_journal SET event = CASE event
+    WHEN 'returned' THEN 'RTN' WHEN 'raised' || ' quietly' THEN 'raised (suppressed)'
+    WHEN 'returned' || ' quietly' THEN 'RTN (suppressed)' WHEN 'raised again' THEN 're-alarmed'
+    WHEN 'suppressed' THEN 'suppressed by design' WHEN 'released' THEN 'unsuppressed' ELSE event END;
 ",
 ];
 
@@ -149,12 +155,12 @@ pub fn journal_oldest() -> String {
 
 /// The raising events of the alarms that were active at an instant, also of those that were suppressed.
 pub fn active_at() -> String {
-    raised_at("", "event IN ('raised', 'raised quietly')")
+    raised_at("", "event IN ('raised', 'raised (suppressed)')")
 }
 
 /// The raising events of the alarms that were active at an instant and have not been suppressed since.
 pub fn standing_at() -> String {
-    raised_at(", 'shelved', 'suppressed', 'out of service'", "event = 'raised'")
+    raised_at(", 'shelved', 'suppressed by design', 'out of service'", "event = 'raised'")
 }
 
 /// The alarms whose latest event before an instant fulfils `is`. Events that raise or end an alarm count, and `others`.
@@ -163,7 +169,7 @@ fn raised_at(others: &str, is: &str) -> String {
     format!(
         "SELECT {columns} FROM (
             SELECT *, rowid AS place FROM alarm_journal
-            WHERE utc < ? AND event IN ('raised', 'raised quietly', 'returned', 'returned quietly'{others})
+            WHERE utc < ? AND event IN ('raised', 'raised (suppressed)', 'RTN', 'RTN (suppressed)'{others})
             QUALIFY row_number() OVER (PARTITION BY subject, message ORDER BY utc DESC, rowid DESC) = 1)
          WHERE {is} ORDER BY utc, place LIMIT ?"
     )

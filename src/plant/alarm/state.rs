@@ -51,11 +51,11 @@ impl AlarmState {
             AlarmState::Normal => "normal",
             AlarmState::Unacknowledged => "UNACK",
             AlarmState::Acknowledged => "acked",
-            AlarmState::ReturnedToNormal => "returned",
+            AlarmState::ReturnedToNormal => "RTN",
             AlarmState::LatchedUnacknowledged => "LATCHED",
             AlarmState::LatchedAcknowledged => "latched",
             AlarmState::Shelved => "shelved",
-            AlarmState::SuppressedByDesign => "suppressed",
+            AlarmState::SuppressedByDesign => "suppressed by design",
             AlarmState::OutOfService => "out of service",
         }
     }

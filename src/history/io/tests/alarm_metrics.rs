@@ -59,8 +59,8 @@ const CHATTERING: &str = "SELECT DISTINCT subject, message FROM (
 
 const FLEETING: &str = "SELECT DISTINCT subject, message FROM (
         SELECT *, rowid AS place, lag(event) OVER alarm AS before, lag(utc) OVER alarm AS began, lag(rowid) OVER alarm AS first
-        FROM alarm_journal WHERE event IN ('raised', 'returned') WINDOW alarm AS (PARTITION BY subject, message ORDER BY rowid)) r
-    WHERE event = 'returned' AND before = 'raised' AND utc - began < INTERVAL 10 SECONDS AND utc >= $1 AND utc < $2
+        FROM alarm_journal WHERE event IN ('raised', 'RTN') WINDOW alarm AS (PARTITION BY subject, message ORDER BY rowid)) r
+    WHERE event = 'RTN' AND before = 'raised' AND utc - began < INTERVAL 10 SECONDS AND utc >= $1 AND utc < $2
         AND NOT EXISTS (SELECT 1 FROM alarm_journal a WHERE a.event = 'acknowledged' AND a.subject = r.subject
             AND a.message = r.message AND a.rowid BETWEEN first AND place) ORDER BY ALL";
 
@@ -68,7 +68,7 @@ const FLEETING: &str = "SELECT DISTINCT subject, message FROM (
 const STALE: &str = "WITH activations AS (
         SELECT event, epoch_us(utc) // 1000000 AS began,
             epoch_us(least(lead(utc) OVER (PARTITION BY subject, message ORDER BY rowid), $2::TIMESTAMP)) // 1000000 AS ended
-        FROM alarm_journal WHERE event IN ('raised', 'returned') AND utc < $2),
+        FROM alarm_journal WHERE event IN ('raised', 'RTN') AND utc < $2),
     stale AS (
         SELECT greatest(began + 86400, epoch_us($1::TIMESTAMP) // 1000000) AS a,
             coalesce(ended, epoch_us($2::TIMESTAMP) // 1000000) AS z FROM activations WHERE event = 'raised'),
@@ -77,7 +77,8 @@ const STALE: &str = "WITH activations AS (
         SELECT (SELECT count(*) FROM spans o WHERE o.a <= s.a AND s.a < o.z) AS n FROM spans s)";
 
 /// Activations that were not annunciated.
-const SUPPRESSED: &str = "SELECT count(*) FROM alarm_journal WHERE event = 'raised quietly' AND utc >= $1 AND utc < $2";
+const SUPPRESSED: &str =
+    "SELECT count(*) FROM alarm_journal WHERE event = 'raised (suppressed)' AND utc >= $1 AND utc < $2";
 
 /// The figures as SQL counts them.
 fn counted(store: &Store, from: Timestamp, until: Timestamp) -> PeriodMetrics {

@@ -287,7 +287,7 @@ fn the_longest_lists_that_are_answered_fit_in_the_memory_of_the_engine() {
     let rows = format!(
         "INSERT INTO alarm_journal
             SELECT make_timestamp(i * 100000), 'UNIT-' || i % 1000 || '.PV', 'temperature high for long, heater off',
-                1 + i % 4, ['raised', 'acknowledged', 'returned'][1 + i % 3], i / 7, 70, 'anna', 'seen, waits for spare part',
+                1 + i % 4, ['raised', 'acknowledged', 'RTN'][1 + i % 3], i / 7, 70, 'anna', 'seen, waits for spare part',
                 NULL, NULL, NULL, 0
             FROM range({ROWS_MAX}) t(i);
         INSERT INTO operator_action
