@@ -111,7 +111,7 @@ impl fmt::Display for Reason {
                 write!(f, "answers take {} of {} ms", p99.as_millis(), timeout.as_millis())
             }
             Reason::Failing { failed, of } => write!(f, "{failed} of {of} requests failed"),
-            Reason::NoValues => f.write_str("answers, but gives no values"),
+            Reason::NoValues => f.write_str("responds without valid values"),
             Reason::Corrupt { corrupt, of } => write!(f, "{corrupt} of {of} answers corrupt or repeated"),
             Reason::Late(count) => write!(f, "{count} answers came too late"),
             Reason::MemoryParity(count) => write!(f, "memory parity error ({count})"),
@@ -254,8 +254,8 @@ mod tests {
     #[test]
     fn a_device_that_answers_without_values_has_failed() {
         let check = |lately: &RequestStats, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
-        check(&stats(0, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
-        check(&stats(100, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F answers, but gives no values");
+        check(&stats(0, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F responds without valid values");
+        check(&stats(100, 12, &[Fault::Exception(ExceptionCode(4)); 12]), "F responds without valid values");
         check(&stats(0, 12, &[Fault::Exception(ExceptionCode(4)); 11]), "");
     }
 

@@ -1,4 +1,4 @@
-//! Alarms: one condition each, on a tag, device or line; "gives no values" for every device, "line overloaded" for every
+//! Alarms: one condition each, on a tag, device or line; "not responding" for every device, "line overloaded" for every
 //! line; the faults of the station.
 
 use std::{collections::HashMap, time::Duration};
@@ -22,11 +22,11 @@ const SHELVE_MAX: Duration = Duration::from_secs(7 * 86_400);
 const SHELVE_MIN: Duration = Duration::from_secs(60);
 
 /// The name of the alarm that every device has.
-const NO_VALUES: &str = "gives no values";
+const NO_VALUES: &str = "not responding";
 /// The name of the alarm that every line has.
 const OVERLOADED: &str = "line overloaded";
 
-/// The alarms of a plant file, one for each device that does not have its own "gives no values" and for each line that does
+/// The alarms of a plant file, one for each device that does not have its own "not responding" and for each line that does
 /// not have its own "line overloaded", and those of the station.
 pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
     let mut alarms = Vec::new();

@@ -177,7 +177,7 @@ fn rate_over(table: &AlarmTable, rate: At<f64>, problems: &mut Problems) -> Opti
         return None;
     };
     if rate.value == 0.0 {
-        problems.add(rate.at, "every value changes or stands still").label("expected more than 0, or less for a fall");
+        problems.add(rate.at, "a limit of 0 always holds").label("expected more than 0, or less for a fall");
         return None;
     }
     let deadband = deadband(table, rate.at, problems)?;

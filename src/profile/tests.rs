@@ -477,15 +477,15 @@ fn the_alarm_of_an_overloaded_line_may_be_written() {
 fn two_alarms_of_one_name_would_share_their_state_and_are_refused() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\nmessage = \"hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:36:8]", "duplicate alarm `hot` of D1.T", "first here"]);
-    let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\nmessage = \"gives no values\"\n[mimic]";
-    check("[mimic]", own, &["duplicate alarm `gives no values` of D1", "expected another text"]);
+    let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\nmessage = \"not responding\"\n[mimic]";
+    check("[mimic]", own, &["duplicate alarm `not responding` of D1", "expected another text"]);
 }
 
 #[test]
 fn every_condition_says_what_it_lacks() {
     for (condition, expect) in [
         ("rate = 5.0", "`rate` needs `over`"),
-        ("rate = 0.0\nover = \"1min\"", "every value changes or stands still"),
+        ("rate = 0.0\nover = \"1min\"", "a limit of 0 always holds"),
         ("rate = 0.5\nover = \"1min\"", "the alarm would never return"),
         ("changes = 10", "`changes` needs `within`"),
         ("changes = 1\nwithin = \"1min\"", "not a count of changes"),

@@ -187,7 +187,7 @@ pub(super) mod tests {
             most: 12,
             flood: Duration::from_secs(600),
             top: vec![
-                Frequent { alarm: name("=PLC-1", "gives no values"), raised: 18 },
+                Frequent { alarm: name("=PLC-1", "not responding"), raised: 18 },
                 Frequent { alarm: high.clone(), raised: 6 },
             ],
             chattering: vec![high],
@@ -225,7 +225,7 @@ priority high (%)                      25.0  at most 5                   beyond 
 priority medium (%)                    12.5  at most 15                  good
 priority low (%)                       62.5  at least 80                 beyond target
 
-frequent       18  =PLC-1  gives no values
+frequent       18  =PLC-1  not responding
 frequent        6  TIC-1.PV  temperature high
 chattering         TIC-1.PV  temperature high
 

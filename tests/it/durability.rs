@@ -151,7 +151,7 @@ fn survive(station: &mut Process, sim: Process, port: &str, disk: &SmallDisk, ou
     station.expect("TIC-1 (unit 1): answers");
     drop(sim);
     station.wait_for("line L1: not connected");
-    station.wait_for("RAISED: TIC-1 gives no values");
+    station.wait_for("RAISED: TIC-1 not responding");
     let mut sim = Process::start(sightglass().args(["sim", "tank", "--tcp", port]));
     sim.wait_for(" on 127.0.0.1:");
     station.wait_for("TIC-1 (unit 1): answers");

@@ -32,7 +32,7 @@ pub enum AlarmCommand {
     },
     /// End the sound of what sounds now.
     Silence,
-    /// Let go an alarm that latches; nothing happens while its cause lasts.
+    /// Reset a latched alarm whose condition has cleared.
     Reset(AlarmId),
     /// Shelve an alarm.
     Shelve {
@@ -59,13 +59,13 @@ pub enum AlarmRefusal {
     #[error("nothing to acknowledge")]
     NothingToAcknowledge,
     /// It was raised again after the operator looked.
-    #[error("raised anew since you looked")]
+    #[error("raised again since it was displayed")]
     RaisedSince,
     /// The plant file wants a note with the acknowledgement.
-    #[error("this alarm needs a note")]
+    #[error("a comment is required")]
     NoteNeeded,
     /// Shelving and taking out of service need a reason.
-    #[error("a reason is needed")]
+    #[error("a reason is required")]
     ReasonNeeded,
     /// A note or reason is longer than [`WORDS_MAX`] characters.
     #[error("more than {WORDS_MAX} characters")]
@@ -77,13 +77,13 @@ pub enum AlarmRefusal {
         max: Duration,
     },
     /// Nothing sounds.
-    #[error("nothing sounds")]
+    #[error("no audible alarm")]
     NothingSounds,
     /// It does not wait for a reset.
     #[error("nothing to reset")]
     NothingToReset,
     /// Its condition still holds.
-    #[error("the cause lasts")]
+    #[error("its condition is still active")]
     CauseLasts,
     /// It is not shelved.
     #[error("not shelved")]
@@ -123,7 +123,7 @@ impl AlarmManager {
         Ok(self.record_action(&alarm, AlarmEvent::Acknowledged, at, value, by, note))
     }
 
-    /// Lets go an alarm that latches.
+    /// Resets a latched alarm whose condition has cleared.
     pub fn reset(&mut self, id: AlarmId, at: Timestamp, by: &Arc<str>) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
         let (machine, state) = (self.machine(id), self.machine(id).state());
@@ -165,7 +165,7 @@ impl AlarmManager {
         Ok(self.take(id, AlarmRecord { by, reason, until: Some(until), ..record }))
     }
 
-    /// Takes an alarm back from the shelf; if it is active it is raised anew with its present `value`.
+    /// Takes an alarm back from the shelf; if it is active it is raised again with its present `value`.
     pub fn unshelve(
         &mut self,
         id: AlarmId,
@@ -196,7 +196,7 @@ impl AlarmManager {
         Ok(self.record_action(&alarm, AlarmEvent::OutOfService, at, None, by, Some(reason)))
     }
 
-    /// Puts an alarm back in service; if it is active it is raised anew with its present `value`.
+    /// Puts an alarm back in service; if it is active it is raised again with its present `value`.
     pub fn in_service(
         &mut self,
         id: AlarmId,

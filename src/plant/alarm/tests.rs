@@ -341,7 +341,7 @@ fn what_was_annunciated_stays_until_somebody_has_answered_to_it_though_its_enabl
     assert_eq!(events(&manager.evaluate(at(0), when(true))), [AlarmEvent::Raised]);
     assert_eq!(events(&manager.evaluate(at(1), when(false))), [AlarmEvent::ReturnedToNormal]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::LatchedUnacknowledged, false));
-    assert_eq!(events(&manager.evaluate(at(2), when(false))), [], "it is neither raised anew nor taken away");
+    assert_eq!(events(&manager.evaluate(at(2), when(false))), [], "it is neither raised again nor taken away");
     manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
     assert_eq!(events(&manager.evaluate(at(4), when(false))), []);
     assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);

@@ -116,7 +116,7 @@ fn blind_words(model: &Model, cx: &ViewContext) -> Option<String> {
         DeviceState::Answering | DeviceState::Failing(_)
             if snapshot.device(device.id).diagnosis == Some(Reason::NoValues) =>
         {
-            Some(format!("{} gives no values", device.name))
+            Some(format!("{} has no valid values", device.name))
         }
         DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
     });

@@ -147,7 +147,7 @@ impl Confirm {
                 AlarmCommand::Silence => "silence",
                 AlarmCommand::Reset(_) => "reset",
                 AlarmCommand::Shelve { .. } => "shelve",
-                AlarmCommand::Unshelve(_) => "take back",
+                AlarmCommand::Unshelve(_) => "unshelve",
                 AlarmCommand::OutOfService(_) => "put out of service",
                 AlarmCommand::InService(_) => "put in service",
             },

@@ -101,7 +101,7 @@ pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
     vec![Notice::or(cx, "out of service", &kind, Modal::Reason(Box::new(reason)))]
 }
 
-/// Asks whether to let go an alarm that latches.
+/// Asks whether to reset a latched alarm.
 pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     let why = match alarm.state {
         AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
@@ -125,7 +125,7 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
 /// Asks whether to unshelve, or to put back in service.
 pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction> {
     let (title, alarm_command) = match suppressed.state {
-        AlarmState::Shelved => ("take back from the shelf", AlarmCommand::Unshelve(suppressed.id)),
+        AlarmState::Shelved => ("unshelve", AlarmCommand::Unshelve(suppressed.id)),
         AlarmState::OutOfService => ("put in service", AlarmCommand::InService(suppressed.id)),
         AlarmState::SuppressedByDesign => {
             let words = "It is suppressed by design, and comes back when its enabling condition holds again.";

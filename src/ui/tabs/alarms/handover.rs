@@ -33,7 +33,7 @@ use crate::{
 const ROWS: usize = 500;
 /// How often they are asked anew, real time.
 const EVERY_S: f64 = 2.0;
-/// Values in doubt that are named at most.
+/// Bad or uncertain values that are named at most.
 const NAMED: usize = 8;
 /// Actions that only concern the program and change nothing in the plant.
 const NO_CHANGE: [&str; 10] = [
@@ -172,8 +172,8 @@ impl Handover {
             cx.snapshot.suppressed.iter().map(|suppressed| suppressed_words(cx, suppressed)).collect(),
             true,
         );
-        section("not as usual: closed, in manual, on trial", unusual(cx), true);
-        section("values in doubt", doubtful(cx), true);
+        section("abnormal: manual, disabled, under test", unusual(cx), true);
+        section("bad or uncertain values", doubtful(cx), true);
         if self.answered {
             let from = self.period(cx).map_or(Timestamp::MIN, |shown| shown.from);
             let of = |keep: fn(&ActionRecord) -> bool| {

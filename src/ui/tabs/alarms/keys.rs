@@ -33,7 +33,7 @@ pub enum Action {
     OutOfService,
     /// Unshelve, or put back in service.
     PutBack,
-    /// Let go an alarm that latches.
+    /// Reset a latched alarm.
     Reset,
     /// Type words to filter or to search by.
     Words,
@@ -118,8 +118,7 @@ const GO: [Row; 5] = [
 ];
 
 const BACK: [Row; 1] =
-    [Key::new(char('u'), "put back", "take it back: from the shelf, or into service", Action::PutBack)
-        .needs(Role::Technician)];
+    [Key::new(char('u'), "put back", "unshelve, or return to service", Action::PutBack).needs(Role::Technician)];
 
 const SEARCH: [Row; 2] = [
     Key::new(char('/'), "search", "search by words of tag, text, user; and by time: 06:00-14:00", Action::Words),
