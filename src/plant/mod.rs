@@ -7,6 +7,7 @@
 //!               values alarms commands
 //! ```
 
+pub(crate) mod number;
 pub mod visible;
 pub mod id;
 pub mod role;

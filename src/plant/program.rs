@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::id::TagId;
+use crate::plant::number::to_usize;
 
 /// The tags of a controller's ramp/soak program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,7 +58,7 @@ pub enum ProgramPosition {
 impl ProgramDef {
     /// What a value of the position means.
     pub fn place(&self, position: f64) -> ProgramPosition {
-        let number = position.max(0.0) as usize;
+        let number = to_usize(position.max(0.0));
         match number.checked_sub(1) {
             None => ProgramPosition::Off,
             Some(half) if half / 2 >= self.steps.len() => ProgramPosition::Ended,
@@ -69,7 +70,7 @@ impl ProgramDef {
     pub fn steps_of(&self, pattern: Option<f64>) -> Option<(usize, usize)> {
         match (self.pattern, self.patterns.is_empty()) {
             (None, _) | (_, true) => Some((0, self.steps.len().saturating_sub(1))),
-            (Some(_), false) => self.patterns.get(pattern? as usize).copied(),
+            (Some(_), false) => self.patterns.get(to_usize(pattern?)).copied(),
         }
     }
 }

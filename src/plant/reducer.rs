@@ -105,7 +105,7 @@ impl Plant {
             programs: vec![ProgramWatch::default(); def.devices.len()],
             def,
             at,
-            run: at.as_microsecond() as u64,
+            run: at.as_microsecond().cast_unsigned(),
             speed,
         }
     }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::event::{ExceptionCode, Fault};
+use crate::plant::number::to_usize;
 
 /// How requests ended.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -211,7 +212,7 @@ fn end_of(bucket: usize) -> Duration {
 
 fn bucket_of(span: Duration) -> usize {
     let doublings = (span.as_secs_f64() / LEAST_S).max(1.0).log2();
-    ((4.0 * doublings) as usize).min(BUCKETS - 1)
+    to_usize(4.0 * doublings).min(BUCKETS - 1)
 }
 
 #[cfg(test)]

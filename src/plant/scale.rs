@@ -1,6 +1,7 @@
 //! Raw numbers to values in engineering units and back.
 
 use super::tag::{Kind, TagDef};
+use crate::plant::number::to_f32;
 
 /// The value of a raw number: `raw · scale · 10^-decimals + offset`. `decimals` are those that the device
 /// announces for this tag ([`super::tag::Decimals::From`]), 0 for all others.
@@ -12,7 +13,7 @@ pub fn to_value(tag: &TagDef, raw: f64, decimals: u8) -> f64 {
 pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
     let exact = (value - tag.offset) / (tag.scale * 10f64.powi(-i32::from(decimals)));
     let raw = match tag.point.kind {
-        Kind::F32 => f64::from(exact as f32),
+        Kind::F32 => f64::from(to_f32(exact)),
         Kind::F64 => exact,
         Kind::Bool
         | Kind::I16
@@ -38,7 +39,7 @@ pub fn held(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
 /// Do two raw numbers of a tag mean the same stored value?
 pub fn same_raw(tag: &TagDef, one: f64, other: f64) -> bool {
     match tag.point.kind {
-        Kind::F32 => one as f32 == other as f32,
+        Kind::F32 => to_f32(one) == to_f32(other),
         // What was lost in scaling forth and back is lost in the value, which an offset makes much larger than the raw number.
         Kind::F64 => alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0)),
         Kind::Bool => (one != 0.0) == (other != 0.0),

@@ -1,8 +1,10 @@
 //! Does a condition hold? Pure comparison with a deadband, a memory where it looks back, and an honest "unknown".
 
+use crate::plant::{
+    def::{Condition, Level},
+    number::to_i64,
+};
 use std::{collections::VecDeque, time::Duration};
-
-use crate::plant::def::{Condition, Level};
 
 /// Points that the memory of a rate keeps: finer than any window needs.
 const POINTS_MAX: u32 = 32;
@@ -145,7 +147,7 @@ pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memo
 
 /// Whether a bit of a word is set. A word with a sign has its highest bit set while it is negative.
 pub fn is_set(value: f64, bit: u8) -> bool {
-    (value as i64 as u64).checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1
+    to_i64(value).cast_unsigned().checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1
 }
 
 /// The limit that the journal names, if the condition has one.

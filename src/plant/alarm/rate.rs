@@ -1,5 +1,7 @@
 //! How many activations the last ten minutes and the last hour had, to the second, and whether that is a flood.
 
+use crate::plant::number::to_usize;
+
 /// The hour that is remembered, seconds.
 const HOUR_S: usize = 3_600;
 /// The window of a flood, seconds.
@@ -86,7 +88,7 @@ impl Rate {
 }
 
 fn place(second: i64) -> usize {
-    second.rem_euclid(HOUR_S as i64) as usize
+    to_usize(second.rem_euclid(HOUR_S as i64))
 }
 
 #[cfg(test)]
