@@ -11,6 +11,7 @@ use super::{
 use crate::plant::{
     def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
     line_check::{Key, SettingError, check_settings},
+    number::to_u16,
 };
 
 /// The lines in the order of the file.
@@ -20,7 +21,7 @@ pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef>
     for (index, table) in tables.iter().enumerate() {
         let raw = table.value.clone();
         let Some(mode) = mode(&raw, problems) else { continue };
-        let id = LineId(index as u16);
+        let id = LineId(to_u16(index));
         let written = if mode.tcp { tcp(raw, mode, id, problems) } else { serial(raw, mode, id, problems) };
         let Some(written) = written else { continue };
         let name = &written.name;

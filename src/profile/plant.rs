@@ -18,6 +18,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, PlantDef, TagId},
+    number::to_u16,
     poll_class,
     tag::{Access, PollClass, TagDef},
 };
@@ -147,7 +148,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         for row in &of_device {
             // A row without a name is reported when it is read.
             if !row.short.is_empty() {
-                names.insert(format!("{}.{}", device.name, row.short), TagId(count as u16));
+                names.insert(format!("{}.{}", device.name, row.short), TagId(to_u16(count)));
             }
             count += 1;
         }
@@ -155,10 +156,10 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     }
     let (mut devices, mut defined) = (Vec::new(), Vec::new());
     for (device, rows) in known.iter().zip(rows) {
-        let (mut def, context) = define_device(DeviceId(devices.len() as u16), device, lines, &names, problems);
+        let (mut def, context) = define_device(DeviceId(to_u16(devices.len())), device, lines, &names, problems);
         let first = defined.len();
         for row in rows {
-            defined.push(tag::define(TagId(defined.len() as u16), row.layers, &context, problems));
+            defined.push(tag::define(TagId(to_u16(defined.len())), row.layers, &context, problems));
         }
         device::check_overlaps(&defined[first..], problems);
         def.functions = device::functions(&device.profile, &defined[first..], problems);

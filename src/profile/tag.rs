@@ -12,6 +12,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
+    number::to_u8,
     tag::{Access, Bound, ByteOrder, Confidence, Decimals, Kind, Point, Poll, PollClass, Table, TagDef},
 };
 
@@ -238,7 +239,7 @@ fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) 
 /// `"5-4"` or `3`: lowest bit and number of bits.
 fn bit_field(field: &At<Choice>, kind: Kind, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
     let bounds = match &field.value {
-        Choice::Number(bit) if bit.fract() == 0.0 && (0.0..64.0).contains(bit) => Some((*bit as u8, *bit as u8)),
+        Choice::Number(bit) if bit.fract() == 0.0 && (0.0..64.0).contains(bit) => Some((to_u8(*bit), to_u8(*bit))),
         Choice::Number(_) => None,
         Choice::Word(word) => match word.split_once('-') {
             Some((high, low)) => high.trim().parse().ok().zip(low.trim().parse().ok()),
