@@ -3,7 +3,10 @@
 use std::ops::Range;
 
 use super::{frame, framing::FrameMatch};
-use crate::plant::event::Fault;
+use crate::plant::{
+    event::Fault,
+    number::{to_u8, to_u16},
+};
 
 /// Longest frame, from `:` to LF (Modbus over serial line V1.02, 2.5.2.1).
 pub const FRAME_MAX: usize = 513;
@@ -30,27 +33,27 @@ pub fn encode(message: &[u8]) -> Vec<u8> {
 /// # Errors
 /// [`Fault::NotHex`] names the first other character; [`Fault::Truncated`] an odd count.
 pub fn decode(digits: &[u8]) -> Result<Vec<u8>, Fault> {
-    let value = |digit: &u8| char::from(*digit).to_digit(16).map(|value| value as u8).ok_or(Fault::NotHex(*digit));
+    let value = |digit: &u8| char::from(*digit).to_digit(16).map(|value| to_u8(value)).ok_or(Fault::NotHex(*digit));
     let values = digits.iter().map(value).collect::<Result<Vec<u8>, Fault>>()?;
     let (pairs, odd) = values.as_chunks::<2>();
     match odd {
         [] => Ok(pairs.iter().map(|[high, low]| high << 4 | low).collect()),
-        [..] => Err(Fault::Truncated { got: digits.len() as u16, expected: digits.len() as u16 + 1 }),
+        [..] => Err(Fault::Truncated { got: to_u16(digits.len()), expected: to_u16(digits.len()) + 1 }),
     }
 }
 
 /// The message of a whole frame (`:` to LF), if it is well formed and its LRC fits.
 pub fn open(frame: &[u8]) -> Result<Vec<u8>, Fault> {
-    let cut = Fault::Truncated { got: frame.len() as u16, expected: frame.len() as u16 + 2 };
+    let cut = Fault::Truncated { got: to_u16(frame.len()), expected: to_u16(frame.len()) + 2 };
     let digits = frame.strip_prefix(b":").and_then(|rest| rest.strip_suffix(END)).ok_or(cut)?;
     if frame.len() > FRAME_MAX {
-        return Err(Fault::WrongLength { got: frame.len() as u16, asked: FRAME_MAX as u16 });
+        return Err(Fault::WrongLength { got: to_u16(frame.len()), asked: to_u16(FRAME_MAX) });
     }
     let mut message = decode(digits)?;
-    let got = message.pop().ok_or(Fault::Truncated { got: frame.len() as u16, expected: 9 })?;
+    let got = message.pop().ok_or(Fault::Truncated { got: to_u16(frame.len()), expected: 9 })?;
     let computed = lrc(&message);
     match message.len() {
-        0 | 1 => Err(Fault::Truncated { got: frame.len() as u16, expected: 9 }),
+        0 | 1 => Err(Fault::Truncated { got: to_u16(frame.len()), expected: 9 }),
         _ if got == computed => Ok(message),
         _ => Err(Fault::Lrc { got, computed }),
     }
@@ -74,7 +77,9 @@ pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
     }
     match (open_frame(buffer), corrupt) {
         (Some(open), _) if open.len() <= FRAME_MAX => FrameMatch::Begun,
-        (Some(open), _) => FrameMatch::Corrupt(Fault::WrongLength { got: open.len() as u16, asked: FRAME_MAX as u16 }),
+        (Some(open), _) => {
+            FrameMatch::Corrupt(Fault::WrongLength { got: to_u16(open.len()), asked: to_u16(FRAME_MAX) })
+        }
         (None, Some(fault)) => FrameMatch::Corrupt(fault),
         (None, None) => FrameMatch::Nothing,
     }
@@ -84,7 +89,8 @@ pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
 pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
     let corrupt = frames(buffer).find_map(|frame| open(&buffer[frame]).err());
     let expected = 2 * frame::shape_of(message).map_or(3, frame::Shape::length) + 5;
-    let cut = || Fault::Truncated { got: open_frame(buffer).unwrap_or(buffer).len() as u16, expected: expected as u16 };
+    let cut =
+        || Fault::Truncated { got: to_u16(open_frame(buffer).unwrap_or(buffer).len()), expected: to_u16(expected) };
     if buffer.is_empty() { Fault::Timeout } else { corrupt.unwrap_or_else(cut) }
 }
 

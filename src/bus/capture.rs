@@ -20,7 +20,11 @@ use super::{
     ascii, dissect,
     frame::{self, Mbap, hex},
 };
-use crate::plant::{line::Framing, traffic::Frame};
+use crate::plant::{
+    line::Framing,
+    number::{to_u16, to_u32},
+    traffic::Frame,
+};
 
 /// Link types (www.tcpdump.org/linktypes.html), each an interface of the capture.
 const LINKS: [(u16, &str); 2] = [(1, "Modbus TCP"), (252, "serial line")];
@@ -72,12 +76,12 @@ fn micros(at: Timestamp) -> String {
 /// A pcapng block: type, length, body filled up to 32 bits, length (draft-ietf-opsawg-pcapng, 3.1).
 fn block(kind: u32, body: &[u8]) -> Vec<u8> {
     let body = padded(body);
-    let length = (body.len() as u32 + 12).to_le_bytes();
+    let length = (to_u32(body.len()) + 12).to_le_bytes();
     [&kind.to_le_bytes()[..], &length, &body, &length].concat()
 }
 
 fn option(code: u16, value: &[u8]) -> Vec<u8> {
-    [&code.to_le_bytes()[..], &(value.len() as u16).to_le_bytes(), &padded(value)].concat()
+    [&code.to_le_bytes()[..], &to_u16(value.len()).to_le_bytes(), &padded(value)].concat()
 }
 
 fn padded(bytes: &[u8]) -> Vec<u8> {
@@ -89,8 +93,10 @@ fn padded(bytes: &[u8]) -> Vec<u8> {
 /// An enhanced packet block: interface, microseconds since 1970, lengths, packet, direction, comment.
 fn packet_block(frame: &Frame, interface: u32, packet: &[u8]) -> Vec<u8> {
     let micros = u64::try_from(frame.at.as_microsecond()).unwrap_or(0);
-    let length = packet.len() as u32;
-    let head = [interface, (micros >> 32) as u32, micros as u32, length, length].map(u32::to_le_bytes).concat();
+    let length = to_u32(packet.len());
+    let head = [interface, (micros >> 32) as u32, (micros & 0xFFFF_FFFF) as u32, length, length]
+        .map(u32::to_le_bytes)
+        .concat();
     let direction: u32 = if frame.sent { 2 } else { 1 };
     let mut options = option(2, &direction.to_le_bytes());
     if !matches!(&*frame.verdict, "ok" | "sent") {
@@ -104,7 +110,7 @@ fn packet_block(frame: &Frame, interface: u32, packet: &[u8]) -> Vec<u8> {
 fn upper_pdu(frame: &Frame) -> Vec<u8> {
     let tag = |code: u16, value: &[u8]| {
         let value = padded(value);
-        [&code.to_be_bytes()[..], &(value.len() as u16).to_be_bytes(), &value].concat()
+        [&code.to_be_bytes()[..], &to_u16(value.len()).to_be_bytes(), &value].concat()
     };
     let word = |value: u16| u32::from(value).to_be_bytes();
     let ends = [(MASTER, PORT_MASTER), (DEVICE, PORT_RTU)];
@@ -141,18 +147,18 @@ impl Connection {
         let [from, to] = if sent { ends } else { [ends[1], ends[0]] };
         let (sequence, acknowledged) = if sent { (self.sent, self.received) } else { (self.received, self.sent) };
         let count = if sent { &mut self.sent } else { &mut self.received };
-        *count = count.wrapping_add(bytes.len() as u32);
+        *count = count.wrapping_add(to_u32(bytes.len()));
         self.packets = self.packets.wrapping_add(1);
         // Data offset 5 words, PSH and ACK; the widest window; checksum, then no urgent pointer.
         let mut tcp = [from.1, to.1].map(u16::to_be_bytes).concat();
         tcp.extend([sequence, acknowledged].map(u32::to_be_bytes).concat());
         tcp.extend([0x50, 0x18, 0xFF, 0xFF, 0, 0, 0, 0]);
         tcp.extend(bytes);
-        let pseudo = [&from.0[..], &to.0, &[0, 6], &(tcp.len() as u16).to_be_bytes(), &tcp].concat();
+        let pseudo = [&from.0[..], &to.0, &[0, 6], &to_u16(tcp.len()).to_be_bytes(), &tcp].concat();
         tcp[16..18].copy_from_slice(&checksum(&pseudo).to_be_bytes());
         // Version 4, header of 5 words; 64 hops, protocol 6 (TCP), checksum, addresses.
         let mut ip = vec![0x45, 0];
-        ip.extend([20 + tcp.len() as u16, self.packets].map(u16::to_be_bytes).concat());
+        ip.extend([20 + to_u16(tcp.len()), self.packets].map(u16::to_be_bytes).concat());
         ip.extend([0x40, 0, 64, 6, 0, 0]);
         ip.extend([from.0, to.0].concat());
         let header = checksum(&ip).to_be_bytes();
@@ -169,7 +175,7 @@ fn checksum(bytes: &[u8]) -> u16 {
     while 0xFFFF < sum {
         sum = (sum & 0xFFFF) + (sum >> 16);
     }
-    !(sum as u16)
+    !((sum & 0xFFFF) as u16)
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 //! ```
 
 use crate::plant::{
+    number::{to_f32, to_i64, to_u16, to_u64},
     tag::{ByteOrder, Kind, Point},
     visible::is_printable,
 };
@@ -17,6 +18,7 @@ use crate::plant::{
 /// The number that the words of a point hold; `None` for what is no number: BCD with a digit above 9, NaN, infinity.
 /// A 64-bit integer beyond 2^53 is rounded to the nearest `f64`, by one part in 10^16 at most. `words` has [`Point::len`]
 /// words.
+#[expect(clippy::cast_possible_truncation, reason = "each kind takes the bits of its own width")]
 pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
     let bytes = to_bytes(point.order, words);
     let bits = bytes.iter().fold(0u64, |bits, byte| (bits << 8) | u64::from(*byte));
@@ -25,11 +27,11 @@ pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
     }
     match point.kind {
         Kind::Bool => Some(f64::from(u8::from(bits != 0))),
-        Kind::I16 => Some(f64::from(bits as u16 as i16)),
+        Kind::I16 => Some(f64::from((bits as u16).cast_signed())),
         Kind::U16 => Some(f64::from(bits as u16)),
-        Kind::I32 => Some(f64::from(bits as u32 as i32)),
+        Kind::I32 => Some(f64::from((bits as u32).cast_signed())),
         Kind::U32 => Some(f64::from(bits as u32)),
-        Kind::I64 => Some(bits as i64 as f64),
+        Kind::I64 => Some(bits.cast_signed() as f64),
         Kind::U64 => Some(bits as f64),
         Kind::F32 => Some(f64::from(f32::from_bits(bits as u32))).filter(|value| value.is_finite()),
         Kind::F64 => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
@@ -76,16 +78,18 @@ pub fn encode(point: Point, value: f64) -> Option<Vec<u16>> {
     if point.field.is_some() || !value.is_finite() {
         return None;
     }
-    let whole = |low: f64, high: f64| (value.fract() == 0.0 && low <= value && value <= high).then_some(value as i64);
+    let whole = |low: f64, high: f64| {
+        (value.fract() == 0.0 && low <= value && value <= high).then(|| to_i64(value).cast_unsigned())
+    };
     let bits = match point.kind {
-        Kind::Bool => whole(0.0, 1.0)? as u64,
-        Kind::I16 => whole(f64::from(i16::MIN), f64::from(i16::MAX))? as u64,
-        Kind::U16 => whole(0.0, f64::from(u16::MAX))? as u64,
-        Kind::I32 => whole(f64::from(i32::MIN), f64::from(i32::MAX))? as u64,
-        Kind::U32 => whole(0.0, f64::from(u32::MAX))? as u64,
-        Kind::I64 => whole(-EXACT, EXACT)? as u64,
-        Kind::U64 => whole(0.0, EXACT)? as u64,
-        Kind::F32 => u64::from(Some(value as f32).filter(|value| value.is_finite())?.to_bits()),
+        Kind::Bool => whole(0.0, 1.0)?,
+        Kind::I16 => whole(f64::from(i16::MIN), f64::from(i16::MAX))?,
+        Kind::U16 => whole(0.0, f64::from(u16::MAX))?,
+        Kind::I32 => whole(f64::from(i32::MIN), f64::from(i32::MAX))?,
+        Kind::U32 => whole(0.0, f64::from(u32::MAX))?,
+        Kind::I64 => whole(-EXACT, EXACT)?,
+        Kind::U64 => whole(0.0, EXACT)?,
+        Kind::F32 => u64::from(Some(to_f32(value)).filter(|value| value.is_finite())?.to_bits()),
         Kind::F64 => value.to_bits(),
         Kind::Bcd16 => to_bcd(whole(0.0, 9_999.0)?),
         Kind::Bcd32 => to_bcd(whole(0.0, 99_999_999.0)?),
@@ -103,8 +107,8 @@ pub fn field_masks(point: Point, value: f64) -> Option<(u16, u16)> {
     if value.fract() != 0.0 || value < 0.0 || field as f64 <= value - 1.0 {
         return None;
     }
-    let on_wire = |bits: u64| from_bytes(point.order, &(bits as u16).to_be_bytes())[0];
-    Some((!on_wire(field << low), on_wire((value as u64) << low)))
+    let on_wire = |bits: u64| from_bytes(point.order, &to_u16(bits).to_be_bytes())[0];
+    Some((!on_wire(field << low), on_wire(to_u64(value) << low)))
 }
 
 /// Whole numbers up to here an `f64` carries exactly, and no other rounds to one of them.
@@ -119,8 +123,8 @@ fn from_bcd(bits: u64, digits: u32) -> Option<f64> {
     (0..digits).rev().try_fold(0.0, |value, place| (digit(place) <= 9).then(|| value * 10.0 + digit(place) as f64))
 }
 
-fn to_bcd(value: i64) -> u64 {
-    let digit = |place: u32| (value as u64 / 10u64.pow(place)) % 10;
+fn to_bcd(value: u64) -> u64 {
+    let digit = |place: u32| (value / 10u64.pow(place)) % 10;
     (0..8).fold(0, |bits, place| bits | (digit(place) << (4 * place)))
 }
 

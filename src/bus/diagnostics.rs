@@ -10,6 +10,7 @@ use crate::plant::{
     def::Serial,
     diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, Scan},
     event::Fault,
+    number::{to_u8, to_u16, to_u32},
     tag::Table,
     traffic::Exchange,
 };
@@ -119,7 +120,7 @@ impl Job {
                 self.take_answer(&step, answer);
             }
         }
-        self.run.total = self.run.done + self.queued.len() as u32 + (self.planned - self.made);
+        self.run.total = self.run.done + to_u32(self.queued.len()) + (self.planned - self.made);
         self.advance();
         if self.step.is_none() {
             self.conclude();
@@ -277,7 +278,7 @@ fn steps_in(diagnostic: &Diagnostic) -> u32 {
         Diagnostic::Send(_) | Diagnostic::Read { .. } => 1,
         Diagnostic::Loopback { count, .. } => 1 + u32::from(*count),
         Diagnostic::Identify { .. } => 2,
-        Diagnostic::Scan(scan) => units_of(scan) * scan.serials.len().max(1) as u32,
+        Diagnostic::Scan(scan) => units_of(scan) * to_u32(scan.serials.len().max(1)),
     }
 }
 
@@ -294,7 +295,7 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
         // knows such an adapter from then on.
         Diagnostic::Loopback { unit, .. } if n == 0 => step(read(*unit, Table::Holding, 0, 1)),
         Diagnostic::Loopback { unit, data, .. } => {
-            let [high, low] = data.wrapping_add(n as u16 - 1).to_be_bytes();
+            let [high, low] = data.wrapping_add(to_u16(n) - 1).to_be_bytes();
             step(vec![*unit, 0x08, 0, 0, high, low])
         }
         // Basic objects, then the regular ones that follow them (id 3 and on).
@@ -306,7 +307,7 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
             Step {
                 serial: scan.serials.get((n / units) as usize).copied(),
                 timeout: Some(scan.timeout),
-                ask: Ask::Message(read((u32::from(scan.first) + n % units) as u8, Table::Holding, 0, 1)),
+                ask: Ask::Message(read(to_u8(u32::from(scan.first) + n % units), Table::Holding, 0, 1)),
             }
         }
     }

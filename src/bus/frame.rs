@@ -6,6 +6,7 @@ use super::ascii;
 use crate::plant::{
     def::Framing,
     event::{ExceptionCode, Fault},
+    number::to_u16,
 };
 
 /// Longest message: unit and 253 bytes of PDU.
@@ -28,7 +29,7 @@ pub fn with_crc(message: &[u8]) -> Vec<u8> {
 /// The message of an RTU frame, if its CRC fits.
 pub fn without_crc(frame: &[u8]) -> Result<&[u8], Fault> {
     let Some((message, check)) = frame.split_last_chunk::<2>() else {
-        return Err(Fault::Truncated { got: frame.len() as u16, expected: 4 });
+        return Err(Fault::Truncated { got: to_u16(frame.len()), expected: 4 });
     };
     let (got, computed) = (u16::from_le_bytes(*check), crc16(message));
     if got == computed { Ok(message) } else { Err(Fault::Crc { got, computed }) }
@@ -39,7 +40,7 @@ pub fn with_mbap(transaction: u16, message: &[u8]) -> Vec<u8> {
     let mut frame = Vec::with_capacity(6 + message.len());
     frame.extend_from_slice(&transaction.to_be_bytes());
     frame.extend_from_slice(&[0, 0]);
-    frame.extend_from_slice(&(message.len() as u16).to_be_bytes());
+    frame.extend_from_slice(&to_u16(message.len()).to_be_bytes());
     frame.extend_from_slice(message);
     frame
 }
@@ -60,7 +61,7 @@ pub fn unwrap(framing: Framing, frame: &[u8]) -> Result<Vec<u8>, Fault> {
         Framing::Ascii => ascii::open(frame),
         Framing::Mbap => match mbap(frame) {
             Mbap::Whole { end, .. } => Ok(frame[6..end].to_vec()),
-            Mbap::Incomplete | Mbap::Broken => Err(Fault::Truncated { got: frame.len() as u16, expected: 8 }),
+            Mbap::Incomplete | Mbap::Broken => Err(Fault::Truncated { got: to_u16(frame.len()), expected: 8 }),
         },
     }
 }
@@ -236,7 +237,7 @@ impl Shape {
 /// An exception answer is [`Fault::Exception`].
 pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     let (&[asked_unit, asked, ..], &[unit, function, ..]) = (request, answer) else {
-        return Err(Fault::Truncated { got: answer.len() as u16, expected: 3 });
+        return Err(Fault::Truncated { got: to_u16(answer.len()), expected: 3 });
     };
     if unit != asked_unit {
         return Err(Fault::WrongUnit { got: unit, asked: asked_unit });
@@ -244,7 +245,7 @@ pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     if function == asked | 0x80 {
         return match answer {
             [_, _, code] => Err(Fault::Exception(ExceptionCode(*code))),
-            _ => Err(Fault::WrongLength { got: answer.len() as u16, asked: 3 }),
+            _ => Err(Fault::WrongLength { got: to_u16(answer.len()), asked: 3 }),
         };
     }
     if function != asked {
@@ -252,10 +253,10 @@ pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     }
     let Some(shape) = shape_of(request) else { return Ok(()) };
     if answer.len() != shape.length {
-        return Err(Fault::WrongLength { got: answer.len() as u16, asked: shape.length as u16 });
+        return Err(Fault::WrongLength { got: to_u16(answer.len()), asked: to_u16(shape.length) });
     }
     if matches!(asked, 0x01..=0x04 | 0x17) && usize::from(answer[2]) != shape.length - 3 {
-        return Err(Fault::WrongLength { got: u16::from(answer[2]), asked: (shape.length - 3) as u16 });
+        return Err(Fault::WrongLength { got: u16::from(answer[2]), asked: to_u16(shape.length - 3) });
     }
     if shape.fits(answer) { Ok(()) } else { Err(Fault::WrongEcho) }
 }

@@ -2,7 +2,7 @@
 //! For lines without transaction ids; Modbus TCP tells by its header.
 
 use super::{ascii, frame};
-use crate::plant::{def::Framing, event::Fault};
+use crate::plant::{def::Framing, event::Fault, number::to_u16};
 
 /// What the bytes received so far are.
 #[derive(Debug, PartialEq, Eq)]
@@ -66,11 +66,11 @@ pub fn left_over(framing: Framing, message: &[u8], buffer: &[u8]) -> Fault {
     }
     let expected = frame::wrapped_length(framing, frame::shape_of(message).map_or(3, |shape| shape.length()));
     if buffer.len() < expected {
-        return Fault::Truncated { got: buffer.len() as u16, expected: expected as u16 };
+        return Fault::Truncated { got: to_u16(buffer.len()), expected: to_u16(expected) };
     }
     match frame::unwrap(framing, buffer) {
         Err(fault) => fault,
-        Ok(answer) => Fault::WrongLength { got: answer.len() as u16, asked: expected as u16 },
+        Ok(answer) => Fault::WrongLength { got: to_u16(answer.len()), asked: to_u16(expected) },
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a technician types or pastes: hex in any dress, ASCII frames, lines of a log.
 
 use super::{ascii, frame};
-use crate::plant::line::Framing;
+use crate::plant::{line::Framing, number::to_u8};
 
 /// Bytes that were typed or pasted, with the framing and direction that their text names.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -162,7 +162,7 @@ fn run(digits: &[char], position: usize, prefixed: bool, bytes: &mut Vec<u8>) ->
     let mut values = Vec::new();
     for (at, letter) in digits.iter().enumerate() {
         let value = letter.to_digit(16).ok_or(HexInputError::NotHex { position: position + at, found: *letter })?;
-        values.push(value as u8);
+        values.push(to_u8(value));
     }
     match (values.as_slice(), prefixed) {
         ([value], true) => bytes.push(*value),

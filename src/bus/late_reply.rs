@@ -17,6 +17,7 @@ use super::{
     frame::{Shape, shape_of},
     plan::Block,
 };
+use crate::plant::number::{to_u8, to_u32};
 
 /// Most answers that are remembered as outstanding; with more, the unit is not polled until it has paused.
 const OUTSTANDING_MAX: usize = 16;
@@ -218,7 +219,7 @@ impl LineReplies {
     /// each block until the repetition must have come.
     pub fn answered(&mut self, request: &[u8], answer: &[u8], proof: bool, now: Duration) {
         let Some(unit) = request.first().map(|unit| usize::from(*unit)) else { return };
-        let unsettled = self.is_unsettled(unit as u8, now);
+        let unsettled = self.is_unsettled(to_u8(unit), now);
         let timeout = self.timeout;
         let unit = &mut self.units[unit];
         if proof && !unsettled {
@@ -347,7 +348,7 @@ impl LineReplies {
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
-        let rest = (unit.patience(timeout) * unit.outstanding.count().max(1) as u32).min(REST_MAX);
+        let rest = (unit.patience(timeout) * to_u32(unit.outstanding.count().max(1))).min(REST_MAX);
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
         if waited < rest {
             return Some(rest - waited);

@@ -26,6 +26,7 @@ use std::{sync::Arc, time::Duration};
 use crate::plant::{
     PlantDef,
     def::{DeviceDef, DeviceId, LineId, TagId},
+    number::to_u16,
     tag::{Access, Point, Poll, PollClass, Table, TagDef},
 };
 
@@ -123,8 +124,8 @@ fn together(device: &DeviceDef, tags: &[&TagDef]) -> Block {
         device: device.id,
         unit: device.unit,
         table: extent.table,
-        address: extent.start as u16,
-        count: extent.count() as u16,
+        address: to_u16(extent.start),
+        count: to_u16(extent.count()),
         tags: tags.iter().map(|tag| tag.id).collect(),
         poll: first.poll,
         class: tags.iter().map(|tag| tag.class).min().unwrap_or(first.class),

@@ -35,6 +35,7 @@ use super::plan::Block;
 use crate::plant::{
     def::{DeviceId, LineDef},
     event::ExceptionCode,
+    number::{to_f32, to_u32},
     tag::PollClass,
 };
 
@@ -202,7 +203,7 @@ impl Schedule {
     fn info(&self, poll: &Pending) -> PollInfo {
         let pace = self.pace_of(poll);
         let factor = match (self.overload.load(), pace) {
-            (Load::Overload { factor }, Pace::Stretched(_)) => factor as f32,
+            (Load::Overload { factor }, Pace::Stretched(_)) => to_f32(factor),
             (Load::Overload { .. }, Pace::Normal | Pace::Shed) | (Load::Normal, _) => 1.0,
         };
         PollInfo {
@@ -333,7 +334,7 @@ impl Schedule {
         self.stale |= self.devices[place].probe_at.is_none();
         // Those that wait for their second or third try come first: none fails for long before it is given up.
         let waiting = self.devices.iter().filter(|other| other.device != device && other.is_failing()).count();
-        let affordable = self.probes.affords(spent * waiting as u32, now);
+        let affordable = self.probes.affords(spent * to_u32(waiting), now);
         self.devices[place].failed(sent, now, affordable)
     }
 

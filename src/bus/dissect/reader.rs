@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::Field;
 use crate::{
     bus::{frame, names},
-    plant::visible::acts,
+    plant::{number::to_u16, visible::acts},
 };
 
 /// The reading of one message as a request or as an answer.
@@ -67,7 +67,7 @@ impl<'a> Reader<'a> {
         for index in 0..count {
             let name = match start {
                 Some(start) => {
-                    let address = start.saturating_add(index as u16);
+                    let address = start.saturating_add(to_u16(index));
                     format!("{} / 0x{address:04X}", names::modicon(function, address))
                 }
                 None => format!("register {}", index + 1),
@@ -84,7 +84,7 @@ impl<'a> Reader<'a> {
             let first = values.len();
             let of_byte = (count - first).min(8);
             let name = match start {
-                Some(start) => names::span(function, start.saturating_add(first as u16), of_byte as u16),
+                Some(start) => names::span(function, start.saturating_add(to_u16(first)), to_u16(of_byte)),
                 None if of_byte == 1 => format!("bit {}", first + 1),
                 None => format!("bits {}–{}", first + 1, first + of_byte),
             };

@@ -8,6 +8,7 @@ use std::{
     time::{Duration, Instant as RealInstant, SystemTime},
 };
 
+use crate::plant::number::to_i64;
 use jiff::{SignedDuration, Timestamp};
 use tokio::time::Instant;
 
@@ -91,7 +92,7 @@ impl Clock {
         // Rounded, not cut off: who slept until a moment must find that it has come.
         let since = moment.saturating_duration_since(self.start);
         let micros = (since.as_secs_f64() * self.speed * 1e6).round();
-        self.base + SignedDuration::from_micros(micros as i64)
+        self.base + SignedDuration::from_micros(to_i64(micros))
     }
 
     /// Plant seconds per real second.

@@ -45,6 +45,7 @@ use crate::{
     plant::{
         def::{Framing, LineDef},
         event::{ExceptionCode, Fault, LineCounters},
+        number::to_u32,
         traffic::{Exchange, Frame},
     },
 };
@@ -192,7 +193,7 @@ impl Link {
         let request = frame::unwrap(framing, bytes).unwrap_or_default();
         let sent_at = self.send(&request, bytes).await?;
         self.note_sent(bytes.into());
-        let deadline = sent_at + self.timeout + self.wire.char_time * frame::MESSAGE_MAX as u32;
+        let deadline = sent_at + self.timeout + self.wire.char_time * to_u32(frame::MESSAGE_MAX);
         let proof = framing != Framing::Mbap && !self.wire.replies.is_ambiguous(&request);
         let (mut buffer, mut reply) = (Vec::new(), None);
         let mut until = deadline;
@@ -439,7 +440,7 @@ impl Link {
     fn expect_late(&mut self, message: &[u8]) {
         self.wire.replies.failed(message, self.wire.age());
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
-        let chars = frame::wrapped_length(self.framing(), longest) as u32;
+        let chars = to_u32(frame::wrapped_length(self.framing(), longest));
         self.wire.rest(self.wire.char_time * chars + self.wire.silence);
     }
 }

@@ -19,6 +19,7 @@ use crate::{
     plant::{
         def::{Framing, LineDef},
         event::LineCounters,
+        number::{to_u16, to_u32},
         traffic::{FRAMES_MAX, Frame},
     },
 };
@@ -39,7 +40,7 @@ pub struct Memory {
 impl Memory {
     /// Nothing has gone over the line yet.
     pub fn new(line: &LineDef, clock: Clock) -> Memory {
-        let seed = clock.now().as_microsecond() as u16;
+        let seed = to_u16(clock.now().as_microsecond().rem_euclid(0x1_0000));
         Memory {
             counters: LineCounters::default(),
             replies: LineReplies::new(line.timeout, seed),
@@ -184,7 +185,7 @@ impl Wire {
     pub async fn put(&mut self, bytes: &[u8]) -> Result<Instant, LinkError> {
         // No flush: on a serial port that waits for the last byte to leave, and blocks the thread while it does.
         // What the system takes at once, as a rule all of it, costs no timer.
-        self.left_at = Instant::now() + self.char_time * bytes.len() as u32;
+        self.left_at = Instant::now() + self.char_time * to_u32(bytes.len());
         let taken = self.port.write(bytes).now_or_never().unwrap_or(Ok(0));
         let taken = taken.map_err(|error| LinkError::Gone(error.to_string()))?;
         if let Some(rest @ [_, ..]) = bytes.get(taken..) {
@@ -196,7 +197,7 @@ impl Wire {
         let sent_at = Instant::now();
         self.counters.sent_bytes += bytes.len() as u64;
         self.counters.last_tx = Some(self.clock.to_utc(self.clock.at(sent_at)));
-        Ok(sent_at + self.char_time * bytes.len() as u32)
+        Ok(sent_at + self.char_time * to_u32(bytes.len()))
     }
 
     /// Appends what comes next to `buffer`; `false` if nothing came before `until`.

@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use crate::plant::number::to_u64;
 use jiff::Timestamp;
 
 /// Share of the line's time for writes, while polls are due.
@@ -42,7 +43,7 @@ impl Budget {
     /// From when on it allows spending, if nothing more is spent.
     pub fn allows_from(&self) -> Timestamp {
         // A microsecond more: at zero it does not allow yet.
-        let missing = Duration::from_micros((-self.saved / self.share * 1e6) as u64 + 1);
+        let missing = Duration::from_micros(to_u64(-self.saved / self.share * 1e6) + 1);
         if 0.0 < self.saved { self.at } else { self.at + missing }
     }
 

@@ -10,7 +10,7 @@ use crate::{
         frame::{self, Shape},
         framing::{self, FrameMatch},
     },
-    plant::{def::Framing, event::Fault},
+    plant::{def::Framing, event::Fault, number::to_u32},
 };
 
 /// Characters of an ASCII frame may be this far apart (Modbus over serial line V1.02, 2.5.2.1).
@@ -45,7 +45,7 @@ impl Link {
         let framing = self.framing();
         let mut echo = self.expects_echo(message).then_some(sent);
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
-        let deadline = sent_at + self.timeout + self.wire.char_time * frame::wrapped_length(framing, longest) as u32;
+        let deadline = sent_at + self.timeout + self.wire.char_time * to_u32(frame::wrapped_length(framing, longest));
         let mut buffer: Vec<u8> = Vec::new();
         // What came and did not fit: it names the fault if nothing better comes.
         let mut misfit: Option<Fault> = None;

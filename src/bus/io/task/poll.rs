@@ -19,6 +19,7 @@ use crate::{
     plant::{
         def::Framing,
         event::{Event, ExceptionCode, Fault},
+        number::to_u16,
         tag::TagDef,
         traffic::Exchange,
     },
@@ -310,7 +311,7 @@ async fn read(link: &mut Link, block: &Block) -> Result<Answer, LinkError> {
 
 /// The values in a checked answer message.
 pub(super) fn parse(block: &Block, answer: Vec<u8>) -> Result<Answer, Fault> {
-    let (count, got) = (usize::from(block.count), answer.len() as u16);
+    let (count, got) = (usize::from(block.count), to_u16(answer.len()));
     let mut pdu = Bytes::from(answer);
     pdu.advance(1.min(pdu.len()));
     match Response::try_from(pdu) {

@@ -16,6 +16,7 @@ use crate::{
         command::{BusRequest, WriteId},
         def::{ActionDef, DeviceDef, Framing},
         event::{Event, Fault, WriteResult},
+        number::to_u16,
         scale,
         tag::{Table, TagDef},
     },
@@ -284,7 +285,7 @@ fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
             Some(match (words.as_slice(), tag.write_fc) {
                 ([word], None | Some(6)) => Request::WriteSingleRegister(address, *word),
                 (_, Some(23)) => {
-                    Request::ReadWriteMultipleRegisters(address, words.len() as u16, address, Cow::Owned(words))
+                    Request::ReadWriteMultipleRegisters(address, to_u16(words.len()), address, Cow::Owned(words))
                 }
                 _ => Request::WriteMultipleRegisters(address, Cow::Owned(words)),
             })
