@@ -3,6 +3,7 @@
 //! Written without a look at the master's codec, so that each is a test of the other.
 
 use super::wire::Request;
+use crate::plant::number::to_u8;
 
 /// Longest frame: `:`, 2 × 255 digits, CR LF (Modbus serial line V1.02, 2.5.2).
 const FRAME_MAX: usize = 513;
@@ -86,7 +87,7 @@ fn lrc(message: &[u8]) -> u8 {
 /// Reads `:` … CR LF. Digits may be small, as some masters write them.
 fn read(frame: &[u8]) -> Option<Request> {
     let digits = frame.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
-    let digit = |character: u8| char::from(character).to_digit(16).map(|value| value as u8);
+    let digit = |character: u8| char::from(character).to_digit(16).map(|value| to_u8(value));
     let pairs = digits.chunks(2).map(|pair| match pair {
         [high, low] => Some(digit(*high)? << 4 | digit(*low)?),
         _ => None,

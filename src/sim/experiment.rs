@@ -8,6 +8,7 @@ use std::time::Duration;
 use super::pxr::map;
 use super::rig::Rig;
 use super::slave::Unit;
+use crate::plant::number::{to_i32, to_u16, to_u32};
 
 /// Set value of all experiments, in °C.
 pub const SV_C: i32 = 70;
@@ -75,7 +76,7 @@ pub const THESIS: [Experiment; 6] = [
 /// Runs one experiment from the start.
 pub fn run(control: &Control) -> Outcome {
     let mut rig = Rig::filled(FILL_L);
-    let tenths = |value: f64| (value * 10.0).round() as u16;
+    let tenths = |value: f64| to_u16((value * 10.0).round());
     let settings = [
         (map::CONTROL, u16::from(control.fuzzy)),
         (map::P, tenths(control.p_percent)),
@@ -83,7 +84,7 @@ pub fn run(control: &Control) -> Outcome {
         (map::D, tenths(control.d_s)),
     ];
     for (place, value) in settings {
-        let [[a, b], [c, d]] = [(ENGINEERING + place as u16).to_be_bytes(), value.to_be_bytes()];
+        let [[a, b], [c, d]] = [(ENGINEERING + to_u16(place)).to_be_bytes(), value.to_be_bytes()];
         let request = [6, a, b, c, d];
         assert_eq!(
             rig.controller().respond(&request).as_deref(),
@@ -94,7 +95,7 @@ pub fn run(control: &Control) -> Outcome {
     // Running, in manual, agitator and heater on.
     let taken = rig.plc().respond(&[15, 0x0C, 0, 0, 7, 1, 0b100_1001]);
     assert_eq!(taken.as_deref(), Some(&[15, 0x0C, 0, 0, 7][..]), "the PLC takes its commands");
-    measure((0..=RECORDING.as_secs() as u32).map(|second| {
+    measure((0..=to_u32(RECORDING.as_secs())).map(|second| {
         let pv_c = rig.state().pv_c;
         rig.advance(Duration::from_secs(1));
         (second, pv_c)
@@ -107,7 +108,7 @@ pub fn measure(recording: impl Iterator<Item = (u32, f64)>) -> Outcome {
     let mut last_s = 0;
     for (second, pv_c) in recording {
         last_s = second;
-        let shown_c = pv_c.round() as i32;
+        let shown_c = to_i32(pv_c.round());
         outcome.overshoot_c = outcome.overshoot_c.max(shown_c - SV_C);
         if shown_c != SV_C {
             outcome.steady_from_s = None;

@@ -21,6 +21,7 @@ use crate::{
     plant::{
         PlantDef,
         def::{LineId, TagId},
+        number::{to_u16, to_usize},
     },
 };
 use process::Troubles;
@@ -252,7 +253,7 @@ impl Answer {
         let message = self.message();
         let mut frame = transaction.to_be_bytes().to_vec();
         frame.extend_from_slice(&[0, 0]);
-        frame.extend_from_slice(&(message.len() as u16).to_be_bytes());
+        frame.extend_from_slice(&to_u16(message.len()).to_be_bytes());
         frame.extend_from_slice(&message);
         if self.damage == Damage::Cut {
             frame.truncate(frame.len() / 2);
@@ -266,7 +267,7 @@ impl Answer {
 }
 
 fn flip(frame: &mut [u8], which: u64, bits: u64) {
-    let index = (which / bits) as usize % frame.len().max(1);
+    let index = to_usize(which / bits) % frame.len().max(1);
     if let Some(byte) = frame.get_mut(index) {
         *byte ^= 1 << (which % bits);
     }

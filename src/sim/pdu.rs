@@ -4,7 +4,10 @@ mod identity;
 
 pub use identity::Identity;
 
-use crate::plant::def::Limits;
+use crate::plant::{
+    def::Limits,
+    number::{to_u8, to_u16},
+};
 
 /// Why a device refuses (Modbus application protocol V1.1b3, 7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -158,7 +161,7 @@ fn plain<D: Registers>(device: &mut D, function: u8, address: u16, operand: u16)
 
 fn read_bits<D: Registers>(device: &D, function: u8, kind: Bits, address: u16, count: u16) -> Result<Vec<u8>, Refusal> {
     let addresses = span(address, count, READ_BITS_MAX.min(device.limits().read_bits_max))?;
-    let mut reply = vec![function, count.div_ceil(8) as u8];
+    let mut reply = vec![function, to_u8(count.div_ceil(8))];
     reply.resize(2 + usize::from(count.div_ceil(8)), 0);
     for (place, at) in addresses.enumerate() {
         reply[2 + place / 8] |= u8::from(device.bit(kind, at)?) << (place % 8);
@@ -174,7 +177,7 @@ fn read_words<D: Registers>(
     count: u16,
 ) -> Result<Vec<u8>, Refusal> {
     let Limits { read_registers_max, alignment, .. } = device.limits();
-    let mut reply = vec![function, (count.min(read_registers_max) * 2) as u8];
+    let mut reply = vec![function, to_u8(count.min(read_registers_max) * 2)];
     let addresses = span(address, count, read_registers_max)?;
     if !address.is_multiple_of(alignment) {
         return Err(Refusal::Address);
@@ -221,7 +224,7 @@ fn block_of_words(count: u16, max: u16, rest: &[u8]) -> Result<Vec<u16>, Refusal
 }
 
 fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<(), Refusal> {
-    span(address, values.len() as u16, WRITE_WORDS_MAX)?;
+    span(address, to_u16(values.len()), WRITE_WORDS_MAX)?;
     let mut trial = device.clone();
     trial.write_block(address, values)?;
     *device = trial;
@@ -242,7 +245,7 @@ fn read_queue<D: Registers>(device: &D, function: u8, address: u16) -> Result<Ve
     if count > QUEUE_MAX {
         return Err(Refusal::Value);
     }
-    let mut reply = vec![function, 0, (2 + 2 * count) as u8, 0, count as u8];
+    let mut reply = vec![function, 0, to_u8(2 + 2 * count), 0, to_u8(count)];
     for place in 1..=count {
         let at = address.checked_add(place).ok_or(Refusal::Address)?;
         reply.extend_from_slice(&device.word(Words::Holding, at)?.to_be_bytes());

@@ -42,6 +42,7 @@ pub fn part(def: &PlantDef, device: DeviceId) -> Option<Part> {
 }
 
 /// Scans of the PLC, which are the inner steps, per sample of the controller.
+#[expect(clippy::cast_possible_truncation, reason = "a constant of two digits")]
 const SCANS_PER_SAMPLE: u32 = (SAMPLE.as_millis() / SCAN.as_millis()) as u32;
 
 /// The simulated plant.

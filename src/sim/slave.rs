@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::pdu::{self, Refusal, Registers};
+use crate::plant::number::to_u8;
 
 /// The functions that a broadcast may carry.
 const WRITES: [u8; 5] = [0x05, 0x06, 0x0F, 0x10, 0x16];
@@ -156,7 +157,7 @@ impl Counters {
             (0x0B, []) => Ok([&[function], &ready[..], &self.done.to_be_bytes()].concat()),
             (0x0C, []) => {
                 let counts = [ready, self.done.to_be_bytes(), self.diagnostic[HEARD].to_be_bytes()].concat();
-                let length = (counts.len() + self.log.len()) as u8;
+                let length = to_u8(counts.len() + self.log.len());
                 Ok([function, length].into_iter().chain(counts).chain(self.log.iter().copied()).collect())
             }
             _ => Err(Refusal::Value),

@@ -56,6 +56,7 @@ const CUT_OUT_HYSTERESIS_K: f64 = 4.0;
 /// One place of the delay line.
 const SLOT_S: f64 = 0.1;
 /// Places of the delay line, which is its bound.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a constant of three digits")]
 const SLOTS: usize = (DEAD_TIME_S / SLOT_S) as usize;
 
 /// What the outputs of PLC and controller do to the plant.

@@ -10,7 +10,7 @@ use sequence::{Conditions, Sequence, Step};
 
 use super::pdu::{Bits, Identity, Refusal, Registers, Words};
 use super::tank::{Actuators, Readings, control_level_cm};
-use crate::plant::def::Limits;
+use crate::plant::{def::Limits, number::to_u16};
 
 /// Time of one scan.
 pub const SCAN: Duration = Duration::from_millis(100);
@@ -219,7 +219,7 @@ impl Dl06 {
     fn publish(&mut self, readings: &Readings) {
         let bcd_words =
             [u16::from(self.step().number()), self.sequence.seconds_left(), self.sequence.batches()].map(bcd);
-        let word = |value: f64, per_unit: f64| (value * per_unit).round().clamp(0.0, 65_535.0) as u16;
+        let word = |value: f64, per_unit: f64| to_u16((value * per_unit).round().clamp(0.0, 65_535.0));
         let signals = [
             word(readings.level_cm, 10.0),
             word(readings.cold_l, 10.0),

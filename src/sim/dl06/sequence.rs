@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::Outputs;
-use crate::sim::tank::Readings;
+use crate::{plant::number::to_u16, sim::tank::Readings};
 
 /// A tank counts as empty below this volume, in litres.
 const EMPTY_L: f64 = 0.05;
@@ -147,7 +147,7 @@ impl Sequence {
             Step::Cool => COOL,
             Step::Idle | Step::Fill | Step::Heat | Step::Drain | Step::Return => Duration::ZERO,
         };
-        length.saturating_sub(self.in_step).as_secs_f64().ceil() as u16
+        to_u16(length.saturating_sub(self.in_step).as_secs_f64().ceil())
     }
 
     fn done(&self, conditions: &Conditions) -> bool {

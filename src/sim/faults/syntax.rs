@@ -1,5 +1,6 @@
 //! The faults and their spelling, the same in a scenario file and on screen.
 
+use crate::plant::number::{to_u8, to_u32, to_u64};
 use std::{fmt, str::FromStr, time::Duration};
 
 /// What is wrong with a line, a unit on it, its values, or the process behind it.
@@ -225,10 +226,10 @@ impl Fault {
         let parameter = self.parameter().filter(|parameter| (parameter.min..=parameter.max).contains(&number))?;
         let whole = number.fract() == 0.0 || matches!(parameter.unit, "s" | "l/min");
         whole.then_some(match self {
-            Fault::Noise(_) => Fault::Noise(number as u8),
-            Fault::Late(_) => Fault::Late(Duration::from_millis((number * 1e3).round() as u64)),
-            Fault::Exception(_) => Fault::Exception(number as u8),
-            Fault::Leak(_) => Fault::Leak((number * 1e3).round() as u32),
+            Fault::Noise(_) => Fault::Noise(to_u8(number)),
+            Fault::Late(_) => Fault::Late(Duration::from_millis(to_u64((number * 1e3).round()))),
+            Fault::Exception(_) => Fault::Exception(to_u8(number)),
+            Fault::Leak(_) => Fault::Leak(to_u32((number * 1e3).round())),
             other => other,
         })
     }

@@ -8,6 +8,7 @@ use crate::{
     plant::{
         PlantDef,
         def::DeviceDef,
+        number::to_u16,
         tag::{Access, Point, Table, TagDef},
     },
 };
@@ -179,7 +180,7 @@ impl Cells {
     }
 
     fn each(&self) -> impl Iterator<Item = ((Table, u16), u16)> {
-        self.cells.iter().enumerate().map(|(n, cell)| ((self.table, self.first.wrapping_add(n as u16)), *cell))
+        self.cells.iter().enumerate().map(|(n, cell)| ((self.table, self.first.wrapping_add(to_u16(n))), *cell))
     }
 
     fn into_answer(self, mut answer: Vec<u8>) -> Vec<u8> {

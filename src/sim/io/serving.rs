@@ -15,6 +15,7 @@ use crate::{
     plant::{
         PlantDef,
         def::{Framing, LineDef, LineId, Serial, Transport},
+        number::to_u16,
     },
     sim::simulator::{Simulator, UnknownSimulation},
 };
@@ -181,7 +182,7 @@ pub async fn serve_simulator(
     // What has started is ended by dropping this if a later line cannot be served.
     let mut serving = Serving { simulator, places: Vec::new(), tasks: Vec::new() };
     for (line, service) in services.iter().enumerate() {
-        let (place, task) = start(serving.simulator.line(LineId(line as u16)), *service).await?;
+        let (place, task) = start(serving.simulator.line(LineId(to_u16(line))), *service).await?;
         serving.places.push(place);
         serving.tasks.push(task);
     }

@@ -9,6 +9,7 @@ use crate::{
     bus::codec,
     plant::{
         def::{DeviceDef, Limits, TagId},
+        number::{to_u8, to_u32},
         scale,
         tag::{Access, Bound, Decimals, Table, TagDef},
     },
@@ -133,7 +134,7 @@ impl Model {
 
     fn decimals(&self, tag: &TagDef) -> u8 {
         match tag.decimals {
-            Decimals::From(from) => self.value(from).map_or(0, |decimals| decimals as u8),
+            Decimals::From(from) => self.value(from).map_or(0, |decimals| to_u8(decimals)),
             Decimals::Fixed(_) => 0,
         }
     }
@@ -149,7 +150,7 @@ impl Model {
     /// its bounds, is no state of its tag, or the device is locked.
     fn take(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), Refusal> {
         let chart = self.chart.clone();
-        let span = u32::from(address)..u32::from(address) + values.len() as u32;
+        let span = u32::from(address)..u32::from(address) + to_u32(values.len());
         let extent =
             |tag: &TagDef| u32::from(tag.point.address)..u32::from(tag.point.address) + u32::from(tag.point.len());
         let touched: Vec<&TagDef> = chart

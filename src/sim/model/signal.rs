@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::plant::{
     def::TagId,
+    number::to_u64,
     simulate::{Check, Motion, Operation, Pace, Simulate, Source, Test},
 };
 
@@ -90,7 +91,7 @@ fn holds(checks: &[Check], values: &impl Fn(TagId) -> Option<f64>) -> bool {
     checks.iter().all(|check| {
         let Some(value) = values(check.tag) else { return false };
         let value = match check.field {
-            Some((low, bits)) => ((value as u64 >> low) & (u64::MAX >> (64 - u32::from(bits)))) as f64,
+            Some((low, bits)) => ((to_u64(value) >> low) & (u64::MAX >> (64 - u32::from(bits)))) as f64,
             None => value,
         };
         match &check.test {
@@ -119,7 +120,7 @@ fn made(operation: Operation, tags: &[TagId], values: &impl Fn(TagId) -> Option<
 
 /// Two swings of different length, which meet again only after a long time.
 fn oscillate([low, high]: [f64; 2], period: Duration, at: Duration, seed: u64) -> f64 {
-    let phase = |shift: u32| f64::from((seed >> shift) as u16) / 65_536.0;
+    let phase = |shift: u32| f64::from(((seed >> shift) & 0xFFFF) as u16) / 65_536.0;
     let turn = |length: f64, phase: f64| (std::f64::consts::TAU * (at.as_secs_f64() / length + phase)).sin();
     let period = period.as_secs_f64();
     let both = 0.6 * turn(period, phase(0)) + 0.4 * turn(period * 0.377, phase(16));
@@ -128,7 +129,7 @@ fn oscillate([low, high]: [f64; 2], period: Duration, at: Duration, seed: u64) -
 
 /// A number between 0 and 1 that looks random and is the same in every run (splitmix64 of seed and time).
 fn noise(seed: u64, at: Duration) -> f64 {
-    let mut bits = seed ^ (at.as_millis() as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut bits = seed ^ to_u64(at.as_millis()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     ((bits ^ (bits >> 31)) >> 11) as f64 / 9_007_199_254_740_992.0

@@ -1,6 +1,7 @@
 //! What a device says of itself: report server id (11) and device identification (2B/0E).
 
 use super::Refusal;
+use crate::plant::number::to_u8;
 
 /// The MEI type of device identification (V1.1b3, 6.21).
 pub(super) const MEI_TYPE: u8 = 0x0E;
@@ -22,7 +23,7 @@ pub struct Identity {
 /// Answer to function 11: the id, the run lamp, the name of the product.
 pub(super) fn report(identity: &Identity, running: bool) -> Vec<u8> {
     let name = identity.objects.iter().find(|(id, _)| *id == 0x01).map_or("", |(_, text)| text);
-    let mut reply = vec![0x11, 2 + name.len() as u8, identity.server_id, if running { 0xFF } else { 0x00 }];
+    let mut reply = vec![0x11, 2 + to_u8(name.len()), identity.server_id, if running { 0xFF } else { 0x00 }];
     reply.extend_from_slice(name.as_bytes());
     reply
 }
@@ -52,9 +53,9 @@ pub(super) fn read(identity: &Identity, code: u8, from: u8) -> Result<Vec<u8>, R
 
 fn message(code: u8, next: Option<u8>, objects: &[(u8, &str)]) -> Vec<u8> {
     let more = if next.is_some() { 0xFF } else { 0x00 };
-    let mut reply = vec![0x2B, MEI_TYPE, code, CONFORMITY, more, next.unwrap_or(0), objects.len() as u8];
+    let mut reply = vec![0x2B, MEI_TYPE, code, CONFORMITY, more, next.unwrap_or(0), to_u8(objects.len())];
     for (id, text) in objects {
-        reply.extend_from_slice(&[*id, text.len() as u8]);
+        reply.extend_from_slice(&[*id, to_u8(text.len())]);
         reply.extend_from_slice(text.as_bytes());
     }
     reply

@@ -2,6 +2,7 @@
 //!
 //! The data sheet confirms the families; the numbers of the types are those remembered of the family, and where the
 //! settings stand in the registers is a guess (see `map`).
+use crate::plant::number::to_usize;
 
 /// What a set point is compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,8 +32,8 @@ pub struct Shape {
 pub fn shape(number: i16) -> Option<Shape> {
     use Base::{Sv, Zero};
     let one = |high, low, hold| Shape { high, low, shared: false, zone: false, hold };
-    let two = |pair, zone, hold| {
-        let (high, low) = [(Zero, Zero), (Sv, Sv), (Zero, Sv), (Sv, Zero)][pair as usize % 4];
+    let two = |pair: i16, zone, hold| {
+        let (high, low) = [(Zero, Zero), (Sv, Sv), (Zero, Sv), (Sv, Zero)][to_usize(pair.rem_euclid(4))];
         Shape { high: Some(high), low: Some(low), shared: false, zone, hold }
     };
     Some(match number {

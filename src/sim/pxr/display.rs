@@ -1,5 +1,7 @@
 //! How temperatures stand in registers: unit (41017) and decimals (41020), neither of which travels with the number.
 
+use crate::plant::number::{to_i16, to_u8};
+
 /// Unit and decimals of every temperature in the registers. Inside, everything is °C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Display {
@@ -12,12 +14,12 @@ pub struct Display {
 impl Display {
     /// From the words of 41017 and 41020.
     pub fn of(unit: i16, decimals: i16) -> Display {
-        Display { decimals: decimals.clamp(0, 2) as u8, fahrenheit: unit == 1 }
+        Display { decimals: to_u8(decimals.clamp(0, 2)), fahrenheit: unit == 1 }
     }
 
     /// A temperature as it stands in a register; one that does not fit stands at the end of the 16 bits.
     pub fn temperature(self, c: f64) -> i16 {
-        self.raw(if self.fahrenheit { c * 1.8 + 32.0 } else { c }).round() as i16
+        to_i16(self.raw(if self.fahrenheit { c * 1.8 + 32.0 } else { c }).round())
     }
 
     /// The temperature in °C that a register holds.
@@ -28,7 +30,7 @@ impl Display {
 
     /// A difference of temperatures in K as it stands in a register.
     pub fn difference(self, k: f64) -> i16 {
-        self.raw(if self.fahrenheit { k * 1.8 } else { k }).round() as i16
+        to_i16(self.raw(if self.fahrenheit { k * 1.8 } else { k }).round())
     }
 
     /// The difference in K that a register holds.

@@ -19,6 +19,7 @@ mod tuning;
 
 use std::time::Duration;
 
+use crate::plant::number::to_i16;
 use alarm::{Alarm, Setup};
 use control::{Control, Law, Settings};
 use program::{Mode, Plan, Program, ProgramCommand, Segment};
@@ -293,7 +294,7 @@ impl Pxr {
     }
 
     fn set_pid(&mut self, found: Found) {
-        let tenths = |value: f64, max: f64| (value * 10.0).round().clamp(1.0, max) as i16;
+        let tenths = |value: f64, max: f64| to_i16((value * 10.0).round().clamp(1.0, max));
         self.settings[map::P] = tenths(100.0 * found.band_k / self.span_c(), 9_999.0);
         self.settings[map::I] = tenths(found.i_s, 32_000.0);
         self.settings[map::D] = tenths(found.d_s, 9_999.0);

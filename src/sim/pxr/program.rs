@@ -1,5 +1,7 @@
 //! The ramp/soak programme: a set value that moves by itself through up to eight steps.
 
+use crate::plant::number::to_u16;
+
 /// What register 41082 asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProgramCommand {
@@ -97,7 +99,7 @@ impl Program {
     fn advance(&mut self, dt_s: f64, plan: &Plan) {
         self.elapsed_s += dt_s;
         if self.position == 1 && plan.first != 0 {
-            self.position = 1 + 2 * plan.first as u16;
+            self.position = 1 + 2 * to_u16(plan.first);
         }
         let lasts = plan.segments.iter().any(|segment| segment.ramp_s + segment.soak_s > 0.0);
         while !self.ended() {
@@ -105,7 +107,7 @@ impl Program {
             let index = (usize::from(self.position - 1) / 2).checked_sub(plan.first);
             let Some(segment) = index.and_then(|index| plan.segments.get(index)) else {
                 if plan.repeat && lasts {
-                    self.position = 1 + 2 * plan.first as u16;
+                    self.position = 1 + 2 * to_u16(plan.first);
                     continue;
                 }
                 self.position = END;

@@ -5,7 +5,7 @@ use super::display::Display;
 use super::map::{self, Meaning, Row};
 use super::{NARROWEST_K, Pxr, SENSOR_C};
 use crate::{
-    plant::def::Limits,
+    plant::{def::Limits, number::to_i16},
     sim::pdu::{Bits, Refusal, Registers, Words},
 };
 
@@ -34,7 +34,8 @@ impl Registers for Pxr {
             Words::Input => self.measurement(place)?,
             Words::Holding => (self.settings[place], self.meaning(place)),
         };
-        Ok(if area == Area::Internal { self.to_internal(raw, meaning) } else { raw } as u16)
+        let raw = if area == Area::Internal { self.to_internal(raw, meaning) } else { raw };
+        Ok(raw.cast_unsigned())
     }
 
     fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
@@ -90,13 +91,13 @@ impl Pxr {
             0 => (pv, Meaning::Temperature),
             1 => (sv, Meaning::Temperature),
             2 => (sv.saturating_sub(pv), Meaning::Difference),
-            3 => ((self.mv_percent * 100.0).round() as i16, Meaning::Plain),
+            3 => (to_i16((self.mv_percent * 100.0).round()), Meaning::Plain),
             4 => (0, Meaning::Plain),
             5 => (1, Meaning::Plain),
             6 => (self.alarm_word() as i16, Meaning::Plain),
             7 => (self.faults as i16, Meaning::Plain),
             8 => (self.program.position() as i16, Meaning::Plain),
-            9 => ((self.heater_a * 10.0).round() as i16, Meaning::Plain),
+            9 => (to_i16((self.heater_a * 10.0).round()), Meaning::Plain),
             _ => return Err(Refusal::Address),
         })
     }
@@ -105,8 +106,8 @@ impl Pxr {
     fn to_internal(&self, raw: i16, meaning: Meaning) -> i16 {
         let (low, span) = self.scale();
         match meaning {
-            Meaning::Temperature => ((f64::from(raw) - low) / span * 10_000.0).round() as i16,
-            Meaning::Difference => (f64::from(raw) / span * 10_000.0).round() as i16,
+            Meaning::Temperature => to_i16(((f64::from(raw) - low) / span * 10_000.0).round()),
+            Meaning::Difference => to_i16((f64::from(raw) / span * 10_000.0).round()),
             Meaning::Plain | Meaning::End | Meaning::AlarmPoint => raw,
         }
     }
@@ -114,8 +115,8 @@ impl Pxr {
     fn to_display(&self, raw: i16, meaning: Meaning) -> i16 {
         let (low, span) = self.scale();
         match meaning {
-            Meaning::Temperature => (f64::from(raw) / 10_000.0 * span + low).round() as i16,
-            Meaning::Difference => (f64::from(raw) / 10_000.0 * span).round() as i16,
+            Meaning::Temperature => to_i16((f64::from(raw) / 10_000.0 * span + low).round()),
+            Meaning::Difference => to_i16((f64::from(raw) / 10_000.0 * span).round()),
             Meaning::Plain | Meaning::End | Meaning::AlarmPoint => raw,
         }
     }
