@@ -76,7 +76,7 @@ pub fn missing(noted: &Noted, now_open: &LastCommit) -> Option<String> {
 /// Numbers of fixed width, and one that belongs to them: a torn line is noticed.
 fn line(last: &LastCommit) -> String {
     let LastCommit { identity, number, at } = *last;
-    let at = at.map_or(0, |at| at.as_microsecond() as u64);
+    let at = at.map_or(0, |at| at.as_microsecond().cast_unsigned());
     format!("{identity:020} {number:020} {at:020} {:020}\n", sum(identity, number, at))
 }
 

@@ -19,6 +19,7 @@ use crate::{
     history::HistoryError,
     plant::{
         def::TagId,
+        number::{to_i64, to_u32, to_u64},
         sample::{Cause, Quality, Sample},
     },
     report::{Gap, step_series::HOLD_MAX},
@@ -70,7 +71,7 @@ impl Store {
         let (mut rows, mut gaps) = (Vec::new(), Vec::<Gap>::new());
         if let Some((stored, micros)) = self.spread(to) {
             // Few rows need one piece, however close together they are: those of a start have one time.
-            let of = |rows: f64| if rows < stored { ((rows / stored * micros) as i64).max(1) } else { i64::MAX };
+            let of = |rows: f64| if rows < stored { to_i64(rows / stored * micros).max(1) } else { i64::MAX };
             (span, span_max) = (span.min(of(self.piece as f64)), of(LOOKED_AT));
         }
         while next < end {
@@ -120,7 +121,7 @@ impl Store {
         let mut places = vec![NONE; usize::from(u16::MAX) + 1];
         for (place, number) in numbers.iter().enumerate() {
             if let Some(number) = number {
-                places[usize::from(*number)] = place as u32;
+                places[usize::from(*number)] = to_u32(place);
             }
         }
         let list: Vec<String> = numbers.iter().flatten().map(u16::to_string).collect();
@@ -165,7 +166,7 @@ impl Store {
         let (from, to) = (from.as_microsecond().max(first), to.as_microsecond().min(last));
         let share = (to - from).max(0) as f64 / (last - first).max(1) as f64;
         let tags = tags as f64 / self.ids.len().max(1) as f64;
-        within((self.rows_about()? as f64 * share * tags.min(1.0)).ceil() as u64, max)
+        within(to_u64((self.rows_about()? as f64 * share * tags.min(1.0)).ceil()), max)
     }
 
     /// The rows up to an instant and the microseconds that they lie in, about; `None` if that is not known.
