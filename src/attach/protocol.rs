@@ -11,7 +11,7 @@ use super::delta::Delta;
 use crate::{
     access::{CommandRequest, Durability, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
-    plant::{PlantDef, command::CommandId, visible::acts},
+    plant::{PlantDef, command::CommandId, number::to_u32, visible::acts},
 };
 
 /// The number of this protocol; goes up with every change of a message.
@@ -181,7 +181,7 @@ fn with_length(mut bytes: Vec<u8>, max: usize) -> Result<Vec<u8>, ProtocolError>
     if max < length {
         return Err(ProtocolError::TooLong { bytes: length, max });
     }
-    bytes[..LENGTH_BYTES].copy_from_slice(&(length as u32).to_le_bytes());
+    bytes[..LENGTH_BYTES].copy_from_slice(&to_u32(length).to_le_bytes());
     Ok(bytes)
 }
 

@@ -18,6 +18,7 @@ use crate::plant::{
     alarm::{AlarmMetrics, PeriodMetrics},
     command::CommandStatus,
     interlock::ActuatorTracker,
+    number::to_u16,
     parameter_set::StoredSet,
     restore::Restore,
     snapshot::{ActiveAlarm, DeviceStatus, HistoryStatus, SuppressedAlarm},
@@ -97,7 +98,7 @@ impl Delta {
         } = new;
         let lines = def.lines.iter().zip(old.lines.iter().zip(lines)).enumerate();
         let lines =
-            lines.filter_map(|(place, (def, (old, new)))| Some((place as u16, LineDelta::between(def, old, new)?)));
+            lines.filter_map(|(place, (def, (old, new)))| Some((to_u16(place), LineDelta::between(def, old, new)?)));
         Delta {
             at: *at,
             run: (old.run != *run).then_some(*run),

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::DeltaMismatch;
 use crate::plant::{
+    number::to_u32,
     sample::{Quality, Sample},
     traffic::Exchange,
 };
@@ -23,7 +24,7 @@ impl Runs {
     fn push(&mut self, place: usize) {
         match self.0.last_mut() {
             Some((from, count)) if *from as usize + *count as usize == place => *count += 1,
-            _ => self.0.push((place as u32, 1)),
+            _ => self.0.push((to_u32(place), 1)),
         }
     }
 
