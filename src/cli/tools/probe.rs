@@ -7,6 +7,7 @@ use crate::{
     plant::{
         diagnostics::{Diagnostic, Finding},
         event::Fault,
+        number::{to_f32, to_u16},
         tag::{ByteOrder, Kind, Point, Table},
     },
 };
@@ -66,18 +67,18 @@ pub fn main(args: Args) -> Result<(), CliError> {
 fn value_lines(table: Table, address: u16, words: &[u16]) -> Vec<String> {
     if table.is_bits() {
         let row = |(n, bit): (usize, &u16)| {
-            let at = address.wrapping_add(n as u16);
+            let at = address.wrapping_add(to_u16(n));
             format!("{:7} / 0x{at:04X}  {bit}", table.modicon(at))
         };
         return words.iter().enumerate().map(row).collect();
     }
     let heads = "modicon / wire  hex  uint16  int16  float32: ABCD       CDAB       BADC       DCBA";
     let row = |(n, word): (usize, &u16)| {
-        let at = address.wrapping_add(n as u16);
+        let at = address.wrapping_add(to_u16(n));
         let pair = words.get(n..n + 2);
         let float = |order| {
             let point = Point { table, address: at, kind: Kind::F32, order, field: None };
-            pair.and_then(|pair| codec::decode(point, pair)).map_or("–".into(), |value| short(value as f32))
+            pair.and_then(|pair| codec::decode(point, pair)).map_or("–".into(), |value| short(to_f32(value)))
         };
         let floats = [ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba]
             .map(|order| format!("{:>10}", float(order)));

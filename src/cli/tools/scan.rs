@@ -8,6 +8,7 @@ use crate::{
     plant::{
         def::Serial,
         diagnostics::{Diagnostic, Finding, Scan},
+        number::to_u32,
     },
     profile::BAUDS,
 };
@@ -42,7 +43,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     // Time for request and answer on the wire of the slowest setting is added by the link.
     let scan = Scan { first, last, serials, timeout: line.timeout.min(Duration::from_secs(60)) };
     let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
-    let most = line.timeout * requests as u32;
+    let most = line.timeout * to_u32(requests);
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if nobody answers", line.transport));
     let run = run(&line, Diagnostic::Scan(scan), |finding| match finding {
