@@ -15,15 +15,18 @@ use super::{
     tabs::Tab,
     widgets::text::{Canvas, between, clock, fit, fit_words, running, width},
 };
-use crate::plant::{
-    command::{CommandKind, NotConfirmed, Outcome},
-    commands::alarm_words as alarm_words_of,
-    def::LineDef,
-    event::LineState,
-    role::Role,
-    snapshot::LineStatus,
+use crate::{
+    plant::{
+        command::{CommandKind, NotConfirmed, Outcome},
+        commands::alarm_words as alarm_words_of,
+        def::LineDef,
+        event::LineState,
+        number::to_u16,
+        role::Role,
+        snapshot::LineStatus,
+    },
+    sim::drill::{Progress, Status},
 };
-use crate::sim::drill::{Progress, Status};
 
 /// Least size in which the tabs make sense; 80x24 shows everything.
 const SIZE_MIN: (u16, u16) = (60, 16);
@@ -261,7 +264,7 @@ fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     };
     let names: Vec<(Tab, String)> = Tab::offered(cx).into_iter().map(|tab| (tab, name(tab))).collect();
     // Where there is no room for blanks around the names they stand closer; then all but the shown one are cut alike.
-    let needs = |blanks: u16| names.iter().map(|(_, name)| width(name) + blanks).sum::<u16>() + names.len() as u16;
+    let needs = |blanks: u16| names.iter().map(|(_, name)| width(name) + blanks).sum::<u16>() + to_u16(names.len());
     let blank = if needs(2) <= canvas.width() + 1 { " " } else { "" };
     let longest = names.iter().map(|(_, name)| width(name)).max().unwrap_or(0);
     let cut = |most: u16| {

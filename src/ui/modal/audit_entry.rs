@@ -5,7 +5,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
 use crate::{
-    plant::record::ActionRecord,
+    plant::{number::to_u16, record::ActionRecord},
     ui::{
         ViewContext,
         widgets::text::{pad, wrap},
@@ -55,7 +55,7 @@ impl AuditEntryDialog {
         let room = body.width.saturating_sub(8).min(76).saturating_sub(NAMES).max(1);
         let lines = self.lines(cx).into_iter().map(|(name, words)| (name, broken(&words, room)));
         let lines: Vec<(&str, Vec<String>)> = lines.collect();
-        let height = lines.iter().map(|(_, rows)| rows.len() as u16).sum::<u16>();
+        let height = lines.iter().map(|(_, rows)| to_u16(rows.len())).sum::<u16>();
         let mut canvas = window(cx, frame, body, "audit entry", (room + NAMES, height));
         let mut y = 0;
         for (name, rows) in &lines {

@@ -5,7 +5,10 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Confirm, Modal, Next, confirm::wire_words, window};
 use crate::{
-    plant::def::{DeviceId, TagId},
+    plant::{
+        def::{DeviceId, TagId},
+        number::to_u16,
+    },
     ui::{
         ViewContext, keys,
         widgets::{text::width, value},
@@ -75,15 +78,15 @@ impl Choice {
         let shown = usize::from(body.height.saturating_sub(6)).clamp(1, self.rows.len().max(1));
         let first = self.selected.saturating_sub(shown - 1);
         let inner = self.rows.iter().map(|row| width(&row.text)).max().unwrap_or(0).max(46);
-        let mut canvas = window(cx, frame, body, &self.title, (inner, shown as u16 + 4));
+        let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(shown) + 4));
         if let Some(row) = self.rows.get(self.selected) {
             canvas.text(0, 0, &format!("now {}", value::show(cx, row.tag).whole()), cx.theme.normal());
             canvas.text(0, 1, &wire_words(cx.def().tag(row.tag)), cx.theme.dim());
         }
         for (y, (n, row)) in self.rows.iter().enumerate().skip(first).take(shown).enumerate() {
             let style = if n == self.selected { cx.theme.focus() } else { cx.theme.normal() };
-            canvas.text(0, y as u16 + 2, if n == self.selected { "▸ " } else { "  " }, cx.theme.strong());
-            canvas.text(2, y as u16 + 2, &row.text, style);
+            canvas.text(0, to_u16(y) + 2, if n == self.selected { "▸ " } else { "  " }, cx.theme.strong());
+            canvas.text(2, to_u16(y) + 2, &row.text, style);
         }
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, "↑↓ select   ⏎ next   Esc leave unchanged", cx.theme.strong());

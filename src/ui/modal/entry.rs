@@ -12,7 +12,7 @@ use super::{
     window,
 };
 use crate::{
-    plant::{command::CommandKind, def::TagId},
+    plant::{command::CommandKind, def::TagId, number::to_u16},
     ui::{
         Confirmed, UiAction, ViewContext, interlock, keys, rights,
         widgets::{
@@ -105,8 +105,8 @@ impl Entry {
             .unwrap_or(0)
             .max(46);
         let title = format!("write {} {}", def.name, def.label);
-        let told = problem.len().max(1) as u16;
-        let mut canvas = window(cx, frame, body, &title, (inner, rows.len() as u16 + 3 + told));
+        let told = to_u16(problem.len().max(1));
+        let mut canvas = window(cx, frame, body, &title, (inner, to_u16(rows.len()) + 3 + told));
         let old = value::show(cx, self.tag);
         let x = canvas.text(0, 0, "old ", theme.dim());
         let x = canvas.text(x, 0, &old.whole(), old.style);
@@ -117,11 +117,11 @@ impl Entry {
             canvas.text(x + 2, 0, &words, theme.strong());
         }
         for (y, (text, style)) in rows.iter().enumerate() {
-            canvas.text(0, y as u16 + 1, text, *style);
+            canvas.text(0, to_u16(y) + 1, text, *style);
         }
         let last = canvas.height().saturating_sub(1);
         for (y, line) in problem.iter().enumerate() {
-            canvas.text(0, last.saturating_sub(told) + y as u16, line, theme.trouble());
+            canvas.text(0, last.saturating_sub(told) + to_u16(y), line, theme.trouble());
         }
         canvas.text(0, last, &theme.enter("⏎ write and verify   Esc leave unchanged"), theme.strong());
     }

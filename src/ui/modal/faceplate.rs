@@ -8,6 +8,7 @@ use crate::{
     plant::{
         def::TagId,
         event::LineState,
+        number::to_u16,
         snapshot::DeviceState,
         tag::{Access, Poll},
     },
@@ -115,10 +116,10 @@ impl Faceplate {
         let names = self.tags.iter().map(|tag| width(&cx.def().tag(*tag).name)).max().unwrap_or(0);
         let room = body.width.saturating_sub(8).min(64);
         let details = wrapped(details(cx, self.tag(), room), room.saturating_sub(9));
-        let list = self.tags.len() as u16;
-        let mut canvas = window(cx, frame, body, &self.title, (room, list + 1 + details.len() as u16));
+        let list = to_u16(self.tags.len());
+        let mut canvas = window(cx, frame, body, &self.title, (room, list + 1 + to_u16(details.len())));
         for (y, tag) in self.tags.iter().enumerate() {
-            let y = y as u16;
+            let y = to_u16(y);
             let def = cx.def().tag(*tag);
             let shown = value::show(cx, *tag);
             let name = if usize::from(y) == self.selected { cx.theme.focus() } else { cx.theme.normal() };
@@ -133,7 +134,7 @@ impl Faceplate {
             }
         }
         for (y, (label, text, style)) in details.iter().enumerate() {
-            let y = list + 1 + y as u16;
+            let y = list + 1 + to_u16(y);
             canvas.text(0, y, label, cx.theme.dim());
             canvas.text(9, y, &fit_words(text, canvas.width().saturating_sub(9)), *style);
         }

@@ -7,7 +7,7 @@ use crossterm::event::{KeyCode, KeyEvent};
 use super::line::Line;
 use crate::{
     access::Secret,
-    plant::role::Role,
+    plant::{number::to_u16, role::Role},
     ui::{
         ViewContext, keys,
         widgets::text::{Canvas, pad, width},
@@ -76,7 +76,7 @@ impl Form {
 
     /// Lines of it.
     pub fn rows(&self) -> u16 {
-        self.fields.len() as u16
+        to_u16(self.fields.len())
     }
 
     /// Is there a password to be typed?
@@ -192,7 +192,7 @@ impl Form {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
         let theme = cx.theme;
         for (n, field) in self.fields.iter().enumerate() {
-            let (y, here) = (y + n as u16, n == self.at);
+            let (y, here) = (y + to_u16(n), n == self.at);
             let mark = if here { theme.pick("▸ ", "> ") } else { "  " };
             canvas.text(0, y, &format!("{mark}{}", pad(field.label, self.labels())), theme.normal());
             let x = self.labels();

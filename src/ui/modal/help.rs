@@ -4,11 +4,14 @@ use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
-use crate::ui::{
-    ViewContext, keys,
-    keys::{Global, Hint},
-    tabs::{Tab, Tabs},
-    widgets::text::{pad, width},
+use crate::{
+    plant::number::to_u16,
+    ui::{
+        ViewContext, keys,
+        keys::{Global, Hint},
+        tabs::{Tab, Tabs},
+        widgets::text::{pad, width},
+    },
 };
 
 pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
@@ -39,10 +42,10 @@ pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, b
     let keys = rows.iter().map(|hint| width(&hint.key)).max().unwrap_or(0);
     let inner = rows.iter().map(|hint| keys + 2 + width(&hint.help)).max().unwrap_or(0).max(40);
     let shown = body.height.saturating_sub(2);
-    let first = row.min((rows.len() as u16).saturating_sub(shown));
-    let mut canvas = window(cx, frame, body, "keys", (inner, rows.len() as u16));
+    let first = row.min(to_u16(rows.len()).saturating_sub(shown));
+    let mut canvas = window(cx, frame, body, "keys", (inner, to_u16(rows.len())));
     for (y, hint) in rows.iter().skip(usize::from(first)).enumerate() {
-        let y = y as u16;
+        let y = to_u16(y);
         if hint.key.is_empty() {
             canvas.text(0, y, &hint.label, cx.theme.dim());
         } else {

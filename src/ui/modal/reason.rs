@@ -11,6 +11,7 @@ use crate::{
         alarm::{AlarmCommand, command::WORDS_MAX},
         command::CommandKind,
         def::AlarmId,
+        number::to_u16,
     },
     ui::{Confirmed, UiAction, ViewContext, keys, rights, widgets::text::wrap},
 };
@@ -148,13 +149,13 @@ impl Reason {
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);
         let notes: Vec<String> = self.notes.iter().flat_map(|note| wrap(note, room)).collect();
-        let times = if 1 < self.choices.len() || self.time.is_some() { self.choices.len() as u16 } else { 0 };
-        let height = notes.len() as u16 + times + 6;
+        let times = if 1 < self.choices.len() || self.time.is_some() { to_u16(self.choices.len()) } else { 0 };
+        let height = to_u16(notes.len()) + times + 6;
         let mut canvas = window(cx, frame, body, &self.title, (room, height));
         for (y, note) in notes.iter().enumerate() {
-            canvas.text(0, y as u16, note, theme.normal());
+            canvas.text(0, to_u16(y), note, theme.normal());
         }
-        let mut y = notes.len() as u16;
+        let mut y = to_u16(notes.len());
         for (n, (words, _)) in self.choices.iter().enumerate().filter(|_| times > 0) {
             let style = if n == self.chosen { theme.focus() } else { theme.normal() };
             canvas.text(0, y, if n == self.chosen { "▸ " } else { "  " }, theme.strong());
@@ -172,7 +173,7 @@ impl Reason {
         self.line.view(theme, &mut canvas, 0, y + 1);
         let problem = self.problem.clone().or_else(|| rights::missing(cx, &self.choices[self.chosen].1));
         for (n, line) in wrap(&problem.unwrap_or_default(), room).iter().take(2).enumerate() {
-            canvas.text(0, y + 2 + n as u16, line, theme.trouble());
+            canvas.text(0, y + 2 + to_u16(n), line, theme.trouble());
         }
         let keys: Vec<String> = self.hints().iter().map(|(key, label)| format!("{key} {label}")).collect();
         let keys = theme.enter(&keys.join("   "));

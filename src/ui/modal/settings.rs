@@ -13,6 +13,7 @@ use crate::{
         command::{CommandKind, Outcome},
         def::{LineDef, LineId},
         event::LineState,
+        number::to_u16,
         snapshot::DeviceState,
     },
     ui::{
@@ -112,7 +113,7 @@ impl Settings {
         let (status, pinned) = (self.status(cx, used, room), self.pinned(cx, used, room));
         let title = format!("communication settings of {}", used.name);
         let wanted = 1 + fields.len() + 1 + status.len() + 1 + pinned.len();
-        let mut canvas = window(cx, frame, body, &title, (room, wanted as u16));
+        let mut canvas = window(cx, frame, body, &title, (room, to_u16(wanted)));
         // On a small screen: first the keys and what is asked, then the fields around the selected one, then the rest.
         let height = usize::from(canvas.height());
         let shown = fields.len().min(height.saturating_sub(1 + pinned.len()));
@@ -122,7 +123,7 @@ impl Settings {
         canvas.text(new_at, 0, "new", theme.dim());
         let old = Draft::of(used);
         for (y, (n, field)) in fields.iter().enumerate().skip(first).take(shown).enumerate() {
-            let y = y as u16 + 1;
+            let y = to_u16(y) + 1;
             let selected = n == self.row && self.asking.is_none();
             canvas.text(2, y, field.name(), if selected { theme.focus() } else { theme.normal() });
             let before = old.words(*field);
@@ -132,10 +133,10 @@ impl Settings {
         let free = height.saturating_sub(1 + shown + pinned.len());
         let gap = usize::from(status.len() < free);
         for (n, (text, style)) in status.iter().take(free).enumerate() {
-            canvas.text(0, (1 + shown + gap + n) as u16, text, *style);
+            canvas.text(0, to_u16(1 + shown + gap + n), text, *style);
         }
         for (n, (text, style)) in pinned.iter().enumerate() {
-            canvas.text(0, (height.saturating_sub(pinned.len()) + n) as u16, text, *style);
+            canvas.text(0, to_u16(height.saturating_sub(pinned.len()) + n), text, *style);
         }
     }
 

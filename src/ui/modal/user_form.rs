@@ -15,7 +15,7 @@ use crate::{
         SessionRequest,
         session_request::{Secret, UserRow},
     },
-    plant::role::Role,
+    plant::{number::to_u16, role::Role},
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint},
@@ -349,7 +349,7 @@ impl UserForm {
 
     /// Rows that all of it takes in so many columns.
     pub fn height(&self, cx: &ViewContext, room: u16) -> u16 {
-        self.rows(cx, room).len() as u16 + self.form.rows() + 1
+        to_u16(self.rows(cx, room).len()) + self.form.rows() + 1
     }
 
     /// Draws words, form and answer; returns the rows that it took.
@@ -376,8 +376,8 @@ impl UserForm {
         let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
         let keys = cx.theme.enter(&format!("{}   Esc leave", keys.join("   ")));
         let inner = self.form.width().max(width(&keys)).clamp(40, body.width.saturating_sub(8).clamp(40, 72));
-        let problem = self.problem_words(cx).map_or(1, |words| wrap(&words, inner).len() as u16);
-        let height = self.rows(cx, inner).len() as u16 + self.form.rows() + problem + 2;
+        let problem = self.problem_words(cx).map_or(1, |words| to_u16(wrap(&words, inner).len()));
+        let height = to_u16(self.rows(cx, inner).len()) + self.form.rows() + problem + 2;
         let mut canvas = window(cx, frame, body, &self.title(), (inner, height));
         self.draw(cx, &mut canvas);
         let last = canvas.height().saturating_sub(1);

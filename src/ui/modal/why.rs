@@ -14,7 +14,10 @@ use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{Modal, Next, window};
 use crate::{
-    plant::def::{DeviceId, TagId},
+    plant::{
+        def::{DeviceId, TagId},
+        number::to_u16,
+    },
     ui::{
         UiAction, ViewContext,
         keys::Hint,
@@ -89,16 +92,16 @@ impl Why {
         let room = body.width.saturating_sub(4).min(WIDTH_MAX);
         let rows = laid_out(facts::rows(cx, tag, room.saturating_sub(LABEL)), room.saturating_sub(LABEL));
         let shown = body.height.saturating_sub(2);
-        let first = self.row.min((rows.len() as u16).saturating_sub(shown));
+        let first = self.row.min(to_u16(rows.len()).saturating_sub(shown));
         let place = if self.tags.len() < 2 { String::new() } else { format!("  {}/{}", self.at + 1, self.tags.len()) };
         let title = format!("why {} {}{place}", def.name, def.label);
-        let mut canvas = window(cx, frame, body, &title, (room, rows.len() as u16));
+        let mut canvas = window(cx, frame, body, &title, (room, to_u16(rows.len())));
         for (y, row) in rows.iter().skip(usize::from(first)).enumerate() {
-            let y = y as u16;
+            let y = to_u16(y);
             canvas.text(0, y, row.label, cx.theme.dim());
             canvas.text(LABEL, y, &fit_words(&row.text, room.saturating_sub(LABEL)), row.style);
         }
-        let (inner, below) = (canvas.area(), (rows.len() as u16).saturating_sub(first + canvas.height()));
+        let (inner, below) = (canvas.area(), to_u16(rows.len()).saturating_sub(first + canvas.height()));
         if 0 < below {
             let words = format!(" {below} more ↓ ");
             let frame_row = Rect { y: inner.bottom(), height: 1, ..inner };

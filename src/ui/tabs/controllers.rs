@@ -36,6 +36,7 @@ use crate::{
     plant::{
         command::CommandKind,
         def::{DeviceDef, DeviceId, ProgramDef, TagId},
+        number::to_u16,
         parameter_set,
         snapshot::Snapshot,
     },
@@ -347,7 +348,7 @@ impl Controllers {
 
     fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
         let count = cx.def().devices.len() as isize;
-        let next = DeviceId((self.device.0 as isize + by).rem_euclid(count) as u16);
+        let next = DeviceId(to_u16((self.device.0 as isize + by).rem_euclid(count)));
         self.show(next);
         self.on_snapshot(cx)
     }
@@ -356,7 +357,7 @@ impl Controllers {
         match &mut self.page {
             Page::List => {
                 let last = cx.def().devices.len().saturating_sub(1);
-                self.device = DeviceId(usize::from(self.device.0).saturating_add_signed(by).min(last) as u16);
+                self.device = DeviceId(to_u16(usize::from(self.device.0).saturating_add_signed(by).min(last)));
             }
             Page::Device => self.table.move_by(cx, device.id, by),
             Page::Program => {

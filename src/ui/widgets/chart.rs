@@ -16,7 +16,10 @@ use self::{
     raster::{Canvas, Raster},
     trace::{Span, Trace},
 };
-use crate::ui::theme::{Glyphs, Theme};
+use crate::{
+    plant::number::{to_i32, to_u16, to_usize},
+    ui::theme::{Glyphs, Theme},
+};
 
 /// Least width of the space for the labels of an axis, so that the picture does not jump with its data.
 const GUTTER: usize = 6;
@@ -116,7 +119,7 @@ impl Chart<'_> {
         let gutter = |axis: Axis| {
             let scales = rough.iter().filter(|(of, _)| *of == axis).map(|(_, scale)| *scale);
             let labels = scales.flat_map(|scale| scale.ticks().into_iter().map(move |tick| scale.label(tick).len()));
-            labels.max().map_or(0, |width| (width + 1).max(GUTTER) as u16)
+            labels.max().map_or(0, |width| to_u16((width + 1).max(GUTTER)))
         };
         let (mut left, mut right) = (gutter(Axis::Left).max(1), gutter(Axis::Right));
         if area.height < 6 || area.width < left + right + 10 {
@@ -158,7 +161,7 @@ impl Chart<'_> {
                 best.or((*axis == Axis::Own).then_some(*scale)).map(|best| (*axis, best))
             };
             let scales: Vec<(Axis, Scale)> = usual.iter().enumerate().map(best).collect::<Option<_>>()?;
-            let least = scales.iter().filter_map(|(_, scale)| scale.intervals()).min().unwrap_or(0).min(4) as i32;
+            let least = to_i32(scales.iter().filter_map(|(_, scale)| scale.intervals()).min().unwrap_or(0).min(4));
             Some((2 * least - i32::from(rows - height), height, scales))
         };
         let choices = (rows.saturating_sub(3).max(3)..=rows).rev().filter_map(choice);
@@ -199,7 +202,7 @@ impl Chart<'_> {
     /// The cell row of a value, counted from the top of the plot: the very cell that its dots are in.
     fn row(&self, scale: Scale, value: f64, height: u16) -> u16 {
         let down = raster(self.theme).dots().1;
-        (dot_of(scale, value, usize::from(height) * down) / down) as u16
+        to_u16(dot_of(scale, value, usize::from(height) * down) / down)
     }
 
     /// The cell column of an instant, counted from the left of the plot.
@@ -207,7 +210,7 @@ impl Chart<'_> {
         let (from, to) = (self.from.as_microsecond(), self.to.as_microsecond());
         let inside = (from..to).contains(&at.as_microsecond());
         let share = (at.as_microsecond() - from) as f64 / (to - from).max(1) as f64;
-        (inside && width > 0).then(|| ((share * f64::from(width)) as u16).min(width - 1))
+        (inside && width > 0).then(|| to_u16(share * f64::from(width)).min(width - 1))
     }
 }
 
@@ -263,7 +266,7 @@ impl Chart<'_> {
             }
         }
         for (x, y, glyph, owner) in canvas.glyphs() {
-            let cell = &mut buf[(plot.x + x as u16, plot.y + y as u16)];
+            let cell = &mut buf[(plot.x + to_u16(x), plot.y + to_u16(y))];
             cell.set_char(glyph).set_style(self.theme.pen(self.curves[owner].pen));
         }
     }
@@ -317,12 +320,12 @@ impl Chart<'_> {
         let mut x = 0;
         while x < past && !plan.columns.is_empty() {
             let end = (x..past).find(known).unwrap_or(past);
-            let (first, last) = (x.div_ceil(across) as u16, (end / across) as u16);
+            let (first, last) = (to_u16(x.div_ceil(across)), to_u16(end / across));
             let length = span_words(span.mul_f64((end - x) as f64 / count as f64));
             let texts = [format!("no data {length}"), format!("gap {length}"), length];
-            let fits = |text: &String| first + text.width() as u16 + 2 <= last;
+            let fits = |text: &String| first + to_u16(text.width()) + 2 <= last;
             if let Some(text) = texts.into_iter().find(fits).filter(|_| was_read(x + (end - x) / 2)) {
-                let start = plot.x + first + (last - first - text.width() as u16) / 2;
+                let start = plot.x + first + (last - first - to_u16(text.width())) / 2;
                 buf.set_string(start, plot.y + plot.height / 2, text, self.theme.dim());
             }
             x = end + 1;
@@ -375,7 +378,7 @@ impl Chart<'_> {
         for (at, label) in self.time_labels(plan) {
             let Some(x) = self.cell(at, plot.width) else { continue };
             buf[(plot.x + x, plot.bottom())].set_symbol(self.theme.pick("┴", "+"));
-            let width = label.width() as u16;
+            let width = to_u16(label.width());
             let start = (plot.x + x).saturating_sub(width / 2).min(area.right().saturating_sub(width)).max(area.x);
             if start >= free && start + width <= area.right() {
                 buf.set_string(start, plot.bottom() + 1, &label, style);
@@ -415,7 +418,7 @@ impl Chart<'_> {
         }
         if plot.y > area.y {
             buf[(x, plot.bottom())].set_symbol(foot).set_style(self.theme.normal());
-            let width = (words.width() as u16).min(plot.width);
+            let width = to_u16(words.width()).min(plot.width);
             let end = plot.right().saturating_sub(2).max(plot.x + width);
             let start = x.saturating_sub(width / 2).clamp(plot.x, end - width);
             buf.set_line(start, area.y, words, width);
@@ -425,7 +428,7 @@ impl Chart<'_> {
 
 /// The row of dots of a value in a plot of so many rows of dots, from the top.
 fn dot_of(scale: Scale, value: f64, rows: usize) -> usize {
-    ((1.0 - scale.share(value)) * rows.saturating_sub(1) as f64).round() as usize
+    to_usize(((1.0 - scale.share(value)) * rows.saturating_sub(1) as f64).round())
 }
 
 fn widen(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {

@@ -8,7 +8,11 @@ use super::{
 };
 use crate::{
     history::Query,
-    plant::{def::LineId, line_minute::LineMinute},
+    plant::{
+        def::LineId,
+        line_minute::LineMinute,
+        number::{to_u16, to_usize},
+    },
     ui::ViewContext,
 };
 
@@ -46,7 +50,7 @@ pub fn columns(minutes: &[LineMinute], now: Timestamp, count: usize) -> Vec<Opti
         let place = ((1.0 - ago / span) * count as f64).floor();
         // A minute may end a little after a guessed present.
         let place = if ago < 0.0 { count.saturating_sub(1) as f64 } else { place.min(count as f64 - 1.0) };
-        if let Some(column) = columns.get_mut(place as usize).filter(|_| 0.0 <= place) {
+        if let Some(column) = columns.get_mut(to_usize(place)).filter(|_| 0.0 <= place) {
             column.push(minute);
         }
     }
@@ -78,7 +82,7 @@ pub fn line_trend(cx: &ViewContext, canvas: &mut Canvas, minutes: &[LineMinute])
         ("busy", bars(&busy, 1.0, theme.glyphs), Some(f64::from(last.utilisation)), most, theme.normal()),
     ];
     for (y, (name, curve, now, most, style)) in rows.into_iter().enumerate() {
-        let y = y as u16;
+        let y = to_u16(y);
         canvas.text(0, y, &pad(name, NAME), theme.dim());
         let x = canvas.text(NAME, y, &curve, style);
         let figures = format!(" {} now {} most", pad_left(&percent(now), 8), pad_left(&percent(Some(most)), 7));

@@ -1,6 +1,6 @@
 //! A curve in one row of cells: the shape of the last hour beside a value.
 
-use crate::{history::Series, ui::theme::Glyphs};
+use crate::{history::Series, plant::number::to_usize, ui::theme::Glyphs};
 
 const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 const ASCII: [char; 5] = ['_', '.', '-', '=', '^'];
@@ -25,7 +25,7 @@ pub fn spark(series: &Series, cells: usize, resolution: f64, glyphs: Glyphs) -> 
     let glyph = |mean: Option<f64>| match mean {
         None => ' ',
         Some(_) if range <= resolution => glyphs[(glyphs.len() - 1) / 2],
-        Some(mean) => glyphs[((mean - least) / range * (glyphs.len() - 1) as f64).round() as usize],
+        Some(mean) => glyphs[to_usize(((mean - least) / range * (glyphs.len() - 1) as f64).round())],
     };
     means.into_iter().map(glyph).collect()
 }
@@ -34,7 +34,7 @@ pub fn spark(series: &Series, cells: usize, resolution: f64, glyphs: Glyphs) -> 
 pub fn bars(values: &[Option<f64>], top: f64, glyphs: Glyphs) -> String {
     let glyphs = bars_of(glyphs);
     let last = glyphs.len() - 1;
-    let bar = |value: f64| glyphs[((value / top).clamp(0.0, 1.0) * last as f64).round() as usize];
+    let bar = |value: f64| glyphs[to_usize(((value / top).clamp(0.0, 1.0) * last as f64).round())];
     values.iter().map(|value| value.filter(|value| value.is_finite()).map_or(' ', bar)).collect()
 }
 
@@ -51,7 +51,7 @@ pub fn shares(values: &[f32], cells: usize, glyphs: Glyphs) -> String {
     let each = values.len().div_ceil(cells.max(1)).max(1);
     let glyph = |part: &[f32]| {
         let mean = part.iter().sum::<f32>() / part.len() as f32;
-        glyphs[(mean.clamp(0.0, 1.0) * (glyphs.len() - 1) as f32).round() as usize]
+        glyphs[to_usize((mean.clamp(0.0, 1.0) * (glyphs.len() - 1) as f32).round())]
     };
     values.rchunks(each).rev().map(glyph).collect()
 }

@@ -6,6 +6,7 @@ use super::text;
 use crate::{
     plant::{
         def::TagId,
+        number::to_u64,
         sample::{Cause, Quality},
         tag::Access,
     },
@@ -65,7 +66,7 @@ fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let set: Vec<&str> = def
         .bit_labels
         .iter()
-        .filter(|(bit, _)| value as u64 >> (*bit).min(63) & 1 == 1)
+        .filter(|(bit, _)| to_u64(value) >> (*bit).min(63) & 1 == 1)
         .map(|(_, name)| name.as_str())
         .collect();
     Some(if set.is_empty() { "none".to_owned() } else { set.join(", ") })

@@ -6,6 +6,7 @@ use crate::{
     plant::{
         alarm::AlarmState,
         def::{AlarmDef, AlarmId, Condition, Level, Subject},
+        number::to_u16,
         snapshot::ActiveAlarm,
         station::STATION,
     },
@@ -45,7 +46,7 @@ pub fn rows_of_any(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static 
 /// The rows of the screen that all of it needs, with its title and the way on.
 pub fn height(rows: &[(&str, String)], width: u16) -> u16 {
     let room = width.saturating_sub(NAMES);
-    rows.iter().map(|(_, text)| wrap(text, room).len() as u16).sum::<u16>() + 2
+    rows.iter().map(|(_, text)| to_u16(wrap(text, room).len())).sum::<u16>() + 2
 }
 
 /// Draws it for a listed alarm.

@@ -14,6 +14,7 @@ use crate::{
         alarm::AlarmState,
         commands::{HAND_OVER, TAKE_OVER},
         event::LineState,
+        number::to_u16,
         record::ActionRecord,
         sample::Quality,
         snapshot::{DeviceState, SuppressedAlarm},
@@ -148,7 +149,7 @@ impl Handover {
         let lines = self.lines(cx, width);
         let room = usize::from(height.saturating_sub(1));
         for (y, (text, style)) in lines.iter().skip(self.first).take(room).enumerate() {
-            canvas.text(1, y as u16 + 1, text, *style);
+            canvas.text(1, to_u16(y) + 1, text, *style);
         }
         let more = lines.len().saturating_sub(self.first + room);
         if more > 0 {

@@ -9,7 +9,10 @@ use super::{
 };
 use crate::{
     history::{Answer, HistoryError, Query},
-    plant::record::{ActionRecord, AlarmRecord},
+    plant::{
+        number::to_u16,
+        record::{ActionRecord, AlarmRecord},
+    },
     report::Period,
     ui::{
         UiAction, ViewContext,
@@ -183,7 +186,7 @@ impl Journal {
         }
         let (width, room) = (canvas.width(), usize::from(canvas.height().saturating_sub(1)));
         for (y, (at, text, style)) in rows.iter().skip(self.first).take(room).enumerate() {
-            let y = y as u16 + 1;
+            let y = to_u16(y) + 1;
             let x = canvas.text(1, y, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
             canvas.text(x, y, &fit_words(text, width.saturating_sub(x + 1)), *style);
         }

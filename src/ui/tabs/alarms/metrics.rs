@@ -10,9 +10,12 @@ use super::{
 };
 use crate::{
     history::{Answer, HistoryError, Query},
-    plant::alarm::{
-        AlarmState, PeriodMetrics,
-        metrics::{METRIC_TARGETS, Verdict},
+    plant::{
+        alarm::{
+            AlarmState, PeriodMetrics,
+            metrics::{METRIC_TARGETS, Verdict},
+        },
+        number::to_u16,
     },
     report::{Period, alarm_metrics},
     ui::{
@@ -126,12 +129,12 @@ impl Metrics {
         let lines = self.lines(cx, width);
         let room = usize::from(height.saturating_sub(3));
         for (y, (text, style)) in lines.iter().skip(self.first).take(room).enumerate() {
-            canvas.text(1, y as u16 + 2, text, *style);
+            canvas.text(1, to_u16(y) + 2, text, *style);
         }
         if 2 * TABLE <= width {
             let mut side = canvas.part(TABLE + 1, 2, width - TABLE - 1, height.saturating_sub(3));
             for (y, (text, style)) in self.bad_actors(cx).iter().enumerate() {
-                side.text(0, y as u16, text, *style);
+                side.text(0, to_u16(y), text, *style);
             }
         }
         let more = lines.len().saturating_sub(self.first + room);

@@ -11,6 +11,7 @@ use crate::{
     bus::{capture, dissect, filter::Filter, frame::hex},
     plant::{
         def::Framing,
+        number::to_u16,
         traffic::{Frame, Frames},
     },
     ui::{
@@ -192,10 +193,10 @@ impl Ring {
         let first = first_for(place, shown.len(), room);
         for (y, frame) in shown.iter().skip(first).take(room).enumerate() {
             let selected = self.selected.is_some() && first + y == place;
-            ring.row(cx, frame, selected, &mut canvas.part(0, y as u16 + 1, width, 1));
+            ring.row(cx, frame, selected, &mut canvas.part(0, to_u16(y) + 1, width, 1));
         }
         for (n, (words, good)) in notice.iter().enumerate() {
-            let y = height.saturating_sub((notice.len() - n) as u16);
+            let y = height.saturating_sub(to_u16(notice.len() - n));
             canvas.text(1, y, words, if *good { theme.done() } else { theme.trouble() });
         }
     }

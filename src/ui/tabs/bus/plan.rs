@@ -13,6 +13,7 @@ use crate::{
     plant::{
         admission::Verdict,
         line_report::{LineReport, PollReport},
+        number::to_u16,
         tag::Poll,
     },
     ui::{
@@ -85,13 +86,13 @@ impl Plan {
                 (false, true) => theme.trouble(),
                 (false, false) => theme.normal(),
             };
-            canvas.text(1, 2 + y as u16, &lines[n], style);
+            canvas.text(1, 2 + to_u16(y), &lines[n], style);
         }
         let below = lines.len().saturating_sub(first + room);
         if 0 < below {
             canvas.text_right(width.saturating_sub(1), 0, &format!(" {below} more ▼"), theme.strong());
         }
-        let bottom = (2 + lines.len().min(room) as u16).min(height.saturating_sub(DETAIL - 1));
+        let bottom = (2 + to_u16(lines.len().min(room))).min(height.saturating_sub(DETAIL - 1));
         let told = detail(cx, report, &report.polls[selected]);
         let style = |line: &str| if line.starts_with('!') { theme.trouble() } else { theme.normal() };
         let rows = told.iter().flat_map(|line| {

@@ -11,6 +11,7 @@ use crate::{
     plant::{
         def::LineId,
         diagnostics::{Diagnostic, DiagnosticState, Finding},
+        number::{to_f32, to_u16},
         tag::{ByteOrder, Kind, Point, Table},
     },
     ui::{
@@ -83,7 +84,7 @@ impl Registers {
         for finding in &run.findings {
             match finding {
                 Finding::Values { address, words: found, .. } => {
-                    words.extend(found.iter().enumerate().map(|(n, word)| (address.wrapping_add(n as u16), *word)));
+                    words.extend(found.iter().enumerate().map(|(n, word)| (address.wrapping_add(to_u16(n)), *word)));
                 }
                 Finding::Failed { fault: why, .. } => fault = Some(*why),
                 Finding::Exchange(_)
@@ -127,16 +128,16 @@ impl Registers {
         let room = usize::from(height.saturating_sub(pair + 3)).max(1);
         let first = first_for(usize::from(self.selected), usize::from(self.count), room);
         for (y, n) in (first..usize::from(self.count)).take(room).enumerate() {
-            let address = self.address.wrapping_add(n as u16);
+            let address = self.address.wrapping_add(to_u16(n));
             let style = if n == usize::from(self.selected) { theme.focus() } else { theme.normal() };
-            canvas.text(0, y as u16 + 2, &self.row(address, words.get(&address), bits), style);
+            canvas.text(0, to_u16(y) + 2, &self.row(address, words.get(&address), bits), style);
         }
         let below = usize::from(self.count).saturating_sub(first + room);
         if 0 < below {
             canvas.text_right(width, 0, &format!(" {below} more ▼"), theme.strong());
         }
         if 0 < pair {
-            let y = (2 + room.min(usize::from(self.count)) as u16).min(height.saturating_sub(pair + 1));
+            let y = (2 + to_u16(room.min(usize::from(self.count)))).min(height.saturating_sub(pair + 1));
             self.pair(cx, &words, &mut canvas.part(0, y, width, pair));
         }
         let keys = "↑↓ move   r read again   Esc close";
@@ -181,7 +182,7 @@ impl Registers {
         let (from, to) = (self.table.modicon(first), self.table.modicon(second));
         canvas.text(0, 1, &format!("  {:18} unsigned 32    signed 32  float", format!("{from}+{to}")), theme.dim());
         for (y, (name, order)) in ORDERS.into_iter().enumerate() {
-            canvas.text(0, y as u16 + 2, &format!("  {name:18} {}", pair_words([*a, *b], order)), theme.normal());
+            canvas.text(0, to_u16(y) + 2, &format!("  {name:18} {}", pair_words([*a, *b], order)), theme.normal());
         }
     }
 }
@@ -200,7 +201,7 @@ fn pair_words(words: [u16; 2], order: ByteOrder) -> String {
     let number = |kind| codec::decode(point(kind), &words);
     let whole = |kind| number(kind).map_or("–".to_owned(), |value| format!("{value:.0}"));
     let float = number(Kind::F32).map_or("no number".to_owned(), |value| {
-        let value = value as f32;
+        let value = to_f32(value);
         let plain = value == 0.0 || (1e-4..1e7).contains(&value.abs());
         if plain { format!("{value}") } else { format!("{value:e}") }
     });

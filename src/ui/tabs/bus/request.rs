@@ -19,6 +19,7 @@ use crate::{
     plant::{
         def::{Framing, LineDef, LineId, Parity, Serial},
         diagnostics::{Diagnostic, Scan},
+        number::{to_u8, to_u16, to_u32, to_u64},
         tag::Table,
     },
     ui::{
@@ -196,7 +197,7 @@ impl Form {
         let top = if framing == Framing::Mbap { 255 } else { 247 };
         // Unit 0 of a serial line is everybody: it can be written to, and answers nothing.
         let least = if framing == Framing::Mbap || self.tried == Tried::Request { 0 } else { 1 };
-        let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(|unit| unit as u8);
+        let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(|unit| to_u8(unit));
         match self.tried {
             Tried::Bytes | Tried::Request => {
                 let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
@@ -206,12 +207,12 @@ impl Form {
             Tried::Registers => {
                 let (unit, table) = (unit(0)?, TABLES[self.chosen(1)]);
                 let address = address(&self.text(2), table)?;
-                let count = number(&self.text(3), "count", 1..=if table.is_bits() { 2_000 } else { 125 })? as u16;
+                let count = to_u16(number(&self.text(3), "count", 1..=if table.is_bits() { 2_000 } else { 125 })?);
                 let told = request_words(&read(unit, table, address, count), framing)?;
                 Ok(Built { diagnostic: Diagnostic::Read { unit, table, address, count }, told })
             }
             Tried::Loopback => {
-                let (unit, count) = (unit(0)?, number(&self.text(1), "times", 1..=1_000)? as u16);
+                let (unit, count) = (unit(0)?, to_u16(number(&self.text(1), "times", 1..=1_000)?));
                 let told = vec![format!("sends a word to unit {unit} and waits for the same word, {count} times")];
                 Ok(Built { diagnostic: Diagnostic::Loopback { unit, data: 0xA537, count }, told })
             }
@@ -228,9 +229,9 @@ impl Form {
         if last < first {
             return Err(format!("from unit {first} to unit {last}: the first is the greater one"));
         }
-        let timeout = Duration::from_millis(number(&self.text(3), "wait ms", 10..=10_000)? as u64);
+        let timeout = Duration::from_millis(to_u64(number(&self.text(3), "wait ms", 10..=10_000)?));
         let serials = if self.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
-        let (units, settings) = (u32::from(last - first) + 1, serials.len().max(1) as u32);
+        let (units, settings) = (u32::from(last - first) + 1, to_u32(serials.len().max(1)));
         let longest = ms(timeout * units * settings);
         let told = vec![format!(
             "{units} units, {settings} settings: about {longest}, if nobody answers. Any answer counts, also a refusal."
@@ -260,14 +261,14 @@ impl Form {
                 .flatten()
                 .map(|line| (line, theme.trouble())),
         );
-        let rows = self.fields.len() as u16;
-        let mut canvas = window(cx, screen, body, self.title(), (room, rows + told.len() as u16 + 3));
+        let rows = to_u16(self.fields.len());
+        let mut canvas = window(cx, screen, body, self.title(), (room, rows + to_u16(told.len()) + 3));
         // On a small screen the chosen field is always seen, and what is told below is cut with a word.
         let last = canvas.height().saturating_sub(1);
         let shown = rows.min(last).max(1);
         let first = (self.at + 1).saturating_sub(usize::from(shown));
         for (n, field) in self.fields.iter().enumerate().skip(first).take(usize::from(shown)) {
-            let y = (n - first) as u16;
+            let y = to_u16(n - first);
             let mark = if n == self.at { "▸ " } else { "  " };
             let x = canvas.text(0, y, mark, theme.strong());
             let x = canvas.text(x, y, &pad(field.label, 10), theme.dim());
@@ -287,7 +288,7 @@ impl Form {
         let room = usize::from(last.saturating_sub(shown + 1));
         let cut = room < told.len();
         for (n, (line, style)) in told.iter().take(room).enumerate() {
-            canvas.text(0, shown + 1 + n as u16, line, *style);
+            canvas.text(0, shown + 1 + to_u16(n), line, *style);
         }
         if cut {
             let more = format!(" {} more lines: enlarge the screen", told.len() - room);
@@ -331,21 +332,21 @@ fn message(unit: u8, function: u8, place: &str, rest: &str) -> Result<Vec<u8>, S
     let mut message = vec![unit, function, start[0], start[1]];
     let each = || rest.split([' ', ',', ';']).filter(|word| !word.is_empty());
     match function {
-        1..=4 => message.extend((number(rest, "count", 1..=2_000)? as u16).to_be_bytes()),
+        1..=4 => message.extend(to_u16(number(rest, "count", 1..=2_000)?).to_be_bytes()),
         5 => message.extend(if bit(rest)? { [0xFF, 0] } else { [0, 0] }),
         6 => message.extend(register(rest)?.to_be_bytes()),
         15 => {
             let bits = each().map(bit).collect::<Result<Vec<bool>, String>>()?;
             let byte = |part: &[bool]| part.iter().rev().fold(0u8, |byte, on| byte << 1 | u8::from(*on));
             let bytes: Vec<u8> = bits.chunks(8).map(byte).collect();
-            message.extend((bits.len() as u16).to_be_bytes());
-            message.push(bytes.len() as u8);
+            message.extend(to_u16(bits.len()).to_be_bytes());
+            message.push(to_u8(bytes.len()));
             message.extend(bytes);
         }
         _ => {
             let values = each().map(register).collect::<Result<Vec<u16>, String>>()?;
-            message.extend((values.len() as u16).to_be_bytes());
-            message.push((2 * values.len()) as u8);
+            message.extend(to_u16(values.len()).to_be_bytes());
+            message.push(to_u8(2 * values.len()));
             message.extend(values.iter().flat_map(|value| value.to_be_bytes()));
         }
     }
@@ -362,7 +363,7 @@ fn number(text: &str, what: &str, range: RangeInclusive<i64>) -> Result<i64, Str
 }
 
 fn register(text: &str) -> Result<u16, String> {
-    number(text, "value", -32_768..=65_535).map(|value| value as u16)
+    number(text, "value", -32_768..=65_535).map(|value| to_u16(value.rem_euclid(0x1_0000)))
 }
 
 fn bit(text: &str) -> Result<bool, String> {
@@ -380,7 +381,7 @@ pub fn address(text: &str, table: Table) -> Result<u16, String> {
     let modicon = matches!(digits.len(), 5 | 6) && digits.bytes().all(|byte| byte.is_ascii_digit());
     let named =
         TABLES.into_iter().find(|table| digits.starts_with(char::from(b'0' + table.digit()))).filter(|_| modicon);
-    let Some(named) = named else { return number(digits, "address", 0..=65_535).map(|address| address as u16) };
+    let Some(named) = named else { return number(digits, "address", 0..=65_535).map(|address| to_u16(address)) };
     if named != table {
         return Err(format!("address: {digits} is of the table {}, this is {}", named.word(), table.word()));
     }

@@ -2,9 +2,12 @@
 
 use ratatui::style::Style;
 
-use crate::ui::{
-    ViewContext,
-    widgets::text::{Canvas, fit_words, pad, pad_left, width},
+use crate::{
+    plant::number::{to_u16, to_usize},
+    ui::{
+        ViewContext,
+        widgets::text::{Canvas, fit_words, pad, pad_left, width},
+    },
 };
 
 /// A row of the screen: words with their looks, one behind the other.
@@ -30,7 +33,7 @@ pub fn draw(cx: &ViewContext, canvas: &mut Canvas, rows: &[Row], first: usize) {
                 continue;
             }
             let text = fit_words(text, canvas.width().saturating_sub(x));
-            x = canvas.text(x, y as u16, if text == "…" { "" } else { &text }, *style);
+            x = canvas.text(x, to_u16(y), if text == "…" { "" } else { &text }, *style);
         }
     }
     let below = rows.len().saturating_sub(first + room);
@@ -126,7 +129,7 @@ pub fn first_for(selected: usize, count: usize, room: usize) -> usize {
 
 /// A share as a bar: `██████────`.
 pub fn bar(cx: &ViewContext, share: f64, cells: usize) -> String {
-    let full = ((share.clamp(0.0, 1.0) * cells as f64).round() as usize).max(usize::from(0.0 < share));
+    let full = to_usize((share.clamp(0.0, 1.0) * cells as f64).round()).max(usize::from(0.0 < share));
     "█".repeat(full) + &cx.theme.pick("─", "-").repeat(cells - full)
 }
 

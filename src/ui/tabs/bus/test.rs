@@ -23,6 +23,7 @@ use crate::{
         def::{Framing, LineId},
         diagnostics::Diagnostic,
         event::LineState,
+        number::to_u16,
     },
     ui::{
         UiAction, ViewContext, keys,
@@ -137,7 +138,7 @@ impl Bench {
         let first = rows::first_for(self.selected, Tried::ALL.len(), usize::from(tests));
         for (y, (n, tried)) in Tried::ALL.into_iter().enumerate().skip(first).take(usize::from(tests)).enumerate() {
             let [key, name, what] = tried.words();
-            let y = y as u16;
+            let y = to_u16(y);
             let chosen = n == self.selected;
             let x = canvas.text(1, y, key, theme.strong());
             let x = canvas.text(x + 1, y, &pad(name, 18), if chosen { theme.focus() } else { theme.normal() });
@@ -163,6 +164,7 @@ fn begin(at: &Place) -> usize {
 }
 
 /// Rows of the tests with the line below them.
+#[expect(clippy::cast_possible_truncation, reason = "a constant of one digit")]
 const TOP: u16 = Tried::ALL.len() as u16 + 2;
 
 /// Why nothing can be sent on a line; `None` if it is open.
@@ -354,7 +356,7 @@ impl Send {
         for (y, row) in rows.iter().take(usize::from(room)).enumerate() {
             let mut x = 0;
             for (text, style) in row {
-                x = canvas.text(x, y as u16 + 1, &fit_words(text, width.saturating_sub(x)), *style);
+                x = canvas.text(x, to_u16(y) + 1, &fit_words(text, width.saturating_sub(x)), *style);
             }
         }
         let last = height.saturating_sub(1);

@@ -15,6 +15,7 @@ use crate::{
     bus::{dissect, frame::hex, names},
     plant::{
         def::{DeviceId, LineId},
+        number::to_u16,
         tag::Table,
         traffic::{Exchange, Frame},
     },
@@ -167,7 +168,7 @@ impl TextWindow {
             }
         };
         let wide = rows.iter().map(|row| row.iter().map(|(text, _)| width(text)).sum::<u16>()).max().unwrap_or(0);
-        let mut canvas = window(cx, screen, body, &title, (wide.min(room).max(40) + 1, rows.len() as u16));
+        let mut canvas = window(cx, screen, body, &title, (wide.min(room).max(40) + 1, to_u16(rows.len())));
         rows::draw(cx, &mut canvas, &rows, self.first);
     }
 }

@@ -7,6 +7,7 @@ use super::{
 use crate::{
     plant::{
         def::DeviceDef,
+        number::to_u16,
         parameter_set::{self, Change, Compared, Problem},
         restore::{Restore, State},
     },
@@ -121,7 +122,7 @@ impl Compare {
         let room = usize::from(bottom.saturating_sub(top + 3)).max(1);
         let first = self.first.min(rows.len().saturating_sub(room));
         for (y, row) in rows.iter().skip(first).take(room).enumerate() {
-            self.row(cx, canvas, top + 2 + y as u16, row, run);
+            self.row(cx, canvas, top + 2 + to_u16(y), row, run);
         }
         if rows.is_empty() {
             canvas.text(1, top + 2, "nothing differs", theme.normal());

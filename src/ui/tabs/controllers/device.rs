@@ -11,6 +11,7 @@ use crate::{
     plant::{
         def::{DeviceDef, DeviceId},
         ne107::{Reason, Signal},
+        number::to_u16,
         snapshot::DeviceState,
     },
     ui::{
@@ -59,7 +60,7 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Tabl
         for (n, line) in lines.iter().enumerate().take(usize::from(words)) {
             let cut = n + 1 == usize::from(words) && lines.len() > n + 1;
             let line = if cut { format!("{line} …") } else { line.clone() };
-            canvas.text(x, y + n as u16, &fit_words(&line, end.saturating_sub(x)), cx.theme.normal());
+            canvas.text(x, y + to_u16(n), &fit_words(&line, end.saturating_sub(x)), cx.theme.normal());
         }
     }
     let more = match (hidden, table.filter.as_str()) {

@@ -7,6 +7,7 @@ use crate::{
     history::Series,
     plant::{
         def::{DeviceDef, Faceplate, Subject, TagId},
+        number::to_u16,
         tuning::Tuning,
     },
     ui::{
@@ -94,7 +95,7 @@ fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool
     // All bars start in one column, so that they can be compared.
     let values = rows.iter().map(|(_, tag)| width(&value::show(cx, *tag).with_unit())).max().unwrap_or(0).clamp(9, 14);
     for (n, (name, tag)) in rows.into_iter().enumerate() {
-        let y = n as u16 * if tall { 3 } else { 1 };
+        let y = to_u16(n) * if tall { 3 } else { 1 };
         let shown = value::show(cx, tag);
         canvas.text(if tall { 0 } else { 1 }, y, name, cx.theme.dim());
         let room = if tall { canvas.width().saturating_sub(4) } else { values };
@@ -141,7 +142,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId,
     let Some((min, max)) = cx.snapshot.range(scale) else { return };
     let column = |value: f64| {
         let share = (value - min) / (max - min);
-        share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
+        share.is_finite().then(|| 1 + to_u16((share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round()))
     };
     let now = cx.snapshot.sample(tag).good_value();
     if tag == faceplate.aim() {

@@ -1,6 +1,9 @@
 //! What the words of a controller mean, and what to change when it does not do what it should: pages to read.
 
-use crate::ui::{ViewContext, widgets::text::Canvas};
+use crate::{
+    plant::number::to_u16,
+    ui::{ViewContext, widgets::text::Canvas},
+};
 
 /// A page: its heading and its lines, at most 16 of at most 76 columns.
 type Page = (&'static str, &'static [&'static str]);
@@ -117,7 +120,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, page: usize) {
     let end = canvas.width().saturating_sub(1);
     canvas.text_right(end, 0, &format!("{}/{}", page + 1, PAGES.len()), cx.theme.dim());
     for (y, line) in lines.iter().enumerate() {
-        canvas.text(2, y as u16 + 2, line, cx.theme.normal());
+        canvas.text(2, to_u16(y) + 2, line, cx.theme.normal());
     }
 }
 

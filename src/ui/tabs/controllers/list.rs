@@ -6,6 +6,7 @@ use super::device::{signal_mark, status_words};
 use crate::{
     plant::{
         def::{DeviceDef, DeviceId, Subject},
+        number::to_u16,
         snapshot::{ActiveAlarm, DeviceState},
         tag::{Access, Poll},
     },
@@ -61,7 +62,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
     let room = usize::from(bottom.saturating_sub(3)).max(1);
     let first = selected.saturating_sub(room / 2).min(devices.len().saturating_sub(room));
     for (y, (n, device)) in devices.iter().enumerate().skip(first).take(room).enumerate() {
-        row(cx, canvas, y as u16 + 2, &columns, device, n == selected);
+        row(cx, canvas, to_u16(y) + 2, &columns, device, n == selected);
     }
     let below = devices.len().saturating_sub(first + room);
     if below > 0 {

@@ -7,6 +7,7 @@ use crate::{
     history::{Bucket, Series},
     plant::{
         def::{DeviceDef, ProgramDef, TagId},
+        number::to_u16,
         program::ProgramPosition,
     },
     ui::{
@@ -48,7 +49,7 @@ impl Cell {
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, cell: Cell) {
     let (wide, high) = (canvas.width(), canvas.height());
     heading(cx, canvas, device, program);
-    let rows = program.steps.len() as u16;
+    let rows = to_u16(program.steps.len());
     // The table and what it says of the present; the curve below takes the rest.
     table(cx, &mut canvas.part(0, 2, 54, rows + 1), program, cell);
     facts(cx, &mut canvas.part(56, 2, wide.saturating_sub(57), rows + 1), device, program);
@@ -102,7 +103,7 @@ fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell
     canvas.text(1, 0, &format!("{} {}", pad("step", 6), names.join(" ")), theme.dim());
     let (now, chosen) = (place(cx, program), chosen(cx, program));
     for (row, step) in program.steps.iter().enumerate() {
-        let y = row as u16 + 1;
+        let y = to_u16(row) + 1;
         let runs = chosen.is_none_or(|(first, last)| (first..=last).contains(&row));
         let style = if runs { theme.normal() } else { theme.dim() };
         let here = matches!(now, Some(ProgramPosition::Ramp(at) | ProgramPosition::Soak(at)) if at == row);
@@ -110,7 +111,7 @@ fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell
         canvas.text(1, y, &format!("{mark} {}", row + 1), if here { theme.strong() } else { style });
         for (column, tag) in [step.sv, step.ramp, step.soak].into_iter().enumerate() {
             let shown = value::show(cx, tag);
-            let x = 8 + column as u16 * (CELL + 1);
+            let x = 8 + to_u16(column) * (CELL + 1);
             let at = (now == Some(ProgramPosition::Ramp(row)) && column == 1)
                 || (now == Some(ProgramPosition::Soak(row)) && column == 2);
             let text = format!("{}{}", if at { theme.pick("▸", ">") } else { "" }, shown.within(CELL - 1));
@@ -141,9 +142,9 @@ fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pr
     ];
     for (y, (name, tag)) in rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).enumerate() {
         let shown = value::show(cx, tag);
-        canvas.text(0, y as u16, &pad(name, 8), cx.theme.dim());
+        canvas.text(0, to_u16(y), &pad(name, 8), cx.theme.dim());
         let room = canvas.width().saturating_sub(9);
-        canvas.text(9, y as u16, &shown.within(room), shown.style);
+        canvas.text(9, to_u16(y), &shown.within(room), shown.style);
     }
     canvas.text(0, 6, "r run   p hold   o off", cx.theme.strong());
 }
@@ -249,7 +250,7 @@ fn axis(
         into.as_secs_f64() / seconds_of(&unit)
     });
     let share = (before + into.min(segments[segment].minutes)) / total;
-    let x = (share.clamp(0.0, 1.0) * f64::from(canvas.width().saturating_sub(1))).round() as u16;
+    let x = to_u16((share.clamp(0.0, 1.0) * f64::from(canvas.width().saturating_sub(1))).round());
     canvas.glyph(x, 0, '▲', theme.strong());
     canvas.text(if x + 6 < end { x + 1 } else { x.saturating_sub(4) }, 0, " now", theme.strong());
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::{
     plant::{
         def::{DeviceDef, DeviceId, TagId},
+        number::to_u16,
         parameter_set::{self, Compared, ParameterSet, StoredSet},
     },
     ui::{
@@ -101,7 +102,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
             (false, true) => theme.trouble(),
             (false, false) => theme.normal(),
         };
-        canvas.text(1, y as u16 + 3, &fit(&text, end), style);
+        canvas.text(1, to_u16(y) + 3, &fit(&text, end), style);
     }
     let words = "Sets are files of the station, in the folder sets beside its history; u reads them anew.";
     canvas.text(1, bottom, &fit_words(words, end), theme.dim());

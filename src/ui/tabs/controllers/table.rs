@@ -3,6 +3,7 @@
 use crate::{
     plant::{
         def::DeviceId,
+        number::to_u16,
         tag::{Access, Poll, TagDef},
     },
     ui::{
@@ -88,7 +89,7 @@ impl Table {
         let room = usize::from(canvas.height().saturating_sub(1)).max(1);
         let first = place.saturating_sub(room / 2).min(rows.len().saturating_sub(room));
         for (y, row) in rows.iter().skip(first).take(room).enumerate() {
-            let y = y as u16 + 1;
+            let y = to_u16(y) + 1;
             match row {
                 Ok((place, tag)) => self.parameter(cx, canvas, y, &columns, tag, *place == self.selected),
                 Err(group) => {

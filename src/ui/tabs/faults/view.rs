@@ -4,7 +4,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{Faults, open, rows};
 use crate::{
-    plant::{def::TagId, tag::Poll},
+    plant::{def::TagId, number::to_u16, tag::Poll},
     sim::{
         drill::{Progress, Status},
         faults::{Fault, FaultTarget, target::device_at},
@@ -85,7 +85,7 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
     let height = usize::from(canvas.height());
     let first = (selected_line + 3).saturating_sub(height).min(lines.len().saturating_sub(height));
     for (y, (name, state, style, selected)) in lines.iter().skip(first).take(height).enumerate() {
-        let y = y as u16;
+        let y = to_u16(y);
         let x = canvas.text(0, y, if *selected { cx.theme.pick("▸", ">") } else { " " }, cx.theme.strong());
         canvas.text(x, y, &pad(name, LIST - 12), *style);
         canvas.text_right(LIST - 2, y, state, if state == "off" { cx.theme.dim() } else { *style });
@@ -124,15 +124,15 @@ fn told(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, ca
     paragraph("Do: ", description.response);
 
     let truth = compare(cx, status, target);
-    let wanted = (truth.len() as u16 + 1).min(canvas.height().saturating_sub(lines.len() as u16 + 1));
-    let below = wanted.max(TRUTH_MIN + 1).min(truth.len() as u16 + 1).min(canvas.height() / 2);
+    let wanted = (to_u16(truth.len()) + 1).min(canvas.height().saturating_sub(to_u16(lines.len()) + 1));
+    let below = wanted.max(TRUTH_MIN + 1).min(to_u16(truth.len()) + 1).min(canvas.height() / 2);
     let above = canvas.height().saturating_sub(below);
     for (y, (line, style)) in lines.iter().take(usize::from(above)).enumerate() {
         // The last row that fits says that there is more.
-        let cut = y as u16 + 1 == above && lines.len() > usize::from(above);
+        let cut = to_u16(y) + 1 == above && lines.len() > usize::from(above);
         let line =
             if cut { fit_words(&format!("{line} {}", "x".repeat(usize::from(room))), room) } else { line.clone() };
-        canvas.text(0, y as u16, &line, *style);
+        canvas.text(0, to_u16(y), &line, *style);
     }
     comparison(cx, &truth, &mut canvas.part(0, above, room, below));
 }
@@ -199,7 +199,7 @@ fn comparison(cx: &ViewContext, rows: &[Compared], canvas: &mut Canvas) {
     canvas.text(names + 2, 0, "actual", cx.theme.dim());
     canvas.text(names + 15, 0, "displayed", cx.theme.dim());
     for (y, row) in rows.iter().enumerate() {
-        let y = y as u16 + 1;
+        let y = to_u16(y) + 1;
         canvas.text(0, y, &pad(&cx.def().tag(row.tag).name, names), cx.theme.normal());
         canvas.text(names + 2, y, &fit(&row.truth, 10), cx.theme.strong());
         let shown = show(cx, row.tag);
@@ -236,6 +236,6 @@ fn verdict(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
     }
     canvas.text(11, y + 1, &progress.verdict.summary(), theme.strong());
     for (n, line) in wrap(&progress.description, room.saturating_sub(11)).into_iter().enumerate() {
-        canvas.text(11, y + 3 + n as u16, &line, theme.dim());
+        canvas.text(11, y + 3 + to_u16(n), &line, theme.dim());
     }
 }

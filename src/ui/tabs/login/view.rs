@@ -3,11 +3,14 @@
 use ratatui::{Frame, layout::Rect};
 
 use super::Login;
-use crate::ui::{
-    ViewContext,
-    chrome::{alarm_words, counts},
-    rights,
-    widgets::text::{Canvas, clock, fit_words, running, wrap},
+use crate::{
+    plant::number::to_u16,
+    ui::{
+        ViewContext,
+        chrome::{alarm_words, counts},
+        rights,
+        widgets::text::{Canvas, clock, fit_words, running, wrap},
+    },
 };
 
 /// Widest text to be read.
@@ -66,9 +69,9 @@ fn banner(cx: &ViewContext, canvas: &mut Canvas, most: u16) -> u16 {
         lines.last_mut().into_iter().for_each(|line| line.push_str(" …"));
     }
     for (y, line) in lines.iter().enumerate() {
-        canvas.text(0, y as u16, &fit_words(line, canvas.width()), cx.theme.normal());
+        canvas.text(0, to_u16(y), &fit_words(line, canvas.width()), cx.theme.normal());
     }
-    lines.len() as u16 + 1
+    to_u16(lines.len()) + 1
 }
 
 /// Who is in, since when, and what he may; returns the row after it.
@@ -106,13 +109,13 @@ fn alarms(cx: &ViewContext, canvas: &mut Canvas) {
     // The last row tells what it leaves out.
     let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
     for (y, alarm) in all.iter().take(shown).enumerate() {
-        let (y, def) = (y as u16 + 1, cx.def().alarm(alarm.id));
+        let (y, def) = (to_u16(y) + 1, cx.def().alarm(alarm.id));
         let mark = theme.alarm(def.priority, alarm.state, cx.flash());
         let x = canvas.text(1, y, theme.priority_mark(def.priority), mark) + 1;
         let text = fit_words(&alarm_words(cx, alarm), width.saturating_sub(x));
         canvas.text(x, y, &text, theme.alarm(def.priority, alarm.state, false));
     }
     if all.len() > shown {
-        canvas.text(1, rows as u16, &format!("… and {} more", all.len() - shown), theme.dim());
+        canvas.text(1, to_u16(rows), &format!("… and {} more", all.len() - shown), theme.dim());
     }
 }

@@ -14,7 +14,10 @@ use super::{
     stored,
 };
 use crate::{
-    plant::def::{Pen, TagId},
+    plant::{
+        def::{Pen, TagId},
+        number::to_u16,
+    },
     ui::{
         ViewContext,
         theme::Glyphs,
@@ -44,7 +47,7 @@ pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {
 fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let (width, height) = (canvas.width(), canvas.height());
     let pens = trends.pens(cx);
-    let legend = (pens.len() as u16 + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
+    let legend = (to_u16(pens.len()) + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
     draw_title(trends, cx, canvas);
     let mut chart = chart(trends, cx);
     let area = canvas.part(0, 1, width, height.saturating_sub(1 + legend)).area();
@@ -195,7 +198,7 @@ fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Opt
         let scale = plan.and_then(|plan| if off { None } else { plan.scales.get(drawn) });
         drawn += usize::from(!off);
         if (first..first + rows).contains(&n) {
-            let y = (n - first) as u16 + 1;
+            let y = to_u16(n - first) + 1;
             let own = scale.filter(|(axis, _)| *axis == Axis::Own).map(|(_, scale)| (scale.low, scale.high));
             let mut row = canvas.part(0, y, canvas.width(), 1);
             draw_pen(trends, cx, &mut row, (n, *pen), cursor, own);
@@ -286,7 +289,7 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
     };
     canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&words, canvas.width().saturating_sub(30)), style);
     for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
-        let (y, def, shown) = (y as u16 + 2, cx.def().tag(*tag), value::show(cx, *tag));
+        let (y, def, shown) = (to_u16(y) + 2, cx.def().tag(*tag), value::show(cx, *tag));
         let style = if n == selected { theme.strong() } else { theme.normal() };
         if n == selected {
             canvas.text(0, y, theme.pick("▸", ">"), theme.strong());

@@ -7,7 +7,7 @@ use ratatui::{Frame, layout::Rect};
 use super::super::{Tab, periodic_query::PeriodicQuery, reports::period};
 use crate::{
     history::{Answer, HistoryError, Query},
-    plant::record::ActionRecord,
+    plant::{number::to_u16, record::ActionRecord},
     report::Period,
     ui::{
         UiAction, ViewContext,
@@ -228,7 +228,7 @@ impl Audit {
         let first = self.selected.saturating_sub(rows - 1);
         for (y, (n, entry)) in self.rows.iter().enumerate().skip(first).take(rows).enumerate() {
             let style = if n == self.selected { theme.focus() } else { theme.normal() };
-            canvas.text(0, y as u16 + 2, &pad(&row(cx, entry, columns), columns), style);
+            canvas.text(0, to_u16(y) + 2, &pad(&row(cx, entry, columns), columns), style);
         }
     }
 

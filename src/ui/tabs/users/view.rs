@@ -4,16 +4,19 @@ use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use super::state;
-use crate::ui::{
-    ViewContext, rights,
-    widgets::text::{Canvas, clock, fit, pad},
+use crate::{
+    plant::number::to_u16,
+    ui::{
+        ViewContext, rights,
+        widgets::text::{Canvas, clock, fit, pad},
+    },
 };
 
 /// Draws both lists; the terminals have the lower third at the most.
 pub(super) fn draw(cx: &ViewContext, place: usize, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = (canvas.width(), canvas.height());
-    let terminals = cx.session.sessions.len() as u16 + 2;
+    let terminals = to_u16(cx.session.sessions.len()) + 2;
     let below = terminals.min(height / 3).max(3.min(height));
     users(cx, place, &mut canvas.part(0, 0, width, height.saturating_sub(below)));
     sessions(cx, &mut canvas.part(0, height.saturating_sub(below), width, below));
@@ -41,7 +44,7 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
             (false, false) => theme.normal(),
         };
         let width = canvas.width();
-        canvas.text(0, y as u16 + 1, &pad(&fit(&text, width), width), style);
+        canvas.text(0, to_u16(y) + 1, &pad(&fit(&text, width), width), style);
     }
     if all.is_empty() {
         canvas.text(1, 2, "No users: a demonstration needs no login.", theme.dim());
@@ -66,10 +69,10 @@ fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
             clock(row.since, &cx.def().time_zone),
             row.from
         );
-        canvas.text(0, y as u16 + 1, &fit(&text, width), theme.normal());
+        canvas.text(0, to_u16(y) + 1, &fit(&text, width), theme.normal());
     }
     if all.len() > shown {
-        canvas.text(1, rows as u16, &format!("… and {} more", all.len() - shown), theme.dim());
+        canvas.text(1, to_u16(rows), &format!("… and {} more", all.len() - shown), theme.dim());
     }
 }
 

@@ -1,5 +1,6 @@
 //! Scales and ticks: round numbers (1-2-5) for values, round local times for the time axis.
 
+use crate::plant::number::to_usize;
 use jiff::{Timestamp, tz::TimeZone};
 
 /// The range of an axis and the distance of its ticks, in the unit of its curves.
@@ -64,7 +65,7 @@ impl Scale {
     /// The round values of the axis, upwards.
     pub fn ticks(self) -> Vec<f64> {
         let (first, last) = ((self.low / self.step - 1e-6).ceil(), (self.high / self.step + 1e-6).floor());
-        let count = (last - first).clamp(0.0, 100.0) as usize;
+        let count = to_usize((last - first).clamp(0.0, 100.0));
         // Adding zero turns a negative zero into a plain one.
         (0..=count).map(|n| (first + n as f64) * self.step + 0.0).collect()
     }
@@ -90,7 +91,7 @@ impl Scale {
 
     /// A tick as text, with the decimals that its step needs.
     pub fn label(self, tick: f64) -> String {
-        let decimals = (-(self.step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
+        let decimals = to_usize((-(self.step.log10() + 1e-9).floor()).clamp(0.0, 9.0));
         format!("{tick:.decimals$}")
     }
 }

@@ -4,7 +4,10 @@ use std::{collections::VecDeque, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
 
-use crate::history::{Bucket, Series};
+use crate::{
+    history::{Bucket, Series},
+    plant::number::{to_i64, to_u32, to_usize},
+};
 
 /// Live values kept while no newer answer comes; the oldest go first, and the history has them.
 const LIVE_MAX: usize = 4096;
@@ -67,7 +70,7 @@ impl Trace {
     pub fn covers(&self, at: Timestamp) -> bool {
         let live = self.live.front().is_some_and(|(first, _)| *first <= at);
         let past = self.past.as_ref().is_some_and(|past| {
-            let width = past.step.checked_mul(past.buckets.len() as u32).unwrap_or(Duration::MAX);
+            let width = past.step.checked_mul(to_u32(past.buckets.len())).unwrap_or(Duration::MAX);
             past.from <= at
                 && at.duration_since(past.from) < SignedDuration::try_from(width).unwrap_or(SignedDuration::MAX)
         });
@@ -90,7 +93,7 @@ impl Trace {
     /// Every column of the history falls into a column of dots, so that no spike is lost.
     pub fn columns(&self, from: Timestamp, to: Timestamp, now: Timestamp, count: usize) -> Vec<Option<Span>> {
         let (start, width) = (from.as_microsecond(), (to.as_microsecond() - from.as_microsecond()).max(0));
-        let edge = |n: usize| start + (i128::from(width) * n as i128 / count.max(1) as i128) as i64;
+        let edge = |n: usize| start + to_i64(i128::from(width) * n as i128 / count.max(1) as i128);
         let now = now.as_microsecond();
         let live_from = self.live.front().map_or(i64::MAX, |(at, _)| at.as_microsecond());
         let column = |n: usize| {
@@ -117,7 +120,7 @@ impl Trace {
         };
         let wanted = first.max(0)..=last.min(past.buckets.len() as i64 - 1);
         let known = wanted.filter(|n| from + n * step < live_from);
-        known.filter_map(|n| past.buckets[n as usize].and_then(span)).fold(None, |sum, next| join(sum, Some(next)))
+        known.filter_map(|n| past.buckets[to_usize(n)].and_then(span)).fold(None, |sum, next| join(sum, Some(next)))
     }
 
     /// The live values between `a` and `b`, with the one that held at `a`.

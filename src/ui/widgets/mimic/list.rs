@@ -4,7 +4,10 @@ use ratatui::layout::Rect;
 
 use super::{label_style, place, put_value, tags, title};
 use crate::{
-    plant::def::{MimicItem, TagId},
+    plant::{
+        def::{MimicItem, TagId},
+        number::to_u16,
+    },
     ui::{
         ViewContext,
         widgets::{
@@ -23,7 +26,7 @@ pub fn is_shown(cx: &ViewContext, area: Rect) -> bool {
     let bottom = |item: &MimicItem| {
         let Some(place) = place(item) else { return 0 };
         let rows = match item {
-            MimicItem::Tank { .. } | MimicItem::Trend { .. } => place.height.min(2 + tags(cx, item).len() as u16),
+            MimicItem::Tank { .. } | MimicItem::Trend { .. } => place.height.min(2 + to_u16(tags(cx, item).len())),
             _ => place.height.max(1),
         };
         place.y.saturating_add(rows)
@@ -63,7 +66,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: Option<usize>) {
     for (y, row) in rows.iter().skip(place / room * room).take(room).enumerate() {
         for (column, n) in row.iter().enumerate() {
             let length = if row.len() == 1 { all } else { half };
-            let mut cell = canvas.part(column as u16 * half, y as u16, length, 1);
+            let mut cell = canvas.part(to_u16(column) * half, to_u16(y), length, 1);
             item(cx, &mut cell, &items[*n], names, selected == Some(*n));
         }
     }

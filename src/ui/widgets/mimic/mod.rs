@@ -11,7 +11,10 @@ use ratatui::style::Style;
 
 use super::text::Canvas;
 use crate::{
-    plant::def::{MimicItem, MimicRect, TagId},
+    plant::{
+        def::{MimicItem, MimicRect, TagId},
+        number::to_u16,
+    },
     ui::ViewContext,
 };
 
@@ -43,11 +46,11 @@ impl CanvasScale {
     }
     /// The left edge of a nominal column.
     pub fn column(self, x: u16) -> u16 {
-        (f64::from(x) * self.x).round() as u16
+        to_u16((f64::from(x) * self.x).round())
     }
     /// The top edge of a nominal row.
     pub fn row(self, y: u16) -> u16 {
-        (f64::from(y) * self.y).round() as u16
+        to_u16((f64::from(y) * self.y).round())
     }
     /// The column in the middle of a nominal one.
     pub fn middle_column(self, x: u16) -> u16 {

@@ -4,7 +4,10 @@ use ratatui::style::Modifier;
 
 use super::{Bounds, alarm_mark, label_style, put_value, unit::states};
 use crate::{
-    plant::def::{DeviceDef, Faceplate, Subject, TagId},
+    plant::{
+        def::{DeviceDef, Faceplate, Subject, TagId},
+        number::to_u16,
+    },
     ui::{
         ViewContext,
         widgets::{
@@ -79,7 +82,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, faceplate: &Faceplate) {
     let Some((min, max)) = cx.snapshot.range(faceplate.pv) else { return };
     let column = |value: f64| {
         let share = (value - min) / (max - min);
-        share.is_finite().then(|| 1 + (share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round() as u16)
+        share.is_finite().then(|| 1 + to_u16((share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round()))
     };
     for limit in limits(cx, faceplate.pv) {
         if let Some(x) = column(limit) {

@@ -4,7 +4,10 @@ use ratatui::style::Style;
 
 use super::{Bounds, alarm_mark, label_style, put_value};
 use crate::{
-    plant::def::TagId,
+    plant::{
+        def::TagId,
+        number::{to_u16, to_u32},
+    },
     ui::{
         ViewContext, interlock,
         theme::Colours,
@@ -49,7 +52,7 @@ impl Tank<'_> {
         self.values(cx, &mut inside);
         // Text over liquid stands on the liquid, not in a hole.
         let Some(eighths) = eighths else { return };
-        let full = (eighths / 8) as u16;
+        let full = to_u16(eighths / 8);
         let (top, width) = (inside.height().saturating_sub(full), inside.width());
         if cx.theme.colours == Colours::None {
             (top..inside.height()).for_each(|y| fill_around(&mut inside, y, BODY));
@@ -70,8 +73,8 @@ impl Tank<'_> {
             let mark = alarm_mark(cx, tag).map_or(0, |(mark, _)| width(mark) + 1);
             let length = width(&shown.within(room.saturating_sub(mark))) + mark;
             let x = room.saturating_sub(length) / 2;
-            canvas.run(x.saturating_sub(1), y as u16, length + 2, ' ', cx.theme.normal());
-            put_value(cx, canvas, x, y as u16, tag, room);
+            canvas.run(x.saturating_sub(1), to_u16(y), length + 2, ' ', cx.theme.normal());
+            put_value(cx, canvas, x, to_u16(y), tag, room);
         }
     }
 
@@ -136,7 +139,7 @@ fn eighths(cx: &ViewContext, level: TagId, rows: u16) -> Option<u32> {
     let share = ((value - min) / (max - min)).clamp(0.0, 1.0);
     // A little is not nothing.
     let least = u32::from(share > 0.005);
-    share.is_finite().then(|| ((share * f64::from(rows) * 8.0).round() as u32).max(least))
+    share.is_finite().then(|| to_u32((share * f64::from(rows) * 8.0).round()).max(least))
 }
 
 /// Without colour liquid is a pattern, so that it is seen beside words and above the bottom of the vessel.
@@ -162,7 +165,7 @@ fn liquid(cx: &ViewContext, canvas: &mut Canvas, eighths: u32) {
     let plain = cx.theme.colours == Colours::None;
     let body = if plain { BODY } else { '█' };
     let (width, height) = (canvas.width(), canvas.height());
-    let full = (eighths / 8) as u16;
+    let full = to_u16(eighths / 8);
     for y in height.saturating_sub(full)..height {
         canvas.run(0, y, width, body, cx.theme.liquid());
     }

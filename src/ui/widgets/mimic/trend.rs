@@ -7,7 +7,10 @@ use ratatui::style::Style;
 use super::{Bounds, label_style};
 use crate::{
     history::Series,
-    plant::def::TagId,
+    plant::{
+        def::TagId,
+        number::{to_u16, to_usize},
+    },
     ui::{
         ViewContext,
         theme::Glyphs,
@@ -43,7 +46,7 @@ pub fn view(
     };
     let label = |value| cx.snapshot.format(tag, value);
     let (top, bottom) = (label(high), label(low));
-    let (end, room) = (canvas.width(), top.len().max(bottom.len()) as u16 + 1);
+    let (end, room) = (canvas.width(), to_u16(top.len().max(bottom.len())) + 1);
     let (rows, columns) = (at.height.saturating_sub(1), end.saturating_sub(room));
     let [top, bottom] = [top, bottom].map(|text| whole(&text, end));
     canvas.text_right(end, 1, &top, theme.dim());
@@ -67,7 +70,7 @@ pub fn curve(canvas: &mut Canvas, series: &Series, (low, high): (f64, f64), glyp
     let dots = height * down;
     let level = |value: f64| {
         let share = if high > low { (value - low) / (high - low) } else { 0.5 };
-        ((1.0 - share.clamp(0.0, 1.0)) * (dots - 1) as f64).round() as usize
+        to_usize(((1.0 - share.clamp(0.0, 1.0)) * (dots - 1) as f64).round())
     };
     let columns = width * across;
     for y in 0..height {
@@ -91,7 +94,7 @@ pub fn curve(canvas: &mut Canvas, series: &Series, (low, high): (f64, f64), glyp
                 (Glyphs::Braille, _) => char::from_u32(0x2800 + bits).unwrap_or(' '),
                 (Glyphs::Block | Glyphs::Ascii, n) => ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'][n - 1],
             };
-            canvas.glyph(x as u16, y as u16, glyph, style);
+            canvas.glyph(to_u16(x), to_u16(y), glyph, style);
         }
     }
 }
