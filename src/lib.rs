@@ -66,6 +66,8 @@
 //!
 //! They form a line, not a graph: a module uses only what stands above it. A test holds this and law 4.
 
+#![cfg_attr(test, allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss))]
+
 pub mod plant;
 pub mod profile;
 pub mod bus;

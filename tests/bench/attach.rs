@@ -2,6 +2,7 @@
 //!
 //! `cargo bench --bench attach`: 35 seconds. Terminals are processes of their own, so the CPU is the station's alone.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
+#![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 use std::{
     fs,

@@ -2,6 +2,7 @@
 //!
 //! `cargo bench --bench bus` runs all parts, `cargo bench --bench bus -- dead overload tcp` these (others: cycle, station).
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
+#![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 #[path = "bus/limits.rs"]
 mod limits;

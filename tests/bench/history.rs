@@ -1,6 +1,7 @@
 //! What the history costs: one commit, rows a second, bytes a sample, and reading a curve of a week; with `-- load`, what
 //! queries cost the recording.
 #![allow(clippy::print_stdout, missing_docs)]
+#![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 #[path = "history/load.rs"]
 mod load;

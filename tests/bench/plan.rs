@@ -1,5 +1,6 @@
 //! What the read plan saves: wire time of a scattered map against simpler ways to read it, and how long planning takes.
 #![allow(clippy::print_stdout, missing_docs)]
+#![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 #[path = "../../src/bus/plan/rivals.rs"]
 mod rivals;

@@ -26,6 +26,7 @@
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+#![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 mod architecture;
 mod attach;
