@@ -33,7 +33,7 @@ pub fn encode(message: &[u8]) -> Vec<u8> {
 /// # Errors
 /// [`Fault::NotHex`] names the first other character; [`Fault::Truncated`] an odd count.
 pub fn decode(digits: &[u8]) -> Result<Vec<u8>, Fault> {
-    let value = |digit: &u8| char::from(*digit).to_digit(16).map(|value| to_u8(value)).ok_or(Fault::NotHex(*digit));
+    let value = |digit: &u8| char::from(*digit).to_digit(16).map(to_u8).ok_or(Fault::NotHex(*digit));
     let values = digits.iter().map(value).collect::<Result<Vec<u8>, Fault>>()?;
     let (pairs, odd) = values.as_chunks::<2>();
     match odd {

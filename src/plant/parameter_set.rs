@@ -186,7 +186,7 @@ fn same(tag: &TagDef, one: f64, other: f64, trusted: Trusted) -> bool {
 fn decimals(tag: &TagDef, trusted: Trusted) -> Option<u8> {
     match tag.decimals {
         Decimals::Fixed(_) => Some(0),
-        Decimals::From(from) => trusted(from).filter(|n| n.fract() == 0.0 && (0.0..=6.0).contains(n)).map(|n| to_u8(n)),
+        Decimals::From(from) => trusted(from).filter(|n| n.fract() == 0.0 && (0.0..=6.0).contains(n)).map(to_u8),
     }
 }
 

@@ -87,7 +87,7 @@ fn lrc(message: &[u8]) -> u8 {
 /// Reads `:` … CR LF. Digits may be small, as some masters write them.
 fn read(frame: &[u8]) -> Option<Request> {
     let digits = frame.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
-    let digit = |character: u8| char::from(character).to_digit(16).map(|value| to_u8(value));
+    let digit = |character: u8| char::from(character).to_digit(16).map(to_u8);
     let pairs = digits.chunks(2).map(|pair| match pair {
         [high, low] => Some(digit(*high)? << 4 | digit(*low)?),
         _ => None,

@@ -134,7 +134,7 @@ impl Model {
 
     fn decimals(&self, tag: &TagDef) -> u8 {
         match tag.decimals {
-            Decimals::From(from) => self.value(from).map_or(0, |decimals| to_u8(decimals)),
+            Decimals::From(from) => self.value(from).map_or(0, to_u8),
             Decimals::Fixed(_) => 0,
         }
     }
