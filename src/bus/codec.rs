@@ -11,7 +11,7 @@
 
 use crate::plant::{
     number::{to_f32, to_i64, to_u16, to_u64},
-    tag::{ByteOrder, Kind, Point},
+    tag::{ByteOrder, DataType, Point},
     visible::is_printable,
 };
 
@@ -26,18 +26,18 @@ pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
         return Some(((bits >> low) & mask(width)) as f64);
     }
     match point.kind {
-        Kind::Bool => Some(f64::from(u8::from(bits != 0))),
-        Kind::I16 => Some(f64::from((bits as u16).cast_signed())),
-        Kind::U16 => Some(f64::from(bits as u16)),
-        Kind::I32 => Some(f64::from((bits as u32).cast_signed())),
-        Kind::U32 => Some(f64::from(bits as u32)),
-        Kind::I64 => Some(bits.cast_signed() as f64),
-        Kind::U64 => Some(bits as f64),
-        Kind::F32 => Some(f64::from(f32::from_bits(bits as u32))).filter(|value| value.is_finite()),
-        Kind::F64 => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
-        Kind::Bcd16 => from_bcd(bits, 4),
-        Kind::Bcd32 => from_bcd(bits, 8),
-        Kind::Text(_) => None,
+        DataType::Bool => Some(f64::from(u8::from(bits != 0))),
+        DataType::I16 => Some(f64::from((bits as u16).cast_signed())),
+        DataType::U16 => Some(f64::from(bits as u16)),
+        DataType::I32 => Some(f64::from((bits as u32).cast_signed())),
+        DataType::U32 => Some(f64::from(bits as u32)),
+        DataType::I64 => Some(bits.cast_signed() as f64),
+        DataType::U64 => Some(bits as f64),
+        DataType::F32 => Some(f64::from(f32::from_bits(bits as u32))).filter(|value| value.is_finite()),
+        DataType::F64 => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
+        DataType::Bcd16 => from_bcd(bits, 4),
+        DataType::Bcd32 => from_bcd(bits, 8),
+        DataType::Text(_) => None,
     }
 }
 
@@ -48,7 +48,7 @@ pub const UNPRINTABLE: char = '·';
 /// its end are filling, each byte or character that cannot be printed is shown as [`UNPRINTABLE`], and text of which
 /// nothing can be printed as the hex of its bytes. `None` for a point that holds no text.
 pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
-    let Kind::Text(count) = point.kind else { return None };
+    let DataType::Text(count) = point.kind else { return None };
     let bytes = to_bytes(point.order, words);
     let bytes = bytes.get(..usize::from(count))?;
     let end = bytes.iter().rposition(|byte| !matches!(byte, 0 | b' ')).map_or(0, |last| last + 1);
@@ -65,10 +65,10 @@ pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
 /// The words that hold a text, filled with NULs; `None` if it is too long, ends in what would be taken for filling, or
 /// has characters that cannot be printed.
 pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
-    let Kind::Text(count) = point.kind else { return None };
+    let DataType::Text(count) = point.kind else { return None };
     let fits = text.len() <= usize::from(count) && !text.ends_with(' ') && text.chars().all(is_printable);
     let mut bytes = text.as_bytes().to_vec();
-    bytes.resize(usize::from(point.kind.words()) * 2, 0);
+    bytes.resize(usize::from(point.kind.registers()) * 2, 0);
     fits.then(|| from_bytes(point.order, &bytes))
 }
 
@@ -82,27 +82,27 @@ pub fn encode(point: Point, value: f64) -> Option<Vec<u16>> {
         (value.fract() == 0.0 && low <= value && value <= high).then(|| to_i64(value).cast_unsigned())
     };
     let bits = match point.kind {
-        Kind::Bool => whole(0.0, 1.0)?,
-        Kind::I16 => whole(f64::from(i16::MIN), f64::from(i16::MAX))?,
-        Kind::U16 => whole(0.0, f64::from(u16::MAX))?,
-        Kind::I32 => whole(f64::from(i32::MIN), f64::from(i32::MAX))?,
-        Kind::U32 => whole(0.0, f64::from(u32::MAX))?,
-        Kind::I64 => whole(-EXACT, EXACT)?,
-        Kind::U64 => whole(0.0, EXACT)?,
-        Kind::F32 => u64::from(Some(to_f32(value)).filter(|value| value.is_finite())?.to_bits()),
-        Kind::F64 => value.to_bits(),
-        Kind::Bcd16 => to_bcd(whole(0.0, 9_999.0)?),
-        Kind::Bcd32 => to_bcd(whole(0.0, 99_999_999.0)?),
-        Kind::Text(_) => return None,
+        DataType::Bool => whole(0.0, 1.0)?,
+        DataType::I16 => whole(f64::from(i16::MIN), f64::from(i16::MAX))?,
+        DataType::U16 => whole(0.0, f64::from(u16::MAX))?,
+        DataType::I32 => whole(f64::from(i32::MIN), f64::from(i32::MAX))?,
+        DataType::U32 => whole(0.0, f64::from(u32::MAX))?,
+        DataType::I64 => whole(-EXACT, EXACT)?,
+        DataType::U64 => whole(0.0, EXACT)?,
+        DataType::F32 => u64::from(Some(to_f32(value)).filter(|value| value.is_finite())?.to_bits()),
+        DataType::F64 => value.to_bits(),
+        DataType::Bcd16 => to_bcd(whole(0.0, 9_999.0)?),
+        DataType::Bcd32 => to_bcd(whole(0.0, 99_999_999.0)?),
+        DataType::Text(_) => return None,
     };
-    let count = usize::from(point.kind.words()) * 2;
+    let count = usize::from(point.kind.registers()) * 2;
     Some(from_bytes(point.order, &bits.to_be_bytes()[8 - count..]))
 }
 
 /// The masks of a mask write (function 22: result = (word AND and) OR (or AND NOT and)) that sets a field of bits inside
 /// a word and leaves the other bits to the device (V1.1b3, 6.16).
 pub fn field_masks(point: Point, value: f64) -> Option<(u16, u16)> {
-    let (low, width) = point.field.filter(|_| point.kind.words() == 1)?;
+    let (low, width) = point.field.filter(|_| point.kind.registers() == 1)?;
     let field = mask(width);
     if value.fract() != 0.0 || value < 0.0 || field as f64 <= value - 1.0 {
         return None;
@@ -158,7 +158,7 @@ mod tests {
     use super::*;
     use crate::plant::tag::Table;
 
-    fn point(kind: Kind, order: ByteOrder) -> Point {
+    fn point(kind: DataType, order: ByteOrder) -> Point {
         Point { table: Table::Holding, address: 0, kind, order, field: None }
     }
 
@@ -171,18 +171,18 @@ mod tests {
             (ByteOrder::Badc, [0x6643, 0x3333]),
             (ByteOrder::Dcba, [0x3333, 0x6643]),
         ] {
-            assert_eq!(decode(point(Kind::F32, order), &words), Some(value), "{order:?}");
-            assert_eq!(encode(point(Kind::F32, order), value).as_deref(), Some(&words[..]), "{order:?}");
+            assert_eq!(decode(point(DataType::F32, order), &words), Some(value), "{order:?}");
+            assert_eq!(encode(point(DataType::F32, order), value).as_deref(), Some(&words[..]), "{order:?}");
         }
     }
 
     #[test]
     fn what_is_no_number_is_none() {
         for (kind, words) in [
-            (Kind::Bcd16, &[0x12A4][..]),
-            (Kind::Bcd32, &[0x1234, 0xF000]),
-            (Kind::F32, &[0x7FC0, 0x0000]),
-            (Kind::F32, &[0x7F80, 0x0000]),
+            (DataType::Bcd16, &[0x12A4][..]),
+            (DataType::Bcd32, &[0x1234, 0xF000]),
+            (DataType::F32, &[0x7FC0, 0x0000]),
+            (DataType::F32, &[0x7F80, 0x0000]),
         ] {
             assert_eq!(decode(point(kind, ByteOrder::Abcd), words), None, "{kind:?} {words:04X?}");
         }
@@ -191,10 +191,10 @@ mod tests {
     #[test]
     fn a_counter_beyond_what_a_double_holds_exactly_is_a_rounded_value() {
         for (kind, words, expect) in [
-            (Kind::U64, [0xFFFF; 4], 18_446_744_073_709_551_615.0),
-            (Kind::U64, [0x0020, 0, 0, 1], 9_007_199_254_740_992.0),
-            (Kind::U64, [0x0020, 0, 0, 3], 9_007_199_254_740_996.0),
-            (Kind::I64, [0x8000, 0, 0, 0], -9_223_372_036_854_775_808.0),
+            (DataType::U64, [0xFFFF; 4], 18_446_744_073_709_551_615.0),
+            (DataType::U64, [0x0020, 0, 0, 1], 9_007_199_254_740_992.0),
+            (DataType::U64, [0x0020, 0, 0, 3], 9_007_199_254_740_996.0),
+            (DataType::I64, [0x8000, 0, 0, 0], -9_223_372_036_854_775_808.0),
         ] {
             assert_eq!(decode(point(kind, ByteOrder::Abcd), &words), Some(expect), "{kind:?} {words:04X?}");
         }
@@ -203,14 +203,14 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_not_written() {
         for (kind, value) in [
-            (Kind::U16, -1.0),
-            (Kind::U16, 65_536.0),
-            (Kind::U16, 0.5),
-            (Kind::I16, 32_768.0),
-            (Kind::Bcd16, 10_000.0),
-            (Kind::F32, 1e300),
-            (Kind::F64, f64::NAN),
-            (Kind::I64, 1e17),
+            (DataType::U16, -1.0),
+            (DataType::U16, 65_536.0),
+            (DataType::U16, 0.5),
+            (DataType::I16, 32_768.0),
+            (DataType::Bcd16, 10_000.0),
+            (DataType::F32, 1e300),
+            (DataType::F64, f64::NAN),
+            (DataType::I64, 1e17),
         ] {
             assert_eq!(encode(point(kind, ByteOrder::Abcd), value), None, "{kind:?} {value}");
         }
@@ -222,7 +222,7 @@ mod tests {
             let mut bytes = bytes.to_vec();
             bytes.resize(bytes.len().next_multiple_of(2), 0xFF);
             let words = from_bytes(ByteOrder::Abcd, &bytes);
-            let text = decode_text(point(Kind::Text(count), ByteOrder::Abcd), &words);
+            let text = decode_text(point(DataType::Text(count), ByteOrder::Abcd), &words);
             assert_eq!(text.as_deref(), Some(expect), "{bytes:02X?}");
         };
         check(b"PXR4TAY1", 8, "PXR4TAY1");
@@ -238,14 +238,14 @@ mod tests {
         check("AB\u{202E}C".as_bytes(), 6, "AB·C");
         check(b"\x01\xFF\0\0", 4, "01 FF");
         check(b"\x01 \xFF\0", 4, "01 20 FF");
-        assert_eq!(decode_text(point(Kind::U16, ByteOrder::Abcd), &[0x4142]), None);
-        assert_eq!(decode_text(point(Kind::Text(4), ByteOrder::Abcd), &[0x4142]), None, "too few words");
-        assert_eq!(decode(point(Kind::Text(2), ByteOrder::Abcd), &[0x3432]), None, "words are no number");
+        assert_eq!(decode_text(point(DataType::U16, ByteOrder::Abcd), &[0x4142]), None);
+        assert_eq!(decode_text(point(DataType::Text(4), ByteOrder::Abcd), &[0x4142]), None, "too few words");
+        assert_eq!(decode(point(DataType::Text(2), ByteOrder::Abcd), &[0x3432]), None, "words are no number");
     }
 
     #[test]
     fn a_text_with_swapped_bytes_reads_the_same() {
-        let swapped = point(Kind::Text(5), ByteOrder::Badc);
+        let swapped = point(DataType::Text(5), ByteOrder::Badc);
         assert_eq!(decode_text(swapped, &[0x5850, 0x3452, 0x0041]).as_deref(), Some("PXR4A"));
         assert_eq!(encode_text(swapped, "PXR4A"), Some(vec![0x5850, 0x3452, 0x0041]));
         for text in ["PXR4TA", "PXR4 ", "P\nX"] {
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_field_of_bits_is_read_and_never_written() {
-        let field = Point { field: Some((4, 2)), ..point(Kind::U16, ByteOrder::Abcd) };
+        let field = Point { field: Some((4, 2)), ..point(DataType::U16, ByteOrder::Abcd) };
         assert_eq!(decode(field, &[0x0020]), Some(2.0));
         assert_eq!(encode(field, 2.0), None);
         assert_eq!(decode(Point { field: Some((0, 16)), ..field }, &[0xFFFF]), Some(65_535.0));
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn a_field_of_bits_is_set_without_touching_the_others() {
-        let field = Point { field: Some((4, 2)), ..point(Kind::U16, ByteOrder::Abcd) };
+        let field = Point { field: Some((4, 2)), ..point(DataType::U16, ByteOrder::Abcd) };
         assert_eq!(field_masks(field, 2.0), Some((0xFFCF, 0x0020)));
         assert_eq!(field_masks(field, 4.0), None, "two bits hold 0 to 3");
         let swapped = Point { order: ByteOrder::Badc, ..field };
@@ -274,7 +274,7 @@ mod tests {
             assert_eq!(decode(field, &[set]), Some(value));
             assert_eq!(set & !0x30, word & !0x30);
         }
-        assert_eq!(field_masks(point(Kind::U16, ByteOrder::Abcd), 1.0), None);
+        assert_eq!(field_masks(point(DataType::U16, ByteOrder::Abcd), 1.0), None);
     }
 
     proptest! {
@@ -284,7 +284,7 @@ mod tests {
         ) {
             let text = text.trim_end_matches(' ');
             let count = u8::try_from(text.len()).unwrap_or(u8::MAX).saturating_add(spare).max(1);
-            let point = point(Kind::Text(count), order);
+            let point = point(DataType::Text(count), order);
             if let Some(words) = encode_text(point, text) {
                 prop_assert_eq!(words.len(), usize::from(point.len()));
                 let back = decode_text(point, &words);
@@ -296,24 +296,24 @@ mod tests {
 
         #[test]
         fn no_bytes_break_a_screen(words in prop::collection::vec(any::<u16>(), 8)) {
-            let text = decode_text(point(Kind::Text(16), ByteOrder::Abcd), &words);
+            let text = decode_text(point(DataType::Text(16), ByteOrder::Abcd), &words);
             prop_assert!(text.is_some_and(|text| text.chars().all(is_printable)));
         }
 
         #[test]
         fn what_is_written_reads_back(
             kind in prop::sample::select(vec![
-                Kind::I16, Kind::U16, Kind::I32, Kind::U32, Kind::I64, Kind::U64, Kind::F32, Kind::F64, Kind::Bcd16, Kind::Bcd32,
+                DataType::I16, DataType::U16, DataType::I32, DataType::U32, DataType::I64, DataType::U64, DataType::F32, DataType::F64, DataType::Bcd16, DataType::Bcd32,
             ]),
             order in prop::sample::select(vec![ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba]),
             words in prop::array::uniform4(any::<u16>()),
         ) {
             let point = point(kind, order);
-            let words = &words[..usize::from(kind.words())];
+            let words = &words[..usize::from(kind.registers())];
             if let Some(value) = decode(point, words) {
                 // −0.0 and 0.0 are one value with two patterns, what is rounded is never written; every other number has
                 // exactly one.
-                let is_rounded = matches!(kind, Kind::I64 | Kind::U64) && EXACT < value.abs();
+                let is_rounded = matches!(kind, DataType::I64 | DataType::U64) && EXACT < value.abs();
                 if is_rounded {
                     prop_assert_eq!(encode(point, value), None);
                 } else if value != 0.0 {

@@ -6,7 +6,7 @@ use super::{codec, dissect::message_of, names};
 use crate::plant::{
     event::Fault,
     line::Framing,
-    tag::{Kind, Point},
+    tag::{DataType, Point},
     traffic::Exchange,
 };
 
@@ -49,7 +49,7 @@ pub fn find(point: Point, exchange: &Exchange) -> Option<Found> {
         false => own.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect(),
     };
     let raw = match point.table.is_bits() {
-        true => codec::decode(Point { kind: Kind::Bool, field: None, ..point }, &words),
+        true => codec::decode(Point { kind: DataType::Bool, field: None, ..point }, &words),
         false => codec::decode(point, &words),
     };
     let (start, step) = match exchange.framing {
@@ -106,7 +106,7 @@ mod tests {
         }
     }
 
-    fn point(table: Table, address: u16, kind: Kind) -> Point {
+    fn point(table: Table, address: u16, kind: DataType) -> Point {
         Point { table, address, kind, order: ByteOrder::Abcd, field: None }
     }
 
@@ -118,7 +118,7 @@ mod tests {
     fn the_bytes_of_a_value_are_found_in_every_framing() {
         for (framing, range) in [(Framing::Rtu, 5..9), (Framing::Ascii, 11..19), (Framing::Mbap, 11..15)] {
             let exchange = exchange(framing, &ASKED, &CAME);
-            let found = find(point(Table::Holding, 1_001, Kind::F32), &exchange).expect("it is there");
+            let found = find(point(Table::Holding, 1_001, DataType::F32), &exchange).expect("it is there");
             assert_eq!(found.range, range, "{framing:?}");
             assert_eq!(found.words, [0x4366, 0x3333]);
             assert_eq!(found.raw, Some(f64::from(230.2f32)));
@@ -132,25 +132,25 @@ mod tests {
     fn what_is_not_in_the_answer_is_not_found_in_it() {
         let check = |point: Point, exchange: &Exchange| assert_eq!(find(point, exchange), None);
         let read = exchange(Framing::Rtu, &ASKED, &CAME);
-        check(point(Table::Holding, 999, Kind::U16), &read);
-        check(point(Table::Holding, 1_003, Kind::U16), &read);
-        check(point(Table::Holding, 1_002, Kind::F32), &read);
-        check(point(Table::Input, 1_000, Kind::U16), &read);
+        check(point(Table::Holding, 999, DataType::U16), &read);
+        check(point(Table::Holding, 1_003, DataType::U16), &read);
+        check(point(Table::Holding, 1_002, DataType::F32), &read);
+        check(point(Table::Input, 1_000, DataType::U16), &read);
         let refused = Exchange {
             outcome: Err(Fault::Exception(crate::plant::event::ExceptionCode(2))),
             ..exchange(Framing::Rtu, &ASKED, &[1, 0x83, 2])
         };
-        check(point(Table::Holding, 1_000, Kind::U16), &refused);
-        check(point(Table::Holding, 1_000, Kind::U16), &Exchange { answer: [].into(), ..read });
+        check(point(Table::Holding, 1_000, DataType::U16), &refused);
+        check(point(Table::Holding, 1_000, DataType::U16), &Exchange { answer: [].into(), ..read });
     }
 
     #[test]
     fn a_bit_is_found_in_its_byte() {
         let exchange = exchange(Framing::Rtu, &[2, 1, 0x0C, 0x00, 0, 12], &[2, 1, 2, 0b0000_0101, 0b0000_0010]);
         for (address, range, raw) in [(3_072, 3..4, 1.0), (3_073, 3..4, 0.0), (3_081, 4..5, 1.0)] {
-            let found = find(point(Table::Coil, address, Kind::Bool), &exchange).expect("it is there");
+            let found = find(point(Table::Coil, address, DataType::Bool), &exchange).expect("it is there");
             assert_eq!((found.range, found.raw), (range, Some(raw)), "{address}");
         }
-        assert_eq!(find(point(Table::Coil, 3_084, Kind::Bool), &exchange), None);
+        assert_eq!(find(point(Table::Coil, 3_084, DataType::Bool), &exchange), None);
     }
 }

@@ -9,7 +9,7 @@ use super::{
         AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Level, Limits, LineDef, LineId, MimicDef, PlantDef,
         ReportDef, Serial, Subject, TagId, Transport,
     },
-    tag::{Access, Bound, ByteOrder, Decimals, Kind, Point, Table, TagDef},
+    tag::{Access, Bound, ByteOrder, DataType, Decimals, Point, Table, TagDef},
 };
 
 /// Process value, decimals from [`DP`], bad while [`FAULT`] is not zero.
@@ -119,7 +119,7 @@ pub fn shared() -> Arc<PlantDef> {
 }
 
 fn tag(id: TagId, short: &str, table: Table, address: u16) -> TagDef {
-    let kind = if table.is_bits() { Kind::Bool } else { Kind::I16 };
+    let kind = if table.is_bits() { DataType::Bool } else { DataType::I16 };
     let point = Point { table, address, kind, order: ByteOrder::Abcd, field: None };
     TagDef { unit: "°C".into(), ..TagDef::new(id, TIC, &format!("TIC-1.{short}"), point) }
 }

@@ -347,7 +347,7 @@ fn is_due(tag: &TagDef, sample: Sample, stored: Option<Sample>, at: Timestamp) -
 mod tests {
     use super::*;
     use crate::plant::fixture::{self, DP, FAULT, PV, RUN, TIC};
-    use crate::plant::tag::Kind;
+    use crate::plant::tag::DataType;
 
     fn at(second: i64) -> Timestamp {
         Timestamp::from_second(second).expect("a small number")
@@ -386,7 +386,7 @@ mod tests {
     #[test]
     fn a_text_is_trusted_and_doubted_like_a_number_and_never_stored() {
         let mut def = fixture::plant();
-        (def.tags[PV.index()].point.kind, def.tags[PV.index()].store) = (Kind::Text(8), false);
+        (def.tags[PV.index()].point.kind, def.tags[PV.index()].store) = (DataType::Text(8), false);
         let mut image = ProcessImage::new(Arc::new(def), at(0));
         assert_eq!(image.texts()[PV.index()], None);
         image.read_texts(&[(PV, "PXR4".into())], at(1));

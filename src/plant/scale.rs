@@ -1,6 +1,6 @@
 //! Raw numbers to values in engineering units and back.
 
-use super::tag::{Kind, TagDef};
+use super::tag::{DataType, TagDef};
 use crate::plant::number::to_f32;
 
 /// The value of a raw number: `raw · scale · 10^-decimals + offset`. `decimals` are those that the device
@@ -13,19 +13,19 @@ pub fn to_value(tag: &TagDef, raw: f64, decimals: u8) -> f64 {
 pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
     let exact = (value - tag.offset) / (tag.scale * 10f64.powi(-i32::from(decimals)));
     let raw = match tag.point.kind {
-        Kind::F32 => f64::from(to_f32(exact)),
-        Kind::F64 => exact,
-        Kind::Bool
-        | Kind::I16
-        | Kind::U16
-        | Kind::I32
-        | Kind::U32
-        | Kind::I64
-        | Kind::U64
-        | Kind::Bcd16
-        | Kind::Bcd32 => exact.round(),
+        DataType::F32 => f64::from(to_f32(exact)),
+        DataType::F64 => exact,
+        DataType::Bool
+        | DataType::I16
+        | DataType::U16
+        | DataType::I32
+        | DataType::U32
+        | DataType::I64
+        | DataType::U64
+        | DataType::Bcd16
+        | DataType::Bcd32 => exact.round(),
         // Words are no number.
-        Kind::Text(_) => return None,
+        DataType::Text(_) => return None,
     };
     let (low, high) = limits(tag);
     (raw.is_finite() && low <= raw && raw <= high).then_some(raw)
@@ -39,14 +39,19 @@ pub fn held(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
 /// Do two raw numbers of a tag mean the same stored value?
 pub fn same_raw(tag: &TagDef, one: f64, other: f64) -> bool {
     match tag.point.kind {
-        Kind::F32 => to_f32(one) == to_f32(other),
+        DataType::F32 => to_f32(one) == to_f32(other),
         // What was lost in scaling forth and back is lost in the value, which an offset makes much larger than the raw number.
-        Kind::F64 => alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0)),
-        Kind::Bool => (one != 0.0) == (other != 0.0),
-        Kind::Text(_) => false,
-        Kind::I16 | Kind::U16 | Kind::I32 | Kind::U32 | Kind::I64 | Kind::U64 | Kind::Bcd16 | Kind::Bcd32 => {
-            one == other
-        }
+        DataType::F64 => alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0)),
+        DataType::Bool => (one != 0.0) == (other != 0.0),
+        DataType::Text(_) => false,
+        DataType::I16
+        | DataType::U16
+        | DataType::I32
+        | DataType::U32
+        | DataType::I64
+        | DataType::U64
+        | DataType::Bcd16
+        | DataType::Bcd32 => one == other,
     }
 }
 
@@ -69,19 +74,19 @@ fn limits(tag: &TagDef) -> (f64, f64) {
     // An f64 counts whole numbers up to 2^53; beyond, a 64-bit value would silently become another one.
     let exact = 2f64.powi(53);
     match tag.point.kind {
-        Kind::Bool => (0.0, 1.0),
-        Kind::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
-        Kind::U16 => (0.0, f64::from(u16::MAX)),
-        Kind::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
-        Kind::U32 => (0.0, f64::from(u32::MAX)),
-        Kind::I64 => (-exact, exact),
-        Kind::U64 => (0.0, exact),
-        Kind::F32 => (f64::from(f32::MIN), f64::from(f32::MAX)),
-        Kind::F64 => (f64::MIN, f64::MAX),
-        Kind::Bcd16 => (0.0, 9_999.0),
-        Kind::Bcd32 => (0.0, 99_999_999.0),
+        DataType::Bool => (0.0, 1.0),
+        DataType::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
+        DataType::U16 => (0.0, f64::from(u16::MAX)),
+        DataType::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
+        DataType::U32 => (0.0, f64::from(u32::MAX)),
+        DataType::I64 => (-exact, exact),
+        DataType::U64 => (0.0, exact),
+        DataType::F32 => (f64::from(f32::MIN), f64::from(f32::MAX)),
+        DataType::F64 => (f64::MIN, f64::MAX),
+        DataType::Bcd16 => (0.0, 9_999.0),
+        DataType::Bcd32 => (0.0, 99_999_999.0),
         // An empty range: nothing is inside.
-        Kind::Text(_) => (0.0, -1.0),
+        DataType::Text(_) => (0.0, -1.0),
     }
 }
 
@@ -115,11 +120,11 @@ mod tests {
     fn a_value_beyond_its_type_is_refused() {
         let mut tag = fixture::plant().tags[0].clone();
         for (kind, value, raw) in [
-            (Kind::I16, 3_276.7, Some(32_767.0)),
-            (Kind::I16, 3_276.8, None),
-            (Kind::U16, -0.1, None),
-            (Kind::Bcd16, 1_000.0, None),
-            (Kind::U32, f64::NAN, None),
+            (DataType::I16, 3_276.7, Some(32_767.0)),
+            (DataType::I16, 3_276.8, None),
+            (DataType::U16, -0.1, None),
+            (DataType::Bcd16, 1_000.0, None),
+            (DataType::U32, f64::NAN, None),
         ] {
             tag.point.kind = kind;
             assert_eq!(to_raw(&tag, value, 1), raw, "{kind:?} {value}");

@@ -145,7 +145,7 @@ impl TagDef {
     }
     /// Does it hold words instead of a number?
     pub fn is_text(&self) -> bool {
-        matches!(self.point.kind, Kind::Text(_))
+        matches!(self.point.kind, DataType::Text(_))
     }
     /// The function code that it is written with: the profile's, else 5 or 6 for one bit or word, 16 for more.
     pub fn write_function(&self) -> Option<u8> {
@@ -183,7 +183,7 @@ pub struct Point {
     /// Address on the wire (PDU), 0-based.
     pub address: u16,
     /// Type of the raw value.
-    pub kind: Kind,
+    pub kind: DataType,
     /// Byte and word order.
     pub order: ByteOrder,
     /// A field of bits inside a word: (lowest bit, number of bits).
@@ -193,7 +193,7 @@ pub struct Point {
 impl Point {
     /// Registers (or bits, for the bit tables) that it takes.
     pub fn len(self) -> u16 {
-        if self.table.is_bits() { 1 } else { self.kind.words() }
+        if self.table.is_bits() { 1 } else { self.kind.registers() }
     }
     /// Never empty; here because clippy and readers expect it beside `len`.
     pub fn is_empty(self) -> bool {
@@ -255,7 +255,7 @@ impl Table {
 
 /// Type of a raw value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Kind {
+pub enum DataType {
     /// One bit of a bit table, or a whole word not zero.
     Bool,
     /// 16 bits, two's complement.
@@ -282,14 +282,14 @@ pub enum Kind {
     Text(u8),
 }
 
-impl Kind {
+impl DataType {
     /// Registers it takes.
-    pub fn words(self) -> u16 {
+    pub fn registers(self) -> u16 {
         match self {
-            Kind::Bool | Kind::I16 | Kind::U16 | Kind::Bcd16 => 1,
-            Kind::I32 | Kind::U32 | Kind::F32 | Kind::Bcd32 => 2,
-            Kind::I64 | Kind::U64 | Kind::F64 => 4,
-            Kind::Text(bytes) => u16::from(bytes).div_ceil(2),
+            DataType::Bool | DataType::I16 | DataType::U16 | DataType::Bcd16 => 1,
+            DataType::I32 | DataType::U32 | DataType::F32 | DataType::Bcd32 => 2,
+            DataType::I64 | DataType::U64 | DataType::F64 => 4,
+            DataType::Text(bytes) => u16::from(bytes).div_ceil(2),
         }
     }
     /// Longest text, bytes: what one read of 125 registers holds.

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::plant::{
     interlock::{ActuatorDef, ControlLogic, InterlockCondition, InterlockDef, SequenceDef, stops},
-    tag::{Access, Decimals, Kind, TagDef},
+    tag::{Access, DataType, Decimals, TagDef},
 };
 
 /// All that the plant file says about commands.
@@ -80,8 +80,10 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
 pub(super) fn bits_of(of: &TagDef) -> u16 {
     let is_raw = of.scale == 1.0 && of.offset == 0.0 && matches!(of.decimals, Decimals::Fixed(_));
     let is_binary = match of.point.kind {
-        Kind::I16 | Kind::U16 | Kind::I32 | Kind::U32 | Kind::I64 | Kind::U64 => !of.point.table.is_bits(),
-        Kind::Bool | Kind::F32 | Kind::F64 | Kind::Bcd16 | Kind::Bcd32 | Kind::Text(_) => false,
+        DataType::I16 | DataType::U16 | DataType::I32 | DataType::U32 | DataType::I64 | DataType::U64 => {
+            !of.point.table.is_bits()
+        }
+        DataType::Bool | DataType::F32 | DataType::F64 | DataType::Bcd16 | DataType::Bcd32 | DataType::Text(_) => false,
     };
     match of.point.field {
         _ if !is_raw || !is_binary => 0,

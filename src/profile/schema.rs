@@ -12,7 +12,7 @@ use super::{
 use crate::plant::{
     def::{AlarmClass, Parity, Priority, Reauthentication, Role, Rs485},
     ne107::Signal,
-    tag::{Access, ByteOrder, Confidence, Kind, PollClass, Table},
+    tag::{Access, ByteOrder, Confidence, DataType, PollClass, Table},
 };
 
 table!(
@@ -568,7 +568,7 @@ words!(PollWord, "poll" {
 
 /// The type of a raw value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct TypeName(pub Kind);
+pub(super) struct TypeName(pub DataType);
 
 impl super::reader::Value for TypeName {
     fn read(
@@ -579,12 +579,13 @@ impl super::reader::Value for TypeName {
         let word = <String as super::reader::Value>::read(value, at, problems)?;
         if let Some(rest) = word.strip_prefix("string") {
             let count = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
-            let count = count.and_then(|count| count.trim().parse().ok()).filter(|n| (1..=Kind::TEXT_MAX).contains(n));
+            let count =
+                count.and_then(|count| count.trim().parse().ok()).filter(|n| (1..=DataType::TEXT_MAX).contains(n));
             if count.is_none() {
                 let problem = problems.add(at, format!("`{word}` does not say how long the text is"));
-                problem.label(format!("expected \"string(N)\" with N bytes, 1 to {}", Kind::TEXT_MAX));
+                problem.label(format!("expected \"string(N)\" with N bytes, 1 to {}", DataType::TEXT_MAX));
             }
-            return count.map(|count| TypeName(Kind::Text(count)));
+            return count.map(|count| TypeName(DataType::Text(count)));
         }
         let found = TYPES.iter().find(|(name, _)| *name == word);
         if found.is_none() {
@@ -596,16 +597,16 @@ impl super::reader::Value for TypeName {
 }
 
 /// The names of the types, as Telegraf and its kin write them.
-const TYPES: &[(&str, Kind)] = &[
-    ("int16", Kind::I16),
-    ("uint16", Kind::U16),
-    ("int32", Kind::I32),
-    ("uint32", Kind::U32),
-    ("int64", Kind::I64),
-    ("uint64", Kind::U64),
-    ("float32", Kind::F32),
-    ("float64", Kind::F64),
-    ("bcd16", Kind::Bcd16),
-    ("bcd32", Kind::Bcd32),
-    ("bool", Kind::Bool),
+const TYPES: &[(&str, DataType)] = &[
+    ("int16", DataType::I16),
+    ("uint16", DataType::U16),
+    ("int32", DataType::I32),
+    ("uint32", DataType::U32),
+    ("int64", DataType::I64),
+    ("uint64", DataType::U64),
+    ("float32", DataType::F32),
+    ("float64", DataType::F64),
+    ("bcd16", DataType::Bcd16),
+    ("bcd32", DataType::Bcd32),
+    ("bool", DataType::Bool),
 ];

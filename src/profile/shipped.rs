@@ -6,7 +6,7 @@ use std::path::Path;
 use super::*;
 use crate::plant::{
     def::{Condition, Subject},
-    tag::{Access, Bound, Decimals, Kind as Raw, Poll, Table},
+    tag::{Access, Bound, DataType, Decimals, Poll, Table},
 };
 
 fn tank() -> Arc<PlantDef> {
@@ -65,33 +65,33 @@ fn a_set_of_the_controller_holds_its_settings_and_none_of_its_commands() {
 #[test]
 fn the_addresses_are_those_of_the_recorded_frames_and_manuals() {
     let plant = tank();
-    let check = |name: &str, table: Table, address: u16, kind: Raw| {
+    let check = |name: &str, table: Table, address: u16, kind: DataType| {
         let point = plant.tag(plant.tag_named(name).unwrap()).point;
         assert_eq!((point.table, point.address, point.kind), (table, address, kind), "{name}");
     };
-    check("TIC-1.SV", Table::Holding, 0x03EA, Raw::I16);
-    check("TIC-1.PV", Table::Input, 0x03E8, Raw::I16);
-    check("TIC-1.MV", Table::Input, 0x03EB, Raw::I16);
-    check("TIC-1.FAULT", Table::Input, 0x03EF, Raw::U16);
-    check("TIC-1.FIX", Table::Holding, 0x03E8, Raw::U16);
-    check("TIC-1.STBY", Table::Holding, 0x03EB, Raw::U16);
-    check("TIC-1.P-DP", Table::Holding, 0x03FB, Raw::U16);
-    check("TIC-1.SV-H", Table::Holding, 0x0407, Raw::I16);
-    check("TIC-1.SV-8", Table::Holding, 0x0427, Raw::I16);
-    check("TIC-1.TM8S", Table::Holding, 0x0437, Raw::U16);
-    check("TIC-1.PTN", Table::Holding, 0x043A, Raw::U16);
-    check("PLC-1.Y0", Table::Coil, 2048, Raw::Bool);
-    check("PLC-1.Y17", Table::Coil, 2063, Raw::Bool);
-    check("PLC-1.X23", Table::Discrete, 2067, Raw::Bool);
-    check("PLC-1.VY0", Table::Holding, 0x4140, Raw::U16);
-    check("PLC-1.VX0", Table::Holding, 0x4100, Raw::U16);
-    check("PLC-1.P-1", Table::Coil, 2048, Raw::Bool);
-    check("PLC-1.AT-SV", Table::Discrete, 2052, Raw::Bool);
-    check("PLC-1.RUN", Table::Coil, 3072, Raw::Bool);
-    check("PLC-1.SEQ.FAULT", Table::Coil, 3079, Raw::Bool);
-    check("PLC-1.STEP", Table::Holding, 1024, Raw::Bcd16);
-    check("PLC-1.LT-1", Table::Input, 1032, Raw::U16);
-    check("PLC-1.HEATER", Table::Input, 1038, Raw::U16);
+    check("TIC-1.SV", Table::Holding, 0x03EA, DataType::I16);
+    check("TIC-1.PV", Table::Input, 0x03E8, DataType::I16);
+    check("TIC-1.MV", Table::Input, 0x03EB, DataType::I16);
+    check("TIC-1.FAULT", Table::Input, 0x03EF, DataType::U16);
+    check("TIC-1.FIX", Table::Holding, 0x03E8, DataType::U16);
+    check("TIC-1.STBY", Table::Holding, 0x03EB, DataType::U16);
+    check("TIC-1.P-DP", Table::Holding, 0x03FB, DataType::U16);
+    check("TIC-1.SV-H", Table::Holding, 0x0407, DataType::I16);
+    check("TIC-1.SV-8", Table::Holding, 0x0427, DataType::I16);
+    check("TIC-1.TM8S", Table::Holding, 0x0437, DataType::U16);
+    check("TIC-1.PTN", Table::Holding, 0x043A, DataType::U16);
+    check("PLC-1.Y0", Table::Coil, 2048, DataType::Bool);
+    check("PLC-1.Y17", Table::Coil, 2063, DataType::Bool);
+    check("PLC-1.X23", Table::Discrete, 2067, DataType::Bool);
+    check("PLC-1.VY0", Table::Holding, 0x4140, DataType::U16);
+    check("PLC-1.VX0", Table::Holding, 0x4100, DataType::U16);
+    check("PLC-1.P-1", Table::Coil, 2048, DataType::Bool);
+    check("PLC-1.AT-SV", Table::Discrete, 2052, DataType::Bool);
+    check("PLC-1.RUN", Table::Coil, 3072, DataType::Bool);
+    check("PLC-1.SEQ.FAULT", Table::Coil, 3079, DataType::Bool);
+    check("PLC-1.STEP", Table::Holding, 1024, DataType::Bcd16);
+    check("PLC-1.LT-1", Table::Input, 1032, DataType::U16);
+    check("PLC-1.HEATER", Table::Input, 1038, DataType::U16);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use super::{
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
     number::to_u8,
-    tag::{Access, Bound, ByteOrder, Confidence, Decimals, Kind, Point, Poll, PollClass, Table, TagDef},
+    tag::{Access, Bound, ByteOrder, Confidence, DataType, Decimals, Point, Poll, PollClass, Table, TagDef},
 };
 
 /// What a tag must know of its device.
@@ -54,7 +54,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     let row = TagTable::of(&layers, problems);
     let point = point(&row, context, problems);
     let kind = point.map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
-    let is_text = point.is_some_and(|point| matches!(point.kind, Kind::Text(_)));
+    let is_text = point.is_some_and(|point| matches!(point.kind, DataType::Text(_)));
     if let Some(point) = point.filter(|_| is_text) {
         check_text(&row, point, problems);
     }
@@ -124,7 +124,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
 
 /// Stands in for an address that is wrong; it never leaves the loader.
 const NOWHERE: Point =
-    Point { table: Table::Holding, address: 0, kind: Kind::U16, order: ByteOrder::Abcd, field: None };
+    Point { table: Table::Holding, address: 0, kind: DataType::U16, order: ByteOrder::Abcd, field: None };
 
 /// The other tags that a row names.
 struct Links {
@@ -161,7 +161,7 @@ fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Li
 }
 
 /// Raw type and, for a field, its number of bits.
-type Raws = (Kind, Option<u8>);
+type Raws = (DataType, Option<u8>);
 
 fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Option<Point> {
     let location = row.address.as_ref().filter(|_| row.sound)?;
@@ -171,11 +171,11 @@ fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Op
         check_modicon(modicon, table, address, problems);
     }
     let kind = match (row.kind, table.is_bits()) {
-        (Some(kind), true) if kind.value.0 != Kind::Bool => {
+        (Some(kind), true) if kind.value.0 != DataType::Bool => {
             problems.add(kind.at, format!("a {} is one bit", table.word())).label("expected type = \"bool\"");
             return None;
         }
-        (None, true) => Kind::Bool,
+        (None, true) => DataType::Bool,
         (Some(kind), _) => kind.value.0,
         (None, false) => {
             problems
@@ -237,7 +237,7 @@ fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) 
 }
 
 /// `"5-4"` or `3`: lowest bit and number of bits.
-fn bit_field(field: &At<Choice>, kind: Kind, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
+fn bit_field(field: &At<Choice>, kind: DataType, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
     let bounds = match &field.value {
         Choice::Number(bit) if bit.fract() == 0.0 && (0.0..64.0).contains(bit) => Some((to_u8(*bit), to_u8(*bit))),
         Choice::Number(_) => None,
@@ -246,8 +246,9 @@ fn bit_field(field: &At<Choice>, kind: Kind, table: Table, problems: &mut Proble
             None => word.trim().parse().ok().map(|bit: u8| (bit, bit)),
         },
     };
-    let size = kind.words() * 16;
-    let whole = !table.is_bits() && !matches!(kind, Kind::F32 | Kind::F64 | Kind::Bcd16 | Kind::Bcd32 | Kind::Text(_));
+    let size = kind.registers() * 16;
+    let whole = !table.is_bits()
+        && !matches!(kind, DataType::F32 | DataType::F64 | DataType::Bcd16 | DataType::Bcd32 | DataType::Text(_));
     let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size && whole);
     if valid.is_none() {
         let problem = problems.add(field.at, "this is not a field of bits");
@@ -269,7 +270,7 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
         }
         return decimals.value;
     }
-    if matches!(kind, Some((Kind::F32 | Kind::F64, _))) {
+    if matches!(kind, Some((DataType::F32 | DataType::F64, _))) {
         return 2;
     }
     let scale = row.scale.map_or(1.0, |scale| scale.value);
@@ -328,16 +329,16 @@ fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
         return Some((0.0, 2f64.powi(i32::from(bits)) - 1.0));
     }
     match kind {
-        Kind::Bool => Some((0.0, 1.0)),
-        Kind::I16 => Some((f64::from(i16::MIN), f64::from(i16::MAX))),
-        Kind::U16 => Some((0.0, f64::from(u16::MAX))),
-        Kind::I32 => Some((f64::from(i32::MIN), f64::from(i32::MAX))),
-        Kind::U32 => Some((0.0, f64::from(u32::MAX))),
-        Kind::I64 => Some((i64::MIN as f64, i64::MAX as f64)),
-        Kind::U64 => Some((0.0, u64::MAX as f64)),
-        Kind::Bcd16 => Some((0.0, 9_999.0)),
-        Kind::Bcd32 => Some((0.0, 99_999_999.0)),
-        Kind::F32 | Kind::F64 | Kind::Text(_) => None,
+        DataType::Bool => Some((0.0, 1.0)),
+        DataType::I16 => Some((f64::from(i16::MIN), f64::from(i16::MAX))),
+        DataType::U16 => Some((0.0, f64::from(u16::MAX))),
+        DataType::I32 => Some((f64::from(i32::MIN), f64::from(i32::MAX))),
+        DataType::U32 => Some((0.0, f64::from(u32::MAX))),
+        DataType::I64 => Some((i64::MIN as f64, i64::MAX as f64)),
+        DataType::U64 => Some((0.0, u64::MAX as f64)),
+        DataType::Bcd16 => Some((0.0, 9_999.0)),
+        DataType::Bcd32 => Some((0.0, 99_999_999.0)),
+        DataType::F32 | DataType::F64 | DataType::Text(_) => None,
     }
 }
 
@@ -429,7 +430,7 @@ fn labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i
 
 fn bit_labels(bits: &Option<At<Numbered>>, kind: Option<Raws>, problems: &mut Problems) -> Vec<(u8, String)> {
     let Some(Numbered(rows)) = bits.as_ref().map(|bits| &bits.value) else { return Vec::new() };
-    let size = kind.map_or(64, |(kind, field)| field.map_or(i64::from(kind.words()) * 16, i64::from));
+    let size = kind.map_or(64, |(kind, field)| field.map_or(i64::from(kind.registers()) * 16, i64::from));
     let mut labels = Vec::new();
     for (bit, text) in rows {
         match u8::try_from(bit.value).ok().filter(|_| bit.value < size) {

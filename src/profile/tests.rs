@@ -11,7 +11,7 @@ use crate::plant::{
     def::{Condition, HistoryDef, LineId, PlantDef, Subject},
     interlock::InterlockCondition,
     station::StationFault,
-    tag::{Bound, Kind, PollClass},
+    tag::{Bound, DataType, PollClass},
 };
 
 /// A small plant that is right. Each case changes some words of it.
@@ -322,7 +322,7 @@ fn with_text(keys: &str) -> Result<PlantDef, Errors> {
 fn a_text_is_read_and_never_stored() {
     let plant = with_text("type = \"string(9)\"\norder = \"BADC\"").unwrap();
     let tag = plant.tag(plant.tag_named("D1.MODEL").unwrap());
-    assert_eq!((tag.point.kind, tag.point.len()), (Kind::Text(9), 5));
+    assert_eq!((tag.point.kind, tag.point.len()), (DataType::Text(9), 5));
     assert!(tag.is_text() && !tag.store && !tag.writable());
 }
 

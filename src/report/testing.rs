@@ -6,7 +6,7 @@ use jiff::{Timestamp, civil::time, tz::TimeZone};
 
 use crate::plant::{
     def::{CsvDialect, DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, ReportDef, ShiftDef, TagId},
-    tag::{ByteOrder, Decimals, Kind, Point, Table, TagDef},
+    tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
 };
 
 /// Seconds after the epoch as an instant.
@@ -91,7 +91,7 @@ pub const THREE: [(&str, i8, i8); 3] = [("morning", 6, 0), ("afternoon", 14, 0),
 
 /// A stored tag of TIC-1 with one decimal; MV in percent, the others in degrees.
 pub fn tag(id: u16, short: &str) -> TagDef {
-    let point = Point { table: Table::Input, address: id, kind: Kind::I16, order: ByteOrder::Abcd, field: None };
+    let point = Point { table: Table::Input, address: id, kind: DataType::I16, order: ByteOrder::Abcd, field: None };
     let unit = if short == "MV" { "%" } else { "°C" };
     let name = format!("TIC-1.{short}");
     TagDef {

@@ -14,7 +14,7 @@ use crate::plant::{
     commands::{outcome_word, outcome_words},
     def::TagId,
     interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
-    tag::{Kind, TagDef},
+    tag::{DataType, TagDef},
 };
 
 /// How long the end of a command is marked in the mimic, in seconds of the operator.
@@ -35,7 +35,7 @@ pub fn other_state(cx: &ViewContext, tag: TagId) -> Option<f64> {
 fn two_states(def: &TagDef) -> Option<(f64, f64)> {
     match (def.labels.as_slice(), def.point.kind) {
         ([one, other], _) => Some((one.0 as f64, other.0 as f64)),
-        ([], Kind::Bool) => Some((0.0, 1.0)),
+        ([], DataType::Bool) => Some((0.0, 1.0)),
         _ => None,
     }
 }

@@ -28,7 +28,7 @@ use sightglass::{
         event::{Event, LineState},
         line_report::{LineReport, PollReport},
         request_stats::RequestStats,
-        tag::{ByteOrder, Kind, Point, Poll, PollClass, Table, TagDef},
+        tag::{ByteOrder, DataType, Point, Poll, PollClass, Table, TagDef},
         traffic::{Exchange, Frame},
     },
     profile::{self, Search},
@@ -215,7 +215,7 @@ fn plant() -> Arc<PlantDef> {
             let point = Point {
                 table: Table::Holding,
                 address: address as u16,
-                kind: Kind::U16,
+                kind: DataType::U16,
                 order: ByteOrder::Abcd,
                 field: None,
             };

@@ -24,7 +24,7 @@ use sightglass::{
         PlantDef,
         def::{DeviceDef, DeviceId, Limits, LineDef, LineId, Serial, TagId, Transport},
         event::Event,
-        tag::{ByteOrder, Kind, Point, Poll, Table, TagDef},
+        tag::{ByteOrder, DataType, Point, Poll, Table, TagDef},
     },
     station::io as station,
 };
@@ -173,7 +173,7 @@ fn plant(lines: Vec<Transport>, devices: u16, blocks: u16, period: Duration, in_
             let words = |block: u16| (0..WORDS).step_by(step).map(move |word| 20 * block + word);
             for address in (0..blocks).flat_map(words) {
                 let point =
-                    Point { table: Table::Holding, address, kind: Kind::U16, order: ByteOrder::Abcd, field: None };
+                    Point { table: Table::Holding, address, kind: DataType::U16, order: ByteOrder::Abcd, field: None };
                 let tag_id = TagId(def.tags.len() as u16);
                 let poll = Poll::Every(period);
                 let fresh = TagDef::new(tag_id, device_id, &format!("{name}.R{address}"), point);

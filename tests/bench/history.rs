@@ -16,7 +16,7 @@ use sightglass::{
         def::{CsvDialect, DeviceId, MimicDef, PlantDef, ReportDef, TagId},
         record::Record,
         sample::Sample,
-        tag::{ByteOrder, Decimals, Kind, Point, Table, TagDef},
+        tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
     },
     report::Period,
 };
@@ -27,7 +27,7 @@ const TAGS: u16 = 24;
 const WEEK: i64 = 7 * 86_400;
 
 fn tag(id: u16) -> TagDef {
-    let point = Point { table: Table::Input, address: id, kind: Kind::I16, order: ByteOrder::Abcd, field: None };
+    let point = Point { table: Table::Input, address: id, kind: DataType::I16, order: ByteOrder::Abcd, field: None };
     let plain = TagDef::new(TagId(id), DeviceId(0), &format!("TIC-1.T{id}"), point);
     TagDef { scale: 0.1, decimals: Decimals::Fixed(1), unit: "°C".into(), ..plain }
 }

@@ -18,7 +18,7 @@ use sightglass::{
         def::{
             CsvDialect, DeviceDef, DeviceId, Limits, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport,
         },
-        tag::{ByteOrder, Kind, Point, Table, TagDef},
+        tag::{ByteOrder, DataType, Point, Table, TagDef},
     },
 };
 
@@ -53,7 +53,16 @@ fn device(id: u16) -> DeviceDef {
 
 /// Tags of mixed types in runs of one to eight, with gaps of up to `gap` registers between the runs.
 fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
-    let kinds = [Kind::U16, Kind::I16, Kind::F32, Kind::U32, Kind::U16, Kind::U64, Kind::Bcd16, Kind::I16];
+    let kinds = [
+        DataType::U16,
+        DataType::I16,
+        DataType::F32,
+        DataType::U32,
+        DataType::U16,
+        DataType::U64,
+        DataType::Bcd16,
+        DataType::I16,
+    ];
     let mut next = vec![[0u64; 2]; usize::from(devices)];
     let (mut run, mut place, mut half) = (0, 0, 0);
     let tag = |id| {
@@ -64,7 +73,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         run -= 1;
         let kind = kinds[dice.below(8) as usize];
         let address = next[place][half] as u16;
-        next[place][half] += u64::from(kind.words());
+        next[place][half] += u64::from(kind.registers());
         let point =
             Point { table: [Table::Holding, Table::Input][half], address, kind, order: ByteOrder::Abcd, field: None };
         TagDef::new(TagId(id), DeviceId(place as u16), &format!("D-{place}.T{id}"), point)

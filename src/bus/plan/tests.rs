@@ -8,7 +8,7 @@ use super::*;
 use crate::plant::{
     def::{Framing, Limits, LineDef, Parity, Rs485, Serial, Transport},
     fixture,
-    tag::Kind,
+    tag::DataType,
 };
 
 #[test]
@@ -72,9 +72,9 @@ fn a_silent_unit_costs_its_timeout_and_a_gap_of_the_line_counts() {
     assert!((failing - 318.33).abs() < 0.01, "{failing}");
 }
 
-fn tag(id: u16, address: u16, table: Table, kind: Kind, poll: Poll) -> TagDef {
+fn tag(id: u16, address: u16, table: Table, kind: DataType, poll: Poll) -> TagDef {
     let sample = fixture::plant().tags.remove(0);
-    let kind = if table.is_bits() { Kind::Bool } else { kind };
+    let kind = if table.is_bits() { DataType::Bool } else { kind };
     TagDef { id: TagId(id), point: Point { table, address, kind, ..sample.point }, poll, ..sample }
 }
 
@@ -82,7 +82,7 @@ const SECOND: Poll = Poll::Every(Duration::from_secs(1));
 
 fn words(addresses: &[u16]) -> PlantDef {
     let mut def = fixture::plant();
-    let tag = |(id, address): (usize, &u16)| tag(id as u16, *address, Table::Holding, Kind::U16, SECOND);
+    let tag = |(id, address): (usize, &u16)| tag(id as u16, *address, Table::Holding, DataType::U16, SECOND);
     def.tags = addresses.iter().enumerate().map(tag).collect();
     def
 }
@@ -224,7 +224,7 @@ fn plant_of(rows: &[Row], limits: Limits, transport: Transport) -> PlantDef {
     def.devices[0].limits = limits;
     def.lines[0].transport = transport;
     let tables = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
-    let kinds = [Kind::U16, Kind::F32, Kind::U64, Kind::Bcd32];
+    let kinds = [DataType::U16, DataType::F32, DataType::U64, DataType::Bcd32];
     let polls = [SECOND, Poll::Once, Poll::Never];
     let tag = |(id, row): (usize, &Row)| tag(id as u16, row.0, tables[row.1], kinds[row.2], polls[usize::from(row.3)]);
     def.tags = rows.iter().enumerate().map(tag).collect();

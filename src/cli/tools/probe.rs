@@ -8,7 +8,7 @@ use crate::{
         diagnostics::{Diagnostic, Finding},
         event::Fault,
         number::{to_f32, to_u16},
-        tag::{ByteOrder, Kind, Point, Table},
+        tag::{ByteOrder, DataType, Point, Table},
     },
 };
 
@@ -77,7 +77,7 @@ fn value_lines(table: Table, address: u16, words: &[u16]) -> Vec<String> {
         let at = address.wrapping_add(to_u16(n));
         let pair = words.get(n..n + 2);
         let float = |order| {
-            let point = Point { table, address: at, kind: Kind::F32, order, field: None };
+            let point = Point { table, address: at, kind: DataType::F32, order, field: None };
             pair.and_then(|pair| codec::decode(point, pair)).map_or("–".into(), |value| short(to_f32(value)))
         };
         let floats = [ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba]

@@ -7,7 +7,7 @@ use super::*;
 use crate::plant::{
     fixture,
     interlock::{InterlockCondition, InterlockDef},
-    tag::{Access, ByteOrder, Kind, Point, Table},
+    tag::{Access, ByteOrder, DataType, Point, Table},
 };
 
 const LOW: TagId = TagId(0);
@@ -26,7 +26,7 @@ fn def() -> PlantDef {
             id,
             TIC,
             &format!("TIC-1.{short}"),
-            Point { table: Table::Holding, address: id.0, kind: Kind::I16, order: ByteOrder::Abcd, field: None },
+            Point { table: Table::Holding, address: id.0, kind: DataType::I16, order: ByteOrder::Abcd, field: None },
         )
     };
     let unit = Some((UNIT, vec![(0, "°C".to_owned()), (1, "°F".to_owned())]));

@@ -516,7 +516,7 @@ fn an_unchanged_double_is_not_refused_as_changed() {
     for (raw, scale, offset) in [(0.09, 0.1, 0.0), (0.14, 3.6, 0.0), (0.03, 0.01, 0.0), (20.05, 1.0, 273.15)] {
         let mut def = fixture::plant();
         let sv = &mut def.tags[SV.index()];
-        (sv.point.kind, sv.decimals) = (crate::plant::tag::Kind::F64, crate::plant::tag::Decimals::Fixed(2));
+        (sv.point.kind, sv.decimals) = (crate::plant::tag::DataType::F64, crate::plant::tag::Decimals::Fixed(2));
         (sv.scale, sv.offset, sv.min, sv.max) = (scale, offset, None, None);
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(read(0, &[(SV, raw), (DP, 1.0), (FAULT, 0.0)]));

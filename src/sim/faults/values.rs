@@ -205,10 +205,10 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{DeviceId, TagId},
-        tag::{ByteOrder, Kind},
+        tag::{ByteOrder, DataType},
     };
 
-    fn tag(table: Table, address: u16, kind: Kind, access: Access) -> TagDef {
+    fn tag(table: Table, address: u16, kind: DataType, access: Access) -> TagDef {
         let point = Point { table, address, kind, order: ByteOrder::Abcd, field: None };
         TagDef { access, bad_if: vec![0x7FFF], ..TagDef::new(TagId(0), DeviceId(0), "D-1.T", point) }
     }
@@ -216,10 +216,10 @@ mod tests {
     /// A float at 10, a set value at 12, a sensor at 13, all in one block, and a measured bit.
     fn values() -> Values {
         let tags = [
-            TagDef { bad_if: Vec::new(), ..tag(Table::Holding, 10, Kind::F32, Access::Read) },
-            TagDef { bad_if: Vec::new(), ..tag(Table::Holding, 12, Kind::U16, Access::ReadWrite) },
-            tag(Table::Holding, 13, Kind::I16, Access::Read),
-            TagDef { bad_if: Vec::new(), ..tag(Table::Discrete, 0, Kind::Bool, Access::Read) },
+            TagDef { bad_if: Vec::new(), ..tag(Table::Holding, 10, DataType::F32, Access::Read) },
+            TagDef { bad_if: Vec::new(), ..tag(Table::Holding, 12, DataType::U16, Access::ReadWrite) },
+            tag(Table::Holding, 13, DataType::I16, Access::Read),
+            TagDef { bad_if: Vec::new(), ..tag(Table::Discrete, 0, DataType::Bool, Access::Read) },
         ];
         Values::of_tags(tags.iter())
     }

@@ -108,7 +108,7 @@ mod tests {
     fn a_text_is_shown_with_its_doubt_like_any_value() {
         let mut fixture = Fixture::normal();
         let tag = fixture.tag("TIC-1.MV");
-        fixture.def.tags[tag.index()].point.kind = crate::plant::tag::Kind::Text(8);
+        fixture.def.tags[tag.index()].point.kind = crate::plant::tag::DataType::Text(8);
         fixture.def.tags[tag.index()].unit.clear();
         let mut check = |text: Option<&str>, quality, room, expect: &str| {
             fixture.samples[tag.index()].value = None;

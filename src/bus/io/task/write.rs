@@ -300,11 +300,11 @@ mod tests {
     use super::*;
     use crate::plant::{
         def::{DeviceId, TagId},
-        tag::{ByteOrder, Kind, Point},
+        tag::{ByteOrder, DataType, Point},
     };
 
     /// The bytes of the request after the function code, as tokio-modbus would send them, told by its own words.
-    fn request(kind: Kind, field: Option<(u8, u8)>, write_fc: Option<u8>, raw: f64) -> Option<Request<'static>> {
+    fn request(kind: DataType, field: Option<(u8, u8)>, write_fc: Option<u8>, raw: f64) -> Option<Request<'static>> {
         let point = Point { table: Table::Holding, address: 100, kind, order: ByteOrder::Abcd, field };
         write_request(&TagDef { write_fc, ..TagDef::new(TagId(0), DeviceId(0), "D.T", point) }, raw)
     }
@@ -312,21 +312,21 @@ mod tests {
     #[test]
     fn each_tag_is_written_by_the_function_that_its_device_has() {
         let one = Request::WriteSingleRegister(100, 7);
-        assert_eq!(request(Kind::U16, None, None, 7.0), Some(one.clone()));
-        assert_eq!(request(Kind::U16, None, Some(6), 7.0), Some(one));
+        assert_eq!(request(DataType::U16, None, None, 7.0), Some(one.clone()));
+        assert_eq!(request(DataType::U16, None, Some(6), 7.0), Some(one));
         let many = |words: Vec<u16>| Request::WriteMultipleRegisters(100, Cow::Owned(words));
-        assert_eq!(request(Kind::U16, None, Some(16), 7.0), Some(many(vec![7])));
-        assert_eq!(request(Kind::U32, None, None, 65_537.0), Some(many(vec![1, 1])));
+        assert_eq!(request(DataType::U16, None, Some(16), 7.0), Some(many(vec![7])));
+        assert_eq!(request(DataType::U32, None, None, 65_537.0), Some(many(vec![1, 1])));
         let both = Request::ReadWriteMultipleRegisters(100, 1, 100, Cow::Owned(vec![7]));
-        assert_eq!(request(Kind::U16, None, Some(23), 7.0), Some(both));
+        assert_eq!(request(DataType::U16, None, Some(23), 7.0), Some(both));
         let masked = Request::MaskWriteRegister(100, 0xFFCF, 0x0020);
-        assert_eq!(request(Kind::U16, Some((4, 2)), Some(22), 2.0), Some(masked));
-        assert_eq!(request(Kind::U16, None, None, 65_536.0), None, "what does not fit is not sent");
+        assert_eq!(request(DataType::U16, Some((4, 2)), Some(22), 2.0), Some(masked));
+        assert_eq!(request(DataType::U16, None, None, 65_536.0), None, "what does not fit is not sent");
     }
 
     #[test]
     fn coils_are_written_one_by_one_unless_the_profile_says_otherwise() {
-        let point = Point { table: Table::Coil, address: 5, kind: Kind::Bool, order: ByteOrder::Abcd, field: None };
+        let point = Point { table: Table::Coil, address: 5, kind: DataType::Bool, order: ByteOrder::Abcd, field: None };
         let coil = TagDef::new(TagId(0), DeviceId(0), "D.C", point);
         assert_eq!(write_request(&coil, 1.0), Some(Request::WriteSingleCoil(5, true)));
         let fifteen = TagDef { write_fc: Some(15), ..coil };

@@ -20,7 +20,7 @@ use crate::{
         def::{DeviceDef, DeviceId, Framing, Limits, LineId, Rs485, Serial, TagId, Transport},
         event::{Event, Fault},
         fixture,
-        tag::{Kind, Point, Poll, Table, TagDef},
+        tag::{DataType, Point, Poll, Table, TagDef},
     },
 };
 
@@ -104,7 +104,7 @@ pub fn plant(mode: Mode) -> PlantDef {
             id: TagId(index as u16),
             device: DeviceId(device),
             name: format!("U{}.{address}", device + 1),
-            point: Point { table: Table::Holding, address, kind: Kind::U16, ..sample.point },
+            point: Point { table: Table::Holding, address, kind: DataType::U16, ..sample.point },
             poll,
             ..sample.clone()
         })

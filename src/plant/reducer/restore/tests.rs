@@ -7,7 +7,7 @@ use crate::plant::{
     event::{Event, Fault, WriteResult},
     fixture::{self, DP, FAULT, SV, TIC},
     parameter_set::{ParameterSet, SetValue, plan},
-    tag::{Access, Bound, ByteOrder, Kind, Point, Table, TagDef},
+    tag::{Access, Bound, ByteOrder, DataType, Point, Table, TagDef},
 };
 
 const HIGH: TagId = TagId(5);
@@ -18,7 +18,8 @@ fn at(second: i64) -> Timestamp {
 
 fn def() -> PlantDef {
     let mut def = fixture::plant();
-    let point = Point { table: Table::Holding, address: 1030, kind: Kind::I16, order: ByteOrder::Abcd, field: None };
+    let point =
+        Point { table: Table::Holding, address: 1030, kind: DataType::I16, order: ByteOrder::Abcd, field: None };
     def.tags.push(TagDef {
         access: Access::ReadWrite,
         in_sets: true,

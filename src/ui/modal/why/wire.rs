@@ -12,7 +12,7 @@ use crate::{
     plant::{
         def::DeviceDef,
         event::LineState,
-        tag::{Access, ByteOrder, Kind, Poll, TagDef},
+        tag::{Access, ByteOrder, DataType, Poll, TagDef},
         traffic::Exchange,
     },
     ui::{
@@ -125,7 +125,7 @@ pub(super) fn point(def: &TagDef) -> String {
     };
     let order = match (point.table.is_bits(), point.order) {
         (true, _) => "",
-        (false, ByteOrder::Abcd | ByteOrder::Cdab) if point.kind.words() == 1 => "",
+        (false, ByteOrder::Abcd | ByteOrder::Cdab) if point.kind.registers() == 1 => "",
         (false, ByteOrder::Abcd) if def.is_text() => " ABCD (high byte first)",
         (false, ByteOrder::Abcd) => " ABCD (high word first)",
         (false, ByteOrder::Cdab) => " CDAB (low word first)",
@@ -138,20 +138,20 @@ pub(super) fn point(def: &TagDef) -> String {
 }
 
 /// The word of a type in the profiles.
-pub(super) fn kind(kind: Kind) -> String {
+pub(super) fn kind(kind: DataType) -> String {
     let word = match kind {
-        Kind::Text(bytes) => return format!("string({bytes})"),
-        Kind::Bool => "bool",
-        Kind::I16 => "int16",
-        Kind::U16 => "uint16",
-        Kind::I32 => "int32",
-        Kind::U32 => "uint32",
-        Kind::I64 => "int64",
-        Kind::U64 => "uint64",
-        Kind::F32 => "float32",
-        Kind::F64 => "float64",
-        Kind::Bcd16 => "bcd16",
-        Kind::Bcd32 => "bcd32",
+        DataType::Text(bytes) => return format!("string({bytes})"),
+        DataType::Bool => "bool",
+        DataType::I16 => "int16",
+        DataType::U16 => "uint16",
+        DataType::I32 => "int32",
+        DataType::U32 => "uint32",
+        DataType::I64 => "int64",
+        DataType::U64 => "uint64",
+        DataType::F32 => "float32",
+        DataType::F64 => "float64",
+        DataType::Bcd16 => "bcd16",
+        DataType::Bcd32 => "bcd32",
     };
     word.to_owned()
 }

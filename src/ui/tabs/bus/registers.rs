@@ -12,7 +12,7 @@ use crate::{
         def::LineId,
         diagnostics::{Diagnostic, DiagnosticState, Finding},
         number::{to_f32, to_u16},
-        tag::{ByteOrder, Kind, Point, Table},
+        tag::{ByteOrder, DataType, Point, Table},
     },
     ui::{
         UiAction, ViewContext,
@@ -200,12 +200,12 @@ fn pair_words(words: [u16; 2], order: ByteOrder) -> String {
     let point = |kind| Point { table: Table::Holding, address: 0, kind, order, field: None };
     let number = |kind| codec::decode(point(kind), &words);
     let whole = |kind| number(kind).map_or("–".to_owned(), |value| format!("{value:.0}"));
-    let float = number(Kind::F32).map_or("no number".to_owned(), |value| {
+    let float = number(DataType::F32).map_or("no number".to_owned(), |value| {
         let value = to_f32(value);
         let plain = value == 0.0 || (1e-4..1e7).contains(&value.abs());
         if plain { format!("{value}") } else { format!("{value:e}") }
     });
-    format!("{:>11} {:>12}  {float}", whole(Kind::U32), whole(Kind::I32))
+    format!("{:>11} {:>12}  {float}", whole(DataType::U32), whole(DataType::I32))
 }
 
 #[cfg(test)]
