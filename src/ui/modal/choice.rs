@@ -11,9 +11,16 @@ use crate::{
     },
     ui::{
         ViewContext, keys,
-        widgets::{text::width, value},
+        widgets::{
+            list::{Motion, first, on_screen},
+            text::width,
+            value,
+        },
     },
 };
+
+/// Rows of a page.
+const PAGE_ROWS: usize = 8;
 
 /// A list to pick from; picking leads to a confirm window.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,33 +67,28 @@ impl Choice {
     }
 
     pub(super) fn on_key(mut self, _cx: &ViewContext, event: KeyEvent) -> Next {
-        let last = self.rows.len().saturating_sub(1);
-        match event.code {
-            KeyCode::Up => self.selected = self.selected.saturating_sub(1),
-            KeyCode::Down => self.selected = (self.selected + 1).min(last),
-            KeyCode::Home => self.selected = 0,
-            KeyCode::End => self.selected = last,
-            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) && !self.rows.is_empty() => {
-                return Next::Stay(Modal::Confirm(self.rows.swap_remove(self.selected).next));
-            }
-            _ => {}
+        if keys::code(KeyCode::Enter).is(event) && !self.rows.is_empty() {
+            return Next::Stay(Modal::Confirm(self.rows.swap_remove(self.selected).next));
+        }
+        if let Some(motion) = Motion::of(event) {
+            self.selected = motion.to(self.selected, self.rows.len(), PAGE_ROWS);
         }
         Next::Stay(Modal::Choice(self))
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let shown = usize::from(body.height.saturating_sub(6)).clamp(1, self.rows.len().max(1));
-        let first = self.selected.saturating_sub(shown - 1);
+        let first = first(self.selected, self.rows.len(), shown);
         let inner = self.rows.iter().map(|row| width(&row.text)).max().unwrap_or(0).max(46);
         let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(shown) + 4));
         if let Some(row) = self.rows.get(self.selected) {
             canvas.text(0, 0, &format!("now {}", value::show(cx, row.tag).whole()), cx.theme.normal());
             canvas.text(0, 1, &wire_words(cx.def().tag(row.tag)), cx.theme.dim());
         }
-        for (y, (n, row)) in self.rows.iter().enumerate().skip(first).take(shown).enumerate() {
+        for (y, n, row) in on_screen(&self.rows, first, shown) {
             let style = if n == self.selected { cx.theme.focus() } else { cx.theme.normal() };
-            canvas.text(0, to_u16(y) + 2, if n == self.selected { "▸ " } else { "  " }, cx.theme.strong());
-            canvas.text(2, to_u16(y) + 2, &row.text, style);
+            canvas.text(0, y + 2, if n == self.selected { "▸ " } else { "  " }, cx.theme.strong());
+            canvas.text(2, y + 2, &row.text, style);
         }
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, "↑↓ select   ⏎ next   Esc leave unchanged", cx.theme.strong());

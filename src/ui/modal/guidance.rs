@@ -11,7 +11,10 @@ use crate::{
         keys::{self, Hint},
         modal::confirm::subject,
         tabs::alarms::{guidance, suppressed_words},
-        widgets::text::{pad, wrap},
+        widgets::{
+            list::{Motion, Scroll},
+            text::{pad, wrap},
+        },
     },
 };
 
@@ -24,14 +27,13 @@ pub struct Guidance {
     alarm: AlarmId,
     /// The faceplate of what the alarm watches, which Enter opens.
     faceplate: Option<Faceplate>,
-    /// The first row that is shown.
-    first: u16,
+    scroll: Scroll,
 }
 
 impl Guidance {
     /// From the top.
     pub fn new(alarm: AlarmId, faceplate: Option<Faceplate>) -> Guidance {
-        Guidance { alarm, faceplate, first: 0 }
+        Guidance { alarm, faceplate, scroll: Scroll::default() }
     }
 
     /// The keys of the moment.
@@ -42,6 +44,10 @@ impl Guidance {
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
+        if let Some(motion) = Motion::of(event) {
+            let rows = self.lines(cx, room(cx.area)).len();
+            self.scroll.on(motion, rows, usize::from(cx.area.height.saturating_sub(4)));
+        }
         match event.code {
             KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
                 return match self.faceplate {
@@ -50,11 +56,6 @@ impl Guidance {
                 };
             }
             KeyCode::Char('q') => return Next::Close,
-            KeyCode::Up => self.first = self.first.saturating_sub(1),
-            KeyCode::Down => {
-                let lines = self.lines(cx, room(cx.area)).len() as u16;
-                self.first = (self.first + 1).min(lines.saturating_sub(cx.area.height.saturating_sub(4)));
-            }
             _ => {}
         }
         Next::Stay(Modal::Guidance(Box::new(self)))
@@ -88,7 +89,7 @@ impl Guidance {
         let title = format!("{} {} {} {condition}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
         let mut canvas = window(cx, frame, body, title.trim_end(), (room + NAMES, lines.len() as u16 + 2));
         let rows = canvas.height().saturating_sub(2);
-        let first = usize::from(self.first.min((lines.len() as u16).saturating_sub(rows)));
+        let first = self.scroll.first(lines.len(), usize::from(rows));
         for (y, (name, text)) in lines.iter().skip(first).take(usize::from(rows)).enumerate() {
             canvas.text(0, y as u16, &pad(name, NAMES), theme.dim());
             canvas.text(NAMES, y as u16, text, theme.normal());

@@ -4,26 +4,29 @@ use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
-use crate::{
-    plant::number::to_u16,
-    ui::{
-        ViewContext, keys,
-        keys::{Global, Hint},
-        tabs::{Tab, Tabs},
-        widgets::text::{pad, width},
+use crate::plant::number::to_u16;
+use crate::ui::{
+    ViewContext, keys,
+    keys::{Global, Hint},
+    tabs::{Tab, Tabs},
+    widgets::{
+        list::Motion,
+        text::{pad, width},
     },
 };
 
 pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
     match event.code {
-        KeyCode::Up => Next::Stay(Modal::Help(row.saturating_sub(1))),
-        KeyCode::Down => Next::Stay(Modal::Help((row + 1).min(99))),
-        KeyCode::PageUp => Next::Stay(Modal::Help(row.saturating_sub(10))),
-        KeyCode::PageDown => Next::Stay(Modal::Help((row + 10).min(99))),
         KeyCode::Char('q' | '?') | KeyCode::Enter => Next::Close,
-        _ => Next::Stay(Modal::Help(row)),
+        _ => {
+            let moved = Motion::of(event).map_or(row, |motion| to_u16(motion.to(usize::from(row), ROWS_MAX, 10)));
+            Next::Stay(Modal::Help(moved))
+        }
     }
 }
+
+/// No tab has more keys; the view stops at the last one.
+const ROWS_MAX: usize = 100;
 
 pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
     let own = tabs.shown().hints(cx);

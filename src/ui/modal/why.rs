@@ -21,7 +21,10 @@ use crate::{
     ui::{
         UiAction, ViewContext,
         keys::Hint,
-        widgets::text::{Canvas, fit_words, width, wrap},
+        widgets::{
+            list::Motion,
+            text::{Canvas, fit_words, width, wrap},
+        },
     },
 };
 
@@ -72,12 +75,10 @@ impl Why {
 
     pub(super) fn on_key(mut self, event: KeyEvent) -> Next {
         let count = self.tags.len();
+        if let Some(motion) = Motion::of(event) {
+            self.row = to_u16(motion.to(usize::from(self.row), ROWS_MAX, 10));
+        }
         match event.code {
-            KeyCode::Up => self.row = self.row.saturating_sub(1),
-            KeyCode::Down => self.row = (self.row + 1).min(ROWS_MAX),
-            KeyCode::PageUp => self.row = self.row.saturating_sub(10),
-            KeyCode::PageDown => self.row = (self.row + 10).min(ROWS_MAX),
-            KeyCode::Home => self.row = 0,
             KeyCode::Left => (self.at, self.row) = ((self.at + count - 1) % count, 0),
             KeyCode::Right => (self.at, self.row) = ((self.at + 1) % count, 0),
             KeyCode::Enter | KeyCode::Char('q' | 'w') => return Next::Close,
@@ -115,7 +116,7 @@ const LABEL: u16 = 9;
 /// Wider than this a window is harder to read, not easier.
 const WIDTH_MAX: u16 = 100;
 /// Further than this nothing is scrolled.
-const ROWS_MAX: u16 = 999;
+const ROWS_MAX: usize = 999;
 
 /// Words that are too long go on in the next row.
 fn laid_out(rows: Vec<Row>, room: u16) -> Vec<Row> {

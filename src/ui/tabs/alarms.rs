@@ -32,6 +32,7 @@ use crate::{
         keys::{Hint, find},
         last_frame::Rows,
         modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_words},
+        widgets::list::{Motion, Selected, first},
     },
 };
 use filter::Filter;
@@ -82,7 +83,7 @@ impl Page {
 pub struct Alarms {
     page: Page,
     /// The selected alarm; it stays selected when the list moves.
-    selected: Option<AlarmId>,
+    selected: Selected<AlarmId>,
     /// First-out groups whose consequences are shown, by their beginning; only those that are in the list.
     unfolded: Vec<Timestamp>,
     filter: Filter,
@@ -104,8 +105,7 @@ impl TabView for Alarms {
         let Some(action) = find(&keys::table(self.page), event) else { return Vec::new() };
         let alarm = self.selected(cx);
         match action {
-            Action::Move(by) => self.step(cx, by),
-            Action::Page(by) => self.step(cx, by * self.page_rows(cx) as isize),
+            Action::Move(motion) => self.step(cx, motion),
             Action::View(by) => self.turn(by),
             Action::Bell => self.bell = !self.bell,
             Action::Fold => self.fold(cx),
@@ -181,8 +181,7 @@ impl TabView for Alarms {
                 Rows::of(rows.iter().map(seen), self.place(&rows))
             }
             Page::Suppressed => {
-                let place = |suppressed: &SuppressedAlarm| Some(suppressed.id) == self.selected;
-                let place = cx.snapshot.suppressed.iter().position(place).unwrap_or(0);
+                let place = self.selected.place(cx.snapshot.suppressed.iter().map(|suppressed| suppressed.id));
                 Rows::of(
                     cx.snapshot
                         .suppressed
@@ -271,7 +270,7 @@ impl Alarms {
     }
 
     fn place(&self, rows: &[list::Row]) -> usize {
-        rows.iter().position(|row| Some(row.alarm.id) == self.selected).unwrap_or(0)
+        self.selected.place(rows.iter().map(|row| row.alarm.id))
     }
 
     /// Rows of the list that the screen has room for.
@@ -286,13 +285,13 @@ impl Alarms {
     fn seen<'a>(&self, cx: &ViewContext<'a>) -> Vec<&'a ActiveAlarm> {
         let rows = self.rows(cx);
         let room = self.page_rows(cx);
-        let first = view::first(self.place(&rows), room);
+        let first = first(self.place(&rows), rows.len(), room);
         rows.into_iter().skip(first).take(room).map(|row| row.alarm).collect()
     }
 
     fn suppressed<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a SuppressedAlarm> {
         let snapshot = cx.snapshot;
-        let place = snapshot.suppressed.iter().position(|suppressed| Some(suppressed.id) == self.selected).unwrap_or(0);
+        let place = self.selected.place(snapshot.suppressed.iter().map(|suppressed| suppressed.id));
         snapshot.suppressed.get(place).filter(|_| self.page == Page::Suppressed)
     }
 
@@ -301,16 +300,16 @@ impl Alarms {
         self.selected(cx).map(|alarm| alarm.id).or_else(|| self.suppressed(cx).map(|suppressed| suppressed.id))
     }
 
-    fn step(&mut self, cx: &ViewContext, by: isize) {
+    fn step(&mut self, cx: &ViewContext, motion: Motion) {
+        let room = self.page_rows(cx);
         let ids: Vec<AlarmId> = match self.page {
             Page::Active | Page::System => self.rows(cx).iter().map(|row| row.alarm.id).collect(),
-            Page::Suppressed => cx.snapshot.suppressed.iter().map(|suppressed| suppressed.id).collect(),
-            Page::Journal => return self.journal.step(cx, by),
-            Page::Metrics => return self.metrics.step(cx, by),
-            Page::Handover => return self.handover.step(cx, by),
+            Page::Suppressed => cx.snapshot.suppressed.iter().map(|alarm| alarm.id).collect(),
+            Page::Journal => return self.journal.step(cx, motion, room),
+            Page::Metrics => return self.metrics.step(cx, motion, room),
+            Page::Handover => return self.handover.step(cx, motion, room),
         };
-        let place = ids.iter().position(|id| Some(*id) == self.selected).unwrap_or(0);
-        self.selected = ids.get(place.saturating_add_signed(by).min(ids.len().saturating_sub(1))).copied();
+        self.selected.on(motion, ids, room);
     }
 
     fn turn(&mut self, by: isize) {
@@ -327,10 +326,10 @@ impl Alarms {
         }
         // Folded away with its first-out group, it is the first of it that is selected.
         let rows = self.rows(cx);
-        if !rows.iter().any(|row| Some(row.alarm.id) == self.selected) {
+        if !rows.iter().any(|row| self.selected.0 == Some(row.alarm.id)) {
             let leader =
                 rows.iter().find(|row| row.folded && row.alarm.first_out.map(|b| b.began) == Some(first_out.began));
-            self.selected = leader.map(|row| row.alarm.id);
+            self.selected.0 = leader.map(|row| row.alarm.id);
         }
     }
 

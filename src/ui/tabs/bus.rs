@@ -40,6 +40,7 @@ use crate::{
         modal::{Modal, Notice, Settings},
         widgets::{
             line_trend::{self, line_trend},
+            list::{Motion, Scroll, motions},
             text::{Canvas, between, fit_words, running, width},
         },
     },
@@ -87,12 +88,8 @@ pub enum Action {
     Show(Page),
     /// The next line of the plant.
     NextLine,
-    /// So many rows down.
-    Move(isize),
-    /// So many screens down.
-    Screen(isize),
-    /// To the first or last row.
-    Jump(isize),
+    /// Another row.
+    Move(Motion),
     /// Opens what is selected.
     Open,
     /// Why the values of the selected block are what they are.
@@ -124,32 +121,23 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('F'), "", "page Frames", Action::Show(Page::Frames)),
     Key::new(char('T'), "", "page Test", Action::Show(Page::Test)),
     Key::new(char('n'), "", "the next line of the plant", Action::NextLine),
-    Key::new(code(KeyCode::PageUp), "", "a screen up", Action::Screen(-1)),
-    Key::new(code(KeyCode::PageDown), "", "a screen down", Action::Screen(1)),
-    Key::new(code(KeyCode::Home), "", "to the first row", Action::Jump(-1)),
-    Key::new(code(KeyCode::End), "", "to the last row", Action::Jump(1)),
-    Key::new(code(KeyCode::Up), "", "a row up", Action::Move(-1)),
 ];
 /// Keys of the first page.
 const LINE_KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Down), "scroll", "a row down", Action::Move(1)),
     Key::new(char('r'), "retry", "ask devices that do not answer now", Action::Retry).needs(Role::Technician),
     Key::new(char('c'), "settings", "communication settings of the line", Action::Settings),
 ];
 const PLAN_KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
     Key::new(code(KeyCode::Enter), "tags", "the tags of the block", Action::Open),
     Key::new(char('w'), "why", "why the values of the block are what they are", Action::Why),
 ];
 const FRAMES_KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
     Key::new(char(' '), "hold", "hold the frames still, or let them run", Action::Freeze),
     Key::new(code(KeyCode::Enter), "decode", "every byte of the frame", Action::Open),
     Key::new(char('f'), "filter", "choose which frames are shown", Action::Filter),
     Key::new(char('x'), "save", "write them as text and for Wireshark", Action::Save),
 ];
 const TEST_KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
     Key::new(code(KeyCode::Enter), "start", "start the selected test", Action::Open).needs(Role::Technician),
     Key::new(char('t'), "", "type bytes and send them", Action::Try(Tried::Bytes)),
     Key::new(char('f'), "", "a request by its fields", Action::Try(Tried::Request)),
@@ -166,8 +154,8 @@ const TEST_KEYS: &[Key<Action>] = &[
 pub struct Bus {
     line: LineId,
     page: Page,
-    /// First row shown of the first page.
-    first: usize,
+    /// The first page.
+    scroll: Scroll,
     plan: plan::Plan,
     frames: frames::Ring,
     /// The bench of tests.
@@ -183,7 +171,7 @@ impl TabView for Bus {
         Bus {
             line: LineId(0),
             page: Page::Line,
-            first: 0,
+            scroll: Scroll::default(),
             plan: plan::Plan::default(),
             frames: frames::Ring::default(),
             test: test::Bench::default(),
@@ -194,9 +182,8 @@ impl TabView for Bus {
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let action = keys::find(page_keys(self.page), event).or_else(|| keys::find(KEYS, event));
+        let action = keys::find(&table(self.page), event);
         let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
-        let screen = isize::try_from(self.room(cx)).unwrap_or(1).max(2) - 1;
         self.frames.dismiss();
         match action {
             Action::Turn(by) => {
@@ -205,9 +192,7 @@ impl TabView for Bus {
             }
             Action::Show(page) => self.page = page,
             Action::NextLine => self.choose_line(cx, 1),
-            Action::Move(by) => self.scroll(cx, &at, by),
-            Action::Screen(by) => self.scroll(cx, &at, by * screen),
-            Action::Jump(by) => self.scroll(cx, &at, by * 100_000),
+            Action::Move(motion) => self.scroll(cx, &at, motion),
             Action::Open => return self.open(cx, &at),
             Action::Why => return self.plan.why(cx, &at),
             Action::Freeze => self.frames.toggle(cx, &at),
@@ -227,18 +212,16 @@ impl TabView for Bus {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut hints = keys::hints(page_keys(self.page));
+        let mut hints = keys::hints(&table(self.page));
         if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
             for hint in hints.iter_mut().filter(|hint| hint.label == "stop") {
                 hint.label.clear();
             }
         }
-        let mut common = keys::hints(KEYS);
         if 1 < cx.def().lines.len() {
-            common.iter_mut().filter(|hint| hint.key == "n").for_each(|hint| hint.label = "line".to_owned());
+            hints.iter_mut().filter(|hint| hint.key == "n").for_each(|hint| hint.label = "line".to_owned());
         }
-        // `↑` stands last of the common keys, so that it is shown with the page's own `↓`.
-        common.into_iter().chain(hints).collect()
+        hints
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
@@ -302,7 +285,7 @@ impl TabView for Bus {
         match self.page {
             Page::Line => {
                 let rows = line::rows(cx, &at, width);
-                rows::draw(cx, &mut page, &rows, self.first);
+                rows::draw(cx, &mut page, &rows, self.scroll.first(rows.len(), self.room(cx) - 1));
                 self.day(cx, &mut page, rows.len() as u16);
             }
             Page::Plan => self.plan.view(cx, &at, &mut page),
@@ -313,14 +296,14 @@ impl TabView for Bus {
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        Page::ALL.iter().map(|page| (page.title(), keys::chords_of(&[page_keys(*page), KEYS].concat()))).collect()
+        Page::ALL.iter().map(|page| (page.title(), keys::chords_of(&table(*page)))).collect()
     }
 }
 
 impl Bus {
     /// Rows that a page has below the heading.
     fn room(&self, cx: &ViewContext) -> usize {
-        usize::from(cx.area.height.saturating_sub(1))
+        usize::from(cx.area.height.saturating_sub(1)).max(2)
     }
 
     /// How the line did over the last day, below the rows where there is room for it.
@@ -338,23 +321,21 @@ impl Bus {
     fn choose_line(&mut self, cx: &ViewContext, by: isize) {
         let count = cx.def().lines.len().max(1) as isize;
         self.line = LineId((self.line.index() as isize + by).rem_euclid(count) as u16);
-        (self.first, self.plan) = (0, plan::Plan::default());
+        (self.scroll, self.plan) = (Scroll::default(), plan::Plan::default());
         self.frames.forget();
         self.test.first = None;
         self.minutes.clear();
         self.periodic = PeriodicQuery::default();
     }
 
-    fn scroll(&mut self, cx: &ViewContext, at: &Place, by: isize) {
-        match self.page {
-            Page::Line if by.abs() == 1 && 1 < cx.def().lines.len() => self.choose_line(cx, by),
-            Page::Line => {
-                let rows = line::rows(cx, at, cx.area.width).len();
-                self.first = self.first.saturating_add_signed(by).min(rows::last_first(rows, self.room(cx)));
-            }
-            Page::Plan => self.plan.scroll(at, by),
-            Page::Frames => self.frames.scroll(cx, at, by),
-            Page::Test => self.test.scroll(cx, at, by),
+    fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion) {
+        let room = self.room(cx);
+        match (self.page, motion) {
+            (Page::Line, Motion::Rows(by)) if 1 < cx.def().lines.len() => self.choose_line(cx, by),
+            (Page::Line, _) => self.scroll.on(motion, line::rows(cx, at, cx.area.width).len(), room - 1),
+            (Page::Plan, _) => self.plan.scroll(at, motion, room),
+            (Page::Frames, _) => self.frames.scroll(cx, at, motion, room),
+            (Page::Test, _) => self.test.scroll(cx, at, motion),
         }
     }
 
@@ -443,11 +424,13 @@ fn state_words(cx: &ViewContext, at: &Place) -> String {
     }
 }
 
-fn page_keys(page: Page) -> &'static [Key<Action>] {
-    match page {
-        Page::Line => LINE_KEYS,
-        Page::Plan => PLAN_KEYS,
-        Page::Frames => FRAMES_KEYS,
-        Page::Test => TEST_KEYS,
-    }
+/// The keys of a page: those of every page first.
+fn table(page: Page) -> Vec<Key<Action>> {
+    let (moves, own) = match page {
+        Page::Line => (motions!("scroll", Action::Move), LINE_KEYS),
+        Page::Plan => (motions!("select", Action::Move), PLAN_KEYS),
+        Page::Frames => (motions!("select", Action::Move), FRAMES_KEYS),
+        Page::Test => (motions!("select", Action::Move), TEST_KEYS),
+    };
+    [KEYS, &moves, own].concat()
 }

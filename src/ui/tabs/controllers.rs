@@ -45,7 +45,10 @@ use crate::{
         keys::{Hint, find, hints},
         last_frame::Rows,
         modal::{Confirm, Faceplate, Modal, Prompt},
-        widgets::text::Canvas,
+        widgets::{
+            list::{Motion, Words},
+            text::Canvas,
+        },
     },
 };
 
@@ -112,7 +115,7 @@ impl TabView for Controllers {
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let Some(action) = find(page_keys(&self.page), event) else { return Vec::new() };
+        let Some(action) = find(&page_keys(&self.page), event) else { return Vec::new() };
         let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
         match action {
             Action::Guide => {
@@ -127,11 +130,9 @@ impl TabView for Controllers {
                 Vec::new()
             }
             Action::Device(by) => self.step_device(cx, by),
-            Action::Move(by) => self.move_by(cx, device, by),
+            Action::Move(motion) => self.move_by(cx, device, motion),
             Action::Column(by) => {
-                if let Some(program) = &device.program {
-                    self.cell.move_by(program, by, 0);
-                }
+                self.cell.column = self.cell.column.saturating_add_signed(by).min(2);
                 Vec::new()
             }
             Action::Open => self.open(cx, device),
@@ -149,7 +150,11 @@ impl TabView for Controllers {
             Action::Find => {
                 self.asked_for = Asked::Filter;
                 let hint = "words in name or meaning; empty shows all";
-                vec![UiAction::Open(Modal::Prompt(Prompt::new("find a parameter", hint, &self.table.filter)))]
+                vec![UiAction::Open(Modal::Prompt(Prompt::new(
+                    "find a parameter",
+                    hint,
+                    &self.table.filter.to_string(),
+                )))]
             }
             Action::Defaults => {
                 self.table.defaults = !self.table.defaults;
@@ -189,7 +194,7 @@ impl TabView for Controllers {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut hints = hints(page_keys(&self.page));
+        let mut hints = hints(&page_keys(&self.page));
         let device = cx.def().devices.get(self.device.index());
         let lacks = |label: &str| {
             device.is_some_and(|device| match label {
@@ -221,7 +226,7 @@ impl TabView for Controllers {
         let alone = cx.def().devices.len() <= 1;
         self.page = match page {
             Page::Device if !self.table.filter.is_empty() => {
-                (self.table.filter, self.table.selected) = (String::new(), 0);
+                (self.table.filter, self.table.selected) = (Words::default(), 0);
                 Page::Device
             }
             Page::Device if !alone => {
@@ -278,7 +283,7 @@ impl TabView for Controllers {
         let text = text.trim();
         match self.asked_for {
             Asked::Filter => {
-                let filter = text.to_owned();
+                let filter = Words::parse(text);
                 let mut table = Table { selected: 0, filter, ..self.table.clone() };
                 if table.rows(cx, self.device).is_empty() {
                     return Err(format!("no parameter has \"{text}\" in its name or meaning"));
@@ -353,24 +358,19 @@ impl Controllers {
         self.on_snapshot(cx)
     }
 
-    fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, by: isize) -> Vec<UiAction> {
+    fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion) -> Vec<UiAction> {
+        let room = usize::from(cx.area.height.saturating_sub(4)).max(1);
+        let to = |at: usize, count: usize| motion.to(at, count, room);
         match &mut self.page {
-            Page::List => {
-                let last = cx.def().devices.len().saturating_sub(1);
-                self.device = DeviceId(to_u16(usize::from(self.device.0).saturating_add_signed(by).min(last)));
-            }
-            Page::Device => self.table.move_by(cx, device.id, by),
+            Page::List => self.device = DeviceId(to_u16(to(usize::from(self.device.0), cx.def().devices.len()))),
+            Page::Device => self.table.selected = to(self.table.selected, self.table.rows(cx, device.id).len()),
             Page::Program => {
-                if let Some(program) = &device.program {
-                    self.cell.move_by(program, 0, by);
-                }
+                let steps = device.program.as_ref().map_or(0, |program| program.steps.len());
+                self.cell.row = to(self.cell.row, steps);
             }
-            Page::Sets => {
-                let last = sets::sources(cx, device).len().saturating_sub(1);
-                self.set = self.set.saturating_add_signed(by).min(last);
-            }
-            Page::Compare(compare) => compare.move_by(cx, device, by),
-            Page::Guide(page, _) => *page = page.saturating_add_signed(by.signum()).min(guide::PAGES.len() - 1),
+            Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
+            Page::Compare(compare) => compare.scroll(cx, device, motion, room),
+            Page::Guide(..) => {}
         }
         Vec::new()
     }

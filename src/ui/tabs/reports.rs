@@ -21,6 +21,7 @@ use crate::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char, code},
         modal::{Modal, Prompt, Why},
+        widgets::list::{Motion, Scroll, motions},
     },
 };
 
@@ -35,14 +36,8 @@ pub enum Action {
     Running,
     /// Any period.
     Free,
-    /// A line up.
-    Up,
-    /// A line down.
-    Down,
-    /// A page up.
-    PageUp,
-    /// A page down.
-    PageDown,
+    /// Scroll.
+    Move(Motion),
     /// Write the CSV.
     Export,
     /// The other way to write CSV.
@@ -61,13 +56,13 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
     Key::new(char('e'), "export", "write the report as CSV", Action::Export).needs(Role::Technician),
     Key::new(char(';'), "format", "CSV with , and . or with ; and ,", Action::Dialect),
-    Key::new(code(KeyCode::Up), "", "scroll up", Action::Up),
-    Key::new(code(KeyCode::Down), "", "scroll down", Action::Down),
-    Key::new(code(KeyCode::PageUp), "", "a page up", Action::PageUp),
-    Key::new(code(KeyCode::PageDown), "", "a page down", Action::PageDown),
     Key::new(char('u'), "", "read the figures anew", Action::Refresh),
     Key::new(char('w'), "", "why its values are what they are now", Action::Why),
 ];
+
+fn table() -> Vec<Key<Action>> {
+    [KEYS, &motions!("", Action::Move)].concat()
+}
 
 /// How often the figures of a running shift are read anew, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 30.0;
@@ -88,8 +83,7 @@ pub struct Reports {
     export: Export,
     /// The CSV that waits for the station's word.
     outgoing: Option<Outgoing>,
-    /// First line shown.
-    first: usize,
+    scroll: Scroll,
     periodic: PeriodicQuery,
     number: u32,
 }
@@ -117,7 +111,7 @@ impl TabView for Reports {
             dialect: snapshot.def.report.csv,
             export: Export::Not,
             outgoing: None,
-            first: 0,
+            scroll: Scroll::default(),
             periodic: PeriodicQuery::default(),
             number: 0,
         }
@@ -185,22 +179,21 @@ impl TabView for Reports {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.dismiss();
-        keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
+        keys::find(&table(), event).map(|action| self.act(cx, action)).unwrap_or_default()
     }
 
     fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
-        keys::hints(KEYS)
+        keys::hints(&table())
     }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        vec![("reports", keys::chords_of(KEYS))]
+        vec![("reports", keys::chords_of(&table()))]
     }
 }
 
 impl Reports {
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let page = usize::from(cx.area.height.saturating_sub(3)).max(1);
         match action {
             Action::Before => self.step(cx, period::before),
             Action::After => self.step(cx, |def, shown| period::after(def, shown, cx.now)),
@@ -212,10 +205,7 @@ impl Reports {
                 let prompt = Prompt::new("report of a period", period::FORMS, "");
                 return vec![UiAction::Open(Modal::Prompt(prompt))];
             }
-            Action::Up => self.first = self.first.saturating_sub(1),
-            Action::Down => self.scroll(cx, 1),
-            Action::PageUp => self.first = self.first.saturating_sub(page),
-            Action::PageDown => self.scroll(cx, page),
+            Action::Move(motion) => self.scroll(cx, motion),
             Action::Export => return self.export(cx),
             Action::Dialect => {
                 self.dialect = self.dialect.toggled(cx.def().report.csv);
@@ -241,7 +231,7 @@ impl Reports {
 impl Reports {
     /// Shows another period; figures of the old one must not stand under its name.
     fn show(&mut self, period: Option<Period>) {
-        (self.period, self.follow, self.report, self.first) = (period, false, None, 0);
+        (self.period, self.follow, self.report, self.scroll) = (period, false, None, Scroll::default());
         (self.export, self.trouble) = (Export::Not, None);
         self.periodic.want();
     }
@@ -252,10 +242,10 @@ impl Reports {
         }
     }
 
-    fn scroll(&mut self, cx: &ViewContext, by: usize) {
+    fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
         let lines = self.report.as_ref().map_or(0, |report| view::lines(cx, report).len());
-        self.first = (self.first + by).min(lines.saturating_sub(rows));
+        self.scroll.on(motion, lines, rows);
     }
 
     fn is_running(&self, now: Timestamp) -> bool {

@@ -3,10 +3,10 @@
 mod audit;
 mod view;
 
-use crossterm::event::{KeyCode, KeyEvent};
+use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
 
-pub use audit::{Action as AuditAction, Audit, KEYS as AUDIT};
+use audit::{Action as AuditAction, Audit};
 
 use super::TabView;
 use crate::{
@@ -15,18 +15,19 @@ use crate::{
     plant::{role::Role, snapshot::Snapshot},
     ui::{
         UiAction, ViewContext,
-        keys::{self, Hint, Key, char, code},
+        keys::{self, Hint, Key, char},
         last_frame::Rows,
         modal::{Modal, Notice, UserForm, user_form::Purpose},
         session_lock,
+        widgets::list::{Motion, Selected, motions},
     },
 };
 
 /// What a key means on the list of users.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Select so many rows further on.
-    Move(isize),
+    /// Select another row.
+    Move(Motion),
     /// Add somebody.
     Add,
     /// Another role.
@@ -43,8 +44,6 @@ pub enum Action {
 
 /// Keys of the list of users.
 const LIST: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Up), "", "select the user above", Action::Move(-1)),
-    Key::new(code(KeyCode::Down), "select", "select the user below", Action::Move(1)),
     Key::new(char('n'), "new", "add a user", Action::Add),
     Key::new(char('r'), "role", "another role for the selected user", Action::Role),
     Key::new(char('d'), "disable", "shut the selected user out, or let in again; ends a lockout too", Action::Disable),
@@ -53,11 +52,15 @@ const LIST: &[Key<Action>] = &[
     Key::new(char('j'), "audit list", "everything that was done, by whom, from where", Action::Audit),
 ];
 
+fn list_keys() -> Vec<Key<Action>> {
+    [&motions!("select", Action::Move), LIST].concat()
+}
+
 /// State of this tab.
 #[derive(Debug, Default)]
 pub struct Users {
     /// The selected user; the selection stays when the list moves.
-    selected: Option<std::sync::Arc<str>>,
+    selected: Selected<std::sync::Arc<str>>,
     /// The audit list while it is shown.
     audit: Option<Audit>,
     /// Queries asked so far.
@@ -67,7 +70,7 @@ pub struct Users {
 impl TabView for Users {
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         match &mut self.audit {
-            Some(audit) => match keys::find(AUDIT, event) {
+            Some(audit) => match keys::find(&audit::keys(), event) {
                 Some(AuditAction::Back) => {
                     self.audit = None;
                     Vec::new()
@@ -79,12 +82,12 @@ impl TabView for Users {
                 }
                 None => Vec::new(),
             },
-            None => keys::find(LIST, event).map(|action| self.act(cx, action)).unwrap_or_default(),
+            None => keys::find(&list_keys(), event).map(|action| self.act(cx, action)).unwrap_or_default(),
         }
     }
 
     fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
-        if self.audit.is_some() { keys::hints(AUDIT) } else { keys::hints(LIST) }
+        if self.audit.is_some() { keys::hints(&audit::keys()) } else { keys::hints(&list_keys()) }
     }
 
     fn back(&mut self, _cx: &ViewContext) -> bool {
@@ -140,7 +143,7 @@ impl TabView for Users {
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        vec![("users", keys::chords_of(LIST)), ("audit", keys::chords_of(AUDIT))]
+        vec![("users", keys::chords_of(&list_keys())), ("audit", keys::chords_of(&audit::keys()))]
     }
 }
 
@@ -150,9 +153,9 @@ impl Users {
         let place = self.place(cx);
         let row = users.get(place);
         let form = match (action, row) {
-            (Action::Move(by), _) => {
-                let place = place.saturating_add_signed(by).min(users.len().saturating_sub(1));
-                self.selected = users.get(place).map(|row| row.user.clone());
+            (Action::Move(motion), _) => {
+                let room = usize::from(cx.area.height.saturating_sub(1));
+                self.selected.on(motion, users.iter().map(|row| row.user.clone()), room);
                 None
             }
             (Action::Audit, _) => {
@@ -184,7 +187,7 @@ impl Users {
 
     /// The place of the selected user.
     fn place(&self, cx: &ViewContext) -> usize {
-        cx.session.users.iter().position(|row| Some(&row.user) == self.selected.as_ref()).unwrap_or(0)
+        self.selected.place(cx.session.users.iter().map(|row| row.user.clone()))
     }
 }
 

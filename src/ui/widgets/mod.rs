@@ -2,6 +2,7 @@
 
 pub mod chart;
 pub mod line_trend;
+pub mod list;
 pub mod mimic;
 pub mod spark;
 pub mod text;

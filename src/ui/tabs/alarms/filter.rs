@@ -6,7 +6,7 @@ use crate::{
         def::{AlarmDef, PlantDef, Priority},
         snapshot::ActiveAlarm,
     },
-    ui::ViewContext,
+    ui::{ViewContext, widgets::list::Words},
 };
 
 /// What may be typed, for the entry window.
@@ -21,8 +21,8 @@ pub struct Filter {
     pub state: Option<AlarmState>,
     /// Alarms of this area only.
     pub area: Option<String>,
-    /// Words in small letters that must all be found.
-    words: Vec<String>,
+    /// Words that must all be found.
+    words: Words,
 }
 
 /// The states that an alarm in the list can be in.
@@ -37,11 +37,11 @@ const STATES: [AlarmState; 5] = [
 impl Filter {
     /// Takes the words that were typed; none is no filter.
     pub fn type_words(&mut self, text: &str) {
-        self.words = text.split_whitespace().map(str::to_lowercase).collect();
+        self.words = Words::parse(text);
     }
     /// The words, as they were typed.
     pub fn typed(&self) -> String {
-        self.words.join(" ")
+        self.words.to_string()
     }
     /// Lets everything through?
     pub fn is_off(&self) -> bool {
@@ -75,11 +75,7 @@ impl Filter {
         self.priority.is_none_or(|priority| priority == def.priority)
             && self.state.is_none_or(|state| state == alarm.state)
             && self.area.as_ref().is_none_or(|area| *area == def.area)
-            && (self.words.is_empty() || self.finds(&text_of(cx, alarm, def)))
-    }
-
-    fn finds(&self, text: &str) -> bool {
-        self.words.iter().all(|word| text.contains(word))
+            && self.words.fit(&text_of(cx, alarm, def))
     }
 
     /// What it asks for: `high  UNACK  area TK-1  "tic"`; empty where it lets everything through.
@@ -94,10 +90,10 @@ impl Filter {
     }
 }
 
-/// All that is looked through for words, in small letters: what the view shows, nothing that is hidden.
+/// All that is looked through for words: what the view shows, nothing that is hidden.
 fn text_of(cx: &ViewContext, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
     let by = alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default();
-    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.message, alarm.state.word()).to_lowercase()
+    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.message, alarm.state.word())
 }
 
 /// The one after `now`, nothing after the last one.

@@ -24,6 +24,7 @@ use crate::{
         UiAction, ViewContext,
         modal::{confirm::subject, faceplate::device_words},
         widgets::{
+            list::{Motion, Scroll},
             text::{Canvas, between, clock, fit_words, moment, running, wrap},
             value,
         },
@@ -59,7 +60,7 @@ pub struct Handover {
     actions: Vec<ActionRecord>,
     answered: bool,
     trouble: Option<String>,
-    first: usize,
+    scroll: Scroll,
     periodic: PeriodicQuery,
 }
 
@@ -73,15 +74,13 @@ impl Handover {
             _ => span::later(cx, shown.as_ref()),
         };
         self.period = chosen.filter(|chosen| chosen.to <= cx.now);
-        (self.actions, self.answered, self.trouble, self.first) = (Vec::new(), false, None, 0);
+        (self.actions, self.answered, self.trouble, self.scroll) = (Vec::new(), false, None, Scroll::default());
         self.periodic = PeriodicQuery::default();
     }
 
     /// Scrolls.
-    pub fn step(&mut self, cx: &ViewContext, by: isize) {
-        let room = usize::from(cx.area.height.saturating_sub(2)).max(1);
-        let lines = self.lines(cx, cx.area.width).len();
-        self.first = self.first.saturating_add_signed(by).min(lines.saturating_sub(room));
+    pub fn step(&mut self, cx: &ViewContext, motion: Motion, room: usize) {
+        self.scroll.on(motion, self.lines(cx, cx.area.width).len(), room);
     }
 
     /// An action was done: queries at once what it changed.
@@ -148,10 +147,11 @@ impl Handover {
         };
         let lines = self.lines(cx, width);
         let room = usize::from(height.saturating_sub(1));
-        for (y, (text, style)) in lines.iter().skip(self.first).take(room).enumerate() {
+        let first = self.scroll.first(lines.len(), room);
+        for (y, (text, style)) in lines.iter().skip(first).take(room).enumerate() {
             canvas.text(1, to_u16(y) + 1, text, *style);
         }
-        let more = lines.len().saturating_sub(self.first + room);
+        let more = lines.len().saturating_sub(first + room);
         if more > 0 {
             canvas.text_right(width.saturating_sub(1), 0, &format!("{more} more below"), theme.strong());
         }

@@ -16,7 +16,10 @@ use crate::{
     report::Period,
     ui::{
         UiAction, ViewContext,
-        widgets::text::{Canvas, fit_words, moment, pad},
+        widgets::{
+            list::{Motion, Scroll, Words},
+            text::{Canvas, fit_words, moment, pad},
+        },
     },
 };
 
@@ -38,10 +41,9 @@ pub struct Journal {
     actions: Vec<ActionRecord>,
     answered: bool,
     trouble: Option<String>,
-    /// First row shown.
-    first: usize,
-    /// Words in small letters that must all be found in a row.
-    words: Vec<String>,
+    scroll: Scroll,
+    /// Words that must all be found in a row.
+    words: Words,
     /// The chosen period; `None` is the last 24 hours.
     period: Option<Period>,
     steps: PeriodicQuery,
@@ -51,7 +53,7 @@ pub struct Journal {
 impl Journal {
     /// Searches for these words in the last 24 hours.
     pub fn look_for(&mut self, words: &str) {
-        self.words = words.split_whitespace().map(str::to_lowercase).collect();
+        self.words = Words::parse(words);
         self.show(None);
     }
 
@@ -63,20 +65,20 @@ impl Journal {
             true => None,
             false => Some(period::typed(cx.def(), &times.join(" "), cx.now)?),
         };
-        self.words = words.into_iter().map(str::to_lowercase).collect();
+        self.words = Words::parse(&words.join(" "));
         self.show(period);
         Ok(())
     }
 
     /// What is searched for.
     pub fn typed(&self) -> String {
-        self.words.join(" ")
+        self.words.to_string()
     }
 
     /// So many shifts later; `0` is everything of the last 24 hours.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
         if by == 0 {
-            self.words.clear();
+            self.words = Words::default();
         }
         let shown = self.period.as_ref();
         let period = match by {
@@ -88,14 +90,13 @@ impl Journal {
     }
 
     /// Scrolls.
-    pub fn step(&mut self, cx: &ViewContext, by: isize) {
-        let last = self.rows(cx).len().saturating_sub(1);
-        self.first = self.first.saturating_add_signed(by).min(last);
+    pub fn step(&mut self, cx: &ViewContext, motion: Motion, room: usize) {
+        self.scroll.on(motion, self.rows(cx).len(), room);
     }
 
     /// Other rows are wanted; those of before must not stand under their heading.
     fn show(&mut self, period: Option<Period>) {
-        (self.first, self.answered, self.period) = (0, false, period);
+        (self.scroll, self.answered, self.period) = (Scroll::default(), false, period);
         (self.alarms, self.actions) = (Vec::new(), Vec::new());
         (self.steps, self.actions_query) = (PeriodicQuery::default(), PeriodicQuery::default());
     }
@@ -185,7 +186,8 @@ impl Journal {
             return;
         }
         let (width, room) = (canvas.width(), usize::from(canvas.height().saturating_sub(1)));
-        for (y, (at, text, style)) in rows.iter().skip(self.first).take(room).enumerate() {
+        let first = self.scroll.first(rows.len(), room);
+        for (y, (at, text, style)) in rows.iter().skip(first).take(room).enumerate() {
             let y = to_u16(y) + 1;
             let x = canvas.text(1, y, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
             canvas.text(x, y, &fit_words(text, width.saturating_sub(x + 1)), *style);
@@ -196,14 +198,9 @@ impl Journal {
     fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
         let alarms = self.alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
         let actions = self.actions.iter().map(|row| (row.at, action_words(cx, row), cx.theme.strong()));
-        let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.finds(text)).collect();
+        let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.words.fit(text)).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.0));
         rows
-    }
-
-    fn finds(&self, text: &str) -> bool {
-        let text = if self.words.is_empty() { String::new() } else { text.to_lowercase() };
-        self.words.iter().all(|word| text.contains(word))
     }
 }
 

@@ -5,16 +5,17 @@ use crossterm::event::KeyCode;
 use super::Page;
 use crate::{
     plant::role::Role,
-    ui::keys::{Hint, Key, char, code, hints},
+    ui::{
+        keys::{Hint, Key, char, code, hints},
+        widgets::list::{Motion, motions},
+    },
 };
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Select so many rows further on, or scroll.
-    Move(isize),
-    /// The same by pages.
-    Page(isize),
+    /// Select another row, or scroll.
+    Move(Motion),
     /// So many views further on.
     View(isize),
     /// The bell rings for new alarms, or not.
@@ -65,14 +66,7 @@ pub enum Action {
 
 type Row = Key<Action>;
 
-const MOVE: [Row; 6] = [
-    Key::new(code(KeyCode::Up), "", "select the row above, or scroll", Action::Move(-1)),
-    Key::new(code(KeyCode::Down), "select", "select the row below, or scroll", Action::Move(1)),
-    Key::new(code(KeyCode::PageUp), "", "a page up", Action::Page(-1)),
-    Key::new(code(KeyCode::PageDown), "", "a page down", Action::Page(1)),
-    Key::new(code(KeyCode::Home), "", "first row", Action::Move(-99_999)),
-    Key::new(code(KeyCode::End), "", "last row", Action::Move(99_999)),
-];
+const MOVE: [Row; 6] = motions!("select", Action::Move);
 
 const VIEWS: [Row; 3] = [
     Key::new(char('v'), "view", "next view: active, suppressed, system, journal, metrics, handover", Action::View(1)),

@@ -22,7 +22,10 @@ use crate::{
         UiAction, ViewContext,
         modal::confirm::subject,
         theme::Theme,
-        widgets::text::{self, Canvas, between, clock, fit_words, pad, pad_left, running},
+        widgets::{
+            list::{Motion, Scroll},
+            text::{self, Canvas, between, clock, fit_words, pad, pad_left, running},
+        },
     },
 };
 
@@ -40,7 +43,7 @@ pub struct Metrics {
     period: Option<Period>,
     figures: Option<Box<PeriodMetrics>>,
     trouble: Option<String>,
-    first: usize,
+    scroll: Scroll,
     periodic: PeriodicQuery,
 }
 
@@ -53,14 +56,13 @@ impl Metrics {
             _ => span::later(cx, self.period.as_ref()),
         };
         // PeriodMetrics of one period must not stand under the name of another.
-        (self.figures, self.trouble, self.first, self.periodic) = (None, None, 0, PeriodicQuery::default());
+        (self.figures, self.trouble, self.scroll, self.periodic) =
+            (None, None, Scroll::default(), PeriodicQuery::default());
     }
 
     /// Scrolls.
-    pub fn step(&mut self, cx: &ViewContext, by: isize) {
-        let lines = self.lines(cx, cx.area.width).len();
-        let room = usize::from(cx.area.height.saturating_sub(3)).max(1);
-        self.first = self.first.saturating_add_signed(by).min(lines.saturating_sub(room));
+    pub fn step(&mut self, cx: &ViewContext, motion: Motion, room: usize) {
+        self.scroll.on(motion, self.lines(cx, cx.area.width).len(), room);
     }
 
     /// Asks the history for a chosen shift if it is time.
@@ -128,7 +130,8 @@ impl Metrics {
         }
         let lines = self.lines(cx, width);
         let room = usize::from(height.saturating_sub(3));
-        for (y, (text, style)) in lines.iter().skip(self.first).take(room).enumerate() {
+        let first = self.scroll.first(lines.len(), room);
+        for (y, (text, style)) in lines.iter().skip(first).take(room).enumerate() {
             canvas.text(1, to_u16(y) + 2, text, *style);
         }
         if 2 * TABLE <= width {
@@ -137,7 +140,7 @@ impl Metrics {
                 side.text(0, to_u16(y), text, *style);
             }
         }
-        let more = lines.len().saturating_sub(self.first + room);
+        let more = lines.len().saturating_sub(first + room);
         let last = height.saturating_sub(1);
         let words = "ISA-18.2, one operator, meant for 30 days or more";
         let more = if more > 0 { format!("{more} more below") } else { String::new() };

@@ -13,6 +13,7 @@ use crate::{
         chrome::history_words,
         modal::confirm::subject,
         widgets::{
+            list::{first, on_screen},
             text::{Canvas, between, fit, fit_words, moment, pad, pad_left, running, width, wrap},
             value,
         },
@@ -59,11 +60,6 @@ fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<String> {
 pub(super) fn room(cx: &ViewContext, width: u16, height: u16) -> usize {
     let height = height.saturating_sub(trouble_rows(cx, width, height).len() as u16);
     usize::from(height.saturating_sub(HEAD + guide(height))).max(1)
-}
-
-/// The first row that is drawn, so that the selected one is seen.
-pub(super) fn first(place: usize, room: usize) -> usize {
-    place.saturating_sub(room - 1)
 }
 
 /// Rows of the guidance on a tab of this height.
@@ -119,7 +115,7 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let all = tab.of_page(cx).count();
     let place = tab.place(&rows);
     let room = usize::from(height.saturating_sub(HEAD - 1 + guide(height + 1))).max(1);
-    let first = first(place, room);
+    let first = first(place, rows.len(), room);
     filter_line(tab, cx, (&rows, all, first, room), canvas);
     let columns = Columns::of(&rows[first.min(rows.len())..], cx, room, width);
     canvas.text(1, 1, &columns.row(["", "", "time", "tag", "what", "value", "state", "for", "by"]), theme.dim());
@@ -132,8 +128,8 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         canvas.text(6, 3, words, theme.normal());
         return;
     }
-    for (y, (n, row)) in rows.iter().enumerate().skip(first).take(room).enumerate() {
-        let y = y as u16 + 2;
+    for (y, n, row) in on_screen(&rows, first, room) {
+        let y = y + 2;
         let priority = cx.def().alarm(row.alarm.id).priority;
         let style = theme.alarm(priority, row.alarm.state, false);
         let style = if n == place { style.patch(theme.focus()).fg(style.fg.unwrap_or_default()) } else { style };
@@ -203,15 +199,15 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         tab.suppressed(cx).and_then(|suppressed| all.iter().position(|other| other.id == suppressed.id)).unwrap_or(0);
     let guide = guide(height + 1).min(6);
     let room = usize::from(height.saturating_sub(1 + guide)).max(1);
-    let first = first(place, room);
-    for (y, (n, suppressed)) in all.iter().enumerate().skip(first).take(room).enumerate() {
+    let first = first(place, all.len(), room);
+    for (y, n, suppressed) in on_screen(all, first, room) {
         let style = match (n == place, suppressed.active) {
             (true, _) => theme.focus(),
             (false, true) => theme.strong(),
             (false, false) => theme.normal(),
         };
         let text = format!("{} {}", theme.state_mark(suppressed.state), suppressed_words(cx, suppressed));
-        canvas.text(1, y as u16 + 1, &fit_words(&text, width.saturating_sub(2)), style);
+        canvas.text(1, y + 1, &fit_words(&text, width.saturating_sub(2)), style);
     }
     if all.len() > first + room {
         let end = width.saturating_sub(1);

@@ -4,7 +4,6 @@ use std::{collections::VecDeque, path::PathBuf};
 
 use super::{
     Place, Window,
-    rows::first_for,
     window::{Shown, TextWindow},
 };
 use crate::{
@@ -19,7 +18,10 @@ use crate::{
         last_frame::Rows,
         modal::{Modal, Prompt},
         tabs::{Outgoing, Tab},
-        widgets::text::{Canvas, clock, fit, fit_words, pad, width},
+        widgets::{
+            list::{self, Motion},
+            text::{Canvas, clock, fit, fit_words, pad, width},
+        },
     },
 };
 
@@ -102,13 +104,13 @@ impl Ring {
     }
 
     /// Moves the selection; looking back holds still.
-    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, by: isize) {
+    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion, room: usize) {
         if self.taken.is_none() {
             self.take(cx, at);
         }
         self.runs = false;
         let shown = self.shown();
-        let place = self.place(&shown).saturating_add_signed(by).min(shown.len().saturating_sub(1));
+        let place = motion.to(self.place(&shown), shown.len(), room);
         self.selected = shown.get(place).map(|frame| frame.number);
     }
 
@@ -190,7 +192,7 @@ impl Ring {
             canvas.text(1, 2, "no frame yet, or none that passes the filter", theme.dim());
         }
         let place = ring.place(&shown);
-        let first = first_for(place, shown.len(), room);
+        let first = list::first(place, shown.len(), room);
         for (y, frame) in shown.iter().skip(first).take(room).enumerate() {
             let selected = self.selected.is_some() && first + y == place;
             ring.row(cx, frame, selected, &mut canvas.part(0, to_u16(y) + 1, width, 1));

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     Place, Window,
     line::{grouped, ms, short_ms},
-    rows::{self, first_for, number, plain, words},
+    rows::{self, number, plain, words},
     window::{Shown, TextWindow},
 };
 use crate::{
@@ -20,7 +20,10 @@ use crate::{
         UiAction, ViewContext,
         last_frame::Rows,
         modal::{Modal, Why},
-        widgets::text::{Canvas, between, fit_words, wrap},
+        widgets::{
+            list::{self, Motion},
+            text::{Canvas, between, fit_words, wrap},
+        },
     },
 };
 
@@ -35,9 +38,8 @@ pub struct Plan {
 
 impl Plan {
     /// Moves the selection.
-    pub fn scroll(&mut self, at: &Place, by: isize) {
-        let last = at.report.map_or(0, |report| report.polls.len()).saturating_sub(1);
-        self.selected = self.selected.saturating_add_signed(by).min(last);
+    pub fn scroll(&mut self, at: &Place, motion: Motion, room: usize) {
+        self.selected = motion.to(self.selected, at.report.map_or(0, |report| report.polls.len()), room);
     }
 
     /// The list that keys act on.
@@ -79,7 +81,7 @@ impl Plan {
         canvas.text(1, 1, &heading, theme.dim());
         let room = usize::from(height.saturating_sub(2 + DETAIL)).max(1);
         let selected = self.selected.min(lines.len() - 1);
-        let first = first_for(selected, lines.len(), room);
+        let first = list::first(selected, lines.len(), room);
         for (y, n) in (first..lines.len()).take(room).enumerate() {
             let style = match (n == selected, ill(&report.polls[n])) {
                 (true, _) => theme.focus(),

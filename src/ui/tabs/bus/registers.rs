@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame as Screen, layout::Rect};
 
-use super::{Place, Window, rows::first_for, test};
+use super::{Place, Window, test};
 use crate::{
     bus::codec,
     plant::{
@@ -18,7 +18,10 @@ use crate::{
         UiAction, ViewContext,
         keys::char,
         modal::{Modal, Next, window},
-        widgets::text::{Canvas, fit_words},
+        widgets::{
+            list::{self, Motion},
+            text::{Canvas, fit_words},
+        },
     },
 };
 
@@ -47,15 +50,11 @@ impl Registers {
 
     /// A key.
     pub fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
-        let last = self.count.saturating_sub(1);
         self.problem = None;
+        if let Some(motion) = Motion::of(event) {
+            self.selected = to_u16(motion.to(usize::from(self.selected), usize::from(self.count), 8));
+        }
         match event.code {
-            KeyCode::Up => self.selected = self.selected.saturating_sub(1),
-            KeyCode::Down => self.selected = (self.selected + 1).min(last),
-            KeyCode::PageUp => self.selected = self.selected.saturating_sub(8),
-            KeyCode::PageDown => self.selected = self.selected.saturating_add(8).min(last),
-            KeyCode::Home => self.selected = 0,
-            KeyCode::End => self.selected = last,
             KeyCode::Char('q') => return Next::Close,
             _ if char('r').is(event) => {
                 let started =
@@ -126,7 +125,7 @@ impl Registers {
         };
         canvas.text(0, 1, &format!("  {:18} {heading}", "register / wire"), theme.dim());
         let room = usize::from(height.saturating_sub(pair + 3)).max(1);
-        let first = first_for(usize::from(self.selected), usize::from(self.count), room);
+        let first = list::first(usize::from(self.selected), usize::from(self.count), room);
         for (y, n) in (first..usize::from(self.count)).take(room).enumerate() {
             let address = self.address.wrapping_add(to_u16(n));
             let style = if n == usize::from(self.selected) { theme.focus() } else { theme.normal() };

@@ -122,11 +122,6 @@ pub fn table<const N: usize>(columns: &[Column; N], lines: &[[String; N]], room:
     (heading, lines.iter().map(|cells| line(&|n| cells[n].clone())).collect())
 }
 
-/// First row to show so that the selected one is in sight, near the middle.
-pub fn first_for(selected: usize, count: usize, room: usize) -> usize {
-    selected.saturating_sub(room / 2).min(count.saturating_sub(room))
-}
-
 /// A share as a bar: `██████────`.
 pub fn bar(cx: &ViewContext, share: f64, cells: usize) -> String {
     let full = to_usize((share.clamp(0.0, 1.0) * cells as f64).round()).max(usize::from(0.0 < share));

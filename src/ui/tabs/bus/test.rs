@@ -28,7 +28,10 @@ use crate::{
     ui::{
         UiAction, ViewContext, keys,
         modal::{Confirm, Modal, Next, Notice, line::Line},
-        widgets::text::{Canvas, fit, fit_words, pad, wrap},
+        widgets::{
+            list::{self, Motion},
+            text::{Canvas, fit, fit_words, pad, wrap},
+        },
     },
 };
 
@@ -115,19 +118,17 @@ impl Bench {
         vec![Notice::or(cx, "test", &CommandKind::Test(at.id, diagnostic), Modal::Bus(Box::new(window)))]
     }
 
-    /// Single rows move the selection; screens scroll the results.
-    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, by: isize) {
-        if by.abs() == 1 {
-            self.selected = self.selected.saturating_add_signed(by).min(Tried::ALL.len() - 1);
+    /// Single rows move the selection; pages scroll the results.
+    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion) {
+        if matches!(motion, Motion::Rows(_)) {
+            self.selected = motion.to(self.selected, Tried::ALL.len(), 1);
             return;
         }
         let room = usize::from(cx.area.height).saturating_sub(TOP as usize + 1).max(1);
         let count = results::rows(cx, at, cx.area.width).len();
         let end = rows::last_first(count, room);
-        let by = by.clamp(-(count as isize), count as isize);
-        let by = if by.unsigned_abs() < count { by.signum() * room.saturating_sub(1).max(1) as isize } else { by };
-        let first = self.first.unwrap_or_else(|| begin(at)).min(end).saturating_add_signed(by).min(end);
-        self.first = Some(first);
+        let first = self.first.unwrap_or_else(|| begin(at)).min(end);
+        self.first = Some(motion.to(first, end + 1, room.saturating_sub(1)));
     }
 
     /// Draws it: the tests, then what came of the last one.
@@ -135,7 +136,7 @@ impl Bench {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
         let tests = height.saturating_sub(3).min(TOP - 2);
-        let first = rows::first_for(self.selected, Tried::ALL.len(), usize::from(tests));
+        let first = list::first(self.selected, Tried::ALL.len(), usize::from(tests));
         for (y, (n, tried)) in Tried::ALL.into_iter().enumerate().skip(first).take(usize::from(tests)).enumerate() {
             let [key, name, what] = tried.words();
             let y = to_u16(y);

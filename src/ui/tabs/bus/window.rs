@@ -25,6 +25,7 @@ use crate::{
         modal::{Modal, Next, window},
         tabs::Tabs,
         widgets::{
+            list::Motion,
             text::{age, fit, pad, width, wrap},
             value,
         },
@@ -101,6 +102,9 @@ impl Window {
     }
 }
 
+/// No text has more rows; the view stops at its last one.
+const ROWS_MAX: usize = 400;
+
 /// Rows to read, drawn anew with every snapshot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TextWindow {
@@ -140,17 +144,12 @@ impl TextWindow {
     }
 
     fn on_key(mut self, event: KeyEvent) -> Next {
-        match event.code {
-            KeyCode::Up => self.first = self.first.saturating_sub(1),
-            KeyCode::Down => self.first += 1,
-            KeyCode::PageUp => self.first = self.first.saturating_sub(8),
-            KeyCode::PageDown => self.first += 8,
-            KeyCode::Home => self.first = 0,
-            KeyCode::Enter | KeyCode::Char('q') => return Next::Close,
-            _ => {}
+        if matches!(event.code, KeyCode::Enter | KeyCode::Char('q')) {
+            return Next::Close;
         }
-        // No text has more rows; the view stops at its last one.
-        self.first = self.first.min(400);
+        if let Some(motion) = Motion::of(event) {
+            self.first = motion.to(self.first, ROWS_MAX, 8);
+        }
         Window::Text(self).stay()
     }
 

@@ -7,7 +7,6 @@ use super::{
 use crate::{
     plant::{
         def::DeviceDef,
-        number::to_u16,
         parameter_set::{self, Change, Compared, Problem},
         restore::{Restore, State},
     },
@@ -15,7 +14,10 @@ use crate::{
         ViewContext,
         chrome::outcome_words,
         modal::{Confirm, Notice},
-        widgets::text::{Canvas, fit, fit_words, moment, pad, pad_left},
+        widgets::{
+            list::{Motion, Scroll, on_screen},
+            text::{Canvas, fit, fit_words, moment, pad, pad_left},
+        },
     },
 };
 
@@ -25,7 +27,7 @@ pub struct Compare {
     /// What is compared with the device.
     pub source: Source,
     /// The first row shown.
-    pub first: usize,
+    scroll: Scroll,
     /// Rows that are the same are shown too.
     pub all: bool,
 }
@@ -36,7 +38,7 @@ type Plan = Result<Vec<Change>, Vec<Problem>>;
 impl Compare {
     /// A source against the device.
     pub fn new(source: Source) -> Compare {
-        Compare { source, first: 0, all: false }
+        Compare { source, scroll: Scroll::default(), all: false }
     }
 
     fn rows(&self, cx: &ViewContext, device: &DeviceDef) -> Vec<Compared> {
@@ -71,9 +73,8 @@ impl Compare {
     }
 
     /// Scrolls.
-    pub fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, by: isize) {
-        let last = self.rows(cx, device).len().saturating_sub(1);
-        self.first = self.first.saturating_add_signed(by).min(last);
+    pub fn scroll(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion, room: usize) {
+        self.scroll.on(motion, self.rows(cx, device).len(), room);
     }
 
     /// The query whether to write the differences, or why they cannot be written.
@@ -120,9 +121,9 @@ impl Compare {
         let names = ["parameter", "", "in the set", "in the device", ""];
         canvas.text(1, top + 1, &columns(names, end), theme.dim());
         let room = usize::from(bottom.saturating_sub(top + 3)).max(1);
-        let first = self.first.min(rows.len().saturating_sub(room));
-        for (y, row) in rows.iter().skip(first).take(room).enumerate() {
-            self.row(cx, canvas, top + 2 + to_u16(y), row, run);
+        let first = self.scroll.first(rows.len(), room);
+        for (y, _, row) in on_screen(&rows, first, room) {
+            self.row(cx, canvas, top + 2 + y, row, run);
         }
         if rows.is_empty() {
             canvas.text(1, top + 2, "nothing differs", theme.normal());

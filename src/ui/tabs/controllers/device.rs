@@ -63,7 +63,7 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Tabl
             canvas.text(x, y + to_u16(n), &fit_words(&line, end.saturating_sub(x)), cx.theme.normal());
         }
     }
-    let more = match (hidden, table.filter.as_str()) {
+    let more = match (hidden, table.filter.to_string().as_str()) {
         (0, "") => String::new(),
         (n, "") => format!("{n} more ▼"),
         (0, filter) => format!("only \"{filter}\", Esc shows all"),

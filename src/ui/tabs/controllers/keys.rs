@@ -5,7 +5,10 @@ use crossterm::event::KeyCode;
 use super::Page;
 use crate::{
     plant::role::Role,
-    ui::keys::{Key, char, code},
+    ui::{
+        keys::{Key, char, code},
+        widgets::list::{Motion, motions},
+    },
 };
 
 /// What a key means here.
@@ -13,8 +16,8 @@ use crate::{
 pub enum Action {
     /// Show the device so many further on.
     Device(isize),
-    /// Select so many rows further on.
-    Move(isize),
+    /// Select another row, or scroll.
+    Move(Motion),
     /// Select so many columns further on.
     Column(isize),
     /// Open, edit or write what is selected.
@@ -74,12 +77,8 @@ pub enum ProgramCommand {
     Off,
 }
 
-const UP: Key<Action> = Key::new(code(KeyCode::Up), "", "a row up", Action::Move(-1));
-const DOWN: Key<Action> = Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1));
-const PAGE_UP: Key<Action> = Key::new(code(KeyCode::PageUp), "", "ten rows up", Action::Move(-10));
-const PAGE_DOWN: Key<Action> = Key::new(code(KeyCode::PageDown), "", "ten rows down", Action::Move(10));
-const HOME: Key<Action> = Key::new(code(KeyCode::Home), "", "first row", Action::Move(-9_999));
-const END: Key<Action> = Key::new(code(KeyCode::End), "", "last row", Action::Move(9_999));
+const SELECT: [Key<Action>; 6] = motions!("select", Action::Move);
+const SCROLL: [Key<Action>; 6] = motions!("scroll", Action::Move);
 const GUIDE: Key<Action> =
     Key::new(char('h'), "guide", "what P, I, D, fuzzy and tuning do, and what to change", Action::Guide);
 const REFRESH: Key<Action> = Key::new(
@@ -104,28 +103,18 @@ const SETTINGS: Key<Action> = Key::new(
 );
 
 const LIST: &[Key<Action>] = &[
-    UP,
-    DOWN,
     Key::new(code(KeyCode::Enter), "open", "faceplate and parameters of the device", Action::Open),
-    PAGE_UP,
-    PAGE_DOWN,
-    HOME,
-    END,
     REFRESH,
     GUIDE,
     WHY,
     SETTINGS,
     LINE,
 ];
-const DEVICE: &[Key<Action>] = &[
+const DEVICE_FIRST: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "previous device", Action::Device(-1)),
     Key::new(code(KeyCode::Right), "device", "next device", Action::Device(1)),
-    UP,
-    DOWN,
-    PAGE_UP,
-    PAGE_DOWN,
-    HOME,
-    END,
+];
+const DEVICE: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "edit", "change the parameter, or look at a read-only one", Action::Open)
         .needs(Role::Technician),
     Key::new(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
@@ -141,11 +130,11 @@ const DEVICE: &[Key<Action>] = &[
     LINE,
     SETTINGS,
 ];
-const PROGRAM: &[Key<Action>] = &[
+const PROGRAM_FIRST: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "the cell to the left", Action::Column(-1)),
     Key::new(code(KeyCode::Right), "cell", "the cell to the right", Action::Column(1)),
-    UP,
-    DOWN,
+];
+const PROGRAM: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "edit", "change the target or time", Action::Open).needs(Role::Technician),
     Key::new(
         char('r'),
@@ -165,20 +154,12 @@ const PROGRAM: &[Key<Action>] = &[
     WHY,
 ];
 const SETS: &[Key<Action>] = &[
-    UP,
-    DOWN,
     Key::new(code(KeyCode::Enter), "compare", "what differs between the set and the device", Action::Open),
     Key::new(char('n'), "new", "save the settings of the device as a set", Action::Save).needs(Role::Technician),
     Key::new(char('u'), "read", "read the folder of sets anew", Action::ReadSets).needs(Role::Technician),
-    PAGE_UP,
-    PAGE_DOWN,
-    HOME,
-    END,
     GUIDE,
 ];
 const COMPARE: &[Key<Action>] = &[
-    UP,
-    Key::new(code(KeyCode::Down), "scroll", "a row down", Action::Move(1)),
     Key::new(code(KeyCode::Enter), "restore", "write what differs to the device (asks first)", Action::Open)
         .needs(Role::Technician),
     Key::new(char('x'), "stop", "stop after the write under way", Action::Stop).needs(Role::Technician),
@@ -186,10 +167,6 @@ const COMPARE: &[Key<Action>] = &[
     Key::new(char('t'), "turn", "copy the other way round", Action::Turnaround),
     ACTIONS,
     REFRESH,
-    PAGE_UP,
-    PAGE_DOWN,
-    HOME,
-    END,
     GUIDE,
 ];
 const READ: &[Key<Action>] = &[
@@ -200,27 +177,32 @@ const READ: &[Key<Action>] = &[
 ];
 
 /// The keys of a page.
-pub fn page_keys(page: &Page) -> &'static [Key<Action>] {
+pub fn page_keys(page: &Page) -> Vec<Key<Action>> {
     match page {
-        Page::List => LIST,
-        Page::Device => DEVICE,
-        Page::Program => PROGRAM,
-        Page::Sets => SETS,
-        Page::Compare(_) => COMPARE,
-        Page::Guide(..) => READ,
+        Page::List => [&SELECT, LIST].concat(),
+        Page::Device => [DEVICE_FIRST, &SELECT, DEVICE].concat(),
+        Page::Program => [PROGRAM_FIRST, &SELECT, PROGRAM].concat(),
+        Page::Sets => [&SELECT, SETS].concat(),
+        Page::Compare(_) => [&SCROLL, COMPARE].concat(),
+        Page::Guide(..) => READ.to_vec(),
     }
 }
 
 /// The chords of every page, for the check that none means two things.
 #[cfg(test)]
 pub fn all_chords() -> crate::ui::keys::PageChords {
-    let pages = [
-        ("controllers", LIST),
-        ("controllers, device", DEVICE),
-        ("controllers, program", PROGRAM),
-        ("controllers, sets", SETS),
-        ("controllers, compare", COMPARE),
-        ("controllers, guide", READ),
+    use crate::ui::keys::chords_of;
+    let tables = [
+        ("controllers", [&[], LIST]),
+        ("controllers, device", [DEVICE_FIRST, DEVICE]),
+        ("controllers, program", [PROGRAM_FIRST, PROGRAM]),
+        ("controllers, sets", [&[], SETS]),
+        ("controllers, compare", [&[], COMPARE]),
     ];
-    pages.into_iter().map(|(name, table)| (name, table.iter().map(|key| key.chord).collect())).collect()
+    let guide = ("controllers, guide", chords_of(READ));
+    tables
+        .map(|(name, [first, rest])| (name, chords_of(&[first, &SELECT, rest].concat())))
+        .into_iter()
+        .chain([guide])
+        .collect()
 }

@@ -6,13 +6,13 @@ use super::device::{signal_mark, status_words};
 use crate::{
     plant::{
         def::{DeviceDef, DeviceId, Subject},
-        number::to_u16,
         snapshot::{ActiveAlarm, DeviceState},
         tag::{Access, Poll},
     },
     ui::{
         ViewContext,
         widgets::{
+            list::{first, on_screen},
             text::{Canvas, fit, fit_words, pad_left, width},
             value,
         },
@@ -60,9 +60,9 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
     let columns = Columns::of(cx, canvas.width());
     put(canvas, 1, heading(&columns, theme.dim()));
     let room = usize::from(bottom.saturating_sub(3)).max(1);
-    let first = selected.saturating_sub(room / 2).min(devices.len().saturating_sub(room));
-    for (y, (n, device)) in devices.iter().enumerate().skip(first).take(room).enumerate() {
-        row(cx, canvas, to_u16(y) + 2, &columns, device, n == selected);
+    let first = first(selected, devices.len(), room);
+    for (y, n, device) in on_screen(devices, first, room) {
+        row(cx, canvas, y + 2, &columns, device, n == selected);
     }
     let below = devices.len().saturating_sub(first + room);
     if below > 0 {

@@ -38,11 +38,6 @@ impl Cell {
         let step = program.steps.get(self.row)?;
         [step.sv, step.ramp, step.soak].get(self.column).copied()
     }
-    /// Moves the selection.
-    pub fn move_by(&mut self, program: &ProgramDef, columns: isize, rows: isize) {
-        self.column = self.column.saturating_add_signed(columns).min(2);
-        self.row = self.row.saturating_add_signed(rows).min(program.steps.len().saturating_sub(1));
-    }
 }
 
 /// Draws the page.

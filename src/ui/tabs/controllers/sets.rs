@@ -5,13 +5,15 @@ use std::sync::Arc;
 use crate::{
     plant::{
         def::{DeviceDef, DeviceId, TagId},
-        number::to_u16,
         parameter_set::{self, Compared, ParameterSet, StoredSet},
     },
     ui::{
         ViewContext,
         modal::Notice,
-        widgets::text::{Canvas, fit, fit_words, moment, pad, pad_left, width, wrap},
+        widgets::{
+            list::{first, on_screen},
+            text::{Canvas, fit, fit_words, moment, pad, pad_left, width, wrap},
+        },
     },
 };
 
@@ -93,8 +95,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
         canvas.text(1, 4, words, theme.normal());
     }
     let room = usize::from(bottom.saturating_sub(4)).max(1);
-    let first = selected.saturating_sub(room / 2).min(all.len().saturating_sub(room));
-    for (y, (n, source)) in all.iter().enumerate().skip(first).take(room).enumerate() {
+    for (y, n, source) in on_screen(&all, first(selected, all.len(), room), room) {
         let here = n == selected;
         let (text, trouble) = row(cx, device, source, here);
         let style = match (here, trouble) {
@@ -102,7 +103,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
             (false, true) => theme.trouble(),
             (false, false) => theme.normal(),
         };
-        canvas.text(1, to_u16(y) + 3, &fit(&text, end), style);
+        canvas.text(1, y + 3, &fit(&text, end), style);
     }
     let words = "Sets are files of the station, in the folder sets beside its history; u reads them anew.";
     canvas.text(1, bottom, &fit_words(words, end), theme.dim());

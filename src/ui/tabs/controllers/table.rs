@@ -3,13 +3,13 @@
 use crate::{
     plant::{
         def::DeviceId,
-        number::to_u16,
         tag::{Access, Poll, TagDef},
     },
     ui::{
         ViewContext,
         modal::number::range_words,
         widgets::{
+            list::{Words, first, on_screen},
             text::{Canvas, age, pad, pad_left, whole, width},
             value,
         },
@@ -21,8 +21,8 @@ use crate::{
 pub struct Table {
     /// The selected parameter, by its place among those shown.
     pub selected: usize,
-    /// Only parameters with these words in name or meaning; empty shows all.
-    pub filter: String,
+    /// Only parameters with these words in name or meaning.
+    pub filter: Words,
     /// Rows that differ from the maker's default are marked.
     pub defaults: bool,
 }
@@ -41,16 +41,10 @@ impl Table {
         self.rows(cx, device).into_iter().nth(self.selected)
     }
 
-    /// Selects so many rows further on.
-    pub fn move_by(&mut self, cx: &ViewContext, device: DeviceId, by: isize) {
-        let last = self.rows(cx, device).len().saturating_sub(1);
-        self.selected = self.selected.saturating_add_signed(by).min(last);
-    }
-
     /// The place of the parameter that the filter means most likely: its exact name, then one with it in its name, then
     /// one with it in its meaning.
     pub fn best(&self, cx: &ViewContext, device: DeviceId) -> usize {
-        let typed = self.filter.trim().to_lowercase();
+        let typed = self.filter.to_string();
         let rank = |tag: &TagDef| match (tag.short.to_lowercase(), tag.label.to_lowercase()) {
             (short, label) if short == typed || label == typed => 0,
             (short, label) if short.contains(&typed) || label.contains(&typed) => 1,
@@ -61,8 +55,7 @@ impl Table {
     }
 
     fn fits(&self, tag: &TagDef) -> bool {
-        let text = format!("{} {} {} {}", tag.short, tag.label, tag.meaning, tag.group).to_lowercase();
-        self.filter.to_lowercase().split_whitespace().all(|word| text.contains(word))
+        self.filter.fit(&format!("{} {} {} {}", tag.short, tag.label, tag.meaning, tag.group))
     }
 
     /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight
@@ -87,9 +80,9 @@ impl Table {
         }
         let place = rows.iter().position(|row| row.is_ok_and(|(n, _)| n == self.selected)).unwrap_or(0);
         let room = usize::from(canvas.height().saturating_sub(1)).max(1);
-        let first = place.saturating_sub(room / 2).min(rows.len().saturating_sub(room));
-        for (y, row) in rows.iter().skip(first).take(room).enumerate() {
-            let y = to_u16(y) + 1;
+        let first = first(place, rows.len(), room);
+        for (y, _, row) in on_screen(&rows, first, room) {
+            let y = y + 1;
             match row {
                 Ok((place, tag)) => self.parameter(cx, canvas, y, &columns, tag, *place == self.selected),
                 Err(group) => {

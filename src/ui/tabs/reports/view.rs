@@ -36,7 +36,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
     match &reports.report {
         Some(report) => {
             let lines = lines(cx, report);
-            let first = reports.first.min(lines.len().saturating_sub(usize::from(rows)));
+            let first = reports.scroll.first(lines.len(), usize::from(rows));
             let mut part = canvas.part(0, 2, columns, rows);
             let area = part.area();
             let (head, body) = (heading(cx, columns), lines.iter().skip(first).take(rows.into()));

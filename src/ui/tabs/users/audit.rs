@@ -7,22 +7,25 @@ use ratatui::{Frame, layout::Rect};
 use super::super::{Tab, periodic_query::PeriodicQuery, reports::period};
 use crate::{
     history::{Answer, HistoryError, Query},
-    plant::{number::to_u16, record::ActionRecord},
+    plant::record::ActionRecord,
     report::Period,
     ui::{
         UiAction, ViewContext,
         keys::{Key, char, code},
         last_frame::Rows,
         modal::{AuditEntryDialog, Modal, Prompt},
-        widgets::text::{Canvas, fit, moment, pad, pad_left, width},
+        widgets::{
+            list::{Motion, first, motions, on_screen},
+            text::{Canvas, fit, moment, pad, pad_left, width},
+        },
     },
 };
 
 /// What a key means on the audit list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Select so many rows further on.
-    Move(isize),
+    /// Select another row.
+    Move(Motion),
     /// All fields of the selected entry.
     Open,
     /// Search words, a user, an action, a time.
@@ -47,13 +50,7 @@ pub enum Part {
 }
 
 /// Keys of the audit list.
-pub const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Up), "", "a row up", Action::Move(-1)),
-    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(1)),
-    Key::new(code(KeyCode::PageUp), "", "ten rows up", Action::Move(-10)),
-    Key::new(code(KeyCode::PageDown), "", "ten rows down", Action::Move(10)),
-    Key::new(code(KeyCode::Home), "", "the newest", Action::Move(-9_999)),
-    Key::new(code(KeyCode::End), "", "the oldest", Action::Move(9_999)),
+const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "open", "entry details", Action::Open),
     Key::new(char('/'), "search", "only rows with some words", Action::Search(Part::Words)),
     Key::new(char('b'), "by", "only what a user did", Action::Search(Part::Who)),
@@ -62,6 +59,11 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('c'), "all", "search nothing, show the last week", Action::Everything),
     Key::new(char('j'), "users", "the list of users", Action::Back),
 ];
+
+/// All keys of the list.
+pub fn keys() -> Vec<Key<Action>> {
+    [&motions!("select", Action::Move), KEYS].concat()
+}
 
 /// Rows of one answer; more are said to be left out.
 const ROWS: usize = 1_000;
@@ -106,10 +108,9 @@ impl Audit {
     }
 
     /// A key of [`KEYS`].
-    pub fn on_key(&mut self, _cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let last = self.rows.len().saturating_sub(1);
+    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         match action {
-            Action::Move(by) => self.selected = self.selected.saturating_add_signed(by).min(last),
+            Action::Move(motion) => self.selected = motion.to(self.selected, self.rows.len(), rows_on(cx.area.height)),
             Action::Open => {
                 let entry = self.rows.get(self.selected).cloned();
                 return entry
@@ -224,11 +225,10 @@ impl Audit {
             canvas.text(2, 3, words, theme.dim());
             return;
         }
-        let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
-        let first = self.selected.saturating_sub(rows - 1);
-        for (y, (n, entry)) in self.rows.iter().enumerate().skip(first).take(rows).enumerate() {
+        let rows = rows_on(canvas.height());
+        for (y, n, entry) in on_screen(&self.rows, first(self.selected, self.rows.len(), rows), rows) {
             let style = if n == self.selected { theme.focus() } else { theme.normal() };
-            canvas.text(0, to_u16(y) + 2, &pad(&row(cx, entry, columns), columns), style);
+            canvas.text(0, y + 2, &pad(&row(cx, entry, columns), columns), style);
         }
     }
 
@@ -256,6 +256,11 @@ impl Audit {
             pad("target", 12)
         )
     }
+}
+
+/// Rows of the list on a tab of this height.
+fn rows_on(height: u16) -> usize {
+    usize::from(height.saturating_sub(2)).max(1)
 }
 
 /// Columns for where it was done from; none on a narrow screen, where the window of the entry tells it.

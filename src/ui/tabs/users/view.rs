@@ -4,11 +4,12 @@ use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use super::state;
-use crate::{
-    plant::number::to_u16,
-    ui::{
-        ViewContext, rights,
-        widgets::text::{Canvas, clock, fit, pad},
+use crate::plant::number::to_u16;
+use crate::ui::{
+    ViewContext, rights,
+    widgets::{
+        list::{first, on_screen},
+        text::{Canvas, clock, fit, pad},
     },
 };
 
@@ -28,8 +29,7 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
     let name = (canvas.width() / 4).clamp(14, 34);
     canvas.text(1, 0, &format!("{}role         state                      last login", pad("user", name)), theme.dim());
     let rows = usize::from(canvas.height().saturating_sub(1)).max(1);
-    let first = place.saturating_sub(rows - 1);
-    for (y, (n, row)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
+    for (y, n, row) in on_screen(all, first(place, all.len(), rows), rows) {
         let last = row.last_login.map_or("never".to_owned(), |at| date(cx, at));
         let mark = if n == place { theme.pick("▸", ">") } else { " " };
         let text = format!(
@@ -44,7 +44,7 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
             (false, false) => theme.normal(),
         };
         let width = canvas.width();
-        canvas.text(0, to_u16(y) + 1, &pad(&fit(&text, width), width), style);
+        canvas.text(0, y + 1, &pad(&fit(&text, width), width), style);
     }
     if all.is_empty() {
         canvas.text(1, 2, "No users: a demonstration needs no login.", theme.dim());
