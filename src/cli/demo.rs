@@ -2,6 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
+use futures_util::{StreamExt, stream};
 use jiff::Timestamp;
 
 use crate::{
@@ -10,9 +11,13 @@ use crate::{
     plant::Snapshot,
     profile::io::atomic::write_for_user,
     report::{self, Period, ShiftReport},
-    sim,
+    sim::{self, drill::SimCommand},
     station::{Session, io as station},
-    ui,
+    ui::{
+        self,
+        extension::{Extension, ExtensionMessage},
+        io::ExtensionPort,
+    },
 };
 
 use super::{
@@ -79,7 +84,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let options = station::Options { def: def.clone(), clock, history, connectors, file: None };
         let (observer, journal) = sim::io::journal();
         let station = station::start_observed(options, Some(Box::new(observer)))?;
-        let mut session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
+        let session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
         let trainer = sim::io::Trainer {
             def: def.clone(),
             simulator: simulated.simulator.clone(),
@@ -92,15 +97,16 @@ pub fn main(args: Args) -> Result<(), CliError> {
         };
         let (port, _judging) = trainer.spawn();
         let drilled = port.status.clone();
-        session.drill = Some(port);
         let result = if args.headless {
             let places: Vec<_> = simulated.places().iter().map(ToString::to_string).collect();
             say(&format!("{}: simulated on {}", def.title, places.join(", ")));
             let drill = scenario.as_ref().map(|scenario| scenario.duration);
             headless(session, clock, args.duration.or(drill), &args).await
         } else {
+            let options =
+                ui::io::Options { extension: Some(extension(port)), ..ui::io::Options::new(ui::Leaving::Demo) };
             tokio::select! {
-                result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Demo)) => result.map_err(CliError::from),
+                result = ui::io::run(session, options) => result.map_err(CliError::from),
                 () = run::over(clock, args.duration) => Ok(()),
             }
         };
@@ -120,6 +126,21 @@ pub fn main(args: Args) -> Result<(), CliError> {
             (result, _) => result,
         }
     })
+}
+
+/// The simulator as an extension of the terminal: its states, and its commands from the Faults tab.
+fn extension(sim::io::Port { commands, mut status }: sim::io::Port) -> ExtensionPort {
+    status.mark_changed();
+    let states = stream::unfold(status, |mut status| async move {
+        status.changed().await.ok()?;
+        let state: Arc<dyn Extension> = status.borrow_and_update().clone();
+        Some((state, status))
+    });
+    let send = move |message: ExtensionMessage| {
+        // Active faults are seen in the next state; a command that finds no room changes nothing there.
+        message.get::<SimCommand>().map(|command| commands.try_send(*command));
+    };
+    ExtensionPort { states: states.fuse().boxed(), send: Box::new(send) }
 }
 
 /// Tells what happens until the time is over, then sums up and writes the report.

@@ -76,7 +76,7 @@ pub struct Station {
 }
 
 /// Starts history, links and plant; lines are polled whether or not the store opens. Nobody is asked who he
-/// is: whoever has started the station, or could, may everything. For demonstrations and drills.
+/// is: whoever has started the station, or could, may everything. For demonstrations.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
     start_observed(options, None)
 }

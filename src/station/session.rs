@@ -11,7 +11,6 @@ use crate::{
         Snapshot,
         command::{CommandId, CommandKind},
     },
-    sim::io::Port,
 };
 
 /// One attached terminal. Dropping it stops nothing.
@@ -28,8 +27,6 @@ pub struct Session {
     pub requests: mpsc::Sender<(u32, Request)>,
     /// Number of this terminal, the first part of its command ids.
     pub terminal: u32,
-    /// The simulation behind the plant; a real plant has none.
-    pub drill: Option<Port>,
 }
 
 /// What a terminal asks of its station.

@@ -98,7 +98,7 @@ impl SessionAcceptor {
             tracing::error!(%error, "a terminal was not let in");
         }
         let (snapshots, requests) = (self.snapshots.clone(), self.requests.clone());
-        Session { snapshots, status, requests, terminal, drill: None }
+        Session { snapshots, status, requests, terminal }
     }
 }
 

@@ -15,17 +15,14 @@ use super::{
     tabs::Tab,
     widgets::text::{Canvas, between, clock, fit, fit_words, running, width},
 };
-use crate::{
-    plant::{
-        command::{CommandKind, NotConfirmed, Outcome},
-        commands::alarm_words as alarm_words_of,
-        def::LineDef,
-        event::LineState,
-        number::to_u16,
-        role::Role,
-        snapshot::LineStatus,
-    },
-    sim::drill::{Progress, Status},
+use crate::plant::{
+    command::{CommandKind, NotConfirmed, Outcome},
+    commands::alarm_words as alarm_words_of,
+    def::LineDef,
+    event::LineState,
+    number::to_u16,
+    role::Role,
+    snapshot::LineStatus,
 };
 
 /// Least size in which the tabs make sense; 80x24 shows everything.
@@ -162,10 +159,7 @@ fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, Stri
         (0, clock(cx.now, &cx.def().time_zone), theme.normal())
     };
     let mut parts = vec![time, who_words(model, cx, role)];
-    if let Some(status) = cx.drill {
-        parts.push(demo_words(cx, status));
-        parts.extend(over_words(cx, status));
-    }
+    parts.extend(cx.extension.iter().flat_map(|extension| extension.header(cx)));
     if cx.snapshot.speed != 1.0 {
         parts.push((8, format!("speed ×{}", cx.snapshot.speed), theme.strong()));
     }
@@ -199,30 +193,6 @@ fn who_words(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Sty
         None if role => (9, format!("{user} {}", who.role.word().to_uppercase()), theme.dim()),
         None => (9, user, theme.dim()),
     }
-}
-
-/// That nothing here is real, and how much of it is wrong on purpose; an exam does not tell.
-fn demo_words(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
-    match (status.is_open(), status.active.len()) {
-        (false, _) => {
-            let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
-            let left = status.scenario.as_ref().map_or(String::new(), |progress| format!(" {} left", left(progress)));
-            (4, format!("EXAM{left}"), cx.theme.strong())
-        }
-        (true, 0) => (4, "DEMO".to_owned(), cx.theme.strong()),
-        (true, 1) => (4, "DEMO 1 FAULT".to_owned(), cx.theme.trouble()),
-        (true, count) => (4, format!("DEMO {count} FAULTS"), cx.theme.trouble()),
-    }
-}
-
-/// How the drill ended, once it has.
-fn over_words(cx: &ViewContext, status: &Status) -> Option<(usize, String, Style)> {
-    let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
-    Some(if verdict.passed() {
-        (5, "drill PASSED: see 8".to_owned(), cx.theme.strong())
-    } else {
-        (5, "drill FAILED: see 8".to_owned(), cx.theme.trouble())
-    })
 }
 
 /// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.

@@ -204,7 +204,7 @@ pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&ViewContext) -> T) -> 
         now: snapshot.at,
         phase: 0,
         area,
-        drill: None,
+        extension: None,
         session: &session(),
     })
 }

@@ -12,7 +12,7 @@ use std::{
 };
 
 use crossterm::event::{Event, EventStream};
-use futures_util::StreamExt;
+use futures_util::{StreamExt, stream::BoxStream};
 use tokio::{
     signal::unix::{SignalKind, signal},
     sync::{mpsc, oneshot},
@@ -20,12 +20,17 @@ use tokio::{
     time::{Instant, MissedTickBehavior, interval, sleep_until},
 };
 
-use super::{Effect, Leaving, Model, Msg, QueryId, tabs::Tab, theme::Theme, update, view};
+use super::{
+    Effect, Leaving, Model, Msg, QueryId,
+    extension::{Extension, ExtensionMessage},
+    tabs::Tab,
+    theme::Theme,
+    update, view,
+};
 use crate::{
     access::SessionRequest,
     history::{HistoryError, Query, io::QueryRequest},
     profile::io::atomic::write_for_user,
-    sim::{drill, io::Port},
     station::{Request, Session},
 };
 use screen::{Screen, own};
@@ -40,18 +45,27 @@ const ECHO: Duration = Duration::from_millis(30);
 const INBOX: usize = 32;
 
 /// What can be chosen about a terminal.
-#[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// How things look.
     pub theme: Theme,
     /// What ends with it.
     pub leaving: Leaving,
+    /// What the embedding command adds.
+    pub extension: Option<ExtensionPort>,
+}
+
+/// The embedding command's end of an [`Extension`].
+pub struct ExtensionPort {
+    /// Its states, the first at once; may be polled after its end.
+    pub states: BoxStream<'static, Arc<dyn Extension>>,
+    /// Receives the messages of its tab; must not block.
+    pub send: Box<dyn Fn(ExtensionMessage) + Send>,
 }
 
 impl Options {
     /// Looks chosen by the environment.
     pub fn new(leaving: Leaving) -> Options {
-        Options { theme: Theme::detect(|name| std::env::var(name).ok()), leaving }
+        Options { theme: Theme::detect(|name| std::env::var(name).ok()), leaving, extension: None }
     }
 }
 
@@ -84,10 +98,13 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let status = session.status.borrow_and_update().clone();
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
     model.leaving = options.leaving;
-    model.drill = session.drill.as_mut().map(|port| port.status.borrow_and_update().clone());
+    let mut extension = options.extension;
+    if let Some(port) = &mut extension {
+        model.extension = port.states.next().await;
+    }
     let screen = Screen::raise()?;
     let heard_at = Instant::now();
-    Loop { session, model, screen, outbox, asked: Vec::new(), redraw_at: None, drawn_at: None, heard_at }
+    Loop { session, model, screen, extension, outbox, asked: Vec::new(), redraw_at: None, drawn_at: None, heard_at }
         .run(inbox)
         .await
 }
@@ -96,6 +113,7 @@ struct Loop {
     session: Session,
     model: Model,
     screen: Screen,
+    extension: Option<ExtensionPort>,
     /// For answers and saved reports, which come from other tasks, with the plant (its count) that they were asked of.
     outbox: mpsc::Sender<(u32, Msg)>,
     /// Queries on their way, and what waits for their answers.
@@ -143,7 +161,7 @@ impl Loop {
                     let status = self.session.status.borrow_and_update().clone();
                     self.take(Msg::SessionStatus(status), ECHO)?
                 }
-                Some(status) = drilled(&mut self.session.drill) => self.take(Msg::Drill(status), FRAME)?,
+                state = next_state(&mut self.extension) => self.take(Msg::Extension(state), FRAME)?,
                 Some((plants, msg)) = inbox.recv() => {
                     // Ids of one plant mean something else in another.
                     let fits = plants == self.model.plants || matches!(msg, Msg::RequestDone(..));
@@ -189,12 +207,7 @@ impl Loop {
                 }
                 Effect::SessionRequest(id, request) => self.send_request(id, request),
                 Effect::Query(id, query) => self.ask(id, query),
-                Effect::Drill(command) => {
-                    if let Some(port) = &self.session.drill {
-                        // What is in force is seen in the next status; a request that was lost changes nothing there.
-                        let _ = port.commands.try_send(command);
-                    }
-                }
+                Effect::Extension(message) => self.extension.iter().for_each(|port| (port.send)(message.clone())),
                 Effect::SaveReport { tab, path, bytes } => self.save(tab, path, bytes),
                 Effect::Bell => self.screen.ring()?,
                 Effect::Redraw => self.screen.renew()?,
@@ -252,13 +265,14 @@ impl Loop {
     }
 }
 
-/// News of the simulation; never without one.
-async fn drilled(port: &mut Option<Port>) -> Option<Arc<drill::Status>> {
-    let Some(Port { status, .. }) = port else { return std::future::pending().await };
-    if status.changed().await.is_err() {
-        return std::future::pending().await;
+/// The next state of the extension; never without one.
+async fn next_state(port: &mut Option<ExtensionPort>) -> Arc<dyn Extension> {
+    if let Some(port) = port
+        && let Some(state) = port.states.next().await
+    {
+        return state;
     }
-    Some(status.borrow_and_update().clone())
+    std::future::pending().await
 }
 
 /// A half-written report never has the name of a whole one.

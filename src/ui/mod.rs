@@ -3,6 +3,7 @@
 pub mod bell;
 pub mod chrome;
 pub mod last_frame;
+pub mod extension;
 pub mod glyph_filter;
 pub mod io;
 pub mod interlock;
@@ -30,8 +31,8 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     access::SessionStatus,
     plant::{alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot},
-    sim::drill,
 };
+use extension::Extension;
 use keys::Global;
 use last_frame::LastFrame;
 use modal::{Confirm, Modal};
@@ -73,8 +74,8 @@ pub struct Model {
     pub commands_sent: u32,
     /// How often the station has come with another plant file: an answer to what was asked before is not heard.
     pub plants: u32,
-    /// The simulation behind the plant; `None` at a real one.
-    pub drill: Option<Arc<drill::Status>>,
+    /// State that the embedding command adds.
+    pub extension: Option<Arc<dyn Extension>>,
     /// What the last frame showed; `None` before the first one.
     pub last_frame: Option<LastFrame>,
     /// Why the last key did nothing; until the next one.
@@ -105,8 +106,8 @@ pub struct ViewContext<'a> {
     pub phase: u32,
     /// Where the shown tab draws, for queries that depend on its width.
     pub area: Rect,
-    /// The simulation behind the plant; `None` at a real one.
-    pub drill: Option<&'a drill::Status>,
+    /// State that the embedding command adds.
+    pub extension: Option<&'a dyn Extension>,
     /// Who sits here and what he may.
     pub session: &'a SessionStatus,
 }
@@ -148,7 +149,7 @@ impl Model {
             kept: None,
             commands_sent: 0,
             plants: 0,
-            drill: None,
+            extension: None,
             last_frame: None,
             note: None,
             leaving: Leaving::default(),
@@ -181,7 +182,8 @@ impl Model {
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let keyed = matches!(msg, Msg::Key(_)) && model.is_as_drawn();
-    if matches!(msg, Msg::Snapshot(_) | Msg::SessionStatus(_) | Msg::Answer(..) | Msg::Drill(_) | Msg::Tick { .. }) {
+    if matches!(msg, Msg::Snapshot(_) | Msg::SessionStatus(_) | Msg::Answer(..) | Msg::Extension(_) | Msg::Tick { .. })
+    {
         model.note_news();
     }
     let actions = match msg {
@@ -210,8 +212,8 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
         Msg::SessionStatus(session) => session_lock::on_session_status(model, session),
         Msg::RequestDone(id, answer) => session_lock::on_request_done(model, id, answer),
-        Msg::Drill(status) => {
-            model.drill = Some(status);
+        Msg::Extension(state) => {
+            model.extension = Some(state);
             Vec::new()
         }
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_answer(cx, id.number, answer)),
@@ -246,8 +248,8 @@ pub fn view(model: &Model, frame: &mut Frame) {
 
 /// What the parts of a terminal of this size may read.
 fn context(model: &Model, screen: Rect) -> ViewContext<'_> {
-    let Model { snapshot, theme, clock, drill, session, .. } = model;
-    view_context(snapshot, theme, *clock, screen, drill, session)
+    let Model { snapshot, theme, clock, extension, session, .. } = model;
+    view_context(snapshot, theme, *clock, screen, extension, session)
 }
 
 /// The same of parts of a model, while others of it change.
@@ -256,19 +258,19 @@ fn view_context<'a>(
     theme: &'a Theme,
     clock: Clock,
     screen: Rect,
-    drill: &'a Option<Arc<drill::Status>>,
+    extension: &'a Option<Arc<dyn Extension>>,
     session: &'a SessionStatus,
 ) -> ViewContext<'a> {
     let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
     let area = chrome::layout(screen).body;
-    ViewContext { snapshot, theme, now, phase: clock.phase, area, drill: drill.as_deref(), session }
+    ViewContext { snapshot, theme, now, phase: clock.phase, area, extension: extension.as_deref(), session }
 }
 
 /// Lets the tabs change while they read the rest of the model.
 fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>) -> Vec<UiAction> {
-    let Model { snapshot, theme, clock, drill, session, screen, tabs, .. } = model;
-    change(tabs, &view_context(snapshot, theme, *clock, *screen, drill, session))
+    let Model { snapshot, theme, clock, extension, session, screen, tabs, .. } = model;
+    change(tabs, &view_context(snapshot, theme, *clock, *screen, extension, session))
 }
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
@@ -289,8 +291,8 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return on_global(model, show);
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
-        let Model { snapshot, theme, clock, drill, session, screen, tabs, .. } = model;
-        let cx = view_context(snapshot, theme, *clock, *screen, drill, session);
+        let Model { snapshot, theme, clock, extension, session, screen, tabs, .. } = model;
+        let cx = view_context(snapshot, theme, *clock, *screen, extension, session);
         let (rest, actions) = modal.on_key(&cx, tabs, event);
         model.modal = rest;
         return actions;

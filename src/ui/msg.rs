@@ -5,7 +5,12 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use crossterm::event::KeyEvent;
 use jiff::Timestamp;
 
-use super::{Confirmed, modal::Modal, tabs::Tab};
+use super::{
+    Confirmed,
+    extension::{Extension, ExtensionMessage},
+    modal::Modal,
+    tabs::Tab,
+};
 use crate::{
     access::{CommandRequest, Durability, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
@@ -14,7 +19,6 @@ use crate::{
         def::{DeviceId, TagId},
         snapshot::Snapshot,
     },
-    sim::drill,
 };
 
 /// What happens to a terminal.
@@ -32,8 +36,8 @@ pub enum Msg {
     SessionStatus(Arc<SessionStatus>),
     /// The reply to a request, or why it failed.
     RequestDone(QueryId, Result<Durability, String>),
-    /// News of the simulation.
-    Drill(Arc<drill::Status>),
+    /// The extension has a new state.
+    Extension(Arc<dyn Extension>),
     /// The history answered.
     Answer(QueryId, Result<Answer, HistoryError>),
     /// A file of this tab was written, or why not.
@@ -58,8 +62,8 @@ pub enum Effect {
     SessionRequest(QueryId, SessionRequest),
     /// Ask the history.
     Query(QueryId, Query),
-    /// Inject or clear a fault of the simulation.
-    Drill(drill::SimCommand),
+    /// A message to the command that added the extension.
+    Extension(ExtensionMessage),
     /// Write a report or a capture; answered by [`Msg::Saved`].
     SaveReport {
         /// The tab that wants it.

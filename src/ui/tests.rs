@@ -70,7 +70,7 @@ pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
         Effect::Command(command) => Some(&command.kind),
         Effect::SessionRequest(..) => None,
         Effect::Query(..)
-        | Effect::Drill(_)
+        | Effect::Extension(_)
         | Effect::SaveReport { .. }
         | Effect::Bell
         | Effect::Redraw

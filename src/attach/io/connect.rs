@@ -80,7 +80,7 @@ pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let (requests, requested) = mpsc::channel(REQUESTS);
     let id_map = CommandIdMap::new(run, terminal);
     tokio::spawn(ClientTask::new(path.to_owned(), place, id_map, publish, status_sender).run(line, requested));
-    Ok(Session { snapshots, status, requests, terminal, drill: None })
+    Ok(Session { snapshots, status, requests, terminal })
 }
 
 /// Says hello and waits for the welcome.

@@ -33,7 +33,7 @@ impl Fault {
             Fault::Late(_) => describe(
                 "The unit is overloaded or sits behind a slow radio or converter.",
                 "An answer within the timeout is only slower. A later one is a timeout; when it then arrives it is thrown away \
-                 as stale and never taken for the answer to the next query.",
+                 as stale and never taken for the answer to the next request.",
                 "See the answer times on Bus; raise timeout_ms of the line if the unit is meant to be slow.",
             ),
             Fault::BadCrc => describe(

@@ -51,8 +51,8 @@ fn on_the_pty() {
                 publish.send_replace(Arc::new(snapshot));
             }
         });
-        let session = Session { snapshots, status, requests, terminal: 1, drill: None };
-        run(session, Options { theme: Theme::FULL, leaving: Leaving::Station })
+        let session = Session { snapshots, status, requests, terminal: 1 };
+        run(session, Options { theme: Theme::FULL, leaving: Leaving::Station, extension: None })
             .await
             .expect("left by its operator or a signal");
     });

@@ -8,21 +8,23 @@ mod tests;
 use std::collections::BTreeMap;
 
 use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame, layout::Rect};
+use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::TabView;
 use crate::{
     plant::snapshot::Snapshot,
     sim::{
-        drill::{SimCommand, Status},
+        drill::{Progress, SimCommand, Status},
         faults::{Fault, FaultTarget},
     },
     ui::{
         Effect, UiAction, ViewContext,
+        extension::{self, Extension, ExtensionMessage},
         keys::{self, Hint, Key, char, code},
         last_frame::Rows,
         rights, session_lock,
         tabs::bus,
+        widgets::text::running,
     },
 };
 
@@ -72,7 +74,7 @@ const KEYS: &[Key<Action>] = &[
 
 impl TabView for Faults {
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let drill = cx.drill.is_some_and(|status| status.scenario.is_some());
+        let drill = extension::state::<Status>(cx).is_some_and(|status| status.scenario.is_some());
         let there = KEYS.iter().filter(|key| drill || key.action != Action::Verdict).copied();
         keys::hints(&there.collect::<Vec<_>>())
     }
@@ -149,9 +151,39 @@ impl Faults {
     }
 }
 
-/// What may be told of the simulation, if anything may.
+impl Extension for Status {
+    fn header(&self, cx: &ViewContext) -> Vec<(usize, String, Style)> {
+        [demo_part(cx, self)].into_iter().chain(result_part(cx, self)).collect()
+    }
+}
+
+/// That the plant is simulated, and how many faults are active, which an exam hides.
+fn demo_part(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
+    match (status.is_open(), status.active.len()) {
+        (false, _) => {
+            let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
+            let left = status.scenario.as_ref().map_or(String::new(), |progress| format!(" {} left", left(progress)));
+            (4, format!("EXAM{left}"), cx.theme.strong())
+        }
+        (true, 0) => (4, "DEMO".to_owned(), cx.theme.strong()),
+        (true, 1) => (4, "DEMO 1 FAULT".to_owned(), cx.theme.trouble()),
+        (true, count) => (4, format!("DEMO {count} FAULTS"), cx.theme.trouble()),
+    }
+}
+
+/// The result of the drill, once it is over.
+fn result_part(cx: &ViewContext, status: &Status) -> Option<(usize, String, Style)> {
+    let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
+    Some(if verdict.passed() {
+        (5, "drill PASSED: see 8".to_owned(), cx.theme.strong())
+    } else {
+        (5, "drill FAILED: see 8".to_owned(), cx.theme.trouble())
+    })
+}
+
+/// The state of the simulator, unless an exam hides it.
 fn open<'a>(cx: &ViewContext<'a>) -> Option<&'a Status> {
-    cx.drill.filter(|status| status.is_open())
+    extension::state::<Status>(cx).filter(|status| status.is_open())
 }
 
 fn rows(status: &Status) -> Vec<(FaultTarget, Fault)> {
@@ -169,5 +201,5 @@ fn cleared(cx: &ViewContext, command: SimCommand) -> Vec<UiAction> {
 }
 
 fn send(command: SimCommand) -> Vec<UiAction> {
-    vec![UiAction::Do(Effect::Drill(command))]
+    vec![UiAction::Do(Effect::Extension(ExtensionMessage::new(command)))]
 }

@@ -242,7 +242,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
             Effect::Command(..)
             | Effect::SessionRequest(..)
             | Effect::Query(..)
-            | Effect::Drill(_)
+            | Effect::Extension(_)
             | Effect::Bell
             | Effect::Redraw
             | Effect::Quit => None,

@@ -78,7 +78,7 @@ fn drill(over: bool) -> Progress {
 
 fn with(fixture: &Fixture, status: Status, theme: Theme) -> Model {
     let mut model = model(fixture, theme);
-    update(&mut model, Msg::Drill(Arc::new(status)));
+    update(&mut model, Msg::Extension(Arc::new(status)));
     screen(&mut model, 80, 24);
     model.tabs.shown = Tab::Faults;
     model
@@ -86,7 +86,7 @@ fn with(fixture: &Fixture, status: Status, theme: Theme) -> Model {
 
 fn press(model: &mut Model, keys: &str) -> Vec<SimCommand> {
     let command = |effect| match effect {
-        Effect::Drill(command) => Some(command),
+        Effect::Extension(message) => message.get::<SimCommand>().copied(),
         _ => None,
     };
     type_keys(model, keys).into_iter().filter_map(command).collect()
@@ -132,7 +132,7 @@ fn a_fault_is_switched_only_as_it_was_drawn() {
     // Another operator of the demonstration sets it first: Enter, meant to set it, would clear it.
     let mut set = status(&fixture);
     set.active.push(ActiveFault { target: FaultTarget::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
-    let set = |model: &mut Model| drop(update(model, Msg::Drill(Arc::new(set))));
+    let set = |model: &mut Model| drop(update(model, Msg::Extension(Arc::new(set))));
     acts_only_on_what_was_drawn(&mut model, set, "⏎");
 }
 
@@ -165,7 +165,7 @@ fn the_tab_is_only_where_a_plant_is_simulated() {
     press(&mut trainee, "8");
     let shown = screen(&mut trainee, 80, 24);
     assert!(shown.contains("EXAM") && !shown.to_lowercase().contains("fault"), "{shown}");
-    update(&mut trainee, Msg::Drill(Arc::new(Status { scenario: Some(drill(true)), ..exam })));
+    update(&mut trainee, Msg::Extension(Arc::new(Status { scenario: Some(drill(true)), ..exam })));
     press(&mut trainee, "8");
     let shown = screen(&mut trainee, 80, 24);
     assert!(shown.contains("DEMO 2 FAULTS") && shown.contains("FAILED"), "{shown}");

@@ -120,8 +120,8 @@ fn told(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, ca
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
     };
     paragraph("", description.cause);
-    paragraph("Seen: ", description.symptoms);
-    paragraph("Do: ", description.response);
+    paragraph("Symptoms: ", description.symptoms);
+    paragraph("Response: ", description.response);
 
     let truth = compare(cx, status, target);
     let wanted = (to_u16(truth.len()) + 1).min(canvas.height().saturating_sub(to_u16(lines.len()) + 1));

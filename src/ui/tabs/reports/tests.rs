@@ -50,7 +50,7 @@ impl Stand {
                 Effect::Query(..)
                 | Effect::Command(..)
                 | Effect::SessionRequest(..)
-                | Effect::Drill(_)
+                | Effect::Extension(_)
                 | Effect::Bell
                 | Effect::Redraw
                 | Effect::Quit => {}
