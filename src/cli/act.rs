@@ -37,7 +37,7 @@ pub struct AckArgs {
     action: client::ActionArgs,
 }
 
-/// Writes, and tells the outcome; anything but verified is a failure.
+/// Writes and prints the outcome; anything but verified is a failure.
 pub fn write(args: WriteArgs) -> Result<(), CliError> {
     in_runtime(async {
         let mut actor = args.action.attach().await?;

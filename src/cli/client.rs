@@ -26,7 +26,7 @@ const SETTLED_MAX: Duration = Duration::from_secs(5);
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Login {
     /// Who acts; the password is asked for, or is the first line of standard input. Without it: the user of the operating
-    /// system, where the plant file trusts him
+    /// system, where the plant file trusts it
     #[arg(long, value_name = "NAME")]
     user: Option<String>,
 }
@@ -56,7 +56,7 @@ pub async fn place(plant: Option<&str>) -> Result<find::Found, CliError> {
         (0, Some(plant)) => Err(CliError::NotRunning(format!("no station of {plant} runs here"))),
         (0, None) => Err(CliError::NotRunning(match find::Places::here().closed() {
             Some(folder) => {
-                format!("no station runs here that this user may reach; {} is closed to him", folder.display())
+                format!("no station runs here that this user may reach; {} is not accessible", folder.display())
             }
             None => "no station runs here".to_owned(),
         })),
@@ -120,12 +120,12 @@ impl ActionArgs {
     }
 }
 
-/// Said behind an outcome that the disk of the station has not taken.
+/// Appended to an outcome that could not be recorded.
 pub fn recorded_words(recorded: bool) -> &'static str {
     if recorded { "" } else { " (not recorded: the disk of the station does not take it)" }
 }
 
-/// Warns of what the station has reply and its disk has not taken.
+/// Warns where an action was done but not recorded.
 pub fn warn_not_recorded(what: &str, durability: Durability) {
     if durability == Durability::NotRecorded {
         super::say_error(&format!("{what}{}", recorded_words(false)));

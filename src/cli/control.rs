@@ -11,7 +11,7 @@ use super::{CliError, client, in_runtime, say};
 
 /// A station ends within this time, whatever its disk does.
 const END_MAX: Duration = Duration::from_secs(30);
-/// Time between two looks whether it has.
+/// Interval of the checks whether it has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// Arguments of both.
@@ -29,7 +29,7 @@ pub fn stop(args: Args) -> Result<(), CliError> {
         let place = client::place(args.plant.as_deref()).await?;
         let mut session = client::attach(Some(&place.name), &args.login).await?;
         let reply = session.request(SessionRequest::Stop).await;
-        // It tells that it goes by going, sometimes before its answer has left.
+        // The connection may close before the reply arrives.
         if reply.is_ok() || session.status.borrow().gone.is_some() {
             let _ = session.status.wait_for(|status| status.gone.is_some()).await;
             drop(session);
@@ -42,7 +42,7 @@ pub fn stop(args: Args) -> Result<(), CliError> {
     })
 }
 
-/// Waits until nobody listens at this place any more: then the last record is on disk.
+/// Waits until the station has closed its socket: then the last record is on disk.
 async fn gone(place: &Found) -> Result<(), CliError> {
     let end = tokio::time::Instant::now() + END_MAX;
     while find::Places::here().living().await.contains(place) {

@@ -38,7 +38,7 @@ const WIDTH: usize = 80;
 /// Most bytes on one row.
 const BYTES: usize = 8;
 
-/// Tells every frame; a line that cannot be read is told on standard error, and the others all the same.
+/// Decodes every frame; a line that cannot be parsed is reported on standard error, and the others are decoded.
 pub fn main(args: Args) -> Result<(), CliError> {
     let framing = match (args.rtu, args.ascii, args.tcp) {
         (true, ..) => Some(Framing::Rtu),
@@ -49,7 +49,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if !args.bytes.is_empty() && args.bytes != ["-"] {
         let typed =
             hex_input::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
-        tell(&typed, framing, None).iter().for_each(|line| say(line));
+        describe(&typed, framing, None).iter().for_each(|line| say(line));
         return match dissection(&typed, framing, None).verdict {
             verdict if verdict == "ok" => Ok(()),
             wrong => Err(CliError::Failed(format!("the frame is wrong: {wrong}"))),
@@ -83,7 +83,7 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
             say("");
         }
         frames += 1;
-        tell(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
+        describe(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
         wrong += usize::from(dissection(&typed, framing, asked.as_ref()).verdict != "ok");
         let dissection = dissection(&typed, framing, None);
         asked = (dissection.direction != Some(Direction::Answer)).then_some(dissection);
@@ -114,7 +114,7 @@ fn dissection(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Diss
 }
 
 /// The lines about one frame: what it is, every byte, the checks, what is wrong with it.
-fn tell(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissection>) -> Vec<String> {
+fn describe(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissection>) -> Vec<String> {
     let dissection = dissection(typed, framing, asked);
     let direction = match dissection.direction {
         Some(Direction::Request) => "request",

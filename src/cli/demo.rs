@@ -90,7 +90,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             simulator: simulated.simulator.clone(),
             snapshots: session.snapshots.clone(),
             journal,
-            // Without a terminal nobody else is there to act.
+            // Without a terminal the operator of the scenario acts.
             operator: (args.headless && scenario.is_some()).then(|| station.commands.clone()),
             scenario: scenario.clone(),
             exam: args.exam,
@@ -187,7 +187,7 @@ fn summary(last: &Snapshot, report: &ShiftReport) -> Vec<String> {
     ]
 }
 
-/// The folder of a history that nobody wants to keep.
+/// The folder of a history that is not kept.
 struct Scratch {
     history: PathBuf,
     folder: Option<PathBuf>,
@@ -198,7 +198,7 @@ impl Scratch {
         if let Some(history) = &args.history {
             return Ok(Scratch { history: history.clone(), folder: None });
         }
-        // Made by nobody else and for nobody else: the temporary folder is everybody's.
+        // Private to this process: the temporary folder is shared.
         let started = Timestamp::now().as_microsecond();
         let folder = std::env::temp_dir().join(format!("sightglass-demo-{}-{started}", std::process::id()));
         std::os::unix::fs::DirBuilderExt::mode(&mut std::fs::DirBuilder::new(), 0o700)

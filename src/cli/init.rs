@@ -1,4 +1,4 @@
-//! What the init system is told: ready, reloading, stopping, alive. Without one all of this does nothing.
+//! Notifies the init system: ready, reloading, stopping, alive. Without one this does nothing.
 
 use std::time::{Duration, Instant};
 
@@ -8,21 +8,21 @@ use crate::{plant::Snapshot, station::liveness::Liveness};
 
 /// The station polls and its socket is open.
 pub fn ready(title: &str) {
-    tell(&[NotifyState::Ready, NotifyState::Status(title)]);
+    notify(&[NotifyState::Ready, NotifyState::Status(title)]);
 }
 
-/// The plant file is being taken up anew.
+/// The plant file is being reloaded.
 pub fn reloading() {
     let states = [Some(NotifyState::Reloading), NotifyState::monotonic_usec_now().ok()];
-    tell(&states.into_iter().flatten().collect::<Vec<_>>());
+    notify(&states.into_iter().flatten().collect::<Vec<_>>());
 }
 
 /// The orderly end has begun.
 pub fn stopping() {
-    tell(&[NotifyState::Stopping]);
+    notify(&[NotifyState::Stopping]);
 }
 
-fn tell(states: &[NotifyState]) {
+fn notify(states: &[NotifyState]) {
     if let Err(error) = sd_notify::notify(states) {
         tracing::warn!(%error, "the init system does not listen");
     }
@@ -50,7 +50,7 @@ impl Watchdog {
         let alive = self.liveness.check(snapshot, self.began.elapsed());
         if alive && self.fed_at.is_none_or(|at| every / 2 <= at.elapsed()) {
             self.fed_at = Some(Instant::now());
-            tell(&[NotifyState::Watchdog]);
+            notify(&[NotifyState::Watchdog]);
         }
     }
 }

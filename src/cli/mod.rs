@@ -64,41 +64,41 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// A simulated plant on a real pseudo-terminal line, with station and terminal in one process
+    /// Run a simulated plant on a real pseudo-terminal line, with station and terminal in one process
     Demo(demo::Args),
-    /// The station alone: polls, judges alarms, keeps the history; no terminal
+    /// Run the station without a terminal: poll, evaluate alarms, record the history
     Run(run::Args),
-    /// A terminal at a running station; leaving it stops nothing
+    /// Open a terminal at a running station; leaving it stops nothing
     Attach(attach::Args),
-    /// How the running station and its plant stand, for people or as JSON
+    /// Show the state of the running station and its plant, as lines or JSON
     Status(status::Args),
-    /// Acknowledges alarms at the running station
+    /// Acknowledge alarms at the running station
     Ack(act::AckArgs),
-    /// Writes a tag at the running station and waits until it is verified
+    /// Write a tag at the running station and wait until it is verified
     Write(act::WriteArgs),
     /// Verifies the audit log: `audit verify` names the first line that was changed, `audit key` has it sealed
     Audit(audit::Args),
-    /// Ends the running station
+    /// Stop the running station
     Stop(control::Args),
-    /// Reloads the plant file of the running station; a file with errors changes nothing
+    /// Reload the plant file of the running station; a file with errors changes nothing
     Reload(control::Args),
     /// Print the systemd unit that runs stations on a panel PC
     SystemdUnit,
-    /// Runs a scenario in virtual time and judges it; without a name lists the scenarios
+    /// Run a scenario in virtual time and evaluate it; without a name list the scenarios
     Drill(drill::Args),
-    /// Serves the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
+    /// Serve the simulated devices of a plant to other masters, over a pseudo-terminal or TCP
     Sim(sim::Args),
-    /// Runs the six control experiments of the thesis on the simulated rig and prints them beside its measurements
+    /// Run the six control experiments of the thesis on the simulated rig and print them beside its measurements
     Experiments(experiments::Args),
-    /// Checks a plant or device file: every error at once, or the read plan of each line
+    /// Check a plant or device file: print every error at once, or the read plan of each line
     Check(check::Args),
-    /// Lists the known profiles, or prints one
+    /// List the known profiles, or print one
     Profiles(profiles::Args),
-    /// Writes the report of a shift or period from the history as CSV, through the station while it runs
+    /// Write the report of a shift or period from the history, through the station while it runs
     Report(report::Args),
-    /// Writes stored values of tags at a fixed interval as CSV
+    /// Write stored values of tags at a fixed interval as CSV
     Export(export::Args),
-    /// Shows how good the alarm system was in a shift or period: rates, floods, chattering, stale, against their targets
+    /// Show alarm performance in a shift or period: rates, floods, chattering, stale, against their targets
     Alarms(alarms::Args),
     /// Decode a Modbus frame: every field, its checksum, and what is wrong with it
     Decode(decode::Args),
@@ -270,7 +270,7 @@ fn say_error(message: &str) {
     let _ = writeln!(std::io::stderr(), "sightglass: {}", visible(message));
 }
 
-/// Writes the bytes of a file to standard output: as they are, unless a person looks at them.
+/// Writes the bytes of a file to standard output: as they are, made visible on a terminal.
 fn put_out(bytes: &[u8]) -> std::io::Result<()> {
     let mut out = std::io::stdout();
     if out.is_terminal() {
@@ -329,7 +329,7 @@ fn load_with_file(
     Ok((def, file))
 }
 
-/// Prints problems or warnings of a profile, in colour where a person looks and has not refused it.
+/// Prints problems or warnings of a profile, in colour on a terminal, unless NO_COLOR is set.
 fn say_problems(problems: &profile::Errors) {
     let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
     // The rendering holds nothing raw but its own colours.

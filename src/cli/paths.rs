@@ -1,4 +1,4 @@
-//! Where files live when nobody says otherwise, and which port a line uses when somebody does.
+//! Default paths of files, and the ports of lines given on the command line.
 
 use std::{env, path::PathBuf};
 
@@ -25,7 +25,7 @@ pub fn history_of(plant: &str) -> PathBuf {
     state_folder().join(format!("{plant}.duckdb"))
 }
 
-/// Who sits at this terminal: the login name.
+/// The login name of the user of this terminal.
 pub fn operator() -> String {
     ["USER", "LOGNAME"].into_iter().find_map(|name| env::var(name).ok()).unwrap_or_else(|| "operator".into())
 }
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_port_is_told_with_what_was_expected() {
+    fn a_wrong_port_is_reported_with_what_was_expected() {
         for (text, part) in [
             ("L1", "expected LINE=/dev/"),
             ("L9=/dev/ttyUSB0", "no line `L9`, the plant has L1"),

@@ -44,7 +44,7 @@ pub struct Args {
     station: StationArgs,
 }
 
-/// Runs the station until it is told to stop; says on standard output what changes.
+/// Runs the station until a stop request; prints changes to standard output.
 pub fn main(args: Args) -> Result<(), CliError> {
     let plant = load_with_file(&args.plant, &args.station)?;
     let _log = log::start(args.station.log.as_deref(), Some(&history_file(&plant.0, &args.station)))?;
@@ -196,7 +196,7 @@ impl Serving {
         Serving { station, socket }
     }
 
-    /// Ends the station; its terminals hear of it by its silence. Gives the socket back, and the last entry of the audit log.
+    /// Ends the station and closes its sessions. Gives the socket back, and the last entry of the audit log.
     async fn stop(self) -> Result<(serve::Listener, Option<ChainHash>), CliError> {
         let last = self.station.stop().await;
         let socket = self.socket.await;
@@ -305,14 +305,14 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_plant_file_that_cannot_even_be_refused_leaves_the_station_as_it_is() {
+    async fn an_unreadable_plant_file_leaves_the_station_as_it_is() {
         assert!(loaded(|| panic!("a mistake in the loader")).await.is_err_and(|why| why.contains("see the log")));
         let why = loaded(|| Err(CliError::Usage("no such plant".to_owned()))).await.err();
         assert_eq!(why.as_deref(), Some("no such plant"));
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_station_whose_plant_file_cannot_be_read_to_its_end_can_be_stopped() {
+    async fn a_station_with_an_endless_plant_file_can_be_stopped() {
         let (begun, begins) = std::sync::mpsc::channel();
         // The loader ends with this test, not before.
         let (_end, ends) = std::sync::mpsc::channel::<()>();

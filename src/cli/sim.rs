@@ -59,7 +59,7 @@ impl From<ModeArg> for Mode {
     }
 }
 
-/// Serves until it is told to stop.
+/// Serves until a stop signal.
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = load(&args.plant, &StationArgs::default())?;
     let services = services(&def, &args)?;

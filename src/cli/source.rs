@@ -84,7 +84,7 @@ impl CsvArgs {
 pub enum Source {
     /// Through its station.
     Station(Box<Session>),
-    /// From the file, which nobody else has open.
+    /// From the file, which no other process has open.
     File {
         /// The file.
         store: Box<Store>,

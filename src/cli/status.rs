@@ -119,9 +119,9 @@ fn device_word(state: DeviceState) -> &'static str {
 /// The same and more: times are UTC, numbers are in the tag's unit, `null` is "not known".
 fn in_json(snapshot: &Snapshot) -> Value {
     let def = &snapshot.def;
-    // What is not told is `null`, never 0.
-    let told = !client::is_withheld(snapshot);
-    let count = |count: u64| told.then_some(count);
+    // What is not authorised is `null`, never 0.
+    let visible = !client::is_withheld(snapshot);
+    let count = |count: u64| visible.then_some(count);
     let lines = def.lines.iter().zip(&snapshot.lines).map(|(line, status)| {
         let connected = status.state == LineState::Connected;
         let counters = &status.counters;
@@ -171,7 +171,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
         "plant": def.name, "title": def.title, "at": snapshot.at.to_string(), "speed": snapshot.speed,
         "lines": lines.collect::<Vec<_>>(), "devices": devices.collect::<Vec<_>>(),
         "alarms": alarms.collect::<Vec<_>>(), "suppressed": suppressed.collect::<Vec<_>>(),
-        "tags": told.then(|| tags.collect::<Vec<_>>()),
+        "tags": visible.then(|| tags.collect::<Vec<_>>()),
         "history": {
             "rows": snapshot.history.rows, "lost": snapshot.history.lost, "trouble": snapshot.history.trouble,
             "epoch": snapshot.history.epoch, "recording": snapshot.history.failing.is_none(),

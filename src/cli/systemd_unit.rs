@@ -8,7 +8,7 @@ const UNIT: &str = include_str!("sightglass@.service");
 /// Prints the unit for this very program.
 pub fn main() -> Result<(), CliError> {
     let exe = std::env::current_exe()
-        .map_err(|error| CliError::Io { what: "cannot tell where this program is".into(), error })?;
+        .map_err(|error| CliError::Io { what: "cannot find the path of this program".into(), error })?;
     say(unit(&exe.to_string_lossy()).trim_end());
     Ok(())
 }

@@ -29,7 +29,7 @@ pub struct Row {
     pub decimals: u8,
 }
 
-/// An alarm that somebody should look into, and why.
+/// An alarm to investigate, and why.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BadActor {
     /// `frequent`, `chattering` or `fleeting`.
@@ -42,7 +42,7 @@ pub struct BadActor {
     pub raised: Option<u64>,
 }
 
-/// All that is told of a period, as `--json` prints it.
+/// The metrics of a period, as `--json` prints them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AlarmMetricsReport {
     /// Name of the plant.
@@ -61,7 +61,7 @@ pub struct AlarmMetricsReport {
     pub suppressed: u64,
     /// PeriodMetrics against targets and limits.
     pub figures: Vec<Row>,
-    /// The alarms to look into.
+    /// The alarms to investigate.
     pub alarms: Vec<BadActor>,
 }
 
@@ -198,7 +198,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_figure_stands_beside_its_target_and_a_missing_one_is_a_dash() {
+    fn a_metric_stands_beside_its_target_and_none_is_a_dash() {
         let period = Period {
             name: "morning 2026-11-21".into(),
             from: at("2026-11-21T06:00+07"),

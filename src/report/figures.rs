@@ -231,7 +231,7 @@ pub fn record_grid(interval: Duration, zone: &TimeZone, from: Timestamp, until: 
     std::iter::successors(on_grid(zone, interval, from), after).take_while(|at| *at < until).collect()
 }
 
-/// The first instant not before `at` whose local time of day is a multiple of `interval`. The grid starts anew at every
+/// The first instant not before `at` whose local time of day is a multiple of `interval`. The grid restarts at every
 /// local midnight and follows the clocks over a change: an hour that happens twice has its rows twice.
 fn on_grid(zone: &TimeZone, interval: Duration, at: Timestamp) -> Option<Timestamp> {
     const DAY: i64 = 86_400_000_000;

@@ -68,7 +68,7 @@ fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u
     report.suppressed.iter().for_each(|alarm| table.row(suppressed_row(alarm, dialect)));
     table.section("alarm metrics", &["measure", "figure", "target", "limit", "verdict"]);
     alarm_metrics::rows(&report.alarm_metrics).iter().for_each(|row| table.row(metric_row(row, dialect)));
-    table.section("alarms to look into", &["kind", "subject", "alarm", "raised"]);
+    table.section("alarms to investigate", &["kind", "subject", "alarm", "raised"]);
     alarm_metrics::bad_actors(&report.alarm_metrics).iter().for_each(|alarm| table.row(bad_actor_row(alarm)));
     table.section("alarms", &["time", "priority", "subject", "alarm", "event", "value", "limit", "by", "reason"]);
     report.alarms.iter().for_each(|alarm| table.row(alarm_row(alarm, zone, dialect)));

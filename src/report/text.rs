@@ -82,7 +82,7 @@ fn tag_line(tag: &TagFigures, width: usize) -> String {
 pub fn mean_or_difference(tag: &TagFigures) -> String {
     let decimals = usize::from(tag.decimals);
     match (tag.mean, tag.difference) {
-        // A mean carries one digit more than the values that it is of.
+        // A mean has one decimal more than its values.
         (Some(mean), _) => format!("{mean:.*}", decimals + 1),
         (None, Some(difference)) => format!("{difference:+.decimals$}"),
         (None, None) => "—".into(),

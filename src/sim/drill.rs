@@ -7,7 +7,7 @@ use super::{
     scenario::judge::{ActualValues, Verdict},
 };
 
-/// A command to the simulation.
+/// A command to the simulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimCommand {
     /// Inject a fault, or change its parameter.
@@ -18,7 +18,7 @@ pub enum SimCommand {
     ClearAll,
 }
 
-/// The simulation as it stands.
+/// State of the simulator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
     /// The faults that can be injected, by target.
@@ -27,13 +27,13 @@ pub struct Status {
     pub active: Vec<ActiveFault>,
     /// Actual values by tag.
     pub actual: ActualValues,
-    /// Nothing of all this may be told before the drill is over.
+    /// Faults and result are hidden until the drill is over.
     pub exam: bool,
-    /// The drill at work, or the one that is over.
+    /// The drill, running or over.
     pub scenario: Option<Progress>,
 }
 
-/// How a drill stands.
+/// Progress of a drill.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
     /// Description for the trainer.
@@ -47,7 +47,7 @@ pub struct Progress {
 }
 
 impl Status {
-    /// Whether faults may be told and changed: always but in an exam that is not over.
+    /// Whether faults may be shown and changed: always, except in an exam that is not over.
     pub fn is_open(&self) -> bool {
         !self.exam || self.scenario.as_ref().is_some_and(|progress| progress.verdict.over)
     }

@@ -205,7 +205,7 @@ impl Faults {
     }
 }
 
-/// A number that looks like chance and is always the same (the finaliser of SplitMix64).
+/// A reproducible pseudo-random number (the finaliser of SplitMix64).
 fn scatter(count: u64) -> u64 {
     let mut mixed = count.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -3,7 +3,7 @@
 //! ```text
 //!  scenario file ── read ──> Scenario ──> timeline: inject and clear faults, (headless) act as a good operator
 //!                                │
-//!  journal, snapshots, truth ────┴─ judge ──> Verdict
+//!  journal, snapshots, actual ───┴─ judge ──> Verdict
 //! ```
 
 pub mod judge;
@@ -91,7 +91,7 @@ pub enum OperatorAction {
 }
 
 impl OperatorAction {
-    /// The command that an operator gives who looks at this; `None` if there is nothing to do.
+    /// The command for the displayed state; `None` if there is nothing to do.
     pub fn command_kind(self, seen: &Snapshot) -> Option<CommandKind> {
         match self {
             OperatorAction::Acknowledge(id) => {

@@ -52,11 +52,11 @@ impl Simulator {
             None => None,
         };
         let (mut modelled, mut places) = (Vec::new(), BTreeMap::new());
-        // A device at the broadcast address of a line is everybody, and nobody by itself.
-        let everybody = |device: &&DeviceDef| {
+        // The broadcast address of a serial line is no device.
+        let is_broadcast = |device: &&DeviceDef| {
             device.unit == BROADCAST && def.line(device.line).transport.framing() != Framing::Mbap
         };
-        for device in def.devices.iter().filter(|device| !everybody(device)) {
+        for device in def.devices.iter().filter(|device| !is_broadcast(device)) {
             let place = match rig::part(def, device.id) {
                 Some(Part::Controller) => Place::Controller,
                 Some(Part::Plc) => Place::Plc,
@@ -109,9 +109,9 @@ impl Simulator {
         unit == BROADCAST && !self.places.contains_key(&(line, unit))
     }
 
-    /// Every unit of a line that hears does what a broadcast says. Nobody answers.
-    pub fn broadcast(&mut self, line: LineId, pdu: &[u8], hears: impl Fn(u8) -> bool) {
-        for unit in self.units(line).into_iter().filter(|unit| hears(*unit)) {
+    /// Every unit of a line that receives a broadcast executes it. There is no response.
+    pub fn broadcast(&mut self, line: LineId, pdu: &[u8], receives: impl Fn(u8) -> bool) {
+        for unit in self.units(line).into_iter().filter(|unit| receives(*unit)) {
             if let Some(unit) = self.unit(line, unit) {
                 unit.obey(pdu);
             }

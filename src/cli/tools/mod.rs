@@ -1,4 +1,4 @@
-//! Tools for a line without a plant: which port, which settings, and how their findings are told.
+//! Tools for a line without a plant: which port, which settings, and the output of findings.
 
 pub mod loopback;
 pub mod probe;
@@ -62,7 +62,7 @@ pub struct UnitArgs {
 }
 
 impl UnitArgs {
-    /// The line, and a unit on it that can answer: on a serial line 0 is everybody, and nobody answers.
+    /// The line, and a unit on it that can answer: on a serial line 0 is the broadcast address, which has no response.
     fn line_and_unit(&self) -> Result<(LineDef, u8), CliError> {
         let line = self.port.line()?;
         let (least, most) = if line.transport.framing() == Framing::Mbap { (0, 255) } else { (1, 247) };
@@ -127,19 +127,19 @@ fn baud(baud: u32) -> Result<u32, CliError> {
     Err(CliError::Usage(format!("--baud: found {baud}, expected one of {}", known())))
 }
 
-/// Runs a diagnostic and tells each finding when it comes. Ctrl-C ends it between two steps.
+/// Runs a diagnostic and prints each finding at once. Ctrl-C ends it between two steps.
 pub fn run(
     line: &LineDef,
     diagnostic: Diagnostic,
-    tell: impl Fn(&Finding) -> Vec<String>,
+    describe: impl Fn(&Finding) -> Vec<String>,
 ) -> Result<DiagnosticRun, CliError> {
     let job = Job::new(CommandId { terminal: 0, number: 0 }, Arc::from("cli"), diagnostic, Timestamp::now());
     let shown = std::io::stderr().is_terminal();
-    let mut told = 0;
+    let mut printed = 0;
     let run = runtime()?.block_on(async {
         let work = testing::run(line, job, |run: &DiagnosticRun| {
-            run.findings[told..].iter().flat_map(&tell).for_each(|text| say(&text));
-            told = run.findings.len();
+            run.findings[printed..].iter().flat_map(&describe).for_each(|text| say(&text));
+            printed = run.findings.len();
             if shown && 1 < run.total {
                 progress(run);
             }
@@ -154,7 +154,7 @@ pub fn run(
         clear_progress();
     }
     let Some(run) = run else { return Err(CliError::Failed("stopped".into())) };
-    run.findings[told.min(run.findings.len())..].iter().flat_map(&tell).for_each(|text| say(&text));
+    run.findings[printed.min(run.findings.len())..].iter().flat_map(&describe).for_each(|text| say(&text));
     match &run.state {
         DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
         DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => Ok(run),

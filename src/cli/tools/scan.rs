@@ -45,7 +45,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
     let most = line.timeout * to_u32(requests);
     let seconds = most.as_secs_f64().ceil();
-    say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if nobody answers", line.transport));
+    say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if no unit answers", line.transport));
     let run = run(&line, Diagnostic::Scan(scan), |finding| match finding {
         Finding::Unit { unit, serial, words } => {
             let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();

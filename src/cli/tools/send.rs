@@ -75,7 +75,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     match (answer, broadcast) {
         (None, false) => Err(CliError::Failed(format!("no answer within {} ms", line.timeout.as_millis()))),
         (None, true) => {
-            say("   sent to all; nobody answers a broadcast");
+            say("   sent to all units; a broadcast has no response");
             Ok(())
         }
         // What was no request has no answer that could be wrong.

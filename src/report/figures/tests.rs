@@ -75,7 +75,7 @@ fn a_counter_has_a_difference_and_no_mean() {
 }
 
 #[test]
-fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
+fn an_alarm_active_while_suppressed_is_listed_with_its_time() {
     use AlarmEvent::{
         Acknowledged, Raised, RaisedSuppressed, ReturnedSuppressed, ReturnedToNormal, Shelved, SuppressedByDesign,
         Unsuppressed,
@@ -106,7 +106,7 @@ fn an_alarm_that_was_active_while_suppressed_is_listed_with_its_time() {
 }
 
 #[test]
-fn minutes_in_alarm_are_counted_once_however_many_alarms_overlap() {
+fn minutes_in_alarm_are_counted_once_where_alarms_overlap() {
     use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
     for (steps, expect) in [
         (vec![], 0),
@@ -147,7 +147,7 @@ fn minutes_in_alarm_are_counted_once_however_many_alarms_overlap() {
 }
 
 #[test]
-fn the_record_stands_on_the_local_grid_and_leaves_out_what_was_not_good() {
+fn the_record_is_on_the_local_grid_with_good_values_only() {
     let sv = [Sample::good(70.0, sec(-5))];
     let pv = [Sample::good(27.0, sec(3)), Sample::bad(Cause::Timeout, sec(15)), Sample::good(28.5, sec(30))];
     let instants: Arc<[_]> = record_grid(Duration::from_secs(10), &TimeZone::UTC, sec(0), sec(40)).into();

@@ -153,7 +153,7 @@ priority high (%),25.0,at most 5,,beyond target,,,,
 priority medium (%),12.5,at most 15,,good,,,,
 priority low (%),62.5,at least 80,,beyond target,,,,
 ,,,,,,,,
-alarms to look into,,,,,,,,
+alarms to investigate,,,,,,,,
 kind,subject,alarm,raised,,,,,
 frequent,'=PLC-1,not responding,18,,,,,
 frequent,TIC-1.PV,temperature high,6,,,,,
@@ -176,7 +176,7 @@ date,time,SV,PV,ER,,,,
 }
 
 #[test]
-fn every_dialect_is_read_back_by_a_strict_reader_with_the_same_cells() {
+fn every_dialect_gives_the_same_cells_to_a_strict_reader() {
     let def = plant("Asia/Bangkok", &THREE);
     let rows = |dialect: CsvDialect| -> Vec<Vec<String>> {
         let bytes = shift_csv(&report(), &def, dialect);
@@ -208,7 +208,7 @@ fn the_record_alone_is_a_plain_table() {
 }
 
 #[test]
-fn text_that_a_spreadsheet_would_run_is_kept_text_and_numbers_are_left_alone() {
+fn text_that_a_spreadsheet_would_run_stays_text() {
     for (cell, expect) in [
         ("=1+1", "'=1+1"),
         ("+66 2", "'+66 2"),

@@ -76,7 +76,7 @@ pub struct Outputs {
     pub heater: bool,
 }
 
-/// What the interlocks block, from the levels alone: an operator can read why before he asks for it.
+/// What the interlocks block, from the levels alone: an operator can read why before a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Blocked {
     /// Bit 0: no heating, the water of TK-1 does not cover the heater.
@@ -265,7 +265,7 @@ fn from_bcd(word: u16) -> Option<u16> {
     })
 }
 
-/// The PLC's manual names 01–06, 0F and 10; ours knows all others too, so that tools for diagnosis find somebody to talk to.
+/// The PLC's manual names 01–06, 0F and 10; the simulator supports all others too, for diagnostic tools.
 impl Registers for Dl06 {
     fn functions(&self) -> &[u8] {
         &[0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x0B, 0x0C, 0x0F, 0x10, 0x11, 0x16, 0x17, 0x18, 0x2B]

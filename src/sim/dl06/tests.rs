@@ -19,7 +19,7 @@ fn ask(plc: &mut Dl06, request: &[u8], expect: &[u8]) {
 }
 
 #[test]
-fn a_written_output_stays_while_stopped_and_is_overwritten_while_driven() {
+fn a_written_output_stays_unless_the_sequence_drives_it() {
     let plc = &mut Dl06::new();
     plc.scan(false, &HALF_FULL);
     ask(plc, &[6, 0x41, 0x40, 0xFF, 0xFF], &[6, 0x41, 0x40, 0xFF, 0xFF]);
@@ -87,7 +87,7 @@ fn the_interlocks_hold_in_manual_and_behind_forced_lamps() {
 }
 
 #[test]
-fn the_word_of_the_interlocks_tells_what_is_blocked_before_it_is_wanted() {
+fn the_interlock_word_shows_blocks_before_a_command() {
     let check = |readings: Readings, expect: u8| {
         let mut plc = Dl06::new();
         plc.scan(false, &readings);

@@ -28,7 +28,7 @@ impl Fault {
                 "The unit has no power, the wrong address or baud rate, or its wire is off.",
                 "Its values are doubted at once and bad after three failed requests, when its alarm \"not answering\" comes; \
                  other units go on. Whether the unit still works its process cannot be known from here.",
-                "Go and look at the unit; treat all it controls as unknown.",
+                "Inspect the unit; treat all it controls as unknown.",
             ),
             Fault::Late(_) => describe(
                 "The unit is overloaded or sits behind a slow radio or converter.",
@@ -45,7 +45,7 @@ impl Fault {
             Fault::Cut => describe(
                 "Each answer ends in the middle: the driver switches off too early, or the unit restarts.",
                 "An answer that is too short is no answer. As with a wrong check, a write may have been done.",
-                "See the frames on Bus: where they end tells which side switches off.",
+                "See the frames on Bus: where they end shows which side switches off.",
             ),
             Fault::Exception(_) => describe(
                 "The unit understands and refuses: no such register, busy, or its own failure.",
@@ -55,7 +55,7 @@ impl Fault {
             ),
             Fault::Stuck => describe(
                 "The measuring part of the unit hangs while its communication goes on: every answer is good and old.",
-                "Nothing on the line tells. A master sees it only by a value that should move and does not: by another \
+                "The line shows nothing. A master sees it only by a value that should move and does not: by another \
                  measurement, by its effect, or by an alarm on no change, where there is one.",
                 "Compare with what the process must do: heating without a change of temperature is not possible.",
             ),
@@ -83,19 +83,19 @@ impl Fault {
                 "Compare MV with the power that is measured.",
             ),
             Fault::ValveStuck(Valve::Drain, Position::Open) => describe(
-                "SV-1 does not shut: TK-1 runs empty into TK-3.",
-                "The PLC shows what it commands (SHUT), not where the valve is. Flow out of TK-1 and a falling level tell the \
-                 truth.",
+                "SV-1 does not close: TK-1 runs empty into TK-3.",
+                "The PLC shows what it commands (SHUT), not where the valve is. Flow out of TK-1 and a falling level show \
+                 that it is open.",
                 "Stop; close the hand valve under TK-1.",
             ),
             Fault::ValveStuck(Valve::Drain, Position::Closed) => describe(
                 "SV-1 does not open: TK-1 keeps its hot water.",
                 "The PLC shows OPEN, but no flow out and the level stands. After the time of the step the sequence fails with \
                  an alarm.",
-                "Stop and look at the coil of the valve; the water is hot.",
+                "Stop and check the coil of the valve; the water is hot.",
             ),
             Fault::ValveStuck(Valve::Fill, Position::Open) => describe(
-                "SV-2 does not shut: TK-2 runs into TK-1.",
+                "SV-2 does not close: TK-2 runs into TK-1.",
                 "The PLC shows SHUT, but there is flow in and the level rises to its alarm.",
                 "Close the hand valve under TK-2 before TK-1 overflows.",
             ),
@@ -107,19 +107,19 @@ impl Fault {
             ),
             Fault::Leak(_) => describe(
                 "TK-1 loses water to the floor.",
-                "The level falls while both valves are shut and no flow is shown. The alarm of a low level waits \
-                 half an hour, because TK-1 is empty between batches: the sum of the three tanks tells earlier.",
-                "Stop heating; look at the tank.",
+                "The level falls while both valves are closed and no flow is shown. The alarm of a low level waits \
+                 half an hour, because TK-1 is empty between batches: the sum of the three tanks shows it earlier.",
+                "Stop heating; inspect the tank.",
             ),
             Fault::PumpFailed => describe(
                 "P-1 does not turn: its motor protection is off or its shaft is broken.",
                 "The PLC shows ON, but no pump flow. TK-3 stays full and the sequence fails in RETURN.",
-                "Look at the motor protection switch.",
+                "Check the motor protection switch.",
             ),
             Fault::AgitatorFailed => describe(
                 "M-1 does not turn: the water forms layers.",
                 "Nothing measures the agitator: the PLC shows ON. The temperature follows the heater late and swings more.",
-                "Look into the tank when the control swings without a change of settings.",
+                "Inspect the tank when the control swings without a change of settings.",
             ),
         }
     }

@@ -8,13 +8,13 @@ use std::{fmt, str::FromStr, time::Duration};
 pub enum Fault {
     /// So many of 100 messages on the line have a wrong bit.
     Noise(u8),
-    /// The unit hears nothing and does nothing.
+    /// The unit receives nothing and does nothing.
     Silent,
-    /// The unit does what it is told and answers this much late (plant time).
+    /// The unit executes requests and answers this much late (plant time).
     Late(Duration),
-    /// The unit does what it is told; the answer arrives with a wrong check.
+    /// The unit executes requests; the answer has a wrong CRC or LRC.
     BadCrc,
-    /// The unit does what it is told; the answer breaks off in the middle.
+    /// The unit executes requests; the answer is cut in the middle.
     Cut,
     /// The unit does nothing and answers with this exception code.
     Exception(u8),

@@ -1,4 +1,4 @@
-//! What each fault looks like on the line, and what it leaves alone.
+//! The effect of each fault on the line, and what it leaves unchanged.
 
 use super::*;
 use crate::{bus::frame::crc16, sim::rig::Rig};
@@ -83,7 +83,7 @@ fn the_same_answer_on_tcp() {
 }
 
 #[test]
-fn noise_corrupts_about_as_many_messages_as_it_says_and_always_the_same() {
+fn noise_corrupts_its_share_of_messages_reproducibly() {
     let corrupt = |percent| {
         let (mut simulator, mut faults) = simulator();
         faults.inject(&mut simulator, FaultTarget::Line(L1), Fault::Noise(percent), SINCE);

@@ -1,4 +1,4 @@
-//! The task of a trainer: lets things go wrong on request or by a scenario, watches, and judges.
+//! The task of a trainer: injects faults on command or by a scenario, and evaluates the result.
 
 use std::{
     sync::{
@@ -30,7 +30,7 @@ use crate::{
 
 /// Commands that may wait; more are dropped, as `in_force` shows.
 const COMMANDS_MAX: usize = 32;
-/// Steps that may wait for the judge, counted as they were told.
+/// Batches of alarm events that may wait for the judge.
 const STEPS_MAX: usize = 4096;
 /// The number of the terminal by which the operator of a scenario gives commands; real terminals count from 1.
 const OPERATOR: u32 = u32::MAX;
@@ -87,9 +87,9 @@ pub struct Trainer {
     pub journal: Journal,
     /// The drill, if there is one.
     pub scenario: Option<Arc<Scenario>>,
-    /// Where the operator of the scenario gives his commands; `None` where a person sits.
+    /// Takes the commands of the scenario's operator; `None` for a human operator.
     pub operator: Option<mpsc::Sender<command::Command>>,
-    /// Nothing is told before the drill is over.
+    /// Hide faults and result until the drill is over.
     pub exam: bool,
 }
 
@@ -172,7 +172,7 @@ impl Task {
         self.judge.map(|judge| judge.verdict())
     }
 
-    /// The judge while the drill goes on; what comes later changes nothing.
+    /// The judge, while the drill runs.
     fn running(&mut self) -> Option<&mut Judge> {
         self.judge.as_mut().filter(|judge| !judge.is_over())
     }

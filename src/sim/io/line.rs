@@ -18,13 +18,13 @@ use crate::plant::def::Serial;
 use crate::sim::faults::Answer;
 use crate::sim::wire::{FrameReceiver, Request};
 
-/// Requests and answers under way at once; a request beyond that is not heard.
+/// Requests and answers under way at once; a request beyond that is dropped.
 const JOBS_MAX: usize = 8;
 /// Silence that ends a frame of unknown length, in real time: bytes of one write may come in pieces.
 const SILENCE_REAL_MIN: Duration = Duration::from_millis(20);
 /// Time that characters of one ASCII frame may be apart (Modbus serial line V1.02, 2.5.2.1).
 const SILENCE_ASCII: Duration = Duration::from_secs(1);
-/// An answer that nobody takes for this long is dropped (the other end of a pty is closed and its buffer full).
+/// An answer that is not read for this long is dropped (the other end of a pty is closed and its buffer full).
 const WRITE_MAX: Duration = Duration::from_secs(1);
 /// Timers tick in 1 ms, so an answer may be this late for no other reason; the next request is credited with it.
 const TICK: Duration = Duration::from_millis(2);
@@ -63,7 +63,7 @@ where
             biased;
             read = stream.read(&mut bytes) => match read? {
                 0 => return Ok(()),
-                count => line.heard(Instant::now(), &bytes[..count]),
+                count => line.on_received(Instant::now(), &bytes[..count]),
             },
             () = sleep_until(line.next()), if line.waits() => match line.due(Instant::now()) {
                 Due::Nothing => {}
@@ -86,7 +86,7 @@ struct Line {
     clock: Clock,
     wire: Wire,
     receiver: FrameReceiver,
-    /// Frames that could not be read since the units were told.
+    /// Corrupt frames that the units have not counted yet.
     corrupt: usize,
     /// Since when the request that is arriving has been on the wire, and when its latest bytes came.
     began: Instant,
@@ -130,7 +130,7 @@ impl Line {
     }
 
     /// Bytes have arrived. They come at once, but the request is not over before its time on the wire.
-    fn heard(&mut self, now: Instant, bytes: &[u8]) {
+    fn on_received(&mut self, now: Instant, bytes: &[u8]) {
         if self.receiver.is_empty() {
             // A master that asks again at once was held up by the late answer; the lateness must not add up.
             let at_once = now - self.sent < SILENCE_REAL_MIN;
@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn ascii_waits_a_second_for_a_character_and_begins_anew_with_a_colon() {
+    async fn ascii_waits_a_second_and_restarts_at_a_colon() {
         let (mut master, simulator) = serve(SEVEN_BITS, true, 1.0);
         master.write_all(b":010303EA").await.expect("the line takes bytes");
         tokio::time::advance(Duration::from_millis(900)).await;

@@ -22,7 +22,7 @@ use crate::{
 
 /// Requests that may wait; a full queue makes the sender wait, and the task always drains it.
 const REQUESTS_MAX: usize = 64;
-/// The simulator is brought up to date this often when nobody asks (plant time), but not oftener than the real interval.
+/// The simulator advances at least this often (plant time), but not more often than the real interval.
 const IDLE: Duration = Duration::from_secs(1);
 const IDLE_REAL_MIN: Duration = Duration::from_millis(50);
 /// The most plant time made up for at once, after the machine was asleep or overloaded; the rest is not simulated.
@@ -233,7 +233,7 @@ async fn run(
     }
 }
 
-/// Who asked may have gone meanwhile; an answer that nobody waits for is dropped.
+/// The reply to a requester that has gone is dropped.
 fn handle_request(
     simulator: &mut Simulator,
     faults: &mut Faults,

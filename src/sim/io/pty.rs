@@ -1,4 +1,4 @@
-//! A pseudo-terminal whose one end looks like a serial port.
+//! A pseudo-terminal, one end of which serves as a serial port.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -166,7 +166,7 @@ impl Service {
     }
 }
 
-/// Serves every line of a plant; `services` tells how, by [`LineId`].
+/// Serves every line of a plant; `services` says how, by [`LineId`].
 pub async fn serve(def: &PlantDef, clock: Clock, services: &[Service]) -> Result<Serving, SimError> {
     serve_simulator(def, Simulator::of(def)?, clock, services).await
 }

@@ -59,7 +59,7 @@ where
 }
 
 /// Serves one client in the order of its requests until it leaves, falls silent or breaks the protocol. TCP knows no
-/// broadcast: who asks for a unit that is not there, 0 too, hears nothing.
+/// broadcast: a request to a unit that does not exist, 0 included, has no response.
 async fn serve_client<S: AsyncRead + AsyncWrite + Unpin>(mut stream: S, units: LineHandle) -> io::Result<()> {
     while let Some((transaction, unit, pdu)) = timeout(IDLE_MAX, receive(&mut stream)).await?? {
         if !units.has(unit) {
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn requests_of_one_segment_are_answered_in_order_and_half_a_frame_waits() {
+    async fn requests_in_one_segment_are_answered_in_order() {
         let mut client = TcpStream::connect(serve(TcpFraming::Mbap).await).await.expect("the server accepts");
         let read = |transaction: u8, function: u8| [0, transaction, 0, 0, 0, 6, 1, function, 0x03, 0xEA, 0, 1];
         let segment =

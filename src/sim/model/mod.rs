@@ -1,4 +1,4 @@
-//! Devices made from their profiles: addresses, types, limits and refusals as the profile tells, values that move by its
+//! Devices made from their profiles: addresses, types, limits and refusals of the profile, values that move by its
 //! `simulate` words. No Rust per device.
 //!
 //! ```text

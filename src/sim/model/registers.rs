@@ -90,7 +90,7 @@ impl Model {
     pub fn new(chart: Arc<Chart>) -> Model {
         let cells = chart.cells.each_ref().map(|cells| cells.iter().map(|address| (*address, 0)).collect());
         let mut model = Model { chart: chart.clone(), cells };
-        // Twice: the place of a decimal point may be told by a tag that comes later.
+        // Twice: a later tag may hold the place of a decimal point.
         for tag in chart.tags.iter().chain(&chart.tags) {
             let start = tag.simulate.as_ref().and_then(|simulate| simulate.start);
             model.set(tag, start.unwrap_or_else(|| at_rest(tag)));

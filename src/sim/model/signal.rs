@@ -37,7 +37,7 @@ impl SignalGenerator {
         SignalGenerator { exact: start, on_since: None, seed }
     }
 
-    /// Moves by one step; `values` tells the value of another tag. Returns what the registers show.
+    /// Moves by one step; `values` gives the value of another tag. Returns the register value.
     pub fn step(&mut self, how: &Simulate, step: Step, values: &impl Fn(TagId) -> Option<f64>) -> f64 {
         let case = how.cases.iter().find(|case| holds(&case.when, values));
         if let Some(case) = case {
@@ -127,7 +127,7 @@ fn oscillate([low, high]: [f64; 2], period: Duration, at: Duration, seed: u64) -
     low + (high - low) * (both + 1.0) / 2.0
 }
 
-/// A number between 0 and 1 that looks random and is the same in every run (splitmix64 of seed and time).
+/// A pseudo-random number between 0 and 1, the same in every run (splitmix64 of seed and time).
 fn noise(seed: u64, at: Duration) -> f64 {
     let mut bits = seed ^ to_u64(at.as_millis()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

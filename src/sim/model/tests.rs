@@ -67,7 +67,7 @@ fn a_model_refuses_what_its_profile_does_not_allow() {
     check(&[(&[6, 0, 10, 0xFF, 0x37], &[0x86, 3]), (&[6, 0, 10, 0x07, 0xD1], &[0x86, 3])]);
     check(&[(&[6, 0, 14, 0, 3], &[0x86, 3]), (&[3, 0, 14, 0, 1], &[3, 2, 0, 1])]);
     check(&[(&[16, 0, 20, 0, 2, 4, 0x40, 0x80, 0, 0], &[0x90, 3]), (&[3, 0, 20, 0, 2], &[3, 4, 0x3F, 0, 0, 0])]);
-    // Half a float; a gap, which may only be read; beyond the gap; read only tables and functions nobody needs.
+    // Half a float; a gap, which may only be read; beyond the gap; read only tables and unused functions.
     check(&[(&[6, 0, 20, 0x3F, 0x80], &[0x86, 2]), (&[6, 0, 12, 0, 1], &[0x86, 2])]);
     check(&[(&[3, 0, 15, 0, 1], &[0x83, 2]), (&[4, 0, 1, 0, 1], &[0x84, 2]), (&[3, 0, 40, 0, 1], &[3, 2, 0, 0])]);
     check(&[(&[6, 0, 40, 0, 1], &[0x86, 2]), (&[22, 0, 10, 0, 0, 0, 0], &[0x96, 1]), (&[8, 0, 0, 0, 0], &[0x88, 1])]);

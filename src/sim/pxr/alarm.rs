@@ -28,7 +28,7 @@ pub struct Shape {
     pub hold: bool,
 }
 
-/// The shape of a type number; 0 and what nobody knows is no alarm.
+/// The shape of a type number; 0 and unknown numbers are no alarm.
 pub fn shape(number: i16) -> Option<Shape> {
     use Base::{Sv, Zero};
     let one = |high, low, hold| Shape { high, low, shared: false, zone: false, hold };

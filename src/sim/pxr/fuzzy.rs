@@ -8,7 +8,7 @@
 //!
 //! "Far" begins to hold a little at SV and holds fully at a share of the proportional band; between, both neighbours hold
 //! in part and the output is their mean, weighted by how much each holds (Sugeno's way with constant and PID consequents).
-//! The maker does not publish his law: this one has its shape (full power longer than PID, settings of PID at SV).
+//! The manufacturer does not publish the law: this one has its shape (full power longer than PID, settings of PID at SV).
 
 /// PV is drawn out along its slope over this share of D.
 const LOOK_AHEAD: f64 = 0.0222;

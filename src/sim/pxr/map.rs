@@ -88,7 +88,7 @@ pub struct Row {
     pub min: i16,
     /// Greatest plain value that may be written; equal to `min` where the rig does not let it change.
     pub max: i16,
-    /// Value before anybody writes, in °C with one decimal.
+    /// Default value, in °C with one decimal.
     pub first: i16,
 }
 
@@ -102,7 +102,7 @@ pub fn rows() -> &'static [Row] {
     ROWS
 }
 
-/// All settings as they are before anybody writes.
+/// The default settings.
 pub fn initial() -> [i16; COUNT] {
     let mut settings = [0; COUNT];
     for row in ROWS {

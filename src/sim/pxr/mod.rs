@@ -38,9 +38,9 @@ const NARROWEST_K: f64 = 10.0;
 const OPEN_UPPER: u16 = 1 << 1;
 const BELOW_RANGE: u16 = 1 << 2;
 const ABOVE_RANGE: u16 = 1 << 3;
-/// Alarm word 31007: alarms 1 to 3, and the burnt-out heater, whose bit nobody has published: this place is a guess.
+/// Alarm word 31007: alarms 1 to 3, and the burnt-out heater, whose bit is not published: this position is a guess.
 const HEATER_BREAK: u16 = 1 << 3;
-/// A heater is judged only above this output, after so many samples: it needs some seconds to warm up.
+/// The heater current is evaluated only above this output, after so many samples: it needs some seconds to warm up.
 const JUDGED_PERCENT: f64 = 20.0;
 const JUDGED_AFTER: u32 = 60;
 /// PV runs from −5 to 105 % of the range.
@@ -115,7 +115,7 @@ impl Pxr {
         self.measure(sensor);
         self.sv_c = self.set_value();
         self.mv_percent = self.output();
-        self.judge();
+        self.evaluate_alarms();
     }
 
     /// Output 1 in percent.
@@ -133,7 +133,7 @@ impl Pxr {
         self.sv_c
     }
 
-    /// The digital output that tells the PLC: PV is known and within 1 °C of SV.
+    /// The digital output to the PLC: PV is known and within 1 °C of SV.
     pub fn at_sv(&self) -> bool {
         self.faults == 0 && (self.pv_c - self.sv_c).abs() <= 1.0
     }
@@ -305,8 +305,8 @@ impl Pxr {
         self.tuner = None;
     }
 
-    /// Alarms rest in standby; the current of a heater is judged while the output asks for some.
-    fn judge(&mut self) {
+    /// Alarms rest in standby; the heater current is evaluated while the output asks for some.
+    fn evaluate_alarms(&mut self) {
         if self.standby() {
             self.alarms = <[Alarm; 3]>::default();
             self.weak_heater = 0;

@@ -144,7 +144,7 @@ impl Pxr {
         }
     }
 
-    /// Unit or decimals change: every temperature is written anew, or nothing is if one would not fit into its word.
+    /// Unit or decimals change: every temperature is rewritten, or nothing is if one would not fit into its word.
     fn show_as(&mut self, to: Display) -> Result<(), Refusal> {
         let from = self.display();
         let mut settings = self.settings;
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn decimals_and_unit_change_the_numbers_and_not_the_temperatures() {
+    fn decimals_and_unit_change_numbers_not_temperatures() {
         let check = |unit, decimals, sv, sv_high, range_high, hysteresis, pv| {
             let pxr = &mut Pxr::new(27.0);
             pxr.sample(super::super::Sensor::Pt100(27.0), 0.0);

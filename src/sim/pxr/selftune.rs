@@ -7,7 +7,7 @@
 //!    least half as large as the first, are a loop that does not calm down: the band becomes a quarter wider and I at
 //!    least half a period.
 //!
-//! The maker does not publish his rule; these two are ours.
+//! The manufacturer does not publish the rule; these two are ours.
 
 use super::rule::{self, Found};
 
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn swings_that_do_not_calm_down_widen_the_band_and_others_do_not() {
+    fn only_persistent_oscillation_widens_the_band() {
         let check = |decay_per_swing: f64, expect: bool| {
             let mut tuner = SelfTuner::default();
             let found = (0..2000).find_map(|sample| {

@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn slope_and_delay_of_a_known_process_are_found_however_it_cools() {
+    fn slope_and_delay_of_a_known_process_are_found() {
         for down in [0.003, 0.006, 0.03] {
             let Verdict::Done(found) = tuned(0.07 - down, down, 60) else { panic!("tuning did not end at {down} K/s") };
             let expect = rule::settings(0.07, 30.0);

@@ -37,7 +37,7 @@ struct Mark {
     met: Option<Duration>,
     /// When and by which value it was violated.
     broken: Option<(Duration, Option<f64>)>,
-    /// Whether there was anything to judge by.
+    /// Whether the value was known at all.
     seen: bool,
     /// Since when what is shown differs from the truth.
     differs: Option<Duration>,
@@ -80,7 +80,7 @@ pub struct Verdict {
     pub pass_percent: u32,
     /// Whether its time is over.
     pub over: bool,
-    /// Steps of alarms that could not be judged because too many came at once.
+    /// Alarm events that were lost because too many came at once.
     pub lost: u64,
 }
 
@@ -257,7 +257,7 @@ impl Mark {
                 ExpectationStatus::Missed(format!("shown as good and wrong from {}{}", clock(at), value(number)))
             }
             (Expectation::Within { .. } | Expectation::True(..), _, None) if over && !self.seen => {
-                ExpectationStatus::Missed("could not be judged: the simulation does not know it".to_owned())
+                ExpectationStatus::Missed("not evaluated: the simulator does not know the value".to_owned())
             }
             (Expectation::NoAlarm(_) | Expectation::Within { .. } | Expectation::True(..), _, None) if over => {
                 ExpectationStatus::Met(now)
@@ -268,7 +268,7 @@ impl Mark {
 }
 
 impl Verdict {
-    /// Whether the points suffice by now. Where steps were lost nobody knows that they do.
+    /// Whether the points suffice. Lost alarm events are never passed.
     pub fn passed(&self) -> bool {
         self.lost == 0 && self.points * 100 >= self.pass_percent * self.of
     }
@@ -277,8 +277,8 @@ impl Verdict {
     pub fn summary(&self) -> String {
         let lost = match self.lost {
             0 => String::new(),
-            1 => "; not judged: 1 step lost".to_owned(),
-            lost => format!("; not judged: {lost} steps lost"),
+            1 => "; not evaluated: 1 alarm event lost".to_owned(),
+            lost => format!("; not evaluated: {lost} alarm events lost"),
         };
         let points = format!("{} of {} points, {} % needed{lost}", self.points, self.of, self.pass_percent);
         match (self.over, self.passed()) {

@@ -171,7 +171,7 @@ fn scenario(name: &str, table: &ScenarioTable, def: &PlantDef, problems: &mut Pr
     let expect: Vec<Expect> =
         table.expect.iter().filter_map(|expect| expect::expectation(&expect.value, duration, def, problems)).collect();
     if table.expect.is_empty() {
-        problems.add(table.at, "a scenario needs at least one [[expect]]").label("there is nothing to judge");
+        problems.add(table.at, "a scenario needs at least one [[expect]]").label("nothing to evaluate");
     }
     if let Some(percent) = table.pass_percent.filter(|percent| percent.value > 100) {
         problems.add(percent.at, format!("found {} %", percent.value)).label("expected 0 to 100");

@@ -33,9 +33,9 @@ use crate::{
 pub struct Faults {
     /// Which row is selected; headings are not counted.
     selected: usize,
-    /// Numbers chosen for faults that are not in force.
+    /// Parameters chosen for faults that are not active.
     numbers: BTreeMap<(FaultTarget, &'static str), Fault>,
-    /// The points of the drill are shown instead of the fault told.
+    /// The score of the drill is shown instead of the fault.
     verdict: bool,
 }
 
@@ -131,7 +131,7 @@ impl Faults {
             Action::Less | Action::More => {
                 let other = fault.step(action == Action::More);
                 self.numbers.insert((target, fault.word()), other);
-                // What is in force changes at once.
+                // An active fault changes at once.
                 if active && other != fault {
                     return send(SimCommand::Inject(target, other));
                 }
@@ -142,7 +142,7 @@ impl Faults {
         Vec::new()
     }
 
-    /// The fault with the number it has, or would have.
+    /// The fault with its present or chosen parameter.
     fn number(&self, status: &Status, target: FaultTarget, offered: Fault) -> Fault {
         match status.find(target, offered) {
             Some(active) => active.fault,
@@ -194,7 +194,7 @@ fn rows(status: &Status) -> Vec<(FaultTarget, Fault)> {
         .collect()
 }
 
-/// A silent device may answer again: it is asked at once, if the present user may do that.
+/// Polls silent devices at once, if the user may: they may answer again.
 fn cleared(cx: &ViewContext, command: SimCommand) -> Vec<UiAction> {
     let allowed = |act: &UiAction| matches!(act, UiAction::Command(kind) if rights::missing(cx, kind).is_none());
     send(command).into_iter().chain(bus::retry(cx, None).into_iter().filter(allowed)).collect()

@@ -1,4 +1,4 @@
-//! What a scenario file says, and how each mistake in it is told.
+//! The content of a scenario file, and the message of each mistake.
 
 use std::path::Path;
 
@@ -58,7 +58,7 @@ fn everything_in_a_file_is_understood() {
 
 /// Each mistake with the line that it is found in.
 #[test]
-fn a_mistake_is_told_with_its_line_what_was_found_and_what_was_expected() {
+fn a_mistake_is_reported_with_line_found_and_expected() {
     let check = |text: &str, expect: &str| {
         let found = read_text(text).expect_err(expect);
         assert!(found.iter().any(|line| line == expect), "expected {expect}\nfound {found:#?}");

@@ -1,4 +1,4 @@
-//! The tab as a trainer uses it: what a key sends, what stands on the screen, and where the tab is not.
+//! The tab as a trainer uses it: what a key sends, what the screen shows, and where the tab is not offered.
 
 use std::{sync::Arc, time::Duration};
 
@@ -107,7 +107,7 @@ fn faults_go_on_and_off_by_enter_with_their_numbers() {
 }
 
 #[test]
-fn devices_that_do_not_answer_are_asked_at_once_when_their_faults_are_cleared() {
+fn clearing_faults_polls_silent_devices_at_once() {
     use crate::plant::{command::CommandKind, def::DeviceId, snapshot::DeviceState};
     let mut fixture = Fixture::normal();
     fixture.devices[0].state = DeviceState::Down { since: fixture::now() };

@@ -46,7 +46,7 @@ pub(super) fn view(tab: &Faults, cx: &ViewContext, frame: &mut Frame, area: Rect
     let mut side = canvas.part(LIST + 2, top, area.width.saturating_sub(LIST + 3), height);
     let all = rows(status);
     if let Some((target, offered)) = all.get(tab.selected.min(all.len().saturating_sub(1))) {
-        told(cx, status, *target, tab.number(status, *target, *offered), &mut side);
+        describe(cx, status, *target, tab.number(status, *target, *offered), &mut side);
     }
 }
 
@@ -112,7 +112,7 @@ fn target_label(cx: &ViewContext, target: FaultTarget) -> String {
 }
 
 /// Describes the selected fault above the comparison.
-fn told(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, canvas: &mut Canvas) {
+fn describe(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
     let description = fault.description();
     let mut lines = vec![(format!("{}: {fault}", target.name(cx.def())), theme.strong())];
@@ -144,7 +144,7 @@ struct Compared {
     comparison: TruthComparison,
 }
 
-/// How what is shown and what is so go together.
+/// Comparison of displayed and actual value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum TruthComparison {
     /// Shown as good, and wrong.
