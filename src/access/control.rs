@@ -26,7 +26,7 @@ use self::{
     user_admin::Saving,
 };
 use super::{
-    CommandRequest, Secret, SessionRequest, Who,
+    Credentials, Secret, SessionRequest, Who,
     lockout::LoginAttempts,
     right,
     user::{Change, Users},
@@ -35,7 +35,7 @@ use crate::{
     history::Query,
     plant::{
         PlantDef,
-        command::{Command, CommandId, Refusal},
+        command::{self, Command, CommandId, CommandStatus, Refusal},
         interlock,
         record::ActionRecord,
         role::Role,
@@ -65,7 +65,7 @@ pub struct Peer {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     /// Hand this command to the plant, permitted or refused.
-    Command(Command),
+    Command(CommandStatus),
     /// Put this into the audit log.
     Record(ActionRecord),
     /// Answer a request.
@@ -215,47 +215,60 @@ impl AccessControl {
         effects
     }
 
-    /// A terminal gives a command.
-    pub fn on_command(&mut self, terminal: u32, mut request: CommandRequest, at: Timestamp) -> Vec<Effect> {
+    /// Checks a command of a terminal and passes it on to the plant, permitted or refused.
+    pub fn on_command(
+        &mut self,
+        terminal: u32,
+        mut command: Command,
+        credentials: Option<Credentials>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
         // A terminal speaks for itself only.
-        request.id.terminal = terminal;
-        request.note = request.note.map(|note| clean(&note).into());
-        // A stop is never one request too many.
-        let stops = request.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
+        command.id.terminal = terminal;
+        command.note = command.note.map(|note| clean(&note).into());
+        // A stop is never one command too many.
+        let stops = command.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
         if !self.within_rate(terminal, at) && !stops {
-            return self.undelivered(request.id, TOO_MANY);
+            return self.undelivered(command.id, TOO_MANY);
         }
-        if request.run != self.run {
+        if command.run != self.run {
             // On record it would name what the plant file of this run has in its place.
-            return self.undelivered(request.id, OTHER_RUN);
+            return self.undelivered(command.id, OTHER_RUN);
         }
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
-        let number = request.id.number;
+        let number = command.id.number;
         if session.last_command.is_some_and(|last| number <= last) {
             // Its outcome would be taken for that of the command that had the number first.
-            return self.undelivered(request.id, "this command has the number of an earlier one, give it again");
+            return self.undelivered(command.id, "this command has the number of an earlier one, give it again");
         }
         session.last_command = Some(number);
         if !session.locked {
             session.active = at;
         }
-        match self.may(terminal, Some(right::needs(&request.kind))) {
-            Err(why) => self.refuse_command(terminal, request, Refusal::NotPermitted(why), at),
-            Ok(_) => self.reauthenticate(terminal, request, at),
+        match self.may(terminal, Some(right::needs(&command.kind))) {
+            Err(why) => self.refuse_command(terminal, command, Refusal::NotPermitted(why), at),
+            Ok(_) => self.reauthenticate(terminal, command, credentials, at),
         }
     }
 
-    /// Role and reauthentication are sufficient.
-    fn let_through(&self, terminal: u32, request: CommandRequest, approver: Option<&str>) -> Vec<Effect> {
+    /// The role is enough, and so is the reauthentication.
+    fn let_through(
+        &self,
+        terminal: u32,
+        mut command: Command,
+        approver: Option<&str>,
+        outcome: command::Outcome,
+        at: Timestamp,
+    ) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
-        let note = match (request.note, approver) {
+        command.note = match (command.note, approver) {
             (note, None) => note,
             (None, Some(approver)) => Some(format!("approved by {approver}").into()),
             (Some(note), Some(approver)) => Some(format!("{note}; approved by {approver}").into()),
         };
-        let CommandRequest { id, kind, seen, .. } = request;
-        let (by, from) = (actor_name(session), session.peer.from.clone());
-        vec![Effect::Command(Command { id, by, from, kind, seen, note, refused: None })]
+        let from = session.peer.from.clone();
+        let status = CommandStatus { from, outcome, ..CommandStatus::new(command, actor_name(session), at) };
+        vec![Effect::Command(status)]
     }
 
     /// A command did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
@@ -267,19 +280,13 @@ impl AccessControl {
 
     /// The plant puts it on record and into the snapshot, so that whoever gave the command sees what became of it. Too many of
     /// them are only told.
-    fn refuse_command(&mut self, terminal: u32, request: CommandRequest, why: Refusal, at: Timestamp) -> Vec<Effect> {
+    fn refuse_command(&mut self, terminal: u32, command: Command, why: Refusal, at: Timestamp) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         let (origin, own) = (session.origin.clone(), session.peer.own);
         if !own && !self.may_record(&origin, at) {
-            return self.undelivered(request.id, &why.to_string());
+            return self.undelivered(command.id, &why.to_string());
         }
-        let mut effects = self.let_through(terminal, request, None);
-        for effect in &mut effects {
-            if let Effect::Command(command) = effect {
-                command.refused = Some(why.clone());
-            }
-        }
-        effects
+        self.let_through(terminal, command, None, command::Outcome::Refused(why), at)
     }
 
     /// May this terminal ask this of the history? `Err` says why not, and what must happen because of it.

@@ -11,7 +11,5 @@ pub mod sealing;
 pub mod io;
 
 pub use control::{AccessControl, Effect, Peer};
-pub use session_request::{
-    CommandRequest, Credentials, Durability, Secret, SessionRequest, SessionRow, SessionStatus, UserRow, Who,
-};
+pub use session_request::{Credentials, Durability, Secret, SessionRequest, SessionRow, SessionStatus, UserRow, Who};
 pub use user::Users;

@@ -5,11 +5,7 @@ use std::{fmt, sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::{
-    Snapshot,
-    command::{CommandId, CommandKind},
-    role::Role,
-};
+use crate::plant::{command::CommandId, role::Role};
 
 /// A password on its way: never shown, not even in a log.
 #[derive(Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -123,36 +119,6 @@ pub struct Credentials {
     pub user: Option<String>,
     /// The password of that person.
     pub password: Secret,
-}
-
-/// A command as a terminal gives it: who gives it, the station knows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CommandRequest {
-    /// Chosen by the terminal.
-    pub id: CommandId,
-    /// The run of the station whose snapshot it was made on, see [`Snapshot::run`]. The ids in the command mean nothing in
-    /// another run: the plant file may have changed.
-    pub run: u64,
-    /// What.
-    pub kind: CommandKind,
-    /// The value of the tag that the operator saw when he confirmed.
-    pub seen: Option<f64>,
-    /// Why, in his words.
-    pub note: Option<Arc<str>>,
-    /// Credentials, if the tag requires reauthentication.
-    pub credentials: Option<Credentials>,
-}
-
-impl CommandRequest {
-    /// A command without seen value, note and credentials.
-    pub fn new(run: u64, id: CommandId, kind: CommandKind) -> CommandRequest {
-        CommandRequest { id, run, kind, seen: None, note: None, credentials: None }
-    }
-
-    /// A command made on what a snapshot shows.
-    pub fn on(snapshot: &Snapshot, id: CommandId, kind: CommandKind) -> CommandRequest {
-        CommandRequest { seen: snapshot.seen(&kind), ..CommandRequest::new(snapshot.run, id, kind) }
-    }
 }
 
 /// Somebody who is logged in.

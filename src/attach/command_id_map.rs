@@ -4,13 +4,10 @@ use std::{collections::VecDeque, sync::Arc};
 
 use jiff::Timestamp;
 
-use crate::{
-    access::CommandRequest,
-    plant::{
-        Snapshot,
-        command::{CommandId, CommandStatus, NotConfirmed, Outcome, Refusal},
-        diagnostics::DiagnosticRun,
-    },
+use crate::plant::{
+    Snapshot,
+    command::{Command, CommandId, CommandStatus, NotConfirmed, Outcome, Refusal},
+    diagnostics::DiagnosticRun,
 };
 
 /// Said of a command that never left this terminal.
@@ -66,59 +63,60 @@ impl CommandIdMap {
     }
 
     /// A command on its way out: with the number that the station knows.
-    pub fn send(&mut self, mut request: CommandRequest, by: Arc<str>, at: Timestamp) -> CommandRequest {
-        push(&mut self.sent, status(&request, by, at, Outcome::Pending), COMMANDS_MAX);
-        request.id.terminal = *self.numbers.back().expect("a connection has a number");
-        request
+    pub fn send(&mut self, mut command: Command, by: Arc<str>, at: Timestamp) -> Command {
+        push(&mut self.sent, status(&command, by, at, Outcome::Pending), COMMANDS_MAX);
+        command.id.terminal = *self.numbers.back().expect("a connection has a number");
+        command
     }
 
     /// A command did not leave this terminal.
-    pub fn refuse(&mut self, request: &CommandRequest, by: Arc<str>, at: Timestamp, why: &str) {
+    pub fn refuse(&mut self, command: &Command, by: Arc<str>, at: Timestamp, why: &str) {
         let outcome = Outcome::Refused(Refusal::NotPermitted(why.to_owned()));
-        push(&mut self.lost, status(request, by, at, outcome), COMMANDS_MAX);
+        push(&mut self.lost, status(command, by, at, outcome), COMMANDS_MAX);
     }
 
     /// The station says that it did not take a command.
     pub fn undelivered(&mut self, id: CommandId, why: String) {
-        if let Some(place) = self.sent.iter().position(|command| command.id.number == id.number)
-            && let Some(command) = self.sent.remove(place)
+        if let Some(place) = self.sent.iter().position(|status| status.command.id.number == id.number)
+            && let Some(status) = self.sent.remove(place)
         {
             let outcome = Outcome::Refused(Refusal::NotPermitted(why));
-            push(&mut self.lost, CommandStatus { outcome, ..command }, COMMANDS_MAX);
+            push(&mut self.lost, CommandStatus { outcome, ..status }, COMMANDS_MAX);
         }
     }
 
     /// The connection has ended: what was sent and not seen may or may not have been done.
     pub fn gone(&mut self) {
         self.connected = false;
-        while let Some(command) = self.sent.pop_front() {
+        while let Some(status) = self.sent.pop_front() {
             let outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
-            push(&mut self.lost, CommandStatus { outcome, ..command }, COMMANDS_MAX);
+            push(&mut self.lost, CommandStatus { outcome, ..status }, COMMANDS_MAX);
         }
     }
 
     /// A snapshot of the station as this terminal is to see it: own commands under the own number, lost ones among them.
     pub fn see(&mut self, snapshot: &Arc<Snapshot>) -> Arc<Snapshot> {
         let told = |number: u32| {
-            let own =
-                |command: &&CommandStatus| command.id.number == number && self.numbers.contains(&command.id.terminal);
-            snapshot.commands.iter().find(own).map(|command| command.outcome != Outcome::Pending)
+            let own = |status: &&CommandStatus| {
+                status.command.id.number == number && self.numbers.contains(&status.command.id.terminal)
+            };
+            snapshot.commands.iter().find(own).map(|status| !status.is_pending())
         };
-        self.sent.retain(|command| told(command.id.number) != Some(true));
+        self.sent.retain(|status| told(status.command.id.number) != Some(true));
         if self.connected {
             // The station remembers it after all: what it says counts again.
-            let (known, lost) = self.lost.drain(..).partition(|command| told(command.id.number).is_some());
+            let (known, lost) = self.lost.drain(..).partition(|status| told(status.command.id.number).is_some());
             let known: VecDeque<CommandStatus> = known;
-            let under_way = known.into_iter().filter(|command| told(command.id.number) == Some(false));
-            self.sent.extend(under_way.map(|command| CommandStatus { outcome: Outcome::Pending, ..command }));
+            let under_way = known.into_iter().filter(|status| told(status.command.id.number) == Some(false));
+            self.sent.extend(under_way.map(|status| CommandStatus { outcome: Outcome::Pending, ..status }));
             self.lost = lost;
         }
         if self.lost.is_empty() && self.numbers.iter().all(|number| *number == self.terminal) {
             return snapshot.clone();
         }
         let mut seen = Snapshot::clone(snapshot);
-        for command in &mut seen.commands {
-            command.id = self.renumbered(command.id);
+        for status in &mut seen.commands {
+            status.command.id = self.renumbered(status.command.id);
         }
         for restore in &mut seen.restores {
             let restore = Arc::make_mut(restore);
@@ -134,9 +132,10 @@ impl CommandIdMap {
             }
         }
         // The last snapshot of a station that has gone shows as under way what nobody will hear the end of.
-        let is_lost =
-            |id: CommandId| id.terminal == self.terminal && self.lost.iter().any(|lost| lost.id.number == id.number);
-        seen.commands.retain(|command| !is_lost(command.id));
+        let is_lost = |id: CommandId| {
+            id.terminal == self.terminal && self.lost.iter().any(|lost| lost.command.id.number == id.number)
+        };
+        seen.commands.retain(|status| !is_lost(status.command.id));
         seen.commands.splice(0..0, self.lost.iter().rev().cloned());
         seen.commands.truncate(COMMANDS_MAX);
         Arc::new(seen)
@@ -155,9 +154,8 @@ impl CommandIdMap {
     }
 }
 
-fn status(request: &CommandRequest, by: Arc<str>, at: Timestamp, outcome: Outcome) -> CommandStatus {
-    let CommandRequest { id, run: _, kind, seen, note, credentials: _ } = request.clone();
-    CommandStatus { id, by, from: "".into(), note, kind, at, old: seen, outcome, recorded: true }
+fn status(command: &Command, by: Arc<str>, at: Timestamp, outcome: Outcome) -> CommandStatus {
+    CommandStatus { old: command.expected_value, outcome, ..CommandStatus::new(command.clone(), by, at) }
 }
 
 fn push<T>(list: &mut VecDeque<T>, element: T, max: usize) {

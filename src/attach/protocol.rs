@@ -9,13 +9,18 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::delta::Delta;
 use crate::{
-    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
+    access::{Credentials, Durability, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
-    plant::{PlantDef, command::CommandId, number::to_u32, visible::acts},
+    plant::{
+        PlantDef,
+        command::{Command, CommandId},
+        number::to_u32,
+        visible::acts,
+    },
 };
 
 /// The number of this protocol; goes up with every change of a message.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Longest hello, bytes.
@@ -69,7 +74,7 @@ pub struct HandshakeReply {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ClientMessage {
     /// A command to the plant.
-    Command(Box<CommandRequest>),
+    Command(Box<Command>, Option<Credentials>),
     /// A query to the history.
     Ask {
         /// Comes back with the answer.

@@ -6,7 +6,6 @@ use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
     command::{CommandKind, Outcome},
-    commands::outcome_words,
     def::TagId,
 };
 
@@ -51,10 +50,10 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         let status = actor.send_command(1, kind).await?;
         let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
         // What the station says that the device holds, which need not be what was typed.
-        let new = status.kind.written().map(|(_, held)| held);
+        let new = status.command.kind.written().map(|(_, held)| held);
         let (old, new, unit) = (words(status.old), words(new), snapshot.unit(tag));
         let recorded = client::recorded_words(status.recorded);
-        let line = format!("{} {old} → {new} {unit}: {}{recorded}", args.tag, outcome_words(&status.outcome));
+        let line = format!("{} {old} → {new} {unit}: {}{recorded}", args.tag, status.outcome);
         match status.outcome {
             Outcome::Verified | Outcome::Unchanged => {
                 say(&line);
@@ -91,7 +90,7 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
             let status = actor.send_command(number, kind).await?;
             let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.message);
             if status.outcome != Outcome::Verified {
-                return Err(CliError::Failed(line + &outcome_words(&status.outcome)));
+                return Err(CliError::Failed(line + &status.outcome.to_string()));
             }
             say(&(line + "acknowledged" + client::recorded_words(status.recorded)));
         }

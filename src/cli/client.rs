@@ -7,7 +7,7 @@ use crate::{
     attach::io::{connect, find},
     plant::{
         Snapshot,
-        command::{CommandId, CommandKind, CommandStatus, Outcome},
+        command::{Command, CommandId, CommandKind, CommandStatus},
         role::Reauthentication,
         sample::{Cause, Quality},
     },
@@ -165,14 +165,13 @@ impl Actor {
             reauthentication::required(&self.session.snapshots.borrow().def, &kind) == Some(Reauthentication::Password);
         let credentials =
             self.password.clone().filter(|_| required).map(|password| Credentials { user: None, password });
-        let request = crate::access::CommandRequest {
-            credentials,
-            note: self.note.as_deref().map(Into::into),
-            ..crate::access::CommandRequest::on(&self.session.snapshots.borrow(), id, kind)
-        };
-        self.session.send(crate::station::Request::Command(request)).map_err(|why| CliError::Failed(why.to_owned()))?;
+        let note = self.note.as_deref().map(Into::into);
+        let command = Command { note, ..Command::on(&self.session.snapshots.borrow(), id, kind) };
+        self.session
+            .send(crate::station::Request::Command(command, credentials))
+            .map_err(|why| CliError::Failed(why.to_owned()))?;
         let ended = |snapshot: &Snapshot| {
-            snapshot.commands.iter().find(|command| command.id == id && command.outcome != Outcome::Pending).cloned()
+            snapshot.commands.iter().find(|status| status.command.id == id && !status.is_pending()).cloned()
         };
         let wait = async {
             let snapshot = self.session.snapshots.wait_for(|snapshot| ended(snapshot).is_some()).await;

@@ -81,9 +81,9 @@ impl Snapshot {
         let day = Arc::make_mut(&mut self.alarm_metrics.day);
         shift(&mut day.from, by);
         shift(&mut day.until, by);
-        self.commands.iter_mut().for_each(|command| {
-            shift(&mut command.at, by);
-            command.kind.unshift(-by);
+        self.commands.iter_mut().for_each(|status| {
+            shift(&mut status.at, by);
+            status.command.kind.unshift(-by);
         });
         self.watch.times().for_each(|since| shift(since, by));
         self.restores.iter_mut().for_each(|run| {
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use crate::plant::{
         Plant,
-        command::{Command, CommandId, Outcome},
+        command::{Command, CommandId, CommandStatus, Outcome},
         event::{Event, Fault},
         fixture::{self, DP, FAULT, PV, SV, TIC},
     };
@@ -181,7 +181,7 @@ mod tests {
             let mut kind = snapshot.alarms[0].acknowledge();
             kind.unshift(by);
             let id = CommandId { terminal: 1, number: 1 };
-            plant.on_command(Command::new(id, "anna", kind), at(1_000_005));
+            plant.on_command(CommandStatus::new(Command::new(1, id, kind), "anna", at(0)), at(1_000_005));
             let mut snapshot = plant.snapshot();
             snapshot.shift(by);
             assert_eq!(snapshot.commands[0].outcome, Outcome::Verified);

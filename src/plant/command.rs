@@ -1,6 +1,6 @@
-//! What an operator wants, how it travels to the bus, and how it ended.
+//! What an operator asks, its way to the bus, and its outcome.
 
-use std::sync::Arc;
+use std::{fmt, sync::Arc};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -12,36 +12,46 @@ use super::{
     diagnostics::Diagnostic,
     event::{ExceptionCode, Fault},
     restore::RestoreRequest,
+    snapshot::Snapshot,
 };
 
-/// What one operator asks, once.
+/// What an operator asks. [`CommandStatus`] says what became of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Command {
-    /// Chosen by the terminal, so that it finds the outcome in a later snapshot.
+    /// Chosen by the terminal, which finds the outcome by it in a later snapshot.
     pub id: CommandId,
-    /// Who asks.
-    pub by: Arc<str>,
-    /// From where: `pts/3 from 10.0.0.5, user panel`; empty for the station itself.
-    pub from: Arc<str>,
-    /// What.
+    /// The run of the station whose snapshot it was made on, see [`Snapshot::run`]. The ids in `kind` mean nothing in
+    /// another run: the plant file may have changed.
+    pub run: u64,
+    /// What to do, to what and with which value.
     pub kind: CommandKind,
-    /// The value of the tag to be written that he saw when he confirmed.
-    pub seen: Option<f64>,
-    /// Why, in his words.
+    /// The value that the operator saw when confirming a write. A write over another value is refused.
+    pub expected_value: Option<f64>,
+    /// The operator's reason.
     pub note: Option<Arc<str>>,
-    /// Why he may not: it is only put on record.
-    pub refused: Option<Refusal>,
 }
 
 impl Command {
-    /// A command that may be carried out, without note.
-    pub fn new(id: CommandId, by: impl Into<Arc<str>>, kind: CommandKind) -> Command {
-        Command { id, by: by.into(), from: "".into(), kind, seen: None, note: None, refused: None }
+    /// A command without expected value and note.
+    pub fn new(run: u64, id: CommandId, kind: CommandKind) -> Command {
+        Command { id, run, kind, expected_value: None, note: None }
+    }
+
+    /// A command on the plant as a snapshot shows it.
+    pub fn on(snapshot: &Snapshot, id: CommandId, kind: CommandKind) -> Command {
+        Command { expected_value: snapshot.expected_value(&kind), ..Command::new(snapshot.run, id, kind) }
+    }
+}
+
+impl From<CommandKind> for Command {
+    /// A command that the terminal has not numbered yet.
+    fn from(kind: CommandKind) -> Command {
+        Command::new(0, CommandId::default(), kind)
     }
 }
 
 /// Identifies a command: the terminal's number and its running count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub struct CommandId {
     /// Which terminal.
     pub terminal: u32,
@@ -116,27 +126,36 @@ impl CommandKind {
     }
 }
 
-/// How a command stands.
+/// A command on its way to its outcome.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CommandStatus {
-    /// Which.
-    pub id: CommandId,
-    /// Who.
+    /// What was asked. Once accepted, a write has the value that the device will hold.
+    pub command: Command,
+    /// The user.
     pub by: Arc<str>,
-    /// From where.
+    /// The user's place: `pts/3 from 10.0.0.5, user panel`; empty for the station itself.
     pub from: Arc<str>,
-    /// Why, in his words.
-    pub note: Option<Arc<str>>,
-    /// What was requested.
-    pub kind: CommandKind,
-    /// When it was taken.
+    /// When the plant accepted it.
     pub at: Timestamp,
-    /// The tag's value when it was taken, for a write.
+    /// The tag's value at that time, for a write.
     pub old: Option<f64>,
-    /// How it stands.
+    /// Its outcome by now.
     pub outcome: Outcome,
     /// Its end is in the audit log, on disk. Said of ended commands only.
     pub recorded: bool,
+}
+
+impl CommandStatus {
+    /// A pending command.
+    pub fn new(command: Command, by: impl Into<Arc<str>>, at: Timestamp) -> CommandStatus {
+        let (by, from, outcome) = (by.into(), "".into(), Outcome::Pending);
+        CommandStatus { command, by, from, at, old: None, outcome, recorded: true }
+    }
+
+    /// Has it no outcome yet?
+    pub fn is_pending(&self) -> bool {
+        self.outcome == Outcome::Pending
+    }
 }
 
 /// The outcome of a command. A write is never retried by itself.
@@ -155,6 +174,34 @@ pub enum Outcome {
     NotConfirmed(NotConfirmed),
     /// No answer to what is no write.
     Failed(Fault),
+}
+
+impl Outcome {
+    /// The outcome without its reason, the same on screen, in the history and in CSV.
+    pub fn label(&self) -> &'static str {
+        match self {
+            Outcome::Pending => "pending",
+            Outcome::Verified => "verified",
+            Outcome::Unchanged => "unchanged",
+            Outcome::Refused(_) => "refused",
+            Outcome::NotConfirmed(_) => "not confirmed",
+            Outcome::Failed(_) => "failed",
+        }
+    }
+}
+
+/// The label with the reason: `refused: read only`.
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.label())?;
+        match self {
+            Outcome::Pending | Outcome::Verified => Ok(()),
+            Outcome::Unchanged => f.write_str(", not written"),
+            Outcome::Refused(why) => write!(f, ": {why}"),
+            Outcome::NotConfirmed(why) => write!(f, ": {why}"),
+            Outcome::Failed(fault) => write!(f, ": {fault}"),
+        }
+    }
 }
 
 /// Why a command was refused.
@@ -271,24 +318,28 @@ pub enum NotConfirmed {
     NoReadBack,
 }
 
+/// A checked write of one tag, as the bus performs it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WriteJob {
+    /// Identifies the write in events.
+    pub id: WriteId,
+    /// The tag to write.
+    pub tag: TagId,
+    /// The raw number, already unscaled.
+    pub raw: f64,
+    /// A key to write first (tag and raw number), if the device needs unlocking.
+    pub unlock: Option<(TagId, f64)>,
+    /// Read the value back afterwards.
+    pub verify: bool,
+    /// It switches something off and goes before all that waits, see [`super::interlock::is_stop`].
+    pub urgent: bool,
+}
+
 /// What the plant asks of a link task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum BusRequest {
-    /// Write one tag once, then read it back.
-    Write {
-        /// Answered by [`super::event::Event::Wrote`].
-        id: WriteId,
-        /// What.
-        tag: TagId,
-        /// The raw number, already unscaled.
-        raw: f64,
-        /// Another tag to write first (raw), if the device needs unlocking.
-        unlock: Option<(TagId, f64)>,
-        /// Read it back afterwards.
-        verify: bool,
-        /// It switches something off: it goes before all that waits, see [`super::interlock::is_stop`].
-        urgent: bool,
-    },
+    /// Write one tag once, then read it back. Answered by [`super::event::Event::Wrote`].
+    Write(WriteJob),
     /// Read every block of a device as soon as possible.
     Refresh {
         /// Which.

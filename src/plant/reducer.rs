@@ -15,7 +15,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_words},
-    command::{BusRequest, Command, CommandId, CommandKind, Outcome, Refusal, WriteId},
+    command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId},
     commands::CommandTracker,
     def::{DeviceId, LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
@@ -166,37 +166,37 @@ impl Plant {
     }
 
     /// Accepts a command of an operator.
-    pub fn on_command(&mut self, command: Command, at: Timestamp) -> Effects {
+    pub fn on_command(&mut self, status: CommandStatus, at: Timestamp) -> Effects {
+        let status = CommandStatus { at, ..status };
         let mut effects = Effects::default();
-        if let Some(why) = &command.refused {
-            let action = self.commands.note(&command, Outcome::Refused(why.clone()), &self.image, at);
-            effects.records.extend(action.map(Record::Action));
+        if !status.is_pending() {
+            let refused = self.commands.finish(&status, status.outcome.clone(), &self.image);
+            effects.records.push(Record::Action(refused));
             self.at = self.at.max(at);
             return effects;
         }
-        let action = match command.kind.clone() {
-            CommandKind::Write { tag, value } => match self.commands.write(&self.image, &command, tag, value, at) {
-                Ok(request) => {
-                    effects.bus.push((self.line_of(tag), request));
+        let action = match status.command.kind.clone() {
+            CommandKind::Write { tag, value } => match self.commands.write(&self.image, &status, tag, value) {
+                Ok(job) => {
+                    effects.bus.push((self.line_of(tag), BusRequest::Write(job)));
                     None
                 }
-                Err(action) => action.map(|action| *action),
+                Err(action) => Some(*action),
             },
-            CommandKind::Alarm(alarm_command) => self.alarm_command(&command, alarm_command, at, &mut effects),
+            CommandKind::Alarm(alarm_command) => Some(self.alarm_command(&status, alarm_command, at, &mut effects)),
             CommandKind::Refresh(device) => {
-                effects
-                    .bus
-                    .push((self.def.device(device).line, BusRequest::Refresh { device, command: Some(command.id) }));
+                let request = BusRequest::Refresh { device, command: Some(status.command.id) };
+                effects.bus.push((self.def.device(device).line, request));
                 // A read is not an operator action: it is shown, but not recorded.
-                let _ = self.commands.note(&command, Outcome::Verified, &self.image, at);
+                self.commands.accept(&CommandStatus { outcome: Outcome::Verified, ..status });
                 None
             }
             CommandKind::Connect(line, open) => {
                 let is_open = self.lines[line.index()].state != LineState::Disconnected;
                 if is_open == open {
-                    self.commands.note(&command, Outcome::Unchanged, &self.image, at)
+                    Some(self.commands.finish(&status, Outcome::Unchanged, &self.image))
                 } else {
-                    self.commands.take(&command, at);
+                    self.commands.accept(&status);
                     effects.bus.push((line, BusRequest::Connect(open)));
                     None
                 }
@@ -204,17 +204,17 @@ impl Plant {
             CommandKind::Configure(_)
             | CommandKind::SaveSettings(_)
             | CommandKind::Test(..)
-            | CommandKind::StopTest(_) => self.line_command(&command, at, &mut effects),
+            | CommandKind::StopTest(_) => self.line_command(&status, &mut effects),
             CommandKind::ReadSets
             | CommandKind::SaveSet { .. }
             | CommandKind::Restore(_)
-            | CommandKind::StopRestore(_) => self.set_command(&command, at, &mut effects),
+            | CommandKind::StopRestore(_) => self.set_command(&status, at, &mut effects),
             CommandKind::HandOver | CommandKind::TakeOver => {
-                let outcome = match check_words(command.note.as_ref()) {
+                let outcome = match check_words(status.command.note.as_ref()) {
                     Ok(()) => Outcome::Verified,
                     Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
                 };
-                self.commands.note(&command, outcome, &self.image, at)
+                Some(self.commands.finish(&status, outcome, &self.image))
             }
         };
         effects.records.extend(action.map(Record::Action));

@@ -147,7 +147,7 @@ impl Snapshot {
         }
     }
     /// The displayed value of the tag that a command writes; `None` where it writes none, or none is displayed.
-    pub fn seen(&self, kind: &CommandKind) -> Option<f64> {
+    pub fn expected_value(&self, kind: &CommandKind) -> Option<f64> {
         let (tag, _) = kind.written()?;
         self.samples.get(tag.index())?.value
     }

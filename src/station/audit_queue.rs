@@ -22,7 +22,7 @@ use crate::{
     plant::{
         Snapshot,
         alarm::manager::subject_name,
-        command::{CommandId, CommandStatus, Outcome},
+        command::{CommandId, CommandStatus},
         def::AlarmId,
         record::{ActionRecord, AlarmRecord, ChainHash},
     },
@@ -39,7 +39,7 @@ const COMMANDS_MAX: usize = 64;
 /// Answers that wait for the audit log; one more, and the oldest waits no longer.
 const ANSWERS_MAX: usize = 64;
 
-/// A message of the session server; command matters.
+/// A message of the session server; order matters.
 #[derive(Debug)]
 pub enum AuditMessage {
     /// Put this into the audit log.
@@ -229,14 +229,14 @@ impl AuditQueue {
     /// Marks in a snapshot what is not on disk: ended commands, and what operators did with alarms.
     pub fn mark(&mut self, snapshot: &mut Snapshot) {
         let (recorded, needed) = (self.recorded.borrow().batches, self.needed);
-        let has_ended = |command: &&mut CommandStatus| command.outcome != Outcome::Pending;
-        for command in snapshot.commands.iter_mut().rev().filter(has_ended) {
-            let known = self.ended.iter().find(|(id, _)| *id == command.id).map(|(_, batch)| *batch);
+        let has_ended = |status: &&mut CommandStatus| !status.is_pending();
+        for status in snapshot.commands.iter_mut().rev().filter(has_ended) {
+            let known = self.ended.iter().find(|(id, _)| *id == status.command.id).map(|(_, batch)| *batch);
             let batch = known.unwrap_or_else(|| {
-                self.ended.push_back((command.id, needed));
+                self.ended.push_back((status.command.id, needed));
                 needed
             });
-            command.recorded = batch <= recorded;
+            status.recorded = batch <= recorded;
         }
         let excess = self.ended.len().saturating_sub(COMMANDS_MAX);
         self.ended.drain(..excess);

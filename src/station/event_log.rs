@@ -5,7 +5,6 @@ use std::{collections::HashMap, sync::Arc};
 use crate::plant::{
     Snapshot,
     alarm::{AlarmState, manager::subject_name},
-    commands::outcome_words,
     def::AlarmId,
     event::LineState,
     snapshot::DeviceState,
@@ -126,16 +125,16 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
 }
 
 fn command_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
-    use crate::plant::command::Outcome;
-    let news = after.commands.iter().rev().filter(|command| {
-        command.outcome != Outcome::Pending
-            && before.commands.iter().find(|old| old.id == command.id).is_none_or(|old| old.outcome != command.outcome)
+    use crate::plant::command::CommandStatus;
+    let news = after.commands.iter().rev().filter(|status| {
+        let same = |old: &&CommandStatus| old.command.id == status.command.id;
+        !status.is_pending() && before.commands.iter().find(same).is_none_or(|old| old.outcome != status.outcome)
     });
-    news.filter_map(|command| {
-        let (tag, value) = command.kind.written()?;
+    news.filter_map(|status| {
+        let (tag, value) = status.command.kind.written()?;
         let (name, unit) = (&after.def.tag(tag).name, after.unit(tag));
         let value = after.format(tag, value);
-        Some(format!("{}: {name} := {value} {unit} {}", command.by, outcome_words(&command.outcome)))
+        Some(format!("{}: {name} := {value} {unit} {}", status.by, status.outcome))
     })
     .collect()
 }

@@ -19,7 +19,7 @@ use crate::{
     },
     plant::{
         Plant, PlantDef,
-        command::Command,
+        command::CommandStatus,
         record::ChainHash,
         snapshot::HistoryStatus,
         station::{FaultState, StationFault},
@@ -62,7 +62,7 @@ pub struct Options {
 pub struct Station {
     acceptor: SessionAcceptor,
     /// Bypasses access control: for a scripted operator.
-    pub commands: mpsc::Sender<Command>,
+    pub commands: mpsc::Sender<CommandStatus>,
     /// What terminals request of the station as a whole.
     pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
     /// `None` for a rehearsal, which keeps nothing.

@@ -20,7 +20,7 @@ use crate::{
     history::io::{open::Restored, thread::offer},
     plant::{
         Effects, Plant, SetWork, Snapshot,
-        command::{BusRequest, Command, CommandId},
+        command::{BusRequest, CommandId, CommandStatus, WriteJob},
         def::{LineDef, LineId},
         event::Event,
         record::{ActionRecord, AlarmRecord, Record},
@@ -122,7 +122,7 @@ impl PlantTask {
     pub async fn run(
         mut self,
         mut events: mpsc::Receiver<Event>,
-        mut commands: mpsc::Receiver<Command>,
+        mut commands: mpsc::Receiver<CommandStatus>,
         mut messages: mpsc::Receiver<AuditMessage>,
     ) {
         let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
@@ -145,9 +145,9 @@ impl PlantTask {
                     self.publish();
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
                 }
-                Some(mut command) = commands.recv() => {
-                    command.kind.unshift(self.clock.behind_utc());
-                    let effects = self.plant.on_command(command, self.clock.now());
+                Some(mut status) = commands.recv() => {
+                    status.command.kind.unshift(self.clock.behind_utc());
+                    let effects = self.plant.on_command(status, self.clock.now());
                     self.carry_out(effects);
                     (changed, next) = (true, Instant::now());
                 }
@@ -367,7 +367,7 @@ impl PlantTask {
 
     fn send(&mut self, line: LineId, request: BusRequest) {
         let link = self.links[line.index()].clone();
-        let is_stop = matches!(request, BusRequest::Write { urgent: true, .. });
+        let is_stop = matches!(request, BusRequest::Write(WriteJob { urgent: true, .. }));
         let place = if is_stop || KEPT_FOR_STOPS < link.capacity() { link.try_reserve().ok() } else { None };
         let effects = match place {
             Some(place) => {

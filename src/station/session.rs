@@ -5,11 +5,11 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
-    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
+    access::{Credentials, Durability, SessionRequest, SessionStatus},
     history::io::QueryRequest,
     plant::{
         Snapshot,
-        command::{CommandId, CommandKind},
+        command::{Command, CommandId, CommandKind},
     },
 };
 
@@ -33,7 +33,7 @@ pub struct Session {
 #[derive(Debug)]
 pub enum Request {
     /// A command to the plant. Its outcome is seen in a later snapshot, also that it was not permitted.
-    Command(CommandRequest),
+    Command(Command, Option<Credentials>),
     /// A query to the history.
     Ask(QueryRequest),
     /// A request about people or the station.
@@ -55,8 +55,8 @@ impl Session {
     /// Gives a command without note and credentials; its outcome is seen in a later snapshot.
     pub fn send_command(&self, number: u32, kind: CommandKind) -> Result<CommandId, &'static str> {
         let id = CommandId { terminal: self.terminal, number };
-        let request = CommandRequest::on(&self.snapshots.borrow(), id, kind);
-        self.send(Request::Command(request))?;
+        let command = Command::on(&self.snapshots.borrow(), id, kind);
+        self.send(Request::Command(command, None))?;
         Ok(id)
     }
 

@@ -25,7 +25,7 @@ use crate::{
     access::{AccessControl, Durability, Effect, Peer, SessionStatus},
     bus::io::clock::Clock,
     history::{HistoryError, io::QueryRequest},
-    plant::{Snapshot, command::Command},
+    plant::{Snapshot, command::CommandStatus},
 };
 
 /// Requests of all terminals that may wait; more are refused.
@@ -61,7 +61,7 @@ pub enum LifecycleRequest {
 #[derive(Debug)]
 pub struct Outputs {
     /// To the plant.
-    pub commands: mpsc::Sender<Command>,
+    pub commands: mpsc::Sender<CommandStatus>,
     /// To the history.
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// To the audit log.
@@ -201,8 +201,8 @@ impl SessionServer {
     fn take(&mut self, terminal: u32, request: Request) {
         let now = self.clock.now();
         match request {
-            Request::Command(command) => {
-                let effects = self.access.on_command(terminal, command, now);
+            Request::Command(command, credentials) => {
+                let effects = self.access.on_command(terminal, command, credentials, now);
                 self.carry_out(effects);
             }
             Request::Ask(query) => match self.access.may_ask(terminal, &query.query, now) {
@@ -233,12 +233,12 @@ impl SessionServer {
         let mut answers = Vec::new();
         for effect in effects {
             match effect {
-                Effect::Command(command) => {
-                    if let Err(error) = self.outputs.commands.try_send(command) {
+                Effect::Command(status) => {
+                    if let Err(error) = self.outputs.commands.try_send(status) {
                         tracing::error!(%error, "a command did not reach the plant");
-                        let (mpsc::error::TrySendError::Full(command) | mpsc::error::TrySendError::Closed(command)) =
+                        let (mpsc::error::TrySendError::Full(status) | mpsc::error::TrySendError::Closed(status)) =
                             error;
-                        let told = self.access.undelivered(command.id, "station too busy");
+                        let told = self.access.undelivered(status.command.id, "station too busy");
                         self.carry_out(told);
                     }
                 }

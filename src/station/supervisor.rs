@@ -73,7 +73,11 @@ mod tests {
     use jiff::Timestamp;
 
     use super::*;
-    use crate::plant::{command::WriteId, def::TagId, fixture};
+    use crate::plant::{
+        command::{WriteId, WriteJob},
+        def::TagId,
+        fixture,
+    };
 
     #[tokio::test(start_paused = true)]
     async fn a_line_whose_task_panics_is_started_again_and_says_why() {
@@ -86,7 +90,8 @@ mod tests {
         tokio::spawn(run(def, LineId(0), clock, Connector::Memory(streams), sender, queue, stopped));
         // A tag that this plant does not have: inside, ids are taken on trust.
         let tag = TagId(u16::MAX);
-        let request = BusRequest::Write { id: WriteId(1), tag, raw: 0.0, unlock: None, verify: true, urgent: false };
+        let request =
+            BusRequest::Write(WriteJob { id: WriteId(1), tag, raw: 0.0, unlock: None, verify: true, urgent: false });
         for _ in 0..3 {
             let (ours, _theirs) = tokio::io::duplex(64);
             ports.try_send(ours).expect("room for a port");

@@ -55,7 +55,8 @@ async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_
     let mut other = station.session("whoever");
     other.status.wait_for(|status| !status.first && status.password_chars_min > 0).await.unwrap();
     let command = other.send_command(1, CommandKind::Alarm(crate::plant::alarm::AlarmCommand::Silence)).unwrap();
-    let shown = |snapshot: &Arc<crate::plant::Snapshot>| snapshot.commands.iter().any(|status| status.id == command);
+    let shown =
+        |snapshot: &Arc<crate::plant::Snapshot>| snapshot.commands.iter().any(|status| status.command.id == command);
     let snapshot = other.snapshots.wait_for(shown).await.unwrap().clone();
     let line = std::fs::read_to_string(audit_log::beside(&history)).unwrap();
     assert!(line.contains("refused: log in first"), "what a snapshot shows is in the audit log");

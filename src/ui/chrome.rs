@@ -17,7 +17,7 @@ use super::{
 };
 use crate::plant::{
     command::{CommandKind, NotConfirmed, Outcome},
-    commands::alarm_words as alarm_words_of,
+    commands::alarm_action,
     def::LineDef,
     event::LineState,
     number::to_u16,
@@ -280,7 +280,8 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Style) {
     let theme = cx.theme;
     // As the station took it: a write of what the device can hold.
-    let (kind, old) = pending.status.as_ref().map_or((&pending.kind, None), |status| (&status.kind, status.old));
+    let (kind, old) =
+        pending.status.as_ref().map_or((&pending.command.kind, None), |status| (&status.command.kind, status.old));
     let what = command_label(cx, kind, old);
     let Some(status) = &pending.status else {
         return match pending.undelivered {
@@ -288,7 +289,7 @@ pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Sty
             None => (format!("{what}  sent …"), theme.normal()),
         };
     };
-    let (words, trouble) = match (&status.kind, &status.outcome) {
+    let (words, trouble) = match (&status.command.kind, &status.outcome) {
         // The line has taken it; what comes of it stands on the bus tab.
         (CommandKind::Test(..), Outcome::Verified) => ("begun".to_owned(), false),
         (CommandKind::StopTest(_), Outcome::Verified) => ("done".to_owned(), false),
@@ -305,7 +306,7 @@ pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Sty
         (_, outcome) => outcome_words(outcome),
     };
     let at = clock(status.at, &cx.def().time_zone);
-    let (words, trouble) = match status.recorded || status.outcome == Outcome::Pending {
+    let (words, trouble) = match status.recorded || status.is_pending() {
         true => (words, trouble),
         // Done all the same: the disk has not taken it yet.
         false => (format!("{words}, NOT RECORDED"), true),
@@ -348,7 +349,7 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> 
             text.trim_end().to_owned()
         }
         CommandKind::Alarm(alarm_command) => {
-            let (action, target, _) = alarm_words_of(cx.def(), alarm_command);
+            let (action, target, _) = alarm_action(cx.def(), alarm_command);
             format!("{action} {target}")
         }
         CommandKind::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),

@@ -11,7 +11,6 @@ use super::{
 };
 use crate::plant::{
     command::{CommandStatus, NotConfirmed, Outcome},
-    commands::{outcome_word, outcome_words},
     def::TagId,
     interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
     tag::{DataType, TagDef},
@@ -202,7 +201,7 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
 
 /// The latest command for a tag.
 fn last_command<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a CommandStatus> {
-    let of_command = |status: &&CommandStatus| status.kind.written().is_some_and(|(tag, _)| tag == command);
+    let of_command = |status: &&CommandStatus| status.command.kind.written().is_some_and(|(tag, _)| tag == command);
     cx.snapshot.commands.iter().find(of_command)
 }
 
@@ -236,7 +235,7 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
     match news(cx, actuator.command) {
         Some((_, None)) => return Some((theme.pick("… sent", ".. sent").to_owned(), theme.strong())),
         Some((outcome, Some(false))) => {
-            let word = outcome_word(outcome);
+            let word = outcome.label();
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
         // A command that cannot be read back was taken, which says nothing while it is blocked.
@@ -284,7 +283,7 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
         rows.push(("differs", words, theme.trouble()));
     }
     if let Some((outcome, well)) = news(cx, actuator.command) {
-        let words = outcome_words(outcome);
+        let words = outcome.to_string();
         let style = if well == Some(false) { theme.trouble() } else { theme.strong() };
         rows.push(("last", words, style));
     }

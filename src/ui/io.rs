@@ -199,9 +199,9 @@ impl Loop {
         self.cancel();
         for effect in effects {
             match effect {
-                Effect::Command(command) => {
+                Effect::Command(command, credentials) => {
                     let id = command.id;
-                    if let Err(why) = self.session.send(Request::Command(command)) {
+                    if let Err(why) = self.session.send(Request::Command(command, credentials)) {
                         own(|| update(&mut self.model, Msg::Undelivered(id, why)));
                     }
                 }

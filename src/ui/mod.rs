@@ -37,7 +37,7 @@ use keys::Global;
 use last_frame::LastFrame;
 use modal::{Confirm, Modal};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
-pub use pending_command::{Confirmed, PendingCommand};
+pub use pending_command::PendingCommand;
 use session_lock::SessionLock;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
@@ -219,7 +219,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_answer(cx, id.number, answer)),
         Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
         Msg::Undelivered(id, why) => {
-            if let Some(pending) = model.pending_command.as_mut().filter(|pending| pending.id == id) {
+            if let Some(pending) = model.pending_command.as_mut().filter(|pending| pending.command.id == id) {
                 pending.undelivered = Some(why);
             }
             Vec::new()
@@ -410,8 +410,8 @@ fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
                 });
                 effects.extend(show(model, Tab::Trends));
             }
-            UiAction::Command(kind) => effects.extend(model.send_command(kind.into())),
-            UiAction::Confirmed(confirmed) => effects.extend(model.send_command(confirmed)),
+            UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
+            UiAction::Confirmed(command, credentials) => effects.extend(model.send_command(command, credentials)),
             UiAction::SessionRequest(tab, request) => {
                 // Nought is nobody's: whoever waits has a number.
                 model.session_lock.last_request = model.session_lock.last_request.checked_add(1).unwrap_or(1);
@@ -442,7 +442,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
         | UiAction::Command(_)
-        | UiAction::Confirmed(_)
+        | UiAction::Confirmed(..)
         | UiAction::SessionRequest(..) => None,
     });
     effects.collect()

@@ -6,16 +6,15 @@ use crossterm::event::KeyEvent;
 use jiff::Timestamp;
 
 use super::{
-    Confirmed,
     extension::{Extension, ExtensionMessage},
     modal::Modal,
     tabs::Tab,
 };
 use crate::{
-    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
+    access::{Credentials, Durability, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
     plant::{
-        command::{CommandId, CommandKind},
+        command::{Command, CommandId, CommandKind},
         def::{DeviceId, TagId},
         snapshot::Snapshot,
     },
@@ -57,7 +56,7 @@ pub enum Msg {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
     /// Give the station a command.
-    Command(CommandRequest),
+    Command(Command, Option<Credentials>),
     /// Send the station a request; answered by [`Msg::RequestDone`].
     SessionRequest(QueryId, SessionRequest),
     /// Ask the history.
@@ -108,7 +107,7 @@ pub enum UiAction {
     /// Give a command and watch its outcome.
     Command(CommandKind),
     /// The same with the confirmed value and the credentials.
-    Confirmed(Confirmed),
+    Confirmed(Command, Option<Credentials>),
     /// Send the station a request; the answer goes to the window that waits for one, else to this tab.
     SessionRequest(Tab, SessionRequest),
     /// Ask whether to leave.

@@ -1,43 +1,19 @@
 //! The last command of this terminal, from the key to its outcome.
 
-use std::sync::Arc;
-
 use super::{Effect, Model, chrome, modal::Modal};
 use crate::{
-    access::{CommandRequest, Credentials},
-    plant::command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+    access::Credentials,
+    plant::command::{Command, CommandId, CommandStatus, Outcome, Refusal},
 };
 
 /// An outcome that is no worry is shown for so many ticks: a minute of real time.
 const OUTCOME_TICKS: u32 = 120;
 
-/// A command as its operator confirmed it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Confirmed {
-    /// What.
-    pub kind: CommandKind,
-    /// The displayed value of the tag to be written; `None` where it was not known.
-    pub expected: Option<f64>,
-    /// What a tag asks for again.
-    pub credentials: Option<Credentials>,
-    /// Why, in his words.
-    pub note: Option<Arc<str>>,
-}
-
-impl From<CommandKind> for Confirmed {
-    /// A command that nothing was asked about.
-    fn from(kind: CommandKind) -> Confirmed {
-        Confirmed { kind, expected: None, credentials: None, note: None }
-    }
-}
-
 /// A command of this terminal on its way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PendingCommand {
-    /// Which.
-    pub id: CommandId,
-    /// What was requested.
-    pub kind: CommandKind,
+    /// The command as it was sent.
+    pub command: Command,
     /// As last seen in a snapshot.
     pub status: Option<CommandStatus>,
     /// Tick at which it was given, and at which its outcome last changed.
@@ -67,23 +43,22 @@ impl PendingCommand {
 }
 
 impl Model {
-    /// Gives a command and watches it. A station that has gone takes none: that is said at once.
-    pub(super) fn send_command(&mut self, confirmed: Confirmed) -> Option<Effect> {
-        let Confirmed { kind, expected, credentials, note } = confirmed;
+    /// Numbers a command, sends it and follows it. Without a station it is reported as not sent.
+    pub(super) fn send_command(&mut self, command: Command, credentials: Option<Credentials>) -> Option<Effect> {
         self.commands_sent = self.commands_sent.wrapping_add(1);
         let id = CommandId { terminal: self.terminal, number: self.commands_sent };
         let undelivered = self.session.gone.as_ref().map(|_| "the station has gone");
         let changed_at = self.clock.phase;
-        self.pending_command = Some(PendingCommand { id, kind: kind.clone(), status: None, changed_at, undelivered });
-        let request = CommandRequest::on(&self.snapshot, id, kind);
-        let request = CommandRequest { seen: expected.or(request.seen), credentials, note, ..request };
-        undelivered.is_none().then_some(Effect::Command(request))
+        let expected_value = command.expected_value.or_else(|| self.snapshot.expected_value(&command.kind));
+        let command = Command { id, run: self.snapshot.run, expected_value, ..command };
+        self.pending_command = Some(PendingCommand { command: command.clone(), status: None, changed_at, undelivered });
+        undelivered.is_none().then_some(Effect::Command(command, credentials))
     }
 
     /// Takes the outcome of the watched command from the snapshot that has come.
     pub(super) fn follow(&mut self) {
         if let Some(pending) = &mut self.pending_command
-            && let Some(status) = self.snapshot.commands.iter().find(|status| status.id == pending.id)
+            && let Some(status) = self.snapshot.commands.iter().find(|status| status.command.id == pending.command.id)
         {
             if pending.status.as_ref() != Some(status) {
                 pending.changed_at = self.clock.phase;

@@ -165,7 +165,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
         match action {
             UiAction::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
             UiAction::Command(_)
-            | UiAction::Confirmed(_)
+            | UiAction::Confirmed(..)
             | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
             | UiAction::Do(Effect::SaveReport { .. } | Effect::Extension(_)) => held = held.or(Some(None)),
             UiAction::Open(_)

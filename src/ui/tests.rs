@@ -67,7 +67,7 @@ pub fn acts_only_on_what_was_drawn(model: &mut Model, change: impl FnOnce(&mut M
 
 pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
     effects.iter().find_map(|effect| match effect {
-        Effect::Command(command) => Some(&command.kind),
+        Effect::Command(command, _) => Some(&command.kind),
         Effect::SessionRequest(..) => None,
         Effect::Query(..)
         | Effect::Extension(_)

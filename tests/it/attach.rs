@@ -9,7 +9,7 @@ use std::{
 };
 
 use sightglass::{
-    access::{CommandRequest, Durability, SessionRequest, SessionStatus},
+    access::{Durability, SessionRequest, SessionStatus},
     attach::{
         callers::TERMINALS_MAX,
         io::{
@@ -26,7 +26,7 @@ use sightglass::{
     plant::alarm::AlarmCommand,
     plant::{
         PlantDef, Snapshot,
-        command::{CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
+        command::{Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
         def::TagId,
         sample::{Cause, Sample},
     },
@@ -137,20 +137,11 @@ impl Stand {
 
 fn answer(request: Request, commands: &watch::Sender<Arc<Snapshot>>) {
     match request {
-        Request::Command(CommandRequest { id, kind, note, seen, .. }) => commands.send_modify(|snapshot| {
+        Request::Command(command, _) => commands.send_modify(|snapshot| {
             let snapshot = Arc::make_mut(snapshot);
             let (at, outcome) = (snapshot.at, Outcome::Verified);
-            let status = CommandStatus {
-                id,
-                by: "anna".into(),
-                from: "".into(),
-                note,
-                kind,
-                at,
-                old: seen,
-                outcome,
-                recorded: true,
-            };
+            let status =
+                CommandStatus { old: command.expected_value, outcome, ..CommandStatus::new(command, "anna", at) };
             snapshot.commands.insert(0, status);
             snapshot.commands.truncate(32);
         }),
@@ -177,7 +168,13 @@ async fn until_status(session: &mut Session, what: &str, so: impl Fn(&SessionSta
 
 fn of(session: &Session, number: u32) -> Option<Outcome> {
     let id = CommandId { terminal: session.terminal, number };
-    session.snapshots.borrow().commands.iter().find(|command| command.id == id).map(|command| command.outcome.clone())
+    session
+        .snapshots
+        .borrow()
+        .commands
+        .iter()
+        .find(|status| status.command.id == id)
+        .map(|status| status.outcome.clone())
 }
 
 fn handshake() -> Vec<u8> {
@@ -428,7 +425,7 @@ async fn a_command_of_another_terminal_or_unknown_tag_is_rejected() {
     stream.write_all(&handshake()).await.unwrap();
     let own = protocol::handshake_reply(&next(&mut stream).await).unwrap().unwrap().terminal;
     let command = |terminal, kind| {
-        asked(&ClientMessage::Command(Box::new(CommandRequest::new(0, CommandId { terminal, number: 1 }, kind))))
+        asked(&ClientMessage::Command(Box::new(Command::new(0, CommandId { terminal, number: 1 }, kind)), None))
     };
     for (bytes, expected) in [
         (command(own + 1, CommandKind::Alarm(AlarmCommand::Silence)), "this is terminal"),

@@ -8,7 +8,7 @@ use std::{
 
 use sightglass::{
     access::{
-        CommandRequest, Peer, SessionRequest, Users,
+        Credentials, Peer, SessionRequest, Users,
         audit_log::{Check, Entry, Summary},
         io::{audit_log, users, users_beside},
         password::{SALT_BYTES, hash},
@@ -18,7 +18,7 @@ use sightglass::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
-        command::{CommandId, CommandKind, CommandStatus, Outcome},
+        command::{Command, CommandId, CommandKind, CommandStatus},
         def::{TagId, Transport},
         role::Role,
         snapshot::DeviceState,
@@ -122,13 +122,22 @@ impl Guarded {
     }
 
     /// Gives a command and waits for what becomes of it.
-    pub async fn send_command(&self, session: &Session, request: CommandRequest) -> CommandStatus {
-        let id = request.id;
-        session.send(Request::Command(request)).unwrap();
+    pub async fn send_command(&self, session: &Session, command: Command) -> CommandStatus {
+        self.send_with_credentials(session, command, None).await
+    }
+
+    pub async fn send_with_credentials(
+        &self,
+        session: &Session,
+        command: Command,
+        credentials: Option<Credentials>,
+    ) -> CommandStatus {
+        let id = command.id;
+        session.send(Request::Command(command, credentials)).unwrap();
         // A terminal where nobody has logged in is not told: what is true is told here.
         let mut truth = self.truth.clone();
         let of = |snapshot: &Arc<Snapshot>| {
-            snapshot.commands.iter().find(|command| command.id == id && command.outcome != Outcome::Pending).cloned()
+            snapshot.commands.iter().find(|status| status.command.id == id && !status.is_pending()).cloned()
         };
         let told = until(&mut truth, &format!("an outcome of {id:?}"), |snapshot| of(snapshot).is_some()).await;
         of(&told).unwrap()
@@ -200,8 +209,8 @@ pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), 
 }
 
 /// A command of this terminal.
-pub fn request(session: &Session, number: u32, kind: CommandKind) -> CommandRequest {
-    CommandRequest::on(&session.snapshots.borrow(), CommandId { terminal: session.terminal, number }, kind)
+pub fn request(session: &Session, number: u32, kind: CommandKind) -> Command {
+    Command::on(&session.snapshots.borrow(), CommandId { terminal: session.terminal, number }, kind)
 }
 
 /// Waits until a snapshot is so, and gives it.

@@ -19,7 +19,7 @@ use tokio::{
 
 use sightglass::{
     access::{
-        CommandRequest, Durability, SessionRequest, Users,
+        Durability, SessionRequest, Users,
         audit_log::{Check, Entry},
         io::{audit_log, sealing, users, users_beside},
         sealing::VerificationKey,
@@ -37,7 +37,7 @@ use sightglass::{
     plant::{
         Snapshot,
         alarm::AlarmCommand,
-        command::{CommandId, CommandKind, Outcome},
+        command::{Command, CommandId, CommandKind, Outcome},
         def::AlarmId,
         record::{AlarmEvent, AlarmRecord, SEAL_LOG},
         role::Role,
@@ -216,16 +216,16 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
             None => CommandKind::Write { tag, value },
         };
         writes += usize::from(kind.written().is_some());
-        let command = CommandRequest::on(&session.snapshots.borrow(), id, kind.clone());
-        let command = CommandRequest { note: Some(note.as_str().into()), ..command };
-        if session.send(Request::Command(command)).is_err() {
+        let command = Command::on(&session.snapshots.borrow(), id, kind.clone());
+        let command = Command { note: Some(note.as_str().into()), ..command };
+        if session.send(Request::Command(command, None)).is_err() {
             break;
         }
         let mut outcome = None;
         let ended = session.snapshots.wait_for(|snapshot| {
-            let command = snapshot.commands.iter().find(|command| command.id == id);
-            let ended = command.filter(|command| command.outcome != Outcome::Pending && command.recorded);
-            outcome = ended.map(|command| command.outcome.clone());
+            let status = snapshot.commands.iter().find(|status| status.command.id == id);
+            let ended = status.filter(|status| !status.is_pending() && status.recorded);
+            outcome = ended.map(|status| status.outcome.clone());
             outcome.is_some()
         });
         let ended = tokio::time::timeout(PATIENCE, ended).await;

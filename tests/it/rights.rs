@@ -11,7 +11,6 @@ use sightglass::{
         PlantDef,
         alarm::AlarmCommand,
         command::{CommandKind, CommandStatus, Outcome, Refusal},
-        commands::outcome_words,
         def::{AlarmId, DeviceId, LineId, Serial},
         diagnostics::{Diagnostic, Scan},
         parameter_set::ParameterSet,
@@ -195,7 +194,7 @@ async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_r
             if row.is_action || !row.lets(person) {
                 let line = guarded.written(written, &said, |entry| &*entry.action == row.action).await;
                 assert!(is_by(&line, person), "{said}: {line:?}");
-                assert_eq!(*line.outcome, outcome_words(&status.outcome), "{said}");
+                assert_eq!(*line.outcome, status.outcome.to_string(), "{said}");
                 assert!(line.from.contains(&format!("process {}", std::process::id())), "{}", line.from);
             }
         }

@@ -5,12 +5,11 @@ use std::{fs, path::Path, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use sightglass::{
-    access::CommandRequest,
     attach::io::{connect::connect, serve::listen},
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
-        command::{CommandId, CommandKind, Outcome, Refusal},
+        command::{Command, CommandId, CommandKind, Outcome, Refusal},
         def::{LineDef, LineId, Serial, Transport},
         snapshot::DeviceState,
     },
@@ -62,13 +61,10 @@ async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool
 
 async fn send_command(session: &mut Session, number: u32, kind: CommandKind) -> Outcome {
     let id = CommandId { terminal: session.terminal, number };
-    let request = CommandRequest::on(&session.snapshots.borrow(), id, kind);
-    session.send(Request::Command(request)).unwrap();
-    let of = move |snapshot: &Snapshot| snapshot.commands.iter().find(|command| command.id == id).cloned();
-    until(session, "the command has ended", |snapshot| {
-        of(snapshot).is_some_and(|command| command.outcome != Outcome::Pending)
-    })
-    .await;
+    let command = Command::on(&session.snapshots.borrow(), id, kind);
+    session.send(Request::Command(command, None)).unwrap();
+    let of = move |snapshot: &Snapshot| snapshot.commands.iter().find(|status| status.command.id == id).cloned();
+    until(session, "the command has ended", |snapshot| of(snapshot).is_some_and(|status| !status.is_pending())).await;
     let command = of(&session.snapshots.borrow()).unwrap();
     command.outcome
 }
@@ -139,7 +135,7 @@ async fn a_command_made_before_a_reload_is_refused() {
     let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
     let write = |snapshot: &Snapshot, number| {
         let kind = CommandKind::Write { tag: snapshot.def.tag_named("TIC-1.SV").unwrap(), value: 61.0 };
-        CommandRequest::on(snapshot, CommandId { terminal: 1, number }, kind)
+        Command::on(snapshot, CommandId { terminal: 1, number }, kind)
     };
     let mut listener = listen(&socket).unwrap();
     let station = start(&def, None, &history);
@@ -163,9 +159,9 @@ async fn a_command_made_before_a_reload_is_refused() {
         .await;
 
     let (id, before) = (open.id, session.snapshots.borrow().sample(changed.tag_named("TIC-1.SV").unwrap()).value);
-    session.send(Request::Command(open)).unwrap();
-    let of = |snapshot: &Snapshot, id| snapshot.commands.iter().find(|command| command.id == id).cloned();
-    let ended = |snapshot: &Snapshot, id| of(snapshot, id).is_some_and(|command| command.outcome != Outcome::Pending);
+    session.send(Request::Command(open, None)).unwrap();
+    let of = |snapshot: &Snapshot, id| snapshot.commands.iter().find(|status| status.command.id == id).cloned();
+    let ended = |snapshot: &Snapshot, id| of(snapshot, id).is_some_and(|status| !status.is_pending());
     until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
     let outcome = of(&session.snapshots.borrow(), id).unwrap().outcome;
     let Outcome::Refused(Refusal::NotPermitted(why)) = outcome else { panic!("{outcome:?}") };
@@ -173,9 +169,9 @@ async fn a_command_made_before_a_reload_is_refused() {
 
     // What is made on the new plant is done, so the refused one had its time.
     let again = write(&session.snapshots.borrow(), 2);
-    assert_eq!(again.seen, before, "nothing was written");
+    assert_eq!(again.expected_value, before, "nothing was written");
     let id = again.id;
-    session.send(Request::Command(again)).unwrap();
+    session.send(Request::Command(again, None)).unwrap();
     until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
     assert_eq!(of(&session.snapshots.borrow(), id).unwrap().outcome, Outcome::Verified);
     drop(session);

@@ -159,7 +159,7 @@ async fn send_command(session: &Session, kind: CommandKind, number: u32) {
     let id = session.send_command(number, kind).unwrap();
     let mut snapshots = session.snapshots.clone();
     let outcome = loop {
-        let status = snapshots.borrow_and_update().commands.iter().find(|command| command.id == id).cloned();
+        let status = snapshots.borrow_and_update().commands.iter().find(|status| status.command.id == id).cloned();
         match status.map(|status| status.outcome) {
             None | Some(Outcome::Pending) => snapshots.changed().await.unwrap(),
             Some(outcome) => break outcome,

@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use sightglass::{
-    access::{CommandRequest, Credentials, SessionRequest},
+    access::{Credentials, SessionRequest},
     plant::{
         PlantDef,
-        command::{CommandKind, Outcome, Refusal},
+        command::{Command, CommandKind, Outcome, Refusal},
         def::Reauthentication,
         sample::Cause,
     },
@@ -181,10 +181,9 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
     .await;
     let tom = guarded.person("tom").await;
     let tag = guarded.tag("TIC-1.SV");
-    let with_credentials = |number: u32, by: Option<(&str, &str)>| CommandRequest {
-        credentials: by.map(|(user, password)| Credentials { user: Some(user.into()), password: password.into() }),
-        ..request(&tom, number, CommandKind::Write { tag, value: 61.0 })
-    };
+    let write = |number: u32| request(&tom, number, CommandKind::Write { tag, value: 61.0 });
+    let credentials =
+        |(user, password): (&str, &str)| Credentials { user: Some(user.into()), password: password.into() };
     let refused = [
         (None, "this tag requires a second user".to_owned()),
         (Some(("TOM", PASSWORD)), "the second user must be another user".to_owned()),
@@ -194,16 +193,14 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
         (Some(("nobody-here", PASSWORD)), wait(1)),
     ];
     for (number, (by, why)) in (1..).zip(refused) {
-        let status = guarded.send_command(&tom, with_credentials(number, by)).await;
+        let status = guarded.send_with_credentials(&tom, write(number), by.map(credentials)).await;
         assert_eq!(status.outcome, Outcome::Refused(Refusal::NotReauthenticated(why)), "{by:?}");
         waited(&guarded, 2).await;
     }
     assert!(guarded.tap.writes().is_empty(), "something has reached the line: {:?}", guarded.tap.writes());
     let written = guarded.entries().len();
-    assert_eq!(
-        guarded.send_command(&tom, with_credentials(9, Some(("sue", PASSWORD)))).await.outcome,
-        Outcome::Verified
-    );
+    let written_now = guarded.send_with_credentials(&tom, write(9), Some(credentials(("sue", PASSWORD)))).await;
+    assert_eq!(written_now.outcome, Outcome::Verified);
     let line = guarded.written(written, "the write", |entry| &*entry.action == "write").await;
     assert_eq!((&*line.who, line.note.as_deref(), &*line.outcome), ("tom", Some("approved by sue"), "verified"));
     guarded.end().await;
@@ -214,8 +211,8 @@ async fn of_two_operators_at_once_the_second_is_told_that_the_value_has_changed_
     let guarded = Guarded::start(|_| {}).await;
     let (tom, tina) = (guarded.person("tom").await, guarded.person("tina").await);
     let (tag, seen) = (guarded.tag("TIC-1.SV"), guarded.value("TIC-1.SV"));
-    let write = |session, number, value, seen| CommandRequest {
-        seen,
+    let write = |session, number, value, expected_value| Command {
+        expected_value,
         ..request(session, number, CommandKind::Write { tag, value })
     };
     assert_eq!(guarded.send_command(&tom, write(&tom, 1, 61.0, seen)).await.outcome, Outcome::Verified);

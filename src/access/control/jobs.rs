@@ -5,7 +5,8 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{AccessControl, Effect, user_admin::Hashing};
-use crate::access::{CommandRequest, Secret, lockout::Key, password, user};
+use crate::access::{Secret, lockout::Key, password, user};
+use crate::plant::command::Command;
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
 pub(super) const JOBS_MAX: usize = 64;
@@ -81,7 +82,7 @@ pub(super) enum JobPurpose {
     /// Of who sits there, before he may have a new one.
     Change { ticket: u64, user: Arc<str>, new: Secret },
     /// Of who signs a command.
-    Reauthenticate { by: Arc<str>, approver: Option<Arc<str>>, request: Box<CommandRequest> },
+    Reauthenticate { by: Arc<str>, approver: Option<Arc<str>>, command: Box<Command> },
     /// A new one is hashed.
     Hash { ticket: u64, hashing: Hashing },
 }
@@ -233,8 +234,8 @@ impl AccessControl {
             JobPurpose::Login { ticket, user } => self.login_done(terminal, ticket, user, wrong, at),
             JobPurpose::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, wrong, at),
             JobPurpose::Change { ticket, user, new } => self.old_password_done(terminal, ticket, user, new, wrong, at),
-            JobPurpose::Reauthenticate { by, approver, request } => {
-                self.on_reauthenticated(terminal, by, approver, *request, wrong, at)
+            JobPurpose::Reauthenticate { by, approver, command } => {
+                self.on_reauthenticated(terminal, by, approver, *command, wrong, at)
             }
             JobPurpose::Hash { .. } => Vec::new(),
         });
@@ -281,7 +282,7 @@ impl AccessControl {
             | JobPurpose::Unlock { ticket, .. }
             | JobPurpose::Change { ticket, .. }
             | JobPurpose::Hash { ticket, .. } => vec![Effect::Reply(ticket, Err(why))],
-            JobPurpose::Reauthenticate { request, .. } => self.refuse_reauthentication(terminal, *request, why, at),
+            JobPurpose::Reauthenticate { command, .. } => self.refuse_reauthentication(terminal, *command, why, at),
         }
     }
 

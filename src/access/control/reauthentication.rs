@@ -10,10 +10,10 @@ use super::{
     right,
 };
 use crate::{
-    access::{CommandRequest, Credentials, user},
+    access::{Credentials, user},
     plant::{
         PlantDef,
-        command::{CommandKind, Refusal},
+        command::{Command, CommandKind, Outcome, Refusal},
         def::{Reauthentication, TagId},
         interlock,
     },
@@ -21,11 +21,16 @@ use crate::{
 
 impl AccessControl {
     /// Passes on a command with a sufficient role once the tag has the reauthentication it requires.
-    pub(super) fn reauthenticate(&mut self, terminal: u32, mut request: CommandRequest, at: Timestamp) -> Vec<Effect> {
-        let needed = required(&self.def, &request.kind).filter(|_| self.users.is_some());
-        let credentials = request.credentials.take();
+    pub(super) fn reauthenticate(
+        &mut self,
+        terminal: u32,
+        command: Command,
+        credentials: Option<Credentials>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let needed = required(&self.def, &command.kind).filter(|_| self.users.is_some());
         let (Some(needed), Some(session)) = (needed, self.sessions.get(&terminal)) else {
-            return self.let_through(terminal, request, None);
+            return self.let_through(terminal, command, None, Outcome::Pending, at);
         };
         let Some(by) = session.who.as_ref().map(|who| who.user.clone()) else { return Vec::new() };
         let own = |name: &str| user::key(name) == user::key(&by);
@@ -46,12 +51,12 @@ impl AccessControl {
             (Reauthentication::Password | Reauthentication::SecondUser, Some(_)) => None,
         };
         let (None, Some(Credentials { user, password })) = (why, credentials) else {
-            return self.refuse_reauthentication(terminal, request, why.unwrap_or_default().to_owned(), at);
+            return self.refuse_reauthentication(terminal, command, why.unwrap_or_default().to_owned(), at);
         };
         let name = user.as_deref().unwrap_or(&by).to_owned();
         let approver = self.users.as_ref().and_then(|users| users.get(&name)).map(|user| user.name.clone());
-        let (copy, request) = (request.clone(), Box::new(request));
-        match self.verify_password(terminal, &name, password, JobPurpose::Reauthenticate { by, approver, request }, at)
+        let (copy, command) = (command.clone(), Box::new(command));
+        match self.verify_password(terminal, &name, password, JobPurpose::Reauthenticate { by, approver, command }, at)
         {
             Ok(effects) => effects,
             Err(why) => self.refuse_reauthentication(terminal, copy, why, at),
@@ -63,7 +68,7 @@ impl AccessControl {
         terminal: u32,
         by: Arc<str>,
         approver: Option<Arc<str>>,
-        request: CommandRequest,
+        command: Command,
         wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
@@ -79,37 +84,37 @@ impl AccessControl {
                     at,
                 ));
             }
-            effects.extend(self.refuse_reauthentication(terminal, request, message, at));
+            effects.extend(self.refuse_reauthentication(terminal, command, message, at));
             return effects;
         }
-        let needed = right::needs(&request.kind);
+        let needed = right::needs(&command.kind);
         // Meanwhile the terminal may have been locked.
         if let Err(why) = self.may(terminal, Some(needed)) {
-            return self.refuse_command(terminal, request, Refusal::NotPermitted(why), at);
+            return self.refuse_command(terminal, command, Refusal::NotPermitted(why), at);
         }
         let other = approver.as_ref().filter(|approver| **approver != by);
         let other = other.and_then(|approver| self.users.as_ref()?.get(approver));
         match other {
             Some(other) if other.must_change => {
                 let why = format!("{} must choose a new password first", other.name);
-                self.refuse_reauthentication(terminal, request, why, at)
+                self.refuse_reauthentication(terminal, command, why, at)
             }
             Some(other) if other.role < needed => {
                 let why = format!("{} cannot approve this: it is for a {}", other.name, needed.word());
-                self.refuse_reauthentication(terminal, request, why, at)
+                self.refuse_reauthentication(terminal, command, why, at)
             }
-            Some(_) | None => self.let_through(terminal, request, approver.as_deref()),
+            Some(_) | None => self.let_through(terminal, command, approver.as_deref(), Outcome::Pending, at),
         }
     }
 
     pub(super) fn refuse_reauthentication(
         &mut self,
         terminal: u32,
-        request: CommandRequest,
+        command: Command,
         why: String,
         at: Timestamp,
     ) -> Vec<Effect> {
-        self.refuse_command(terminal, request, Refusal::NotReauthenticated(why), at)
+        self.refuse_command(terminal, command, Refusal::NotReauthenticated(why), at)
     }
 }
 

@@ -118,18 +118,21 @@ impl Bench {
         terminal: u32,
         kind: CommandKind,
         credentials: Option<Credentials>,
-    ) -> Option<(Command, Option<Refusal>)> {
+    ) -> Option<(CommandStatus, Option<Refusal>)> {
         self.last_command += 1;
         let id = CommandId { terminal, number: self.last_command };
-        let request = CommandRequest { credentials, note: Some("why".into()), ..CommandRequest::new(0, id, kind) };
-        let effects = self.access.on_command(terminal, request, self.now);
+        let command = Command { note: Some("why".into()), ..Command::new(0, id, kind) };
+        let effects = self.access.on_command(terminal, command, credentials, self.now);
         let effects = self.work(effects);
-        let command = effects.into_iter().find_map(|effect| match effect {
-            Effect::Command(command) => Some(command),
+        let status = effects.into_iter().find_map(|effect| match effect {
+            Effect::Command(status) => Some(status),
             _ => None,
         })?;
-        let refused = command.refused.clone();
-        Some((command, refused))
+        let refused = match &status.outcome {
+            command::Outcome::Refused(why) => Some(why.clone()),
+            _ => None,
+        };
+        Some((status, refused))
     }
 
     fn who(&self, terminal: u32) -> Option<String> {
@@ -402,7 +405,7 @@ fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
         bench.later(2);
     }
     let (command, refused) = bench.send_command(1, SV, credentials(Some("BOSS"), BOSS)).unwrap();
-    assert_eq!((refused, command.note.as_deref()), (None, Some("why; approved by boss")));
+    assert_eq!((refused, command.command.note.as_deref()), (None, Some("why; approved by boss")));
 }
 
 #[test]

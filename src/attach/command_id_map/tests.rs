@@ -9,8 +9,8 @@ use crate::{plant::command::CommandKind, ui::fixture::Fixture};
 
 const NOT_CONFIRMED: Outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
 
-fn request(terminal: u32, number: u32) -> CommandRequest {
-    CommandRequest::new(1, CommandId { terminal, number }, CommandKind::Alarm(AlarmCommand::Silence))
+fn request(terminal: u32, number: u32) -> Command {
+    Command::new(1, CommandId { terminal, number }, CommandKind::Alarm(AlarmCommand::Silence))
 }
 
 fn snapshot(commands: &[(u32, u32, Outcome)]) -> Arc<Snapshot> {
@@ -25,7 +25,10 @@ fn snapshot(commands: &[(u32, u32, Outcome)]) -> Arc<Snapshot> {
 
 fn seen(id_map: &mut CommandIdMap, commands: &[(u32, u32, Outcome)]) -> Vec<(u32, u32, Outcome)> {
     let seen = id_map.see(&snapshot(commands));
-    seen.commands.iter().map(|command| (command.id.terminal, command.id.number, command.outcome.clone())).collect()
+    seen.commands
+        .iter()
+        .map(|status| (status.command.id.terminal, status.command.id.number, status.outcome.clone()))
+        .collect()
 }
 
 fn send(id_map: &mut CommandIdMap, number: u32) -> CommandId {

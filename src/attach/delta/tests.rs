@@ -12,7 +12,7 @@ use crate::{
     plant::{
         Snapshot,
         alarm::AlarmState,
-        command::{CommandId, CommandKind, CommandStatus, Outcome},
+        command::{Command, CommandId, CommandKind, CommandStatus, Outcome},
         def::{AlarmId, Framing, TagId},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
         event::{Fault, LineState},
@@ -109,15 +109,17 @@ fn change(snapshot: &mut Snapshot, (kind, place, amount): (u8, u16, u32)) {
         }
         8 => {
             let command = CommandStatus {
-                id: CommandId { terminal: u32::from(place), number: amount },
-                by: "anna".into(),
                 from: "pts/3".into(),
-                note: None,
-                kind: CommandKind::Write { tag: TagId(place), value: 1.0 },
-                at,
-                old: None,
                 outcome: Outcome::Pending,
-                recorded: true,
+                ..CommandStatus::new(
+                    Command::new(
+                        0,
+                        CommandId { terminal: u32::from(place), number: amount },
+                        CommandKind::Write { tag: TagId(place), value: 1.0 },
+                    ),
+                    "anna",
+                    at,
+                )
             };
             snapshot.commands.insert(0, command);
             snapshot.commands.truncate(32);

@@ -177,11 +177,11 @@ impl ClientTask {
     /// Sends a request on its way, or refuses it.
     fn send(&mut self, request: Request, out: &mpsc::Sender<Vec<u8>>) {
         match request {
-            Request::Command(command) => {
+            Request::Command(command, credentials) => {
                 let (by, at) = (self.by(), self.latest.at);
                 let command = self.id_map.send(command, by, at);
                 let id = command.id;
-                if let Err(why) = hand_over(&ClientMessage::Command(Box::new(command)), out) {
+                if let Err(why) = hand_over(&ClientMessage::Command(Box::new(command), credentials), out) {
                     self.id_map.undelivered(id, why);
                     self.show();
                 }
@@ -262,7 +262,7 @@ impl ClientTask {
 
     fn refuse(&mut self, request: Request) {
         match request {
-            Request::Command(command) => {
+            Request::Command(command, _) => {
                 let (by, at) = (self.by(), self.latest.at);
                 self.id_map.refuse(&command, by, at, GONE);
                 self.show();

@@ -14,7 +14,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::{CommandRequest, SessionRequest, SessionStatus},
+    access::{Credentials, SessionRequest, SessionStatus},
     attach::{
         check,
         delta::Delta,
@@ -25,7 +25,10 @@ use crate::{
         redaction,
     },
     history::{HistoryError, Query, io::QueryRequest},
-    plant::{PlantDef, Snapshot, command::Outcome},
+    plant::{
+        PlantDef, Snapshot,
+        command::{Command, Outcome},
+    },
     station::{Request, Session},
 };
 
@@ -107,7 +110,7 @@ impl Inbound {
             let asked = protocol::decode(&bytes, "message of a terminal").map_err(WireError::from)?;
             rate_limit.acquire().await;
             match asked {
-                ClientMessage::Command(command) => self.send_command(*command).await,
+                ClientMessage::Command(command, credentials) => self.send_command(*command, credentials).await,
                 ClientMessage::Ask { ticket, query } => self.ask(ticket, query).await,
                 ClientMessage::Cancel { ticket } => self.cancel(ticket),
                 ClientMessage::SessionRequest { ticket, request } => self.send_request(ticket, request).await,
@@ -115,14 +118,14 @@ impl Inbound {
         }
     }
 
-    async fn send_command(&self, command: CommandRequest) {
+    async fn send_command(&self, command: Command, credentials: Option<Credentials>) {
         let id = command.id;
         let sent = if id.terminal == self.session.terminal {
             check::command(&self.def, &command.kind)
         } else {
             Err(format!("a command of terminal {}, this is terminal {}", id.terminal, self.session.terminal))
         };
-        let sent = sent.and_then(|()| self.session.send(Request::Command(command)).map_err(str::to_owned));
+        let sent = sent.and_then(|()| self.session.send(Request::Command(command, credentials)).map_err(str::to_owned));
         if let Err(why) = sent {
             // Only a terminal that has ended does not hear it.
             let _ = self.replies.send((ServerMessage::Undelivered { id, why }, Vec::new())).await;
@@ -227,8 +230,8 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
     fn has_news_of_own(&self, sent: &Snapshot, snapshot: &Snapshot) -> bool {
         let terminal = self.session.terminal;
         let own = |snapshot: &'_ Snapshot| -> Vec<(u32, Outcome)> {
-            let own = snapshot.commands.iter().filter(|command| command.id.terminal == terminal);
-            own.map(|command| (command.id.number, command.outcome.clone())).collect()
+            let own = snapshot.commands.iter().filter(|status| status.command.id.terminal == terminal);
+            own.map(|status| (status.command.id.number, status.outcome.clone())).collect()
         };
         self.session.status.borrow().view && own(sent) != own(snapshot)
     }

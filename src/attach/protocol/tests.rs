@@ -81,9 +81,9 @@ fn what_a_terminal_says_of_itself_cannot_disturb_a_screen_or_say_who_it_is() {
 #[test]
 fn requests_and_news_survive_the_way() {
     let command =
-        CommandRequest::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1 });
+        Command::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1 });
     let asked = [
-        ClientMessage::Command(Box::new(command)),
+        ClientMessage::Command(Box::new(command), None),
         ClientMessage::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
         ClientMessage::Cancel { ticket: 1 },
         ClientMessage::SessionRequest {
@@ -191,16 +191,15 @@ proptest! {
     #[test]
     fn a_corrupt_message_is_refused_without_harm(place in 0usize..200, byte: u8, end in 0usize..200) {
         let credentials = crate::access::Credentials { user: Some("somchai".into()), password: "secret".into() };
-        let command = CommandRequest {
+        let command = Command {
             note: Some("because".into()),
-            credentials: Some(credentials),
-            ..CommandRequest::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
+            ..Command::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
         };
-        let mut bytes = body(encode(&ClientMessage::Command(Box::new(command)), REQUEST_BYTES_MAX).unwrap());
+        let mut bytes = body(encode(&ClientMessage::Command(Box::new(command), Some(credentials)), REQUEST_BYTES_MAX).unwrap());
         let place = place % bytes.len();
         bytes[place] = byte;
         bytes.truncate(bytes.len() - end % bytes.len());
-        if let Ok(ClientMessage::Command(command)) = decode::<ClientMessage>(&bytes, "message") {
+        if let Ok(ClientMessage::Command(command, _)) = decode::<ClientMessage>(&bytes, "message") {
             let _ = check::command(&Fixture::normal().def, &command.kind);
         }
     }

@@ -8,7 +8,7 @@ use tokio::{
 };
 
 use crate::plant::{
-    command::{BusRequest, WriteId},
+    command::{BusRequest, WriteId, WriteJob},
     def::TagId,
 };
 
@@ -62,7 +62,7 @@ impl Requests {
     /// The request to serve now: a stop before all others, writes last and only if they `may_write`.
     pub fn next(&mut self, may_write: bool) -> Result<Option<BusRequest>, Closed> {
         self.fetch()?;
-        let is_write = |request: &BusRequest| matches!(request, BusRequest::Write { .. });
+        let is_write = |request: &BusRequest| matches!(request, BusRequest::Write(_));
         let request = self.first.pop_front().or_else(|| {
             let refresh = self.waiting.iter().position(|request| !is_write(request));
             self.waiting.remove(refresh.or(may_write.then_some(0))?)
@@ -162,30 +162,30 @@ impl Requests {
     fn sort(&mut self, request: BusRequest) {
         match request {
             stop if is_stop(&stop) => self.first.push_front(stop),
-            BusRequest::Write { .. } | BusRequest::Refresh { .. } => self.put_off(request),
+            BusRequest::Write(_) | BusRequest::Refresh { .. } => self.put_off(request),
             other => self.first.push_back(other),
         }
     }
 
     fn hand_out(&mut self, request: BusRequest) -> BusRequest {
-        if let BusRequest::Write { id, .. } = request {
-            self.under_way.push(id);
+        if let BusRequest::Write(job) = request {
+            self.under_way.push(job.id);
         }
         request
     }
 
     /// It was handed out, and is not begun.
     fn take_back(&mut self, request: &BusRequest) {
-        if let BusRequest::Write { id, .. } = request {
-            self.ended(*id);
+        if let BusRequest::Write(job) = request {
+            self.ended(job.id);
         }
     }
 
     fn take_writes(&mut self, of: impl Fn(TagId) -> bool) -> Vec<WriteId> {
         let mut taken = Vec::new();
         self.waiting.retain(|request| match request {
-            BusRequest::Write { id, tag, .. } if of(*tag) => {
-                taken.push(*id);
+            BusRequest::Write(job) if of(job.tag) => {
+                taken.push(job.id);
                 false
             }
             _ => true,
@@ -195,7 +195,7 @@ impl Requests {
 }
 
 fn is_stop(request: &BusRequest) -> bool {
-    matches!(request, BusRequest::Write { urgent: true, .. })
+    matches!(request, BusRequest::Write(WriteJob { urgent: true, .. }))
 }
 
 fn later() -> Instant {

@@ -205,7 +205,7 @@ impl Task<'_> {
                 () = pause => return Ok(()),
             };
             match request {
-                BusRequest::Write { id, .. } => self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?,
+                BusRequest::Write(job) => self.tell_wrote(job.id, WriteResult::NotSent(Fault::NotConnected)).await?,
                 // An operator does not wait for the next try to open the port.
                 BusRequest::Refresh { .. } if until.is_some() => return Ok(()),
                 BusRequest::Refresh { .. } | BusRequest::StopTest => {}
@@ -333,28 +333,26 @@ impl Task<'_> {
                 self.tell_test().await.map(Ok)
             }
             BusRequest::StopTest => self.stop_test().await.map(Ok),
-            BusRequest::Write { id, tag, raw, unlock, verify, urgent } => {
+            BusRequest::Write(job) => {
                 // What was requested before a stop and still waits for this tag would undo it.
-                let overtaken = if urgent { self.requests.take_writes_of(tag) } else { Vec::new() };
+                let overtaken = if job.urgent { self.requests.take_writes_of(job.tag) } else { Vec::new() };
                 for id in overtaken {
                     self.tell_wrote(id, WriteResult::Overtaken).await?;
                 }
                 let def = self.def.clone();
-                match self.clear_way(link, schedule, def.tag(tag).device, urgent).await? {
+                match self.clear_way(link, schedule, def.tag(job.tag).device, job.urgent).await? {
                     Ok(true) => {}
                     Ok(false) => {
-                        self.requests.put_off(BusRequest::Write { id, tag, raw, unlock, verify, urgent });
+                        self.requests.put_off(BusRequest::Write(job));
                         return Ok(Ok(()));
                     }
                     Err(leave) => {
-                        self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+                        self.tell_wrote(job.id, WriteResult::NotSent(Fault::NotConnected)).await?;
                         return Ok(Err(leave));
                     }
                 }
-                let (tag, unlock) = (def.tag(tag), unlock.map(|(tag, raw)| (def.tag(tag), raw)));
                 let started = self.clock.now();
-                let job = write::WriteJob { tag, raw, unlock, verify, urgent };
-                let turn = self.write(link, schedule, id, job).await;
+                let turn = self.write(link, schedule, &job).await;
                 let now = self.clock.now();
                 self.budget.spent(Duration::try_from(now.duration_since(started)).unwrap_or_default(), now);
                 turn

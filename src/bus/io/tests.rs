@@ -24,7 +24,7 @@ use tokio::io::AsyncWriteExt;
 use self::slave::{MS, Mode, SlaveAction, line, plant};
 use crate::bus::frame;
 use crate::plant::{
-    command::{BusRequest, WriteId},
+    command::{BusRequest, WriteId, WriteJob},
     def::{DeviceId, LineDef, TagId},
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
     request_stats::RequestStats,
@@ -371,8 +371,14 @@ async fn write(action: SlaveAction, read_back: SlaveAction) -> (WriteResult, usi
         if message[2..6] == [0, 10, 0, 1] { read_back.clone() } else { SlaveAction::Answer }
     });
     line.read(&def).await;
-    let request =
-        BusRequest::Write { id: WriteId(7), tag: TagId(0), raw: 10.0, unlock: None, verify: true, urgent: false };
+    let request = BusRequest::Write(WriteJob {
+        id: WriteId(7),
+        tag: TagId(0),
+        raw: 10.0,
+        unlock: None,
+        verify: true,
+        urgent: false,
+    });
     line.requests.send(request).await.expect("the line runs");
     let result = line
         .until(&def, |event| match event {
@@ -423,8 +429,14 @@ async fn a_broadcast_is_sent_once_and_never_called_verified() {
             SlaveAction::Silent
         });
         line.read(&def).await;
-        let request =
-            BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 7.0, unlock: None, verify: false, urgent: false };
+        let request = BusRequest::Write(WriteJob {
+            id: WriteId(1),
+            tag: TagId(0),
+            raw: 7.0,
+            unlock: None,
+            verify: false,
+            urgent: false,
+        });
         line.requests.send(request).await.expect("the line runs");
         let result = line
             .until(&def, |event| match event {
@@ -477,14 +489,14 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
     });
     line.read(&def).await;
     for (id, tag) in [(1, 0), (2, 1)] {
-        let request = BusRequest::Write {
+        let request = BusRequest::Write(WriteJob {
             id: WriteId(id),
             tag: TagId(tag),
             raw: 10.0,
             unlock: None,
             verify: true,
             urgent: false,
-        };
+        });
         line.requests.send(request).await.expect("the line runs");
     }
     for (id, expect) in
@@ -551,13 +563,8 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
         if lost { SlaveAction::Silent } else { SlaveAction::Late(200 * MS) }
     });
     line.read(&def).await;
-    let write = |id, tag, raw, urgent| BusRequest::Write {
-        id: WriteId(id),
-        tag: TagId(tag),
-        raw,
-        unlock: None,
-        verify: true,
-        urgent,
+    let write = |id, tag, raw, urgent| {
+        BusRequest::Write(WriteJob { id: WriteId(id), tag: TagId(tag), raw, unlock: None, verify: true, urgent })
     };
     for tag in 0..4u16 {
         line.requests.send(write(u64::from(tag), tag, 1.0, false)).await.expect("the line runs");
@@ -598,7 +605,7 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
     };
     line.until(&def, holds).await;
     let (id, unlock) = (WriteId(1), Some((key, 1.0)));
-    let request = BusRequest::Write { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false };
+    let request = BusRequest::Write(WriteJob { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false });
     line.requests.send(request).await.expect("the line runs");
     let told = |event: &Event| match event {
         Event::Unlocked { key, result, .. } => Some((Some(*key), result.clone())),

@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use super::{Effects, Plant};
 use crate::plant::{
     alarm::{AlarmCommand, AlarmRefusal, condition::Facts},
-    command::{Command, NotConfirmed, Outcome, Refusal},
+    command::{CommandStatus, NotConfirmed, Outcome, Refusal},
     def::{AlarmDef, AlarmId, Condition, Subject},
     event::LineState,
     ne107::Signal,
@@ -21,17 +21,17 @@ impl Plant {
         self.alarm_manager.restore(steps);
     }
 
-    /// Takes a command about alarms.
+    /// Carries out a command about alarms.
     pub(super) fn alarm_command(
         &mut self,
-        command: &Command,
+        status: &CommandStatus,
         alarm_command: AlarmCommand,
         at: Timestamp,
         effects: &mut Effects,
-    ) -> Option<ActionRecord> {
+    ) -> ActionRecord {
         // The steps of one alarm must not go back in time, whatever the clock does.
         let now = self.at.max(at);
-        let (manager, by, note) = (&mut self.alarm_manager, &command.by, command.note.as_ref());
+        let (manager, by, note) = (&mut self.alarm_manager, &status.by, status.command.note.as_ref());
         let done = match alarm_command {
             AlarmCommand::Acknowledge { alarm, seen } => {
                 manager.acknowledge(alarm, seen, note, now, by).map(|step| vec![step])
@@ -40,7 +40,7 @@ impl Plant {
                 let each = seen.iter().map(|(alarm, seen)| manager.acknowledge(*alarm, *seen, note, now, by));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
-                return self.commands.note(command, outcome, &self.image, at);
+                return self.commands.finish(status, outcome, &self.image);
             }
             AlarmCommand::Silence => match manager.silence() {
                 true => Ok(Vec::new()),
@@ -61,7 +61,7 @@ impl Plant {
             }
             Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
         };
-        self.commands.note(command, outcome, &self.image, at)
+        self.commands.finish(status, outcome, &self.image)
     }
 
     /// Judges every alarm now.

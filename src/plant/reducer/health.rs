@@ -61,9 +61,9 @@ impl Plant {
     /// Is a device left alone because an action takes it some time (saving its settings)?
     fn settling(&self, device: DeviceId) -> bool {
         let actions = &self.def.device(device).actions;
-        self.commands.commands().any(|command| match (&command.kind, &command.outcome) {
+        self.commands.commands().any(|status| match (&status.command.kind, &status.outcome) {
             (CommandKind::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
-                let age = Duration::try_from(self.at.duration_since(command.at)).unwrap_or_default();
+                let age = Duration::try_from(self.at.duration_since(status.at)).unwrap_or_default();
                 actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)
             }
             _ => false,
@@ -77,7 +77,7 @@ mod tests {
 
     use super::*;
     use crate::plant::{
-        command::{Command, CommandId},
+        command::{Command, CommandId, CommandStatus},
         def::{ActionDef, LineId},
         event::{Event, LineState, WriteResult},
         fixture::{self, DP, PLC, PV, SV, TIC},
@@ -109,7 +109,8 @@ mod tests {
         plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
         let id = CommandId { terminal: 1, number: 1 };
-        plant.on_command(Command::new(id, "anna", CommandKind::Write { tag: SV, value: 1.0 }), at(1));
+        let command = Command::new(1, id, CommandKind::Write { tag: SV, value: 1.0 });
+        plant.on_command(CommandStatus::new(command, "anna", at(1)), at(1));
         plant.on_event(Event::Wrote { at: at(1), id: WriteId(1), result: WriteResult::ReadBack(10.0) });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, Some(Reason::Settling));
         assert_eq!(plant.snapshot().device(PLC).diagnosis, None);

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
-    command::{BusRequest, Command, CommandId, CommandKind, NotConfirmed, Outcome, Refusal},
+    command::{BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
     def::{DeviceId, LineId, TagId},
     parameter_set::{self, Problem, StoredSet},
     process_image::ProcessImage,
@@ -40,33 +40,34 @@ impl Plant {
     /// Takes a command about sets; others are not for this place.
     pub(super) fn set_command(
         &mut self,
-        command: &Command,
+        status: &CommandStatus,
         at: Timestamp,
         effects: &mut Effects,
     ) -> Option<ActionRecord> {
-        match &command.kind {
+        match &status.command.kind {
             CommandKind::ReadSets => {
                 effects.sets = Some(SetWork::Read);
                 // A read is not an operator action.
-                let _ = self.commands.note(command, Outcome::Verified, &self.image, at);
+                self.commands.accept(&CommandStatus { outcome: Outcome::Verified, ..status.clone() });
                 None
             }
             CommandKind::SaveSet { device, name, replace } => {
                 let trusted = trusted(&self.image);
-                let set = parameter_set::take(&self.def, *device, name, command.by.clone(), at, &trusted);
+                let set = parameter_set::take(&self.def, *device, name, status.by.clone(), at, &trusted);
                 let problem = match parameter_set::check_name(name) {
                     Err(why) => Some(why),
                     Ok(()) if set.values.is_empty() => Some("no setting of the device is known now".to_owned()),
                     Ok(()) => None,
                 };
                 if let Some(why) = problem {
-                    return self.commands.note(command, Outcome::Refused(Refusal::NotSaved(why)), &self.image, at);
+                    return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotSaved(why)), &self.image));
                 }
-                self.commands.take(command, at);
-                effects.sets = Some(SetWork::Write { command: command.id, set: Box::new(set), replace: *replace });
+                self.commands.accept(status);
+                effects.sets =
+                    Some(SetWork::Write { command: status.command.id, set: Box::new(set), replace: *replace });
                 None
             }
-            CommandKind::Restore(request) => self.begin_restore(command, request, at, effects),
+            CommandKind::Restore(request) => self.begin_restore(status, request, at, effects),
             CommandKind::StopRestore(device) => {
                 let running = self.restores.iter_mut().find(|run| run.device == *device && run.at_work());
                 let outcome = match running {
@@ -76,7 +77,7 @@ impl Plant {
                     }
                     None => Outcome::Unchanged,
                 };
-                self.commands.note(command, outcome, &self.image, at)
+                Some(self.commands.finish(status, outcome, &self.image))
             }
             _ => None,
         }
@@ -100,24 +101,24 @@ impl Plant {
     /// A restore begins with a look at the device: what is on the image may be hours old where tags are read seldom.
     fn begin_restore(
         &mut self,
-        command: &Command,
+        status: &CommandStatus,
         request: &RestoreRequest,
         at: Timestamp,
         effects: &mut Effects,
     ) -> Option<ActionRecord> {
         if self.restores.iter().any(|run| run.device == request.device && run.at_work()) {
-            return self.commands.note(command, Outcome::Refused(Refusal::UnderWay), &self.image, at);
+            return Some(self.commands.finish(status, Outcome::Refused(Refusal::UnderWay), &self.image));
         }
         if let Some(why) = self.unlike(request.device, &request.set, &request.changes) {
-            return self.commands.note(command, Outcome::Refused(why), &self.image, at);
+            return Some(self.commands.finish(status, Outcome::Refused(why), &self.image));
         }
         if request.changes.is_empty() {
-            return self.commands.note(command, Outcome::Unchanged, &self.image, at);
+            return Some(self.commands.finish(status, Outcome::Unchanged, &self.image));
         }
-        self.commands.take(command, at);
+        self.commands.accept(status);
         self.restores.retain(|run| run.device != request.device);
-        self.restores.push(Arc::new(Restore::new(command.id, command.by.clone(), request, at)));
-        let look = BusRequest::Refresh { device: request.device, command: Some(command.id) };
+        self.restores.push(Arc::new(Restore::new(status.command.id, status.by.clone(), request, at)));
+        let look = BusRequest::Refresh { device: request.device, command: Some(status.command.id) };
         effects.bus.push((self.def.device(request.device).line, look));
         None
     }
@@ -188,17 +189,18 @@ impl Plant {
             let id = CommandId { terminal: PLANT, number: *numbers };
             step.command = Some(id);
             let (tag, value) = (step.change.tag, step.change.new);
-            let seen = Some(step.change.old);
-            let command = Command { seen, ..Command::new(id, by, CommandKind::Write { tag, value }) };
+            let expected_value = Some(step.change.old);
+            let command = Command { expected_value, ..Command::new(self.run, id, CommandKind::Write { tag, value }) };
+            let status = CommandStatus::new(command, by, at);
             let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.image) };
             if let Some(why) = refusal {
-                let action = self.commands.note(&command, Outcome::Refused(why), &self.image, at);
-                effects.records.extend(action.map(Record::Action));
+                let refused = self.commands.finish(&status, Outcome::Refused(why), &self.image);
+                effects.records.push(Record::Action(refused));
                 continue;
             }
-            match self.commands.write(&self.image, &command, tag, value, at) {
-                Ok(request) => effects.bus.push((self.line_of(tag), request)),
-                Err(action) => effects.records.extend(action.map(|action| Record::Action(*action))),
+            match self.commands.write(&self.image, &status, tag, value) {
+                Ok(job) => effects.bus.push((self.line_of(tag), BusRequest::Write(job))),
+                Err(action) => effects.records.push(Record::Action(*action)),
             }
         }
         if let Some(outcome) = run.outcome(&self.def) {

@@ -2,35 +2,28 @@
 
 use std::sync::Arc;
 
-use jiff::Timestamp;
-
 use super::{Effects, Plant};
 use crate::plant::{
-    command::{BusRequest, Command, CommandId, CommandKind, Outcome, Refusal},
+    command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
     def::{LineDef, LineId},
     line_check::valid,
     record::{ActionRecord, Record},
 };
 
 impl Plant {
-    /// Takes a command for a line itself; others are not for this place.
-    pub(super) fn line_command(
-        &mut self,
-        command: &Command,
-        at: Timestamp,
-        effects: &mut Effects,
-    ) -> Option<ActionRecord> {
-        match &command.kind {
+    /// Accepts a command for a line: settings and diagnostics.
+    pub(super) fn line_command(&mut self, status: &CommandStatus, effects: &mut Effects) -> Option<ActionRecord> {
+        match &status.command.kind {
             CommandKind::Configure(settings)
                 if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
             {
-                return self.commands.note(command, Outcome::Refused(Refusal::NotALine), &self.image, at);
+                return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotALine), &self.image));
             }
             CommandKind::Configure(settings) if let Err(why) = valid(settings) => {
-                return self.commands.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
+                return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotValid(why)), &self.image));
             }
             CommandKind::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
-                return self.commands.note(command, Outcome::Refused(Refusal::NotValid(why)), &self.image, at);
+                return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotValid(why)), &self.image));
             }
             CommandKind::Configure(settings) => {
                 self.remember_settings(settings);
@@ -39,13 +32,13 @@ impl Plant {
             }
             CommandKind::Test(line, diagnostic) => {
                 let request =
-                    BusRequest::Test { id: command.id, by: command.by.clone(), diagnostic: diagnostic.clone() };
+                    BusRequest::Test { id: status.command.id, by: status.by.clone(), diagnostic: diagnostic.clone() };
                 effects.bus.push((*line, request));
             }
             CommandKind::StopTest(line) => effects.bus.push((*line, BusRequest::StopTest)),
             CommandKind::SaveSettings(line) => {
-                effects.save = Some((command.id, self.settings(*line).clone()));
-                self.commands.take(command, at);
+                effects.save = Some((status.command.id, self.settings(*line).clone()));
+                self.commands.accept(status);
                 return None;
             }
             CommandKind::Write { .. }
@@ -59,7 +52,7 @@ impl Plant {
             | CommandKind::HandOver
             | CommandKind::TakeOver => return None,
         }
-        self.commands.take(command, at);
+        self.commands.accept(status);
         None
     }
 
@@ -94,8 +87,11 @@ impl Plant {
 mod tests {
     use std::time::Duration;
 
+    use jiff::Timestamp;
+
     use super::*;
     use crate::plant::{
+        command::Command,
         def::{Serial, Transport},
         diagnostics::{Diagnostic, Scan},
         event::Event,
@@ -126,7 +122,7 @@ mod tests {
 
     fn command(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
         let id = CommandId { terminal: 1, number };
-        plant.on_command(Command::new(id, "anna", kind), at(i64::from(number)))
+        plant.on_command(CommandStatus::new(Command::new(1, id, kind), "anna", at(1)), at(i64::from(number)))
     }
 
     /// Commands other settings and lets the line take them.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::*;
 use crate::plant::{
     alarm::AlarmState,
-    command::{CommandId, NotConfirmed, Refusal},
+    command::{Command, CommandId, NotConfirmed, Refusal, WriteJob},
     def::{ActionDef, AlarmDef, AlarmId, Condition, Subject},
     event::ExceptionCode,
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
@@ -43,21 +43,22 @@ fn running() -> Plant {
     plant
 }
 
-fn command(number: u32, kind: CommandKind) -> Command {
-    Command::new(CommandId { terminal: 1, number }, "anna", kind)
+fn command(number: u32, kind: CommandKind) -> CommandStatus {
+    CommandStatus::new(Command::new(1, CommandId { terminal: 1, number }, kind), "anna", at(0))
 }
 
 /// A write by an operator who sees the plant's present values.
-fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> Command {
+fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> CommandStatus {
     let kind = CommandKind::Write { tag, value };
-    Command { seen: plant.snapshot().seen(&kind), ..command(number, kind) }
+    let command = Command::on(&plant.snapshot(), CommandId { terminal: 1, number }, kind);
+    CommandStatus::new(command, "anna", at(0))
 }
 
 /// Writes `SV := value`, answers with `result`, and gives the outcome and the raw number that was sent.
 fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option<f64>) {
     let effects = plant.on_command(shown(plant, 1, SV, value), at(1));
     let sent = effects.bus.first().map(|(_, request)| match request {
-        BusRequest::Write { id, raw, .. } => (*id, *raw),
+        BusRequest::Write(job) => (job.id, job.raw),
         other => panic!("not a write: {other:?}"),
     });
     if let Some((id, _)) = sent {
@@ -116,8 +117,9 @@ fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
 fn a_handover_is_on_record_with_its_note() {
     let mut plant = running();
     let mut action = |number, kind, note: Option<String>| {
-        let command = Command { note: note.map(Into::into), ..command(number, kind) };
-        let effects = plant.on_command(command, at(1));
+        let mut status = command(number, kind);
+        status.command.note = note.map(Into::into);
+        let effects = plant.on_command(status, at(1));
         let [Record::Action(action)] = &effects.records[..] else { panic!("{effects:?}") };
         (action.action.to_string(), action.note.as_deref().map(str::to_owned), action.outcome.to_string())
     };
@@ -204,7 +206,7 @@ fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
 fn the_record_of_a_write_has_old_new_and_outcome() {
     let mut plant = running();
     let effects = plant.on_command(shown(&plant, 1, SV, 72.5), at(1));
-    let BusRequest::Write { id, .. } = effects.bus[0].1 else { panic!("a write was requested") };
+    let BusRequest::Write(WriteJob { id, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
     let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(725.0) });
     let Some(Record::Action(action)) = effects.records.last() else { panic!("no action on record") };
     assert_eq!(
@@ -378,7 +380,7 @@ fn a_stop_is_sent_though_a_start_is_under_way() {
     let mut check = |number, value, expect: Option<(f64, bool)>| {
         let effects = plant.on_command(shown(&plant, number, RUN, value), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write { raw, urgent, .. } => (*raw, *urgent),
+            BusRequest::Write(job) => (job.raw, job.urgent),
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!(sent, expect, "command {number}: {:?}", plant.snapshot().commands[0].outcome);
@@ -399,7 +401,7 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
     let keyed = |plant: &mut Plant, number, value| {
         let effects = plant.on_command(shown(plant, number, SV, value), at(1));
         match &effects.bus[0].1 {
-            BusRequest::Write { id, unlock, .. } => (*id, *unlock),
+            BusRequest::Write(job) => (job.id, job.unlock),
             other => panic!("not a write: {other:?}"),
         }
     };
@@ -472,9 +474,13 @@ fn action_of(effects: &Effects) -> &ActionRecord {
 fn a_write_is_recorded_with_the_value_that_the_device_holds() {
     let mut plant = in_steps(100.0);
     let effects = plant.on_command(shown(&plant, 1, SV, 72.3), at(1));
-    let BusRequest::Write { id, raw, .. } = effects.bus[0].1 else { panic!("a write was requested") };
+    let BusRequest::Write(WriteJob { id, raw, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
     assert_eq!(raw, 145.0, "72.5 °C goes out");
-    assert_eq!(plant.snapshot().commands[0].kind, CommandKind::Write { tag: SV, value: 72.5 }, "screens show it too");
+    assert_eq!(
+        plant.snapshot().commands[0].command.kind,
+        CommandKind::Write { tag: SV, value: 72.5 },
+        "screens show it too"
+    );
     let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(raw) });
     let action = action_of(&effects);
     assert_eq!((action.new.as_deref(), &*action.outcome), (Some("72.5 °C"), "verified"));
@@ -491,7 +497,7 @@ fn rounding_never_leads_beyond_a_limit() {
         let mut plant = in_steps(99.8);
         let effects = plant.on_command(shown(&plant, 1, SV, value), at(1));
         let raw = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write { raw, .. } => *raw,
+            BusRequest::Write(job) => job.raw,
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!((raw, plant.snapshot().commands[0].outcome.clone()), (sent, outcome), "{value}");
@@ -556,7 +562,7 @@ fn a_write_over_a_value_that_came_back_as_another_one_is_refused() {
     let mut plant = running();
     plant.on_event(fail(1, &[SV], Fault::Timeout));
     let write = shown(&plant, 1, SV, 65.0);
-    assert_eq!(write.seen, Some(70.0), "a doubted value was shown as well");
+    assert_eq!(write.command.expected_value, Some(70.0), "a doubted value was shown as well");
     plant.on_event(read(2, &[(SV, 800.0)]));
     plant.on_command(write, at(3));
     assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::ChangedTo("80.0 °C".into())));

@@ -15,7 +15,7 @@ use super::SimulatorHandle;
 use crate::{
     plant::{
         PlantDef, Snapshot,
-        command::{self, CommandId},
+        command::{Command, CommandId, CommandStatus},
         record::Record,
     },
     sim::{
@@ -88,7 +88,7 @@ pub struct Trainer {
     /// The drill, if there is one.
     pub scenario: Option<Arc<Scenario>>,
     /// Takes the commands of the scenario's operator; `None` for a human operator.
-    pub operator: Option<mpsc::Sender<command::Command>>,
+    pub operator: Option<mpsc::Sender<CommandStatus>>,
     /// Hide faults and result until the drill is over.
     pub exam: bool,
 }
@@ -191,9 +191,9 @@ impl Task {
                 let Some(kind) = step.action.command_kind(&snapshot) else { return };
                 self.commands_sent += 1;
                 let id = CommandId { terminal: OPERATOR, number: self.commands_sent };
-                let seen = snapshot.seen(&kind);
-                let command = command::Command { seen, ..command::Command::new(id, "operator of the drill", kind) };
-                if commands.try_send(command).is_err() {
+                let command = Command::on(&snapshot, id, kind);
+                let status = CommandStatus::new(command, "operator of the drill", snapshot.at);
+                if commands.try_send(status).is_err() {
                     tracing::error!("the station has not taken a command of the drill");
                 }
             }

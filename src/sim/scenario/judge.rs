@@ -8,7 +8,7 @@ use super::{Expectation, Scenario};
 use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
-    command::{CommandKind, CommandStatus, Outcome},
+    command::{CommandStatus, Outcome},
     def::{AlarmId, PlantDef, TagId},
     record::{AlarmEvent, AlarmRecord, Record},
 };
@@ -152,12 +152,12 @@ impl Judge {
         }
     }
 
-    fn on_command(&mut self, command: &CommandStatus) {
-        let (Some(at), CommandKind::Write { tag, value }) = (self.elapsed(command.at), &command.kind) else { return };
-        let done = matches!(command.outcome, Outcome::Verified | Outcome::Unchanged);
+    fn on_command(&mut self, status: &CommandStatus) {
+        let (Some(at), Some((tag, value))) = (self.elapsed(status.at), status.command.kind.written()) else { return };
+        let done = matches!(status.outcome, Outcome::Verified | Outcome::Unchanged);
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let Expectation::Written(wanted, number) = expect.expectation else { continue };
-            if done && wanted == *tag && number == *value && expect.from <= at && at <= expect.until {
+            if done && wanted == tag && number == value && expect.from <= at && at <= expect.until {
                 mark.met.get_or_insert(at);
             }
         }

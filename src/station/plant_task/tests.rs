@@ -9,7 +9,7 @@ use crate::{
     history::io::alarm_file::{self, AlarmFile},
     plant::{
         alarm::AlarmCommand,
-        command::{CommandKind, Outcome},
+        command::{Command, CommandKind, CommandStatus, Outcome},
         def::{AlarmId, TagId},
         event::Fault,
         fixture,
@@ -22,7 +22,7 @@ const COMMAND: CommandId = CommandId { terminal: 1, number: 1 };
 /// A plant with an alarm that waits for its acknowledgement, beside a history that takes nothing.
 struct Station {
     events: mpsc::Sender<Event>,
-    commands: mpsc::Sender<Command>,
+    commands: mpsc::Sender<CommandStatus>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     task: JoinHandle<()>,
     recorder: std::thread::JoinHandle<Option<ChainHash>>,
@@ -72,14 +72,15 @@ impl Station {
         let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
         let kind = silent.acknowledge();
         assert!(matches!(kind, CommandKind::Alarm(AlarmCommand::Acknowledge { .. })));
-        self.commands.send(Command::new(COMMAND, "anna", kind)).await.unwrap();
+        let status = CommandStatus::new(Command::new(1, COMMAND, kind), "anna", Timestamp::UNIX_EPOCH);
+        self.commands.send(status).await.unwrap();
     }
 
     /// The first snapshot in which the acknowledgement has its end, recorded or not.
     async fn ended(&mut self, recorded: impl Fn(bool) -> bool) -> Arc<Snapshot> {
         let ended = |snapshot: &Arc<Snapshot>| {
-            let own = snapshot.commands.iter().find(|command| command.id == COMMAND);
-            own.is_some_and(|command| command.outcome == Outcome::Verified && recorded(command.recorded))
+            let own = snapshot.commands.iter().find(|status| status.command.id == COMMAND);
+            own.is_some_and(|status| status.outcome == Outcome::Verified && recorded(status.recorded))
         };
         self.snapshots.wait_for(ended).await.unwrap().clone()
     }

@@ -10,10 +10,13 @@ use rustix::process::{Pid, Signal, kill_process};
 use tokio::sync::watch;
 
 use super::*;
-use crate::access::{CommandRequest, SessionStatus, Who};
+use crate::access::{SessionStatus, Who};
 use crate::{plant::role::Role, station::Request};
 use crate::{
-    plant::{alarm::AlarmCommand, command::CommandKind},
+    plant::{
+        alarm::AlarmCommand,
+        command::{Command, CommandKind},
+    },
     ui::fixture::Fixture,
 };
 
@@ -38,7 +41,7 @@ fn on_the_pty() {
             watch::channel(Arc::new(SessionStatus { who: Some(who), view: true, ..SessionStatus::default() }));
         tokio::spawn(async move {
             while let Some((_, request)) = taken.recv().await {
-                let Request::Command(CommandRequest { kind, .. }) = request else { continue };
+                let Request::Command(Command { kind, .. }, _) = request else { continue };
                 let mut snapshot = Arc::unwrap_or_clone(Fixture::alarm().snapshot());
                 match kind {
                     CommandKind::Alarm(AlarmCommand::Acknowledge { .. }) => {

@@ -14,14 +14,14 @@ use crate::{
     access::{Credentials, control::reauthentication},
     plant::{
         alarm::{AlarmCommand, manager::subject_name},
-        command::CommandKind,
+        command::{Command, CommandKind},
         def::TagId,
         diagnostics::Diagnostic,
         role::Reauthentication,
         tag::{Access, Confidence, TagDef},
     },
     ui::{
-        Confirmed, Effect, Leaving, UiAction, ViewContext, interlock, keys, rights,
+        Effect, Leaving, UiAction, ViewContext, interlock, keys, rights,
         tabs::mimic,
         widgets::{
             text::{Canvas, width, wrap},
@@ -229,7 +229,7 @@ impl Confirm {
             Intent::Command(kind) => {
                 let expected = self.expected.as_ref().and_then(|expected| expected.shown(cx));
                 let credentials = self.reauthentication.as_ref().map(credentials);
-                UiAction::Confirmed(Confirmed { expected, credentials, ..kind.clone().into() })
+                UiAction::Confirmed(Command { expected_value: expected, ..kind.clone().into() }, credentials)
             }
         };
         if self.reauthentication.is_some() {

@@ -58,12 +58,12 @@ impl ConfirmedValue {
     fn words(&self, cx: &ViewContext, before: Option<f64>, now: Option<f64>) -> String {
         let text = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| cx.snapshot.format(self.tag, value));
         let unit = cx.snapshot.unit(self.tag);
-        let by = cx.snapshot.commands.iter().find(|command| {
-            command.outcome == Outcome::Verified
-                && command.kind.written().is_some_and(|(tag, new)| tag == self.tag && Some(new) == now)
+        let by = cx.snapshot.commands.iter().find(|status| {
+            status.outcome == Outcome::Verified
+                && status.command.kind.written().is_some_and(|(tag, new)| tag == self.tag && Some(new) == now)
         });
-        let by = by
-            .map_or(String::new(), |command| format!(" by {} {}", command.by, clock(command.at, &cx.def().time_zone)));
+        let by =
+            by.map_or(String::new(), |status| format!(" by {} {}", status.by, clock(status.at, &cx.def().time_zone)));
         let now = format!("{} {unit}", text(now));
         format!("changed to {}{by} (was {})", now.trim_end(), text(before))
     }

@@ -12,9 +12,13 @@ use super::{
     window,
 };
 use crate::{
-    plant::{command::CommandKind, def::TagId, number::to_u16},
+    plant::{
+        command::{Command, CommandKind},
+        def::TagId,
+        number::to_u16,
+    },
     ui::{
-        Confirmed, UiAction, ViewContext, interlock, keys, rights,
+        UiAction, ViewContext, interlock, keys, rights,
         widgets::{
             text::{width, wrap},
             value,
@@ -56,7 +60,10 @@ impl Entry {
                 Ok(value) => {
                     let expected = self.expected.shown(cx);
                     let kind = CommandKind::Write { tag: self.tag, value };
-                    return Next::Do(vec![UiAction::Confirmed(Confirmed { expected, ..kind.into() })]);
+                    return Next::Do(vec![UiAction::Confirmed(
+                        Command { expected_value: expected, ..kind.into() },
+                        None,
+                    )]);
                 }
                 Err(problem) => self.problem = Some(problem),
             }

@@ -9,11 +9,11 @@ use super::{Modal, Next, line::Line, window};
 use crate::{
     plant::{
         alarm::{AlarmCommand, command::WORDS_MAX},
-        command::CommandKind,
+        command::{Command, CommandKind},
         def::AlarmId,
         number::to_u16,
     },
-    ui::{Confirmed, UiAction, ViewContext, keys, rights, widgets::text::wrap},
+    ui::{UiAction, ViewContext, keys, rights, widgets::text::wrap},
 };
 
 /// The window.
@@ -142,7 +142,7 @@ impl Reason {
             return Next::Stay(Modal::Reason(Box::new(self)));
         }
         let note = (!words.is_empty()).then(|| Arc::from(words));
-        Next::Do(vec![UiAction::Confirmed(Confirmed { note, ..kind.into() })])
+        Next::Do(vec![UiAction::Confirmed(Command { note, ..kind.into() }, None)])
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {

@@ -310,7 +310,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
 
 /// Why the last request to save the settings of a line was refused, in full.
 fn not_saved(cx: &ViewContext, line: LineId) -> Option<String> {
-    let saved = cx.snapshot.commands.iter().find(|command| command.kind == CommandKind::SaveSettings(line))?;
+    let saved = cx.snapshot.commands.iter().find(|status| status.command.kind == CommandKind::SaveSettings(line))?;
     match &saved.outcome {
         Outcome::Refused(why) => Some(format!("! {why}")),
         Outcome::Pending | Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(_) | Outcome::Failed(_) => {

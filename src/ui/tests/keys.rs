@@ -7,10 +7,9 @@ use jiff::SignedDuration;
 
 use super::{model, screen, sent_kind, type_keys};
 use crate::{
-    access::CommandRequest,
     history::{Answer, HistoryError, Query},
     plant::{
-        command::{CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
+        command::{Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
         def::{AlarmId, Priority},
         event::{Fault, LineState},
         record::{ActionRecord, AlarmEvent, AlarmRecord},
@@ -331,15 +330,9 @@ fn the_mimic_shows_how_a_command_went() {
         let kind = CommandKind::Write { tag, value: 1.0 };
         let at = snapshot.at;
         let status = |outcome| CommandStatus {
-            from: "".into(),
-            note: None,
-            id,
-            by: Arc::from("b"),
-            kind,
-            at,
             old: Some(0.0),
             outcome,
-            recorded: true,
+            ..CommandStatus::new(Command::new(0, id, kind), "b", at)
         };
         snapshot.commands = outcome.map(status).into_iter().collect();
         if disobeys {
@@ -569,20 +562,14 @@ fn the_outcome_of_a_command_stays_until_dismissed() {
     let check = |outcome: Outcome, expect: &str| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Command(CommandRequest { id, kind, .. })) = effects.first().cloned() else {
+        let Some(Effect::Command(Command { id, kind, .. }, _)) = effects.first().cloned() else {
             panic!("{effects:?}")
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         snapshot.commands = vec![CommandStatus {
-            from: "".into(),
-            note: None,
-            id,
-            by: Arc::from("tech1"),
-            kind,
-            at: snapshot.at,
             old: Some(70.0),
             outcome,
-            recorded: true,
+            ..CommandStatus::new(Command::new(0, id, kind), "tech1", snapshot.at)
         }];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
         // The station forgets old commands; the terminal still knows its own.
@@ -610,15 +597,12 @@ fn only_what_was_read_back_is_called_verified() {
         perform(&mut model, vec![UiAction::Command(kind.clone())]);
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         snapshot.commands = vec![CommandStatus {
-            from: "".into(),
-            note: None,
-            id: model.pending_command.as_ref().expect("the command is watched").id,
-            by: Arc::from("tech1"),
-            kind,
-            at: snapshot.at,
-            old: None,
             outcome: Outcome::Verified,
-            recorded: true,
+            ..CommandStatus::new(
+                Command::new(0, model.pending_command.as_ref().expect("the command is pending").command.id, kind),
+                "tech1",
+                snapshot.at,
+            )
         }];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
         let shown = screen(&mut model, 80, 24);
@@ -634,20 +618,14 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
     let check = |outcome: Outcome, stays: bool| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, "s60⏎");
-        let Some(Effect::Command(CommandRequest { id, kind, .. })) = effects.first().cloned() else {
+        let Some(Effect::Command(Command { id, kind, .. }, _)) = effects.first().cloned() else {
             panic!("{effects:?}")
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         let status = CommandStatus {
-            from: "".into(),
-            note: None,
-            id,
-            by: Arc::from("tech1"),
-            kind,
-            at: snapshot.at,
             old: Some(70.0),
             outcome,
-            recorded: true,
+            ..CommandStatus::new(Command::new(0, id, kind), "tech1", snapshot.at)
         };
         snapshot.commands = vec![status];
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
@@ -667,7 +645,7 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
 fn a_command_that_was_never_sent_is_reported() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     let effects = type_keys(&mut model, "s60⏎");
-    let Some(Effect::Command(CommandRequest { id, .. })) = effects.first() else { panic!("{effects:?}") };
+    let Some(Effect::Command(Command { id, .. }, _)) = effects.first() else { panic!("{effects:?}") };
     update(&mut model, Msg::Undelivered(*id, "station too busy"));
     assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
 }
@@ -772,7 +750,7 @@ fn what_was_seen_is_sent_though_the_values_are_doubted_meanwhile() {
     update(&mut model, Msg::Tick { silent: Duration::from_secs(4) });
     let effects = type_keys(&mut model, "⏎");
     let seen = effects.iter().find_map(|effect| match effect {
-        Effect::Command(request) => Some(request.seen),
+        Effect::Command(command, _) => Some(command.expected_value),
         _ => None,
     });
     assert_eq!(seen, Some(Some(70.0)), "the window showed `old 70.0`");

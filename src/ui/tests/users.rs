@@ -7,12 +7,12 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use super::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys};
 use crate::{
     access::{
-        CommandRequest, Durability, SessionRequest, SessionStatus, Who,
+        Credentials, Durability, SessionRequest, SessionStatus, Who,
         session_request::{SessionRow, UserRow},
     },
     history::{Answer, Query},
     plant::{
-        command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+        command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         record::{ActionRecord, ChainHash},
         role::{Reauthentication, Role},
         sample::Quality,
@@ -265,7 +265,7 @@ fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
 fn a_lock_keeps_a_reauthentication_that_awaits_its_answer() {
     let mut model = with(&reauthenticated(Reauthentication::SecondUser), person("anna", Role::Technician));
     let effects = type_keys(&mut model, "s65⏎boris⏎horse⏎");
-    let Some(Effect::Command(command)) = effects.last() else { panic!("no command: {effects:?}") };
+    let Some(Effect::Command(command, _)) = effects.last() else { panic!("no command: {effects:?}") };
     let id = command.id;
     change_session(&mut model, |session| session.locked = true);
     update(&mut model, Msg::Undelivered(id, "station too busy"));
@@ -362,22 +362,21 @@ fn reauthenticated(kind: Reauthentication) -> Fixture {
 fn a_tag_with_reauthentication_gets_credentials() {
     let request = |effects: &[Effect]| {
         effects.iter().find_map(|effect| match effect {
-            Effect::Command(request) => Some(request.clone()),
+            Effect::Command(command, credentials) => Some((command.clone(), credentials.clone())),
             _ => None,
         })
     };
-    let sent = |kind: Reauthentication, keys: &str| -> Option<CommandRequest> {
+    let sent = |kind: Reauthentication, keys: &str| -> Option<(Command, Option<Credentials>)> {
         let mut model = with(&reauthenticated(kind), person("anna", Role::Technician));
         request(&type_keys(&mut model, keys))
     };
     assert_eq!(sent(Reauthentication::Password, "s65⏎⏎"), None, "without the password");
-    let command = sent(Reauthentication::Password, "s65⏎yes n q⏎").expect("a command");
-    let credentials = command.credentials.expect("a credentials");
-    assert_eq!((credentials.user, credentials.password, command.seen), (None, "yes n q".into(), Some(70.0)));
-    let credentials = sent(Reauthentication::SecondUser, "s65⏎boris⏎horse⏎")
-        .and_then(|command| command.credentials)
-        .expect("a credentials");
-    assert_eq!((credentials.user.as_deref(), credentials.password), (Some("boris"), "horse".into()));
+    let (command, sign) = sent(Reauthentication::Password, "s65⏎yes n q⏎").expect("a command");
+    let sign = sign.expect("a credentials");
+    assert_eq!((sign.user, sign.password, command.expected_value), (None, "yes n q".into(), Some(70.0)));
+    let sign =
+        sent(Reauthentication::SecondUser, "s65⏎boris⏎horse⏎").and_then(|(_, sign)| sign).expect("a credentials");
+    assert_eq!((sign.user.as_deref(), sign.password), (Some("boris"), "horse".into()));
 
     let mut model = with(&reauthenticated(Reauthentication::SecondUser), person("anna", Role::Technician));
     type_keys(&mut model, "s65⏎boris⏎abc");
@@ -389,21 +388,15 @@ fn refused_credentials_are_asked_again_in_their_window() {
     let fixture = reauthenticated(Reauthentication::Password);
     let mut model = with(&fixture, person("anna", Role::Technician));
     let effects = type_keys(&mut model, "s65⏎hors⏎");
-    let Some(Effect::Command(first)) = effects.last() else { panic!("no command: {effects:?}") };
+    let Some(Effect::Command(first, _)) = effects.last() else { panic!("no command: {effects:?}") };
     shows(&mut model, "asking the station");
     assert_eq!(type_keys(&mut model, "1q⏎"), [], "while the answer is awaited");
-    let told = |request: &CommandRequest, outcome: Outcome| {
+    let told = |request: &Command, outcome: Outcome| {
         let mut snapshot = fixture.snapshot();
         Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
-            id: request.id,
-            by: "anna".into(),
-            from: "".into(),
-            note: None,
-            kind: request.kind.clone(),
-            at: fixture::now(),
             old: Some(70.0),
             outcome,
-            recorded: true,
+            ..CommandStatus::new(Command::new(0, request.id, request.kind.clone()), "anna", fixture::now())
         }];
         Msg::Snapshot(snapshot)
     };
@@ -415,8 +408,8 @@ fn refused_credentials_are_asked_again_in_their_window() {
     let effects = type_keys(&mut model, "r1q 3a⏎");
     assert_eq!((model.tabs.shown, effects.len()), (Tab::Mimic, 1), "no letter of it was a key: {effects:?}");
     assert!(!screen(&mut model, 80, 24).contains("r1q"));
-    let Some(Effect::Command(second)) = effects.last() else { panic!("no command: {effects:?}") };
-    assert_eq!(second.credentials.as_ref().map(|credentials| credentials.password.clone()), Some("r1q 3a".into()));
+    let Some(Effect::Command(second, credentials)) = effects.last() else { panic!("no command: {effects:?}") };
+    assert_eq!(credentials.as_ref().map(|sign| sign.password.clone()), Some("r1q 3a".into()));
     update(&mut model, told(second, Outcome::Pending));
     assert_eq!(model.modal, None);
 }
@@ -430,23 +423,25 @@ fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
     later.set("TIC-1.SV", 65.0);
     let mut snapshot = later.snapshot();
     Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
-        id: CommandId { terminal: 2, number: 1 },
-        by: "anna".into(),
-        from: "".into(),
-        note: None,
-        kind: CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0 },
-        at: fixture::now(),
         old: Some(70.0),
         outcome: Outcome::Verified,
-        recorded: true,
+        ..CommandStatus::new(
+            Command::new(
+                0,
+                CommandId { terminal: 2, number: 1 },
+                CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0 },
+            ),
+            "anna",
+            fixture::now(),
+        )
     }];
     update(&mut model, Msg::Snapshot(snapshot));
     shows(&mut model, "changed to 65.0 °C by anna 14:02:31 (was 70.0)");
     insta::assert_snapshot!("changed_under_you_80x24", screen(&mut model, 80, 24));
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);
     let effects = type_keys(&mut model, "⏎");
-    let Some(Effect::Command(request)) = effects.first() else { panic!("no command: {effects:?}") };
-    assert_eq!(request.seen, Some(65.0), "what was seen when it was confirmed");
+    let Some(Effect::Command(command, _)) = effects.first() else { panic!("no command: {effects:?}") };
+    assert_eq!(command.expected_value, Some(65.0), "what was seen when it was confirmed");
 }
 
 #[test]

@@ -83,10 +83,9 @@ fn an_unlock_or_reauthentication_counts_only_in_its_session() {
     bench.login(2, "tech", TECH).unwrap();
     let credentials = Some(Credentials { user: Some("boss".to_owned()), password: BOSS.into() });
     let id = CommandId { terminal: 2, number: 50 };
-    let effects =
-        bench.access.on_command(2, CommandRequest { credentials, ..CommandRequest::new(0, id, SV) }, bench.now);
+    let effects = bench.access.on_command(2, Command::new(0, id, SV), credentials, bench.now);
     bench.request(2, SessionRequest::Logout).unwrap();
     let effects = bench.access.on_job_done(under_way(&effects), Outcome::Verified(true), bench.now);
-    let given = effects.iter().any(|effect| matches!(effect, Effect::Command(Command { refused: None, .. })));
+    let given = effects.iter().any(|effect| matches!(effect, Effect::Command(status) if status.is_pending()));
     assert!(!given, "{effects:?}");
 }

@@ -14,7 +14,7 @@ use crate::{
         schedule::Next,
     },
     plant::{
-        command::BusRequest,
+        command::{BusRequest, WriteJob},
         def::Framing,
         diagnostics::DiagnosticState,
         event::{Event, Fault, WriteResult},
@@ -116,16 +116,16 @@ impl Task<'_> {
     /// Takes a request while a test is at work, `alone` on the port or between polls; `false` when the test is ended by it.
     async fn hear_while_testing(&mut self, request: BusRequest, alone: bool) -> Result<bool, Ended> {
         match request {
-            BusRequest::Write { id, urgent: false, .. } if alone => {
+            BusRequest::Write(WriteJob { id, urgent: false, .. }) if alone => {
                 self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
                 Ok(true)
             }
             BusRequest::Refresh { .. } if alone => Ok(true),
-            BusRequest::Write { urgent: false, .. } | BusRequest::Refresh { .. } => {
+            BusRequest::Write(WriteJob { urgent: false, .. }) | BusRequest::Refresh { .. } => {
                 self.requests.put_off(request);
                 Ok(true)
             }
-            BusRequest::Write { urgent: true, .. } => {
+            BusRequest::Write(WriteJob { urgent: true, .. }) => {
                 self.end_test("ended by an urgent stop").await?;
                 self.requests.put_first(request);
                 Ok(false)

@@ -13,7 +13,7 @@ use crate::{
         schedule::Schedule,
     },
     plant::{
-        command::{BusRequest, WriteId},
+        command::{BusRequest, WriteJob},
         def::{ActionDef, DeviceDef, Framing},
         event::{Event, Fault, WriteResult},
         number::to_u16,
@@ -22,59 +22,47 @@ use crate::{
     },
 };
 
-/// What is to be written: a tag, its raw number, and how.
-pub(super) struct WriteJob<'a> {
-    pub tag: &'a TagDef,
-    pub raw: f64,
-    /// What is written first.
-    pub unlock: Option<(&'a TagDef, f64)>,
-    /// Read it back afterwards.
-    pub verify: bool,
-    /// A stop.
-    pub urgent: bool,
+/// What became of a write.
+enum Written {
+    /// It ended, well or not.
+    Ended(WriteResult),
+    /// The port closed; the result to report, and why it closed.
+    PortClosed(WriteResult, String),
 }
 
-impl WriteJob<'_> {
-    fn request(&self, id: WriteId) -> BusRequest {
-        let &WriteJob { tag, raw, unlock, verify, urgent } = self;
-        BusRequest::Write { id, tag: tag.id, raw, unlock: unlock.map(|(key, raw)| (key.id, raw)), verify, urgent }
-    }
+/// What became of the key that a write needs.
+enum Unlocked {
+    /// The write may be sent.
+    Yes,
+    /// The write ends without having been sent.
+    No(Written),
 }
 
 impl Task<'_> {
-    /// Carries a write and tells how it ended.
-    pub(super) async fn write(
-        &mut self,
-        link: &mut Link,
-        schedule: &mut Schedule,
-        id: WriteId,
-        job: WriteJob<'_>,
-    ) -> Turn {
-        let tag = job.tag;
+    /// Performs a write and reports its result.
+    pub(super) async fn write(&mut self, link: &mut Link, schedule: &mut Schedule, job: &WriteJob) -> Turn {
+        let def = self.def.clone();
+        let (id, tag) = (job.id, def.tag(job.tag));
         if job.urgent {
             link.hurry();
         }
-        let locked = match job.unlock {
-            Some(key) => self.unlock(link, schedule, id, key, &job).await?,
-            None => Ok(None),
+        let unlocked = match job.unlock {
+            Some((key, raw)) => self.unlock(link, schedule, def.tag(key), raw, job).await?,
+            None => Unlocked::Yes,
         };
-        let result = match locked {
-            Ok(None) => {
-                self.write_once(link, schedule, &job).await.map_err(|why| (WriteResult::Lost as fn(Fault) -> _, why))
-            }
-            Ok(Some(result)) => Ok(result),
-            Err(why) => Err((WriteResult::NotSent as fn(Fault) -> _, why)),
+        let written = match unlocked {
+            Unlocked::Yes => self.write_once(link, schedule, job).await,
+            Unlocked::No(written) => written,
         };
-        let result = match result {
+        let result = match written {
             // It waits again, unless the stop is one of its tag.
-            Ok(WriteResult::Overtaken) => {
-                self.requests.put_off(job.request(id));
+            Written::Ended(WriteResult::Overtaken) => {
+                self.requests.put_off(BusRequest::Write(*job));
                 return Ok(Ok(()));
             }
-            Ok(result) => result,
-            Err((told, why)) => {
-                // The port went away: under the write, which may or may not have arrived, or before it.
-                self.tell_wrote(id, told(Fault::NotConnected)).await?;
+            Written::Ended(result) => result,
+            Written::PortClosed(result, why) => {
+                self.tell_wrote(id, result).await?;
                 return Ok(Err(Leave::Lost(why)));
             }
         };
@@ -109,35 +97,35 @@ impl Task<'_> {
         Ok(if tcp && unanswered && !self.requests.stop_waits() { Err(Leave::Reopen) } else { Ok(()) })
     }
 
-    /// Writes the key, tells it and has it read again. `Some` is how the write ends that needs it, unless it may now be sent;
-    /// `Err` within when the port is gone.
+    /// Writes the key, reports it and has it read again.
     async fn unlock(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        id: WriteId,
-        (key, raw): (&TagDef, f64),
-        job: &WriteJob<'_>,
-    ) -> Result<Result<Option<WriteResult>, String>, Ended> {
+        key: &TagDef,
+        raw: f64,
+        job: &WriteJob,
+    ) -> Result<Unlocked, Ended> {
         // A key of another device would be written to an address of this one.
-        if key.device != job.tag.device {
-            return Ok(Ok(Some(WriteResult::NotSent(Fault::NotANumber))));
+        if key.device != self.def.tag(job.tag).device {
+            return Ok(Unlocked::No(Written::Ended(WriteResult::NotSent(Fault::NotANumber))));
         }
         let sent = self.send_number(link, schedule, key, raw, job.urgent).await;
-        if let Ok(WriteResult::NotSent(_) | WriteResult::Overtaken) = &sent {
-            return Ok(sent.map(Some));
+        if let Ok(ended @ (WriteResult::NotSent(_) | WriteResult::Overtaken)) = sent {
+            return Ok(Unlocked::No(Written::Ended(ended)));
         }
         let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
-        self.tell(Event::Unlocked { at: self.clock.now(), id, key: key.id, result }).await?;
+        self.tell(Event::Unlocked { at: self.clock.now(), id: job.id, key: key.id, result }).await?;
         schedule.refresh(key.device, self.clock.now());
-        Ok(sent.map(|result| match result {
-            WriteResult::Accepted => None,
-            // A stop is tried all the same: what was not answered may have been heard.
-            WriteResult::Lost(_) if job.urgent => None,
+        Ok(match sent {
+            Ok(WriteResult::Accepted) => Unlocked::Yes,
+            // A stop is tried all the same: a key without a reply may have arrived.
+            Ok(WriteResult::Lost(_)) if job.urgent => Unlocked::Yes,
             // The value itself was never on the wire.
-            WriteResult::Lost(fault) => Some(WriteResult::NotSent(fault)),
-            refused => Some(refused),
-        }))
+            Ok(WriteResult::Lost(fault)) => Unlocked::No(Written::Ended(WriteResult::NotSent(fault))),
+            Ok(refused) => Unlocked::No(Written::Ended(refused)),
+            Err(why) => Unlocked::No(Written::PortClosed(WriteResult::NotSent(Fault::NotConnected), why)),
+        })
     }
 
     /// Sends one number: accepted, refused, lost, not sent, or overtaken by a stop of any tag. `Err` when the port is gone.
@@ -177,18 +165,21 @@ impl Task<'_> {
         }
     }
 
-    /// Writes once, reads back. `Err` when the port is gone.
+    /// Writes once and reads back.
     async fn write_once(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        &WriteJob { tag, raw, verify, urgent, .. }: &WriteJob<'_>,
-    ) -> Result<WriteResult, String> {
-        match self.send_number(link, schedule, tag, raw, urgent).await? {
-            WriteResult::Accepted => {}
-            ended => return Ok(ended),
-        }
+        &WriteJob { tag, raw, verify, urgent, .. }: &WriteJob,
+    ) -> Written {
         let def = self.def.clone();
+        let tag = def.tag(tag);
+        match self.send_number(link, schedule, tag, raw, urgent).await {
+            Ok(WriteResult::Accepted) => {}
+            Ok(ended) => return Written::Ended(ended),
+            // It may or may not have arrived.
+            Err(why) => return Written::PortClosed(WriteResult::Lost(Fault::NotConnected), why),
+        }
         let device = def.device(tag.device);
         // An action such as saving to non-volatile memory wants the device left alone, not the line.
         let is_this = |action: &&ActionDef| action.tag == tag.id && scale::to_raw(tag, action.value, 0) == Some(raw);
@@ -196,15 +187,15 @@ impl Task<'_> {
             schedule.rest(tag.device, self.clock.now() + action.settle);
         }
         if !verify {
-            return Ok(WriteResult::Accepted);
+            return Written::Ended(WriteResult::Accepted);
         }
         let block = plan::single(device, tag);
-        Ok(match self.read_unless_stopped(link, &block, None).await {
+        Written::Ended(match self.read_unless_stopped(link, &block, None).await {
             Some(Ok(values)) => match value_of(tag, &block, &values) {
                 Some(back) => WriteResult::ReadBack(back),
                 None => WriteResult::NotRead(Fault::NotANumber),
             },
-            // The device has accepted it; that the port is gone shows itself at the next request.
+            // The device has accepted it; the next request shows that the port is closed.
             Some(Err(LinkError::Gone(_))) => WriteResult::NotRead(Fault::NotConnected),
             Some(Err(LinkError::Fault(fault))) => WriteResult::NotRead(fault),
             None => WriteResult::NotRead(Fault::Timeout),

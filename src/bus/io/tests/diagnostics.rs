@@ -9,7 +9,7 @@ use tokio::{
 
 use super::slave::{Line, MS, Mode, SlaveAction, line, plant, until_silent};
 use crate::plant::{
-    command::{BusRequest, CommandId, WriteId},
+    command::{BusRequest, CommandId, WriteId, WriteJob},
     def::{Serial, TagId},
     diagnostics::{Diagnostic, DiagnosticState, Finding, Scan},
     event::{Event, LineState, WriteResult},
@@ -80,7 +80,14 @@ async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, Diagn
     until_silent(&mut line, &def).await;
     line.plug(Mode::Rtu, script);
     let asked = Instant::now();
-    let stop = BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 10.0, unlock: None, verify: true, urgent: true };
+    let stop = BusRequest::Write(WriteJob {
+        id: WriteId(1),
+        tag: TagId(0),
+        raw: 10.0,
+        unlock: None,
+        verify: true,
+        urgent: true,
+    });
     line.requests.send(stop).await.expect("the line runs");
     let (mut state, mut result) = (None, None);
     while result.is_none() {
@@ -136,8 +143,14 @@ async fn a_usual_write_waits_for_the_step_of_a_test() {
     start(&line, Diagnostic::Scan(Scan { first: 9, last: 9, serials: Vec::new(), timeout: Duration::from_secs(10) }))
         .await;
     until_silent(&mut line, &def).await;
-    let write =
-        BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 10.0, unlock: None, verify: true, urgent: false };
+    let write = BusRequest::Write(WriteJob {
+        id: WriteId(1),
+        tag: TagId(0),
+        raw: 10.0,
+        unlock: None,
+        verify: true,
+        urgent: false,
+    });
     line.requests.send(write).await.expect("the line runs");
     let mut done = None;
     let ended = |event: &Event| match event {

@@ -12,7 +12,7 @@ use tokio::time::Instant;
 
 use super::slave::{Line, MS, Mode, SlaveAction, line, plant, until_silent};
 use crate::plant::{
-    command::{BusRequest, WriteId},
+    command::{BusRequest, WriteId, WriteJob},
     def::{DeviceId, TagId},
     event::{Event, Fault, WriteResult},
 };
@@ -21,7 +21,7 @@ use crate::plant::{
 const FIRST_OF: [TagId; 2] = [TagId(0), TagId(10)];
 
 fn write(id: u64, tag: TagId, urgent: bool) -> BusRequest {
-    BusRequest::Write { id: WriteId(id), tag, raw: 10.0, unlock: None, verify: true, urgent }
+    BusRequest::Write(WriteJob { id: WriteId(id), tag, raw: 10.0, unlock: None, verify: true, urgent })
 }
 
 async fn end_of(line: &mut Line, def: &crate::plant::PlantDef, id: u64) -> WriteResult {

@@ -14,7 +14,7 @@ use jiff::Timestamp;
 use super::slave::{Line, MS, Mode, SlaveAction, line, plant};
 use crate::plant::{
     PlantDef,
-    command::{BusRequest, WriteId},
+    command::{BusRequest, WriteId, WriteJob},
     def::{DeviceId, TagId},
     event::{Event, Fault, WriteResult},
     tag::Poll,
@@ -82,7 +82,8 @@ async fn no_value_that_was_read_before_a_write_is_told_after_it() {
     line.until(&def, |event| matches!(event, Event::Read { at, .. } if seconds < *at).then_some(())).await;
     for number in 0..20 {
         let id = WriteId(number);
-        let request = BusRequest::Write { id, tag: TagId(10), raw: 10.0, unlock: None, verify: true, urgent: false };
+        let request =
+            BusRequest::Write(WriteJob { id, tag: TagId(10), raw: 10.0, unlock: None, verify: true, urgent: false });
         line.requests.send(request).await.expect("the line runs");
         let wrote = |event: &Event| match event {
             Event::Wrote { at, id: done, result } if *done == id => Some((*at, result.clone())),
@@ -117,8 +118,14 @@ async fn a_stop_does_not_wait_for_the_answers_of_other_units() {
     line.until(&def, first).await;
     assert!(0 < number.load(Ordering::Relaxed));
     let asked = start.elapsed().as_millis() as usize;
-    let request =
-        BusRequest::Write { id: WriteId(1), tag: TagId(10), raw: 10.0, unlock: None, verify: false, urgent: true };
+    let request = BusRequest::Write(WriteJob {
+        id: WriteId(1),
+        tag: TagId(10),
+        raw: 10.0,
+        unlock: None,
+        verify: false,
+        urgent: true,
+    });
     line.requests.send(request).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Wrote { .. }).then_some(())).await;
     let waited = heard.load(Ordering::Relaxed) - asked;
@@ -138,8 +145,14 @@ async fn the_gap_of_a_unit_after_a_write_does_not_hold_the_others() {
         line.plug(mode, |_, _| SlaveAction::Answer);
         let first = |event: &Event| matches!(event, Event::Read { device: DeviceId(1), .. }).then_some(());
         line.until(&def, first).await;
-        let request =
-            BusRequest::Write { id: WriteId(1), tag: TagId(0), raw: 10.0, unlock: None, verify: false, urgent: false };
+        let request = BusRequest::Write(WriteJob {
+            id: WriteId(1),
+            tag: TagId(0),
+            raw: 10.0,
+            unlock: None,
+            verify: false,
+            urgent: false,
+        });
         line.requests.send(request).await.expect("the line runs");
         line.until(&def, |event| matches!(event, Event::Wrote { .. }).then_some(())).await;
         let mut others = 0;

@@ -77,7 +77,7 @@ fn restore_request(plant: &Plant, set: Arc<ParameterSet>) -> RestoreRequest {
 }
 
 fn command(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
-    plant.on_command(Command::new(CommandId { terminal: 1, number }, "anna", kind), at(1))
+    plant.on_command(CommandStatus::new(Command::new(1, CommandId { terminal: 1, number }, kind), "anna", at(1)), at(1))
 }
 
 fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
@@ -87,7 +87,7 @@ fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
 /// The tags and raw numbers that went to the bus.
 fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     let write = |(_, request): &(_, BusRequest)| match request {
-        BusRequest::Write { tag, raw, .. } => Some((*tag, *raw)),
+        BusRequest::Write(job) => Some((job.tag, job.raw)),
         _ => None,
     };
     effects.bus.iter().filter_map(write).collect()
@@ -99,7 +99,7 @@ fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> 
         .bus
         .iter()
         .find_map(|(_, request)| match request {
-            BusRequest::Write { id, tag, raw, .. } => Some((*id, *tag, *raw)),
+            BusRequest::Write(job) => Some((job.id, job.tag, job.raw)),
             _ => None,
         })
         .expect("a write is under way");
@@ -150,7 +150,7 @@ fn the_first_failure_stops_it_and_says_what_was_written() {
     assert_eq!(written(&second), [(HIGH, 80.0)]);
     let last = end(&mut plant, &second, |_| WriteResult::Lost(Fault::Timeout));
     assert_eq!(
-        outcome(&plant, 1).map(|o| crate::plant::commands::outcome_words(&o)).as_deref(),
+        outcome(&plant, 1).map(|outcome| outcome.to_string()).as_deref(),
         Some("not confirmed: 1 of 2 written, then SV-H failed")
     );
     assert_eq!(actions(&last).len(), 2, "the write and the whole: {:?}", actions(&last));

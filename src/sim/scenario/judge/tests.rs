@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     plant::{
         Plant,
-        command::{CommandId, Refusal},
+        command::{Command, CommandId, CommandKind, Refusal},
         def::Priority,
         fixture::{self, HIGH, PV, SV},
         sample::{Cause, Sample},
@@ -112,15 +112,12 @@ fn only_a_verified_write_of_the_right_value_counts() {
     let check = |second: u64, value: f64, outcome: Outcome, expect: ExpectationStatus| {
         let mut judge = judge(Expectation::Written(SV, 60.0));
         let command = CommandStatus {
-            from: "".into(),
-            note: None,
-            id: CommandId { terminal: 1, number: 1 },
-            by: "tech1".into(),
-            kind: CommandKind::Write { tag: SV, value },
-            at: at(second),
-            old: None,
             outcome,
-            recorded: true,
+            ..CommandStatus::new(
+                Command::new(0, CommandId { terminal: 1, number: 1 }, CommandKind::Write { tag: SV, value }),
+                "tech1",
+                at(second),
+            )
         };
         judge.on_values(&shown(50, good(50.0), vec![command]), &ActualValues::new());
         assert_eq!(is_over(&mut judge), expect);

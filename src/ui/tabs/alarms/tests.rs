@@ -280,7 +280,7 @@ fn an_alarm_of_more_than_a_day_is_handed_over_whether_acknowledged_or_not() {
 fn a_shift_is_handed_over_with_a_note_and_taken_over() {
     let mut model = shown(&Fixture::normal(), Theme::FULL, "V");
     let effects = type_keys(&mut model, "nP-1 is loud⏎");
-    let Some(Effect::Command(command)) = effects.last() else { panic!("{effects:?}") };
+    let Some(Effect::Command(command, _)) = effects.last() else { panic!("{effects:?}") };
     assert_eq!((&command.kind, command.note.as_deref()), (&CommandKind::HandOver, Some("P-1 is loud")));
     assert_eq!(sent_kind(&type_keys(&mut model, "o")), None, "asks first");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::TakeOver));
@@ -331,7 +331,7 @@ fn a_note_is_asked_for_where_the_plant_wants_one() {
         let mut model = shown(fixture, Theme::FULL, "");
         let effects = type_keys(&mut model, keys);
         let command = effects.into_iter().find_map(|effect| match effect {
-            Effect::Command(command) => Some((command.kind, command.note)),
+            Effect::Command(command, _) => Some((command.kind, command.note)),
             _ => None,
         });
         (command, model.modal)
@@ -354,7 +354,7 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
     type_keys(&mut model, "⏎");
     assert!(screen(&mut model, 80, 24).contains("say why"), "nothing is shelved without a reason");
     let effects = type_keys(&mut model, "↓↓sensor is cleaned⏎");
-    let Some(Effect::Command(command)) = effects.last() else { panic!("{effects:?}") };
+    let Some(Effect::Command(command, _)) = effects.last() else { panic!("{effects:?}") };
     let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(3_600) };
     assert_eq!((&command.kind, command.note.as_deref()), (&CommandKind::Alarm(shelve), Some("sensor is cleaned")));
     // No time is offered that the plant does not allow.

@@ -132,9 +132,12 @@ pub fn signal_mark(signal: Signal) -> String {
 /// The latest write to this device and its outcome, and whether that is a worry.
 fn last_write(cx: &ViewContext, device: DeviceId) -> Option<(String, bool)> {
     let to_device = |tag| cx.def().tag(tag).device == device;
-    let command =
-        cx.snapshot.commands.iter().find(|command| command.kind.written().is_some_and(|(tag, _)| to_device(tag)))?;
-    let (words, trouble) = outcome_words(&command.outcome);
-    let what = command_label(cx, &command.kind, command.old);
-    Some((format!("last: {what}  {words} {} by {}", clock(command.at, &cx.def().time_zone), command.by), trouble))
+    let status = cx
+        .snapshot
+        .commands
+        .iter()
+        .find(|status| status.command.kind.written().is_some_and(|(tag, _)| to_device(tag)))?;
+    let (words, trouble) = outcome_words(&status.outcome);
+    let what = command_label(cx, &status.command.kind, status.old);
+    Some((format!("last: {what}  {words} {} by {}", clock(status.at, &cx.def().time_zone), status.by), trouble))
 }

@@ -5,10 +5,9 @@ use std::{sync::Arc, time::Duration};
 use jiff::SignedDuration;
 
 use crate::{
-    access::CommandRequest,
     plant::{
         alarm::AlarmState,
-        command::{CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+        command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         def::{ActionDef, AlarmId, DeviceId},
         ne107::Reason,
         parameter_set::StoredSet,
@@ -316,7 +315,7 @@ fn a_name_is_asked_before_a_set_is_saved_and_again_before_one_is_replaced() {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, &format!("4⏎sn{keys}"));
         let commands = effects.into_iter().filter_map(|effect| match effect {
-            Effect::Command(CommandRequest { kind: CommandKind::SaveSet { name, replace, .. }, .. }) => {
+            Effect::Command(Command { kind: CommandKind::SaveSet { name, replace, .. }, .. }, _) => {
                 Some((name.to_string(), replace))
             }
             _ => None,
@@ -363,15 +362,17 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
     later.set("TIC-1.P", 3.0);
     let mut snapshot = later.snapshot();
     Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
-        from: "".into(),
-        note: None,
-        id: CommandId { terminal: 2, number: 1 },
-        by: "boris".into(),
-        kind: CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },
-        at: fixture::now(),
         old: Some(1.2),
         outcome: Outcome::Verified,
-        recorded: true,
+        ..CommandStatus::new(
+            Command::new(
+                0,
+                CommandId { terminal: 2, number: 1 },
+                CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },
+            ),
+            "boris",
+            fixture::now(),
+        )
     }];
     update(&mut model, Msg::Snapshot(snapshot));
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);

@@ -114,7 +114,7 @@ fn clearing_faults_polls_silent_devices_at_once() {
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
     let retried = |effects: Vec<Effect>| -> Vec<DeviceId> {
         let command = |effect| match effect {
-            Effect::Command(request) => Some(request.kind),
+            Effect::Command(command, _) => Some(command.kind),
             _ => None,
         };
         let refreshed = |kind| if let CommandKind::Refresh(device) = kind { Some(device) } else { None };

@@ -1,0 +1,93 @@
+//! The checks of a write before it goes to the bus.
+
+use super::CommandTracker;
+use crate::plant::{
+    command::{CommandStatus, Outcome, Refusal, WriteId, WriteJob},
+    commands::record::value_text,
+    def::TagId,
+    interlock,
+    process_image::ProcessImage,
+    scale,
+    tag::{Access, Bound},
+};
+
+impl CommandTracker {
+    /// Checks a write against access, choices, bounds, type, what is under way, and the value that the operator saw.
+    pub(super) fn check(
+        &self,
+        image: &ProcessImage,
+        status: &CommandStatus,
+        tag: TagId,
+        value: f64,
+    ) -> Result<WriteJob, Outcome> {
+        let job = self.check_value(image, tag, value)?;
+        self.check_expected(image, status, &job)?;
+        Ok(job)
+    }
+
+    /// Refuses a write over a value that the operator has not seen. A stop is right whatever the value is.
+    fn check_expected(&self, image: &ProcessImage, status: &CommandStatus, job: &WriteJob) -> Result<(), Outcome> {
+        let def = self.def.tag(job.tag);
+        let now = image.good_raw(job.tag).zip(image.scaling_decimals(def)).filter(|_| !job.urgent);
+        let Some((raw, decimals)) = now else { return Ok(()) };
+        let now = scale::to_value(def, raw, decimals);
+        let same_raw = |seen| scale::to_raw(def, seen, decimals).is_some_and(|seen| scale::same_raw(def, seen, raw));
+        match status.command.expected_value {
+            Some(seen) if same_raw(seen) => Ok(()),
+            Some(_) => Err(Outcome::Refused(Refusal::ChangedTo(value_text(image, def, now)))),
+            None => Err(Outcome::Refused(Refusal::NotSeen(value_text(image, def, now)))),
+        }
+    }
+
+    fn check_value(&self, image: &ProcessImage, tag: TagId, value: f64) -> Result<WriteJob, Outcome> {
+        let refuse = |refusal| Err(Outcome::Refused(refusal));
+        let def = self.def.tag(tag);
+        if !def.writable() {
+            return refuse(Refusal::ReadOnly);
+        }
+        let decimals = image.scaling_decimals(def);
+        let held = decimals.and_then(|decimals| scale::held(def, value, decimals));
+        let urgent = held.is_some_and(|held| interlock::is_stop(&self.def, tag, held));
+        let mut under_way = self.writes.iter().filter(|(_, job)| job.tag == tag).map(|(_, job)| job.raw).peekable();
+        let is_busy = under_way.peek().is_some();
+        // A stop need not wait for the start under way; the same stop twice would only take the line's time.
+        let same = |raw| decimals.map(|decimals| scale::to_value(def, raw, decimals)) == held;
+        if is_busy && (!urgent || under_way.any(same)) {
+            return refuse(Refusal::UnderWay);
+        }
+        if !def.labels.is_empty() && def.label_of(value).is_none() {
+            return refuse(Refusal::NotAChoice);
+        }
+        if let Some(lock) = self.def.logic.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {
+            return refuse(Refusal::Interlock(lock.message.clone()));
+        }
+        let bound = |bound: Option<Bound>| bound.map(|bound| image.bound(bound)).transpose();
+        let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
+        let (min, max) = (bound(def.min).map_err(unknown)?, bound(def.max).map_err(unknown)?);
+        let Some(decimals) = decimals else {
+            return refuse(Refusal::Unknown("number of decimals".into()));
+        };
+        // A limit holds for what is sent: rounding must not lead beyond it, nor hide that more was asked for.
+        let inside = scale::is_inside(min, max, value) && held.is_none_or(|held| scale::is_inside(min, max, held));
+        let raw = scale::to_raw(def, value, decimals).filter(|_| inside);
+        let Some(raw) = raw else {
+            let shown = usize::from(image.shown_decimals(def));
+            let text = |bound: Option<f64>, none: &str| bound.map_or(none.into(), |bound| format!("{bound:.shown$}"));
+            return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
+        };
+        // What was read before the write under way says nothing about the time after it.
+        if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
+            return Err(Outcome::Unchanged);
+        }
+        let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
+        let unlock = def.write_unlock.map(|(key, value)| (key, raw_of(key, value)));
+        // A key that is turned already stays so, unless a write is just turning it.
+        let unlock = unlock.filter(|(key, turned)| {
+            let moving = self.writes.iter().any(|(_, job)| job.tag == *key);
+            let now = image.good_raw(*key).filter(|_| !moving);
+            now.is_none_or(|now| !scale::same_raw(self.def.tag(*key), now, *turned))
+        });
+        let verify = def.access != Access::Write;
+        Ok(WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent })
+    }
+}

@@ -1,0 +1,91 @@
+//! The audit record of a command.
+
+use crate::plant::{
+    alarm::{AlarmCommand, manager::subject_name},
+    command::{CommandKind, CommandStatus},
+    def::{AlarmId, PlantDef},
+    process_image::ProcessImage,
+    record::ActionRecord,
+    tag::TagDef,
+};
+
+/// The recorded word for a plant that was handed over to the next shift.
+pub const HAND_OVER: &str = "hand over";
+/// The recorded word for a plant that was taken over from the shift before.
+pub const TAKE_OVER: &str = "take over";
+
+pub(super) fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImage) -> ActionRecord {
+    let (action, target, new): (&str, String, Option<String>) = match &status.command.kind {
+        CommandKind::Write { tag, value } => {
+            let tag = def.tag(*tag);
+            ("write", tag.name.clone(), Some(value_text(image, tag, *value)))
+        }
+        CommandKind::Alarm(alarm_command) => alarm_action(def, alarm_command),
+        CommandKind::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
+        CommandKind::Connect(line, true) => ("connect", def.line(*line).name.clone(), None),
+        CommandKind::Connect(line, false) => ("disconnect", def.line(*line).name.clone(), None),
+        CommandKind::Configure(settings) => ("configure", settings.name.clone(), Some(settings.transport.to_string())),
+        CommandKind::SaveSettings(line) => ("save settings", def.line(*line).name.clone(), None),
+        CommandKind::Test(line, diagnostic) => ("test", def.line(*line).name.clone(), Some(diagnostic.to_string())),
+        CommandKind::StopTest(line) => ("stop test", def.line(*line).name.clone(), None),
+        CommandKind::ReadSets => ("read sets", "parameter sets".into(), None),
+        CommandKind::SaveSet { device, name, .. } => {
+            ("save set", def.device(*device).name.clone(), Some(name.to_string()))
+        }
+        CommandKind::Restore(request) => {
+            let new = format!("{}: {} changes", request.from, request.changes.len());
+            ("restore set", def.device(request.device).name.clone(), Some(new))
+        }
+        CommandKind::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
+        CommandKind::HandOver => (HAND_OVER, def.name.clone(), None),
+        CommandKind::TakeOver => (TAKE_OVER, def.name.clone(), None),
+    };
+    let old = status.old.zip(status.command.kind.written());
+    let old = old.map(|(old, (tag, _))| value_text(image, def.tag(tag), old));
+    ActionRecord {
+        at: status.at,
+        by: status.by.clone(),
+        from: status.from.clone(),
+        action: action.into(),
+        target: target.into(),
+        old: old.map(Into::into),
+        new: new.map(Into::into),
+        outcome: status.outcome.to_string().into(),
+        note: status.command.note.clone(),
+        chain_hash: None,
+    }
+}
+
+/// Action, target and new state of an action on alarms.
+pub fn alarm_action(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static str, String, Option<String>) {
+    let name = |alarm: &AlarmId| match def.alarms.get(alarm.index()) {
+        Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.message),
+        None => format!("alarm {}", alarm.0),
+    };
+    match alarm_command {
+        AlarmCommand::Acknowledge { alarm, .. } => ("acknowledge", name(alarm), None),
+        AlarmCommand::AcknowledgeAll { seen } => {
+            let target = if let [(one, _)] = &**seen { name(one) } else { format!("{} alarms", seen.len()) };
+            ("acknowledge", target, None)
+        }
+        AlarmCommand::Silence => ("silence", "alarms".into(), None),
+        AlarmCommand::Reset(alarm) => ("reset", name(alarm), None),
+        AlarmCommand::Shelve { alarm, lasts } => {
+            ("shelve", name(alarm), Some(format!("for {} min", lasts.as_secs().div_ceil(60))))
+        }
+        AlarmCommand::Unshelve(alarm) => ("unshelve", name(alarm), None),
+        AlarmCommand::OutOfService(alarm) => ("out of service", name(alarm), None),
+        AlarmCommand::InService(alarm) => ("in service", name(alarm), None),
+    }
+}
+
+/// A value as text with label or unit.
+pub(super) fn value_text(image: &ProcessImage, tag: &TagDef, value: f64) -> String {
+    match tag.label_of(value) {
+        Some(label) => label.to_owned(),
+        None => {
+            let unit = tag.unit_now(|tag| image.sample(tag));
+            format!("{value:.*} {unit}", usize::from(image.shown_decimals(tag))).trim_end().to_owned()
+        }
+    }
+}
