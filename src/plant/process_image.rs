@@ -12,6 +12,7 @@ use super::{
     scale,
     tag::{Bound, Decimals, Poll, TagDef},
 };
+use crate::plant::number::{to_i64, to_u8};
 
 /// A value is uncertain after so many poll periods without an answer, and bad after [`PERIODS_BAD`].
 pub const PERIODS_UNCERTAIN: u32 = 3;
@@ -204,7 +205,7 @@ impl ProcessImage {
                 // A register that holds anything else would scale every value to nothing.
                 let known =
                     self.sample(from).good_value().filter(|n| n.fract() == 0.0 && (0.0..=DECIMALS_MAX).contains(n));
-                known.map(|decimals| decimals as u8)
+                known.map(to_u8)
             }
         }
     }
@@ -280,7 +281,7 @@ impl ProcessImage {
             None => sample,
             // The raw number: a status word may be signed, and is never meant to be scaled.
             Some((word, bits, mask)) => match bits {
-                Some(bits) if bits as i64 as u64 & mask != 0 => Sample::bad(Cause::SensorFault, at),
+                Some(bits) if to_i64(bits).cast_unsigned() & mask != 0 => Sample::bad(Cause::SensorFault, at),
                 Some(_) => sample,
                 None => sample.uncertain(word.quality.cause().unwrap_or(Cause::NotRead)),
             },

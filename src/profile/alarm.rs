@@ -13,6 +13,7 @@ use super::{
 };
 use crate::plant::{
     def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, LineDef, Priority, Subject},
+    number::to_u16,
     station::StationFault,
 };
 
@@ -33,7 +34,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     for table in tables.iter().map(|table| &table.value) {
         let found = if table.sound { condition::subject(table, defs, problems) } else { None };
         let Some((subject, condition)) = found else { continue };
-        let alarm = alarm(table, AlarmId(alarms.len() as u16), subject, condition, defs, problems);
+        let alarm = alarm(table, AlarmId(to_u16(alarms.len())), subject, condition, defs, problems);
         alarms.push(alarm);
     }
     check_names(tables, problems);
@@ -43,11 +44,11 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     for (name, alarm) in of_devices.chain(of_lines) {
         if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
             check_generated(tables, name, &alarm.message, problems);
-            alarms.push(AlarmDef { id: AlarmId(alarms.len() as u16), ..alarm });
+            alarms.push(AlarmDef { id: AlarmId(to_u16(alarms.len())), ..alarm });
         }
     }
     for fault in StationFault::ALL {
-        alarms.push(fault.alarm(AlarmId(alarms.len() as u16)));
+        alarms.push(fault.alarm(AlarmId(to_u16(alarms.len()))));
     }
     alarms
 }

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::plant::{
     def::TagId,
+    number::to_u8,
     record::{AlarmEvent, AlarmRecord},
     sample::Sample,
     tag::{Decimals, TagDef},
@@ -41,7 +42,7 @@ impl Label {
         let decimals = match def.decimals {
             Decimals::Fixed(decimals) => decimals,
             Decimals::From(tag) => match latest.get(&tag) {
-                Some(decimals) if (0.0..=9.0).contains(decimals) => *decimals as u8,
+                Some(decimals) if (0.0..=9.0).contains(decimals) => to_u8(*decimals),
                 Some(_) | None => DECIMALS_UNKNOWN,
             },
         };

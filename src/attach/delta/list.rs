@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::DeltaMismatch;
+use crate::plant::number::to_u32;
 
 /// So far on an element is looked for where some were taken away before it.
 const LOOK_AHEAD: usize = 32;
@@ -38,7 +39,7 @@ impl<T: Clone + PartialEq> List<T> {
             let found = std::iter::once(place).chain(ahead).find(|at| old.get(*at) == Some(element));
             match (found, pieces.last_mut()) {
                 (Some(at), Some(Piece::Kept(from, count))) if *from as usize + *count as usize == at => *count += 1,
-                (Some(at), _) => pieces.push(Piece::Kept(at as u32, 1)),
+                (Some(at), _) => pieces.push(Piece::Kept(to_u32(at), 1)),
                 (None, Some(Piece::New(elements))) => elements.push(element.clone()),
                 (None, _) => pieces.push(Piece::New(vec![element.clone()])),
             }

@@ -16,6 +16,7 @@ use crate::{
     history::{HistoryError, words::plain},
     plant::{
         def::PlantDef,
+        number::to_u32,
         record::{AlarmRecord, ChainHash},
     },
 };
@@ -172,7 +173,7 @@ impl Store {
         let db = connect(path, AccessMode::ReadWrite).map_err(failed)?;
         let mut store = Store::around(db, path, def);
         store.migrate().map_err(failed)?;
-        let newest = sql::MIGRATIONS.len() as u32;
+        let newest = to_u32(sql::MIGRATIONS.len());
         let version = store.version().map_err(failed)?;
         if version > newest {
             let words = format!("schema version {version} is of a newer sightglass, this one writes {newest}");
@@ -194,7 +195,7 @@ impl Store {
             // What a station left in the log goes into the file first, see `sql::MIGRATIONS`.
             self.db.execute_batch("CHECKPOINT; BEGIN")?;
             self.db.execute_batch(migration)?;
-            self.db.execute(sql::SET_VERSION, params![number as u32 + 1])?;
+            self.db.execute(sql::SET_VERSION, params![to_u32(number) + 1])?;
             self.db.execute_batch("COMMIT; CHECKPOINT")?;
         }
         Ok(())

@@ -17,6 +17,7 @@ use crate::{
         command::{Command, CommandKind},
         def::TagId,
         diagnostics::Diagnostic,
+        number::to_u16,
         role::Reauthentication,
         tag::{Access, Confidence, TagDef},
     },
@@ -281,7 +282,7 @@ impl Confirm {
             }
             let room = canvas.width();
             for (n, words) in self.problem.iter().flat_map(|words| wrap(words, room)).enumerate() {
-                canvas.text(0, y + n as u16, &words, cx.theme.trouble());
+                canvas.text(0, y + to_u16(n), &words, cx.theme.trouble());
             }
         }
     }
@@ -315,13 +316,13 @@ impl Confirm {
         };
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
         let inner = inner.max(self.reauthentication.as_ref().map_or(0, Form::width));
-        let problem = self.problem.as_ref().map_or(1, |words| wrap(words, inner).len() as u16);
+        let problem = self.problem.as_ref().map_or(1, |words| to_u16(wrap(words, inner).len()));
         let form = self.reauthentication.as_ref().map_or(0, |form| form.rows() + problem);
-        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() as u16 + form + 2));
+        let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(rows.len()) + form + 2));
         for (y, (text, style)) in rows.iter().enumerate() {
-            canvas.text(0, y as u16, text, *style);
+            canvas.text(0, to_u16(y), text, *style);
         }
-        self.view_sign(cx, &mut canvas, rows.len() as u16);
+        self.view_sign(cx, &mut canvas, to_u16(rows.len()));
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, &keys, cx.theme.strong());
     }

@@ -9,6 +9,7 @@ use crate::{
     history::{Answer, HistoryError, Query, Series},
     plant::{
         def::{MimicCommand, MimicItem, MimicRect, TagId},
+        number::to_u32,
         role::Role,
         snapshot::Snapshot,
     },
@@ -87,14 +88,14 @@ impl TabView for Mimic {
         }
         self.asked_at = Some(cx.phase);
         self.asked = self.asked.wrapping_add(1);
-        let count = self.trends.len() as u32;
+        let count = to_u32(self.trends.len());
         let asks = self.trends.iter().enumerate().filter_map(|(n, (item, _))| match &cx.def().mimic.items[*item] {
             MimicItem::Trend { tag, window, place } => {
                 let from = cx.now - SignedDuration::try_from(*window).ok()?;
                 let width = scale(cx, cx.area).place(*place).width;
                 let query =
                     Query::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
-                Some(UiAction::query(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(n as u32), query))
+                Some(UiAction::query(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(to_u32(n)), query))
             }
             MimicItem::Tank { .. }
             | MimicItem::Valve { .. }
@@ -109,11 +110,11 @@ impl TabView for Mimic {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        (number.wrapping_sub(self.asked.wrapping_mul(self.trends.len() as u32)) as usize) < self.trends.len()
+        (number.wrapping_sub(self.asked.wrapping_mul(to_u32(self.trends.len()))) as usize) < self.trends.len()
     }
 
     fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        let first = self.asked.wrapping_mul(self.trends.len() as u32);
+        let first = self.asked.wrapping_mul(to_u32(self.trends.len()));
         let place = number.wrapping_sub(first) as usize;
         if let Some((_, series)) = self.trends.get_mut(place) {
             *series = match answer {

@@ -25,7 +25,7 @@ use super::{
 use crate::{
     access::{SessionRequest, audit_log::sha256},
     history::{Answer, HistoryError},
-    plant::snapshot::Snapshot,
+    plant::{number::to_u32, snapshot::Snapshot},
 };
 
 /// A file that is written once the station has put on record that it is.
@@ -205,7 +205,7 @@ impl Tab {
 
     /// The number key that shows it.
     pub fn key(self) -> keys::Chord {
-        keys::char(char::from_digit(self.number() as u32, 10).unwrap_or('0'))
+        keys::char(char::from_digit(to_u32(self.number()), 10).unwrap_or('0'))
     }
 
     /// The tab so many further on among those that are offered, around the end.

@@ -14,6 +14,7 @@ use super::{Export, Reports};
 use crate::{
     plant::{
         def::Priority,
+        number::to_u16,
         record::{ActionRecord, AlarmEvent, AlarmRecord},
     },
     report::{Period, ShiftReport, SuppressedSummary, TagFigures, raised, text::mean_or_difference},
@@ -41,7 +42,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             let area = part.area();
             let (head, body) = (heading(cx, columns), lines.iter().skip(first).take(rows.into()));
             for (y, line) in body.enumerate() {
-                part.buffer().set_line(area.x, area.y + y as u16, line, area.width);
+                part.buffer().set_line(area.x, area.y + to_u16(y), line, area.width);
             }
             let hidden = lines.len().saturating_sub(first + usize::from(rows));
             let mut row = canvas.part(0, 1, columns, 1);
