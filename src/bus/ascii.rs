@@ -138,6 +138,23 @@ mod tests {
     }
 
     #[test]
+    fn the_lrc_of_every_printed_vector_is_right() {
+        let table = include_str!("../../tests/vectors/frames.csv");
+        let mut seen = 0;
+        for row in csv::Reader::from_reader(table.as_bytes()).records() {
+            let row = row.expect("a row");
+            let bytes = |cell: &str| -> Vec<u8> {
+                cell.split(' ').map(|byte| u8::from_str_radix(byte, 16).expect("two hex digits")).collect()
+            };
+            if row[1] != *"negative" {
+                assert_eq!(vec![lrc(&bytes(&row[3]))], bytes(&row[5]), "{row:?}");
+                seen += 1;
+            }
+        }
+        assert!(seen > 15, "{seen} vectors");
+    }
+
+    #[test]
     fn an_answer_is_found_whole_and_behind_noise_and_cut_at_every_character() {
         let whole = encode(&ANSWER);
         let length = whole.len();

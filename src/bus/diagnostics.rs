@@ -4,7 +4,7 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::names;
+use super::{names, pdu};
 use crate::plant::{
     command::CommandId,
     def::Serial,
@@ -183,16 +183,9 @@ impl Job {
     /// Objects: id, length, text. If more follow, they are asked for (V1.1b3, 6.21).
     fn take_identification(&mut self, request: &[u8], answer: &[u8]) {
         let [unit, _, _, code, ..] = *request else { return };
-        let (more, next, count) = match answer {
-            [_, _, _, _, _, more, next, count, ..] => (*more, *next, *count),
-            _ => return,
-        };
-        let mut rest = answer.get(8..).unwrap_or_default();
-        for _ in 0..count {
-            let [id, length, tail @ ..] = rest else { break };
-            let (text, tail) = tail.split_at(tail.len().min(usize::from(*length)));
-            self.found(Finding::Object { name: object_name(*id), text: text_of(text) });
-            rest = tail;
+        let [_, _, _, _, _, more, next, _, ..] = *answer else { return };
+        for (id, text) in pdu::identification_objects(&answer[1..]) {
+            self.found(Finding::Object { name: object_name(id), text: text_of(text) });
         }
         // A device that always says "more" at the same place would be asked for ever.
         if more == 0xFF && request[4] < next {

@@ -2,7 +2,10 @@
 //!
 //! A *message* is unit and PDU without any check: `01 03 03 EA 00 01`. RTU appends a CRC, TCP prepends the MBAP header.
 
-use super::ascii;
+use super::{
+    ascii,
+    pdu::{self, Item, Length},
+};
 use crate::plant::{
     def::Framing,
     event::{ExceptionCode, Fault},
@@ -114,7 +117,7 @@ pub fn mbap(buffer: &[u8]) -> Mbap {
 }
 
 /// Does a TCP stream go on with anything but whole frames and the beginning of one?
-pub fn is_out_of_step(mut stream: &[u8]) -> bool {
+pub fn is_out_of_sync(mut stream: &[u8]) -> bool {
     loop {
         match mbap(stream) {
             Mbap::Whole { end, .. } => stream = &stream[end..],
@@ -124,64 +127,34 @@ pub fn is_out_of_step(mut stream: &[u8]) -> bool {
     }
 }
 
-/// Length of the answer message (unit and PDU) that begins in `received`; `None` while too little has come to tell, or
-/// for a function whose length only silence can tell.
-pub fn answer_length(received: &[u8]) -> Option<usize> {
-    let at = |index: usize| received.get(index).map(|byte| usize::from(*byte));
-    match received.get(1)? {
-        0x80.. => Some(3),
-        0x01..=0x04 | 0x0C | 0x11 | 0x17 => Some(3 + at(2)?),
-        0x05 | 0x06 | 0x08 | 0x0B | 0x0F | 0x10 => Some(6),
-        0x07 => Some(3),
-        0x16 => Some(8),
-        0x18 => Some(4 + (at(2)? << 8 | at(3)?)),
-        0x2B => device_identification_length(received),
-        _ => None,
-    }
-}
-
-/// 2B/0E answers carry a list of objects, each with its length: unit 2B 0E code conformity more next count, then id len bytes.
-fn device_identification_length(received: &[u8]) -> Option<usize> {
-    let count = *received.get(7)?;
-    (0..count).try_fold(8, |end: usize, _| Some(end + 2 + usize::from(*received.get(end + 1)?)))
-}
-
-/// Length of the request message (unit and PDU) that begins in `received`; `None` while too little has come to tell, or for
-/// a function whose requests nobody sends while a line is polled.
-fn request_length(received: &[u8]) -> Option<usize> {
-    match received.get(1)? {
-        0x01..=0x06 | 0x08 => Some(6),
-        0x0F | 0x10 => Some(7 + usize::from(*received.get(6)?)),
-        _ => None,
-    }
-}
-
-/// A good message that nobody has asked for.
+/// An unsolicited message with a good check.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Unasked {
-    /// A unit answers, or something looks like it.
-    Answer(Vec<u8>),
-    /// Another master asks.
+pub(crate) enum Unsolicited {
+    /// A response of a unit, by its length.
+    Response(Vec<u8>),
+    /// A request of another master.
     Request(Vec<u8>),
 }
 
-/// The whole good frames among bytes that nobody waits for, on lines without transaction ids.
-pub fn on_unsolicited(framing: Framing, bytes: &[u8]) -> Vec<Unasked> {
-    let judge = |message: &[u8]| match (answer_length(message), request_length(message)) {
-        (Some(length), _) if length == message.len() => Some(Unasked::Answer(message.to_vec())),
-        (_, Some(length)) if length == message.len() => Some(Unasked::Request(message.to_vec())),
+/// The whole good frames among unsolicited bytes, on lines without transaction ids.
+pub(crate) fn unsolicited(framing: Framing, bytes: &[u8]) -> Vec<Unsolicited> {
+    let classify = |message: &[u8]| match message.len() {
+        length if pdu::response_length(message) == Length::Known(length) => {
+            Some(Unsolicited::Response(message.to_vec()))
+        }
+        length if pdu::request_length(message) == Length::Known(length) => Some(Unsolicited::Request(message.to_vec())),
         _ => None,
     };
     match framing {
         Framing::Mbap => Vec::new(),
-        Framing::Ascii => ascii::messages(bytes).filter_map(|message| judge(&message)).collect(),
+        Framing::Ascii => ascii::messages(bytes).filter_map(|message| classify(&message)).collect(),
         Framing::Rtu => {
             let (mut found, mut rest) = (Vec::new(), bytes);
             while !rest.is_empty() {
-                let lengths = [answer_length(rest), request_length(rest)];
+                let lengths = [pdu::response_length(rest).known(), pdu::request_length(rest).known()];
                 let whole = |length: &usize| rest.get(..length + 2).is_some_and(|frame| without_crc(frame).is_ok());
                 let length = lengths.into_iter().flatten().find(whole);
-                found.extend(length.and_then(|length| judge(&rest[..length])));
+                found.extend(length.and_then(|length| classify(&rest[..length])));
                 rest = &rest[length.map_or(1, |length| length + 2)..];
             }
             found
@@ -202,16 +175,17 @@ pub struct Shape {
 
 /// The shape of the normal answer to a request message; `None` for functions whose answer length is not known before.
 pub fn shape_of(request: &[u8]) -> Option<Shape> {
-    let function = *request.get(1)?;
-    let word = |index: usize| Some(usize::from(u16::from_be_bytes([*request.get(index)?, *request.get(index + 1)?])));
-    let shape = |length: usize, echo: Option<[u8; 4]>| Some(Shape { function, length, echo });
-    match function {
-        0x01 | 0x02 => shape(3 + word(4)?.div_ceil(8), None),
-        0x03 | 0x04 | 0x17 => shape(3 + 2 * word(4)?, None),
-        0x05 | 0x06 | 0x08 | 0x0F | 0x10 => shape(6, request.get(2..6)?.try_into().ok()),
-        0x16 => shape(8, request.get(2..6)?.try_into().ok()),
-        _ => None,
-    }
+    let function = pdu::function(*request.get(1)?)?;
+    let count = || Some(usize::from(u16::from_be_bytes([*request.get(4)?, *request.get(5)?])));
+    let (length, echo) = match function.response {
+        [Item::ByteCount, Item::Bits] => (3 + count()?.div_ceil(8), None),
+        [Item::ByteCount, Item::Registers] => (3 + 2 * count()?, None),
+        _ if function.repeats_start() => {
+            (pdu::response_length(request).known()?, Some(request.get(2..6)?.try_into().ok()?))
+        }
+        _ => return None,
+    };
+    Some(Shape { function: function.code, length, echo })
 }
 
 impl Shape {
@@ -255,7 +229,7 @@ pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     if answer.len() != shape.length {
         return Err(Fault::WrongLength { got: to_u16(answer.len()), asked: to_u16(shape.length) });
     }
-    if matches!(asked, 0x01..=0x04 | 0x17) && usize::from(answer[2]) != shape.length - 3 {
+    if shape.echo.is_none() && usize::from(answer[2]) != shape.length - 3 {
         return Err(Fault::WrongLength { got: u16::from(answer[2]), asked: to_u16(shape.length - 3) });
     }
     if shape.fits(answer) { Ok(()) } else { Err(Fault::WrongEcho) }
@@ -300,7 +274,10 @@ mod tests {
             assert_eq!(check, crc, "{id}");
             assert_eq!(without_crc(&with_crc(&message)), Ok(&message[..]), "{id}");
             if kind == "response" || kind == "exception" {
-                assert_eq!(answer_length(&message), Some(message.len()), "{id}");
+                assert_eq!(pdu::response_length(&message), Length::Known(message.len()), "{id}");
+            }
+            if kind == "request" {
+                assert_eq!(pdu::request_length(&message), Length::Known(message.len()), "{id}");
             }
             seen += 1;
         }
@@ -348,15 +325,15 @@ mod tests {
         assert_eq!(mbap(&[0, 1, 0, 0, 255, 255]), Mbap::Broken);
         let two = [&frame[..], &frame].concat();
         for cut in 0..two.len() {
-            assert!(!is_out_of_step(&two[..cut]), "cut at {cut}");
+            assert!(!is_out_of_sync(&two[..cut]), "cut at {cut}");
         }
-        assert!(is_out_of_step(&[&frame[..], &[0, 1, 9, 9]].concat()));
+        assert!(is_out_of_sync(&[&frame[..], &[0, 1, 9, 9]].concat()));
     }
 
     #[test]
     fn lists_of_identification_objects_are_measured() {
         let answer = [1, 0x2B, 0x0E, 1, 1, 0, 0, 2, 0, 3, b'a', b'b', b'c', 1, 1, b'x'];
-        assert_eq!(answer_length(&answer), Some(answer.len()));
-        assert_eq!(answer_length(&answer[..9]), None);
+        assert_eq!(pdu::response_length(&answer), Length::Known(answer.len()));
+        assert_eq!(pdu::response_length(&answer[..9]), Length::TooEarly);
     }
 }

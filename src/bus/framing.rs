@@ -1,7 +1,7 @@
 //! What the bytes that have come over a line are: the answer, somebody else's frame, noise, or the beginning of one.
 //! For lines without transaction ids; Modbus TCP tells by its header.
 
-use super::{ascii, frame};
+use super::{ascii, frame, pdu};
 use crate::plant::{def::Framing, event::Fault, number::to_u16};
 
 /// What the bytes received so far are.
@@ -35,7 +35,9 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
     };
     for start in 0..buffer.len() {
         let rest = &buffer[start..];
-        let Some(length) = frame::answer_length(rest).filter(|length| length + 2 <= rest.len()) else { continue };
+        let Some(length) = pdu::response_length(rest).known().filter(|length| length + 2 <= rest.len()) else {
+            continue;
+        };
         let Ok(answer) = frame::without_crc(&rest[..length + 2]) else { continue };
         match frame::check_answer(message, answer) {
             Ok(()) | Err(Fault::Exception(_)) => return FrameMatch::Answer(start..start + length + 2),
@@ -50,7 +52,7 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
         return FrameMatch::Nothing;
     }
     let corrupt = beginnings.find_map(|rest| {
-        let frame = rest.get(..frame::answer_length(rest)? + 2)?;
+        let frame = rest.get(..pdu::response_length(rest).known()? + 2)?;
         frame::without_crc(frame).err()
     });
     corrupt.map_or(FrameMatch::Begun, FrameMatch::Corrupt)

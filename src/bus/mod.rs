@@ -19,6 +19,7 @@
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
+pub(crate) mod pdu;
 pub mod ascii;
 pub mod frame;
 pub mod framing;

@@ -1,41 +1,16 @@
 //! The names of the standard: functions, sub-functions, identification objects, and what to do about an exception.
 
+use super::pdu;
 use crate::plant::tag::Table;
 
-/// Name of a function (Modbus application protocol V1.1b3, section 6); `None` for one that the standard does not know.
+/// Name of a function; `None` for one that the standard does not know.
 pub fn function(code: u8) -> Option<&'static str> {
-    Some(match code {
-        0x01 => "read coils",
-        0x02 => "read discrete inputs",
-        0x03 => "read holding registers",
-        0x04 => "read input registers",
-        0x05 => "write single coil",
-        0x06 => "write single register",
-        0x07 => "read exception status",
-        0x08 => "diagnostics",
-        0x0B => "get comm event counter",
-        0x0C => "get comm event log",
-        0x0F => "write multiple coils",
-        0x10 => "write multiple registers",
-        0x11 => "report server id",
-        0x14 => "read file record",
-        0x15 => "write file record",
-        0x16 => "mask write register",
-        0x17 => "read/write multiple registers",
-        0x18 => "read FIFO queue",
-        0x2B => "encapsulated interface transport",
-        _ => return None,
-    })
+    pdu::function(code).map(|function| function.name)
 }
 
 /// The table that a function works on.
 pub fn table(function: u8) -> Table {
-    match function {
-        0x01 | 0x05 | 0x0F => Table::Coil,
-        0x02 => Table::Discrete,
-        0x04 => Table::Input,
-        _ => Table::Holding,
-    }
+    pdu::function(function).map_or(Table::Holding, |function| function.table)
 }
 
 /// Name of a sub-function of diagnostics 08 (V1.1b3, 6.8.1).

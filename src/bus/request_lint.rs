@@ -1,6 +1,9 @@
 //! What is wrong with a request before it is sent: counts, addresses, values and lengths that no device can take.
 
-use super::{frame, names};
+use super::{
+    frame, names,
+    pdu::{self, Item, Length},
+};
 use crate::plant::line::Framing;
 
 /// Why a request should not be sent. Raw bytes can still be sent with an explicit override.
@@ -74,73 +77,74 @@ pub enum RequestError {
 /// Everything that is wrong with a request message (unit and PDU) before it is sent.
 pub fn check_request(message: &[u8], framing: Framing) -> Vec<RequestError> {
     let &[unit, function, ..] = message else { return vec![RequestError::TooShort(message.len())] };
-    let mut errors = Vec::new();
+    let (row, mut errors) = (pdu::function(function), Vec::new());
     if frame::MESSAGE_MAX < message.len() {
         errors.push(RequestError::TooLong(message.len()));
     }
     if framing != Framing::Mbap {
+        let may_be_broadcast = |row: &pdu::Function| row.writes() || row.code == 0x08;
         match unit {
-            0 if !is_write(function) => errors.push(RequestError::ReadFromAll),
+            0 if !row.is_some_and(may_be_broadcast) => errors.push(RequestError::ReadFromAll),
             0..=247 => {}
             248..=255 => errors.push(RequestError::Unit(unit)),
         }
     }
     if 0x80 <= function {
         errors.push(RequestError::Exception(function));
-    } else if names::function(function).is_none() {
+    } else if let Some(row) = row {
+        let expected = expected_length(row, message).filter(|expected| *expected != message.len());
+        errors.extend(expected.map(|expected| RequestError::Length { function, got: message.len(), expected }));
+        errors.extend(check_data(message, row.request));
+    } else {
         errors.push(RequestError::Unknown(function));
-    } else if let Some(expected) = request_length(message).filter(|expected| *expected != message.len()) {
-        errors.push(RequestError::Length { function, got: message.len(), expected });
     }
-    errors.extend(check_data(message, function));
     errors
 }
 
-fn is_write(function: u8) -> bool {
-    matches!(function, 0x05 | 0x06 | 0x08 | 0x0F | 0x10 | 0x15 | 0x16)
-}
-
-/// Length of a request message, as its function and counts say; `None` if they do not tell.
-fn request_length(message: &[u8]) -> Option<usize> {
-    let counted = |at: usize| Some(at + 1 + usize::from(*message.get(at)?));
-    match message.get(1)? {
-        0x01..=0x06 => Some(6),
-        0x07 | 0x0B | 0x0C | 0x11 => Some(2),
-        0x0F | 0x10 => counted(6).or(Some(7)),
-        0x14 | 0x15 => counted(2).or(Some(3)),
-        0x16 => Some(8),
-        0x17 => counted(10).or(Some(11)),
-        0x18 => Some(4),
-        _ => None,
+/// Length of a request message, as its function and counts say; `None` where any length is right.
+fn expected_length(row: &pdu::Function, message: &[u8]) -> Option<usize> {
+    match pdu::request_length(message) {
+        // Function 08 takes any data.
+        Length::Known(_) if message.get(1) == Some(&0x08) => None,
+        Length::Known(length) => Some(length),
+        Length::TooEarly => Some(2 + row.request.iter().map(|item| item.size()).sum::<usize>()),
+        Length::BySilence => None,
     }
 }
 
 /// Counts, addresses and values, as far as they are there.
-fn check_data(message: &[u8], function: u8) -> Vec<RequestError> {
+fn check_data(message: &[u8], items: &[Item]) -> Vec<RequestError> {
     let word = |at: usize| Some(u16::from_be_bytes([*message.get(at)?, *message.get(at + 1)?]));
-    let block = |at: usize, what: &'static str, most: u16| {
-        let (Some(address), Some(count)) = (word(at), word(at + 2)) else { return Vec::new() };
-        let range = (!(1..=most).contains(&count)).then_some(RequestError::Count { what, got: count, most });
-        let past = 0x1_0000 < u32::from(address) + u32::from(count);
-        range.into_iter().chain(past.then_some(RequestError::PastTheEnd { what, address, count })).collect()
-    };
-    let bytes = |at: usize, what: &'static str, count: Option<u16>| {
-        let (&got, count) = (message.get(at)?, count?);
-        let expected = if what == "coils" { usize::from(count).div_ceil(8) } else { 2 * usize::from(count) };
-        (usize::from(got) != expected).then_some(RequestError::ByteCount { got, count, what, expected })
-    };
-    match function {
-        0x01 | 0x02 => block(2, "to read", 2000),
-        0x03 | 0x04 => block(2, "to read", 125),
-        0x05 => word(4).filter(|value| !matches!(value, 0 | 0xFF00)).map(RequestError::CoilValue).into_iter().collect(),
-        0x0F => block(2, "to write", 1968).into_iter().chain(bytes(6, "coils", word(4))).collect(),
-        0x10 => block(2, "to write", 123).into_iter().chain(bytes(6, "registers", word(4))).collect(),
-        0x17 => {
-            let blocks = block(2, "to read", 125).into_iter().chain(block(6, "to write", 121));
-            blocks.chain(bytes(10, "registers", word(8))).collect()
+    let (mut errors, mut at, mut address, mut count) = (Vec::new(), 2, None, None);
+    for (index, item) in items.iter().enumerate() {
+        match *item {
+            Item::Address(_) => address = word(at),
+            Item::Count { verb, most, .. } => {
+                count = word(at);
+                if let (Some(address), Some(count)) = (address, count) {
+                    let out_of_range = !(1..=most).contains(&count);
+                    errors.extend(out_of_range.then_some(RequestError::Count { what: verb, got: count, most }));
+                    let past = 0x1_0000 < u32::from(address) + u32::from(count);
+                    errors.extend(past.then_some(RequestError::PastTheEnd { what: verb, address, count }));
+                }
+            }
+            Item::CoilState => {
+                errors.extend(word(at).filter(|value| !matches!(value, 0 | 0xFF00)).map(RequestError::CoilValue));
+            }
+            Item::ByteCount => {
+                let (Some(&got), Some(count)) = (message.get(at), count) else { continue };
+                let (what, expected) = match items.get(index + 1) {
+                    Some(Item::Bits) => ("coils", usize::from(count).div_ceil(8)),
+                    _ => ("registers", 2 * usize::from(count)),
+                };
+                let wrong = usize::from(got) != expected;
+                errors.extend(wrong.then_some(RequestError::ByteCount { got, count, what, expected }));
+            }
+            _ => {}
         }
-        _ => Vec::new(),
+        at += item.size();
     }
+    errors
 }
 
 #[cfg(test)]

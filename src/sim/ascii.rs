@@ -1,12 +1,7 @@
-//! Modbus ASCII as a slave hears and speaks it: `:`, two digits a byte, LRC, CR LF.
-//!
-//! Written without a look at the master's codec, so that each is a test of the other.
+//! Modbus ASCII as a slave receives it: characters become requests.
 
 use super::wire::Request;
-use crate::plant::number::to_u8;
-
-/// Longest frame: `:`, 2 × 255 digits, CR LF (Modbus serial line V1.02, 2.5.2).
-const FRAME_MAX: usize = 513;
+use crate::bus::ascii::{self, FRAME_MAX};
 
 /// Collects characters and cuts whole requests with a right check out of them.
 #[derive(Debug, Clone)]
@@ -37,7 +32,8 @@ impl Receiver {
                 _ if self.frame.is_empty() => {}
                 b'\n' if self.frame.ends_with(b"\r") => {
                     self.frame.push(b'\n');
-                    self.done.push(read(&self.frame));
+                    let message = ascii::open(&self.frame).ok();
+                    self.done.push(message.map(|message| Request { message, characters: self.frame.len() }));
                     self.frame.clear();
                 }
                 _ if self.frame.len() >= FRAME_MAX => self.break_off(),
@@ -67,34 +63,6 @@ impl Receiver {
             self.done.push(None);
         }
     }
-}
-
-/// The frame of a message (unit and PDU).
-pub fn encode(message: &[u8]) -> Vec<u8> {
-    let mut frame = String::from(":");
-    for byte in message.iter().chain([&lrc(message)]) {
-        frame.push_str(&format!("{byte:02X}"));
-    }
-    frame.push_str("\r\n");
-    frame.into_bytes()
-}
-
-/// Two's complement of the sum of all bytes (Modbus serial line V1.02, 6.2.1).
-fn lrc(message: &[u8]) -> u8 {
-    message.iter().fold(0_u8, |sum, byte| sum.wrapping_sub(*byte))
-}
-
-/// Reads `:` … CR LF. Digits may be small, as some masters write them.
-fn read(frame: &[u8]) -> Option<Request> {
-    let digits = frame.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
-    let digit = |character: u8| char::from(character).to_digit(16).map(to_u8);
-    let pairs = digits.chunks(2).map(|pair| match pair {
-        [high, low] => Some(digit(*high)? << 4 | digit(*low)?),
-        _ => None,
-    });
-    let mut message = pairs.collect::<Option<Vec<u8>>>()?;
-    let check = message.pop()?;
-    (message.len() >= 2 && check == lrc(&message)).then_some(Request { message, characters: frame.len() })
 }
 
 #[cfg(test)]
@@ -134,27 +102,10 @@ mod tests {
         check(8, &parity, &[]);
     }
 
-    #[test]
-    fn the_printed_vectors_are_spelled_as_they_are_printed() {
-        let table = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/vectors/frames.csv"));
-        let mut seen = 0;
-        for row in csv::Reader::from_reader(table.expect("the vectors are there").as_bytes()).records() {
-            let row = row.expect("a row");
-            let bytes = |cell: &str| -> Vec<u8> {
-                cell.split(' ').map(|byte| u8::from_str_radix(byte, 16).expect("two hex digits")).collect()
-            };
-            if row[1] != *"negative" {
-                assert_eq!(vec![lrc(&bytes(&row[3]))], bytes(&row[5]), "{row:?}");
-                seen += 1;
-            }
-        }
-        assert!(seen > 15, "{seen} vectors");
-    }
-
     proptest! {
         #[test]
         fn what_is_spelled_is_read(message in prop::collection::vec(any::<u8>(), 2..254)) {
-            check(7, &encode(&message), &[Some(&message)]);
+            check(7, &ascii::encode(&message), &[Some(&message)]);
         }
 
         #[test]
@@ -165,7 +116,7 @@ mod tests {
             receiver.silence();
             prop_assert!(receiver.is_empty());
             while receiver.take().is_some() {}
-            receiver.push(&encode(READ));
+            receiver.push(&ascii::encode(READ));
             prop_assert_eq!(receiver.take().flatten().map(|it| it.message), Some(READ.to_vec()));
         }
     }

@@ -15,9 +15,9 @@ pub use self::{
     syntax::{Fault, Position, TargetKind, Valve},
     target::{AvailableFaults, FaultTarget, available_faults, why_not_applicable},
 };
-use super::{ascii, simulator::Simulator};
+use super::simulator::Simulator;
 use crate::{
-    bus::frame::with_crc,
+    bus::{ascii, frame::with_crc},
     plant::{
         PlantDef,
         def::{LineId, TagId},

@@ -4,9 +4,9 @@ mod identity;
 
 pub use identity::Identity;
 
-use crate::plant::{
-    def::Limits,
-    number::{to_u8, to_u16},
+use crate::{
+    bus::pdu::{self, Item, MEI_IDENTIFICATION},
+    plant::{def::Limits, number::to_u8},
 };
 
 /// Why a device refuses (Modbus application protocol V1.1b3, 7).
@@ -88,8 +88,8 @@ pub trait Registers: Clone {
 
 /// Answers a request. The PDU holds function and data, neither unit nor check; an empty one has no answer.
 pub fn serve<D: Registers>(device: &mut D, pdu: &[u8]) -> Option<Vec<u8>> {
-    let (&function, data) = pdu.split_first()?;
-    Some(answer(device, function, data).unwrap_or_else(|refusal| exception(function, refusal.code())))
+    let function = *pdu.first()?;
+    Some(answer(device, pdu).unwrap_or_else(|refusal| exception(function, refusal.code())))
 }
 
 /// The PDU of an exception.
@@ -97,72 +97,74 @@ pub fn exception(function: u8, code: u8) -> Vec<u8> {
     vec![function | 0x80, code]
 }
 
-/// Most bits of one read and of one write, words of one write, words written together with a read, words of a queue
-/// (V1.1b3, 6.1, 6.11, 6.12, 6.17, 6.18).
-const READ_BITS_MAX: u16 = 2000;
-const WRITE_BITS_MAX: u16 = 1968;
-const WRITE_WORDS_MAX: u16 = 123;
-const EXCHANGE_WRITE_MAX: u16 = 121;
+/// Most registers of a queue (V1.1b3, 6.18).
 const QUEUE_MAX: u16 = 31;
 
+/// The most that the standard allows in each block of a function.
+fn most(function: u8) -> impl Iterator<Item = u16> {
+    let items = pdu::function(function).map_or(&[][..], |function| function.request);
+    items.iter().filter_map(|item| match item {
+        Item::Count { most, .. } => Some(*most),
+        _ => None,
+    })
+}
+
 /// A request of a wrong length is refused with 03, which the standard gives to "the implied length is incorrect".
-fn answer<D: Registers>(device: &mut D, function: u8, data: &[u8]) -> Result<Vec<u8>, Refusal> {
-    if !device.functions().contains(&function) {
+fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Refusal> {
+    let function = pdu[0];
+    if !device.functions().contains(&function) || matches!(pdu, [0x2B, other, ..] if *other != MEI_IDENTIFICATION) {
         return Err(Refusal::Function);
     }
-    let word = |high: u8, low: u8| u16::from_be_bytes([high, low]);
-    match (function, data) {
-        (0x01..=0x06, &[a, b, c, d]) => plain(device, function, word(a, b), word(c, d)),
-        (0x07, []) => Ok(vec![function, device.exception_status()]),
-        (0x0F, &[a, b, c, d, ref block @ ..]) => {
-            write_bits(device, word(a, b), word(c, d), block)?;
-            Ok(echo(function, &data[..4]))
+    let (fields, data) = pdu::request_fields(pdu).ok_or(Refusal::Value)?;
+    let limits = device.limits();
+    match (function, &fields[..]) {
+        (0x01 | 0x02, &[address, count]) => {
+            let kind = if function == 0x01 { Bits::Coils } else { Bits::Discretes };
+            read_bits(device, function, kind, span(function, 0, address, count, limits.read_bits_max)?)
         }
-        (0x10, &[a, b, c, d, ref block @ ..]) => {
-            let values = block_of_words(word(c, d), device.limits().write_registers_max.min(WRITE_WORDS_MAX), block)?;
-            write_words(device, word(a, b), &values)?;
-            Ok(echo(function, &data[..4]))
+        (0x03, &[address, count]) => read_words(device, function, Words::Holding, address, count),
+        (0x04, &[address, count]) => read_words(device, function, Words::Input, address, count),
+        (0x05, &[address, state @ (0x0000 | 0xFF00)]) => {
+            device.write_bit(address, state != 0)?;
+            Ok(pdu.to_vec())
+        }
+        (0x06, &[address, value]) => write_words(device, address, &[value]).map(|()| pdu.to_vec()),
+        (0x07, []) => Ok(vec![function, device.exception_status()]),
+        (0x0F, &[address, count]) => {
+            write_bits(device, span(function, 0, address, count, u16::MAX)?, data)?;
+            Ok(pdu[..5].to_vec())
+        }
+        (0x10, &[address, count]) => {
+            let values = registers(span(function, 0, address, count, limits.write_registers_max)?, data)?;
+            write_words(device, address, &values)?;
+            Ok(pdu[..5].to_vec())
         }
         (0x11, []) => Ok(identity::report(&device.identity(), device.running())),
-        (0x16, &[a, b, and_high, and_low, or_high, or_low]) => {
-            let (address, and, or) = (word(a, b), word(and_high, and_low), word(or_high, or_low));
+        (0x16, &[address, and, or]) => {
             let value = device.word(Words::Holding, address)? & and | or & !and;
             device.write_word(address, value)?;
-            Ok(echo(function, data))
+            Ok(pdu.to_vec())
         }
-        (0x17, &[a, b, c, d, e, f, g, h, ref block @ ..]) => {
-            let values =
-                block_of_words(word(g, h), device.limits().write_registers_max.min(EXCHANGE_WRITE_MAX), block)?;
+        (0x17, &[from, count, to, written]) => {
+            let values = registers(span(function, 1, to, written, limits.write_registers_max)?, data)?;
             let mut trial = device.clone();
-            write_words(&mut trial, word(e, f), &values)?;
-            let reply = read_words(&trial, function, Words::Holding, word(a, b), word(c, d))?;
+            write_words(&mut trial, to, &values)?;
+            let reply = read_words(&trial, function, Words::Holding, from, count)?;
             *device = trial;
             Ok(reply)
         }
-        (0x18, &[a, b]) => read_queue(device, function, word(a, b)),
-        (0x2B, &[identity::MEI_TYPE, code, object]) => identity::read(&device.identity(), code, object),
-        (0x2B, &[other, ..]) if other != identity::MEI_TYPE => Err(Refusal::Function),
+        (0x18, &[address]) => read_queue(device, function, address),
+        (0x2B, &[_, code, object]) => identity::read(&device.identity(), to_u8(code), to_u8(object)),
         _ => Err(Refusal::Value),
     }
 }
 
-/// The functions 01–06: an address and a count or a value.
-fn plain<D: Registers>(device: &mut D, function: u8, address: u16, operand: u16) -> Result<Vec<u8>, Refusal> {
-    match function {
-        0x01 => return read_bits(device, function, Bits::Coils, address, operand),
-        0x02 => return read_bits(device, function, Bits::Discretes, address, operand),
-        0x03 => return read_words(device, function, Words::Holding, address, operand),
-        0x04 => return read_words(device, function, Words::Input, address, operand),
-        0x05 => write_bit(device, address, operand)?,
-        _ => write_words(device, address, &[operand])?,
-    }
-    Ok(echo(function, &[address.to_be_bytes(), operand.to_be_bytes()].concat()))
-}
+type Span = std::ops::RangeInclusive<u16>;
 
-fn read_bits<D: Registers>(device: &D, function: u8, kind: Bits, address: u16, count: u16) -> Result<Vec<u8>, Refusal> {
-    let addresses = span(address, count, READ_BITS_MAX.min(device.limits().read_bits_max))?;
-    let mut reply = vec![function, to_u8(count.div_ceil(8))];
-    reply.resize(2 + usize::from(count.div_ceil(8)), 0);
+fn read_bits<D: Registers>(device: &D, function: u8, kind: Bits, addresses: Span) -> Result<Vec<u8>, Refusal> {
+    let bytes = addresses.len().div_ceil(8);
+    let mut reply = vec![function, to_u8(bytes)];
+    reply.resize(2 + bytes, 0);
     for (place, at) in addresses.enumerate() {
         reply[2 + place / 8] |= u8::from(device.bit(kind, at)?) << (place % 8);
     }
@@ -178,7 +180,7 @@ fn read_words<D: Registers>(
 ) -> Result<Vec<u8>, Refusal> {
     let Limits { read_registers_max, alignment, .. } = device.limits();
     let mut reply = vec![function, to_u8(count.min(read_registers_max) * 2)];
-    let addresses = span(address, count, read_registers_max)?;
+    let addresses = span(function, 0, address, count, read_registers_max)?;
     if !address.is_multiple_of(alignment) {
         return Err(Refusal::Address);
     }
@@ -191,19 +193,8 @@ fn read_words<D: Registers>(
     Ok(reply)
 }
 
-fn write_bit<D: Registers>(device: &mut D, address: u16, operand: u16) -> Result<(), Refusal> {
-    let on = match operand {
-        0xFF00 => true,
-        0x0000 => false,
-        _ => return Err(Refusal::Value),
-    };
-    device.write_bit(address, on)
-}
-
-fn write_bits<D: Registers>(device: &mut D, address: u16, count: u16, rest: &[u8]) -> Result<(), Refusal> {
-    let addresses = span(address, count, WRITE_BITS_MAX)?;
-    let [bytes, packed @ ..] = rest else { return Err(Refusal::Value) };
-    if usize::from(*bytes) != packed.len() || packed.len() != usize::from(count.div_ceil(8)) {
+fn write_bits<D: Registers>(device: &mut D, addresses: Span, packed: &[u8]) -> Result<(), Refusal> {
+    if packed.len() != addresses.len().div_ceil(8) {
         return Err(Refusal::Value);
     }
     let mut trial = device.clone();
@@ -214,26 +205,23 @@ fn write_bits<D: Registers>(device: &mut D, address: u16, count: u16, rest: &[u8
     Ok(())
 }
 
-fn block_of_words(count: u16, max: u16, rest: &[u8]) -> Result<Vec<u16>, Refusal> {
-    let [bytes, packed @ ..] = rest else { return Err(Refusal::Value) };
-    let fits = usize::from(*bytes) == packed.len() && packed.len() == 2 * usize::from(count);
-    if count == 0 || count > max || !fits {
-        return Err(Refusal::Value);
-    }
-    Ok(packed.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
+/// The registers of a write, which must be as many as its addresses.
+fn registers(addresses: Span, packed: &[u8]) -> Result<Vec<u16>, Refusal> {
+    let values: Vec<u16> = packed.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
+    (packed.len() == 2 * addresses.len()).then_some(values).ok_or(Refusal::Value)
 }
 
 fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<(), Refusal> {
-    span(address, to_u16(values.len()), WRITE_WORDS_MAX)?;
     let mut trial = device.clone();
     trial.write_block(address, values)?;
     *device = trial;
     Ok(())
 }
 
-/// The addresses of a request: a wrong count is a wrong value, an end beyond 65535 a wrong address.
-fn span(address: u16, count: u16, max: u16) -> Result<std::ops::RangeInclusive<u16>, Refusal> {
-    if count == 0 || count > max {
+/// The addresses of the `nth` block of a request: a wrong count is a wrong value, an end beyond 65535 a wrong address.
+fn span(function: u8, nth: usize, address: u16, count: u16, limit: u16) -> Result<Span, Refusal> {
+    let most = most(function).nth(nth).unwrap_or(limit).min(limit);
+    if count == 0 || count > most {
         return Err(Refusal::Value);
     }
     Ok(address..=address.checked_add(count - 1).ok_or(Refusal::Address)?)
@@ -251,11 +239,6 @@ fn read_queue<D: Registers>(device: &D, function: u8, address: u16) -> Result<Ve
         reply.extend_from_slice(&device.word(Words::Holding, at)?.to_be_bytes());
     }
     Ok(reply)
-}
-
-/// A write that was done is answered with what it said.
-fn echo(function: u8, data: &[u8]) -> Vec<u8> {
-    [&[function], data].concat()
 }
 
 #[cfg(test)]

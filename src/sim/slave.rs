@@ -3,10 +3,8 @@
 use std::collections::VecDeque;
 
 use super::pdu::{self, Refusal, Registers};
-use crate::plant::number::to_u8;
+use crate::{bus, plant::number::to_u8};
 
-/// The functions that a broadcast may carry.
-const WRITES: [u8; 5] = [0x05, 0x06, 0x0F, 0x10, 0x16];
 /// Events in the log (V1.1b3, 6.10); the oldest makes room.
 const LOG_MAX: usize = 64;
 
@@ -92,7 +90,8 @@ impl<D: Registers> Unit for Slave<D> {
     fn obey(&mut self, pdu: &[u8]) {
         self.counters.addressed(RECEIVED_BROADCAST);
         self.counters.count(UNANSWERED);
-        let heard = |function: &u8| WRITES.contains(function) && !self.device.holds_back(*function);
+        let writes = |function: u8| bus::pdu::function(function).is_some_and(bus::pdu::Function::writes);
+        let heard = |function: &u8| writes(*function) && !self.device.holds_back(*function);
         if let Some(function) = pdu.first().copied().filter(heard)
             && let Some(reply) = pdu::serve(&mut self.device, pdu)
         {

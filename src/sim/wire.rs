@@ -1,7 +1,10 @@
 //! Requests on a serial line as a slave finds them: by the length that the function tells, by silence where it does not.
 
 use super::ascii;
-use crate::bus::frame::crc16;
+use crate::bus::{
+    frame::crc16,
+    pdu::{self, Length},
+};
 
 /// Twice the longest frame of a serial line (Modbus serial line V1.02, 2.5.1): one whole and the beginning of a next.
 const BYTES_MAX: usize = 2 * 256;
@@ -116,34 +119,18 @@ impl Receiver {
         self.bytes.is_empty()
     }
 
+    /// Length of the request with its check.
     fn length(&self) -> Length {
-        let counted = |place: usize, around: usize| match self.bytes.get(place) {
-            Some(count) => Length::Known(around + usize::from(*count)),
-            None => Length::TooEarly,
-        };
-        match self.bytes.get(1) {
-            None => Length::TooEarly,
+        match pdu::request_length(&self.bytes) {
+            Length::Known(length) if self.bytes.get(1) != Some(&0x08) => Length::Known(length + 2),
             // An echo may be of any length; with two bytes of data, as is usual, the check fits here.
-            Some(0x08) if self.bytes.get(7).is_some() && crc16(&self.bytes[..8]) != 0 => Length::BySilence,
-            Some(0x01..=0x06 | 0x08) => Length::Known(8),
-            Some(0x07 | 0x0B | 0x0C | 0x11) => Length::Known(4),
-            Some(0x18) => Length::Known(6),
-            Some(0x0F | 0x10) => counted(6, 9),
-            Some(0x16) => Length::Known(10),
-            Some(0x17) => counted(10, 13),
-            Some(0x2B) if self.bytes.get(2) == Some(&0x0E) => Length::Known(7),
-            Some(0x2B) if self.bytes.len() < 3 => Length::TooEarly,
-            Some(_) => Length::BySilence,
+            Length::Known(length) => match self.bytes.get(..length + 2).map(crc16) {
+                Some(0) | None => Length::Known(length + 2),
+                Some(_) => Length::BySilence,
+            },
+            other => other,
         }
     }
-}
-
-/// Length of a request with unit and check.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Length {
-    Known(usize),
-    TooEarly,
-    BySilence,
 }
 
 #[cfg(test)]

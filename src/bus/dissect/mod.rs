@@ -5,10 +5,10 @@
 //!           CRC LRC MBAP         └─> answer ──┴─> the reading that fits ─> Dissection
 //! ```
 
-mod answer;
 mod envelope;
+mod fields;
 mod reader;
-mod request;
+mod summary;
 
 #[cfg(test)]
 mod tests;
@@ -16,7 +16,7 @@ mod tests;
 use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
-use super::{frame, names, request_lint};
+use super::{frame, names, pdu, request_lint};
 use crate::plant::{line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
@@ -167,10 +167,13 @@ impl Readings {
         let message = &envelope.message;
         let mbap = envelope.framing == Some(Framing::Mbap);
         let same = match message.get(1) {
-            Some(0x05 | 0x06 | 0x08 | 0x15 | 0x16) => Some("the answer repeats the request: these bytes may be either"),
-            Some(0..=0x7F) if names::function(message[1]).is_none() => {
-                Some("the standard has no such function: request and answer cannot be told apart")
-            }
+            Some(code @ 0..=0x7F) => match pdu::function(*code) {
+                Some(function) if function.echoes() => {
+                    Some("the answer repeats the request: these bytes may be either")
+                }
+                Some(_) => None,
+                None => Some("the standard has no such function: request and answer cannot be told apart"),
+            },
             Some(_) | None => None,
         };
         Readings {
@@ -230,13 +233,12 @@ fn read_message(reader: &mut Reader, mbap: bool, direction: Direction, asked: Op
         0x80.. => format!("{code} / 0x{code:02X}: exception to {}", function_words(code & 0x7F)),
         _ => function_words(code),
     })?;
-    match direction {
-        Direction::Answer => answer::read(reader, function, asked),
-        Direction::Request => {
-            let what = request::read(reader, function)?;
-            Some(if unit == 0 && !mbap { format!("broadcast {what}") } else { format!("unit {unit} {what}") })
-        }
-    }
+    let what = summary::read(reader, function, direction, asked)?;
+    Some(match direction {
+        Direction::Answer => what,
+        Direction::Request if unit == 0 && !mbap => format!("broadcast {what}"),
+        Direction::Request => format!("unit {unit} {what}"),
+    })
 }
 
 fn unit_words(unit: u8, mbap: bool) -> String {

@@ -299,7 +299,7 @@ impl Task<'_> {
         Ok(())
     }
 
-    /// Nothing is due: drops what comes on_unsolicited until something is.
+    /// Nothing is due: drops unsolicited bytes until something is.
     async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Turn {
         let request = tokio::select! {
             // What comes at one moment is taken in this order, so that a rehearsal ends as the one before.

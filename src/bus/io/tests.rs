@@ -619,7 +619,7 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
 
 /// A try that was not even sent, because the unit is out of sync, is not made again at once and for ever.
 #[tokio::test(start_paused = true)]
-async fn a_silent_unit_that_is_out_of_step_is_read_again() {
+async fn a_silent_unit_that_is_out_of_sync_is_read_again() {
     let script = |number, _: &[u8]| match number {
         0 | 2 => SlaveAction::Silent,
         1 => SlaveAction::Late(1_681 * MS),

@@ -12,7 +12,7 @@ use super::{clock::Clock, link::LinkError, pause::Pause, transport::Stream};
 use crate::{
     bus::{
         ascii,
-        frame::{self, Unasked},
+        frame::{self, Unsolicited},
         late_reply::LineReplies,
         plan::Block,
     },
@@ -82,7 +82,7 @@ pub struct Wire {
     /// Units whose answers came late since this was last taken.
     late: Vec<u8>,
     /// Units that sent since then what they were not asked for, though nothing was outstanding.
-    on_unsolicited: Vec<u8>,
+    unsolicited: Vec<u8>,
     /// Totals of the line; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
 }
@@ -117,7 +117,7 @@ impl Wire {
             idle: clock.real_span(silence).max(line.idle),
             frames: Vec::new(),
             late: Vec::new(),
-            on_unsolicited: Vec::new(),
+            unsolicited: Vec::new(),
             counters,
         }
     }
@@ -273,20 +273,20 @@ impl Wire {
         tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
         let mut late = false;
         // Only a whole good frame tells who was late: chance bytes name anybody.
-        for on_unsolicited in frame::on_unsolicited(self.framing, bytes) {
+        for frame in frame::unsolicited(self.framing, bytes) {
             let age = self.age();
-            let (Unasked::Answer(message) | Unasked::Request(message)) = &on_unsolicited;
+            let (Unsolicited::Response(message) | Unsolicited::Request(message)) = &frame;
             let Some(unit) = message.first().copied() else { continue };
-            let asks = matches!(on_unsolicited, Unasked::Request(_));
-            let detect_reordering = !asks && self.replies.detect_reordering(unit, message, age);
-            let was_outstanding = !asks && !detect_reordering && self.replies.on_late_reply(unit, message, age);
+            let asks = matches!(frame, Unsolicited::Request(_));
+            let reordered = !asks && self.replies.detect_reordering(unit, message, age);
+            let was_outstanding = !asks && !reordered && self.replies.on_late_reply(unit, message, age);
             if was_outstanding {
                 late = true;
                 self.counters.late += 1;
                 self.late.push(unit);
             }
-            if detect_reordering || (!was_outstanding && self.replies.on_unsolicited(unit, message, age)) {
-                self.on_unsolicited.push(unit);
+            if reordered || (!was_outstanding && self.replies.on_unsolicited(unit, message, age)) {
+                self.unsolicited.push(unit);
             }
             if asks {
                 self.replies.mark_all_unproven();
@@ -321,7 +321,7 @@ impl Wire {
 
     /// The units that have sent what they were not asked for since this was last asked.
     pub fn take_unsolicited(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.on_unsolicited)
+        std::mem::take(&mut self.unsolicited)
     }
 
     async fn wait_for_silence(&mut self) {
@@ -364,7 +364,7 @@ impl Wire {
         match self.framing {
             Framing::Mbap => false,
             Framing::Ascii => ascii::open_frame(&self.stray).is_some(),
-            Framing::Rtu => 1 < self.stray.len() && frame::on_unsolicited(self.framing, &self.stray).is_empty(),
+            Framing::Rtu => 1 < self.stray.len() && frame::unsolicited(self.framing, &self.stray).is_empty(),
         }
     }
 }

@@ -1,10 +1,8 @@
 //! What a device says of itself: report server id (11) and device identification (2B/0E).
 
 use super::Refusal;
-use crate::plant::number::to_u8;
+use crate::{bus::pdu::MEI_IDENTIFICATION, plant::number::to_u8};
 
-/// The MEI type of device identification (V1.1b3, 6.21).
-pub(super) const MEI_TYPE: u8 = 0x0E;
 /// Basic and regular objects, as a stream and one by one.
 const CONFORMITY: u8 = 0x82;
 /// Room for objects: a PDU of 253 bytes less function, type, code, conformity, more, next and count.
@@ -53,7 +51,7 @@ pub(super) fn read(identity: &Identity, code: u8, from: u8) -> Result<Vec<u8>, R
 
 fn message(code: u8, next: Option<u8>, objects: &[(u8, &str)]) -> Vec<u8> {
     let more = if next.is_some() { 0xFF } else { 0x00 };
-    let mut reply = vec![0x2B, MEI_TYPE, code, CONFORMITY, more, next.unwrap_or(0), to_u8(objects.len())];
+    let mut reply = vec![0x2B, MEI_IDENTIFICATION, code, CONFORMITY, more, next.unwrap_or(0), to_u8(objects.len())];
     for (id, text) in objects {
         reply.extend_from_slice(&[*id, to_u8(text.len())]);
         reply.extend_from_slice(text.as_bytes());

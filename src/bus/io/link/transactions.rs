@@ -235,7 +235,7 @@ impl Link {
         Ok(())
     }
 
-    /// Takes what comes on_unsolicited; returns when a request has ended.
+    /// Receives unsolicited bytes; returns when a request has ended.
     pub(super) async fn idle_mbap(&mut self) -> Result<(), LinkError> {
         while self.transactions.ended.is_empty() {
             self.collect(Instant::now() + LOOK_AGAIN).await?;
@@ -346,7 +346,7 @@ impl Link {
     /// answer: each may be a piece of something else.
     fn take_frames_mbap(&mut self) -> Result<(), LinkError> {
         let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
-        if frame::is_out_of_step(&bytes) {
+        if frame::is_out_of_sync(&bytes) {
             self.wire.record(false, bytes.into(), Cow::Borrowed("no MBAP header"));
             return Err(LinkError::Gone("the stream is out of sync".into()));
         }

@@ -1,0 +1,293 @@
+//! The fields of a request or response by the layout of its function; with the request, values get their addresses.
+
+use super::{
+    Direction,
+    reader::{Reader, hex_words, text},
+};
+use crate::bus::{
+    names::{self, counted, place},
+    pdu::{Item, MEI_IDENTIFICATION},
+};
+
+/// What the fields of one message hold.
+#[derive(Default)]
+pub(super) struct Values {
+    /// Address and count of each block; those of the request in a response that does not repeat them.
+    pub blocks: Vec<(u16, u16)>,
+    /// Every other number, in order.
+    pub numbers: Vec<u16>,
+    pub registers: Vec<u16>,
+    pub bits: Vec<bool>,
+    /// Data, objects or groups, each as text.
+    pub parts: Vec<String>,
+}
+
+/// Reads the fields of one message.
+pub(super) struct Fields<'r, 'a> {
+    reader: &'r mut Reader<'a>,
+    function: u8,
+    direction: Direction,
+    values: Values,
+    /// First address of the values that follow, and how many there are, as far as known.
+    start: Option<u16>,
+    count: Option<u16>,
+    /// Does the message itself say the count?
+    counts: bool,
+    /// Bytes that follow, by the latest byte count.
+    bytes: usize,
+}
+
+impl<'r, 'a> Fields<'r, 'a> {
+    /// `asked` is the request message of a response, if it is known.
+    pub fn new(reader: &'r mut Reader<'a>, function: u8, direction: Direction, asked: Option<&[u8]>) -> Fields<'r, 'a> {
+        let word = |at: usize| Some(u16::from_be_bytes([*asked?.get(at)?, *asked?.get(at + 1)?]));
+        let (start, count, values) = (word(2), word(4), Values::default());
+        Fields { reader, function, direction, values, start, count, counts: false, bytes: 0 }
+    }
+
+    /// Reads the items; `None` if the message is cut short.
+    pub fn read(mut self, items: &[Item]) -> Option<Values> {
+        for (index, item) in items.iter().enumerate() {
+            match *item {
+                Item::ByteCount => self.byte_count(items.get(index + 1).copied())?,
+                Item::MeiType if self.mei_type()? != MEI_IDENTIFICATION => {
+                    let left = self.reader.left();
+                    self.reader.bytes("data", left, text)?;
+                    break;
+                }
+                Item::MeiType => {}
+                item => self.item(item)?,
+            }
+        }
+        Some(self.values)
+    }
+
+    fn item(&mut self, item: Item) -> Option<()> {
+        let function = self.function;
+        match item {
+            Item::Address(prefix) => {
+                let address = self.reader.word(&format!("{prefix}address"), |address| place(function, address))?;
+                self.start = Some(address);
+                self.values.blocks.push((address, 1));
+            }
+            Item::Count { prefix, verb, .. } => {
+                let kind = if names::table(function).is_bits() { "bit" } else { "register" };
+                let label = |count: u16| format!("{} {verb}", counted(count.into(), kind));
+                let count = self.reader.word(&format!("{prefix}count"), label)?;
+                (self.count, self.counts) = (Some(count), true);
+                self.values.blocks.last_mut()?.1 = count;
+            }
+            Item::CoilState => {
+                let value = self.reader.word("value", |value| match coil_state(value) {
+                    Some(state) => state.into(),
+                    None => "neither on (FF00) nor off (0000)".into(),
+                })?;
+                if coil_state(value).is_none() {
+                    self.reader.wrong(format!("coil value {value:04X}, expected FF00 (on) or 0000 (off)"));
+                }
+                self.values.numbers.push(value);
+            }
+            Item::Register => {
+                self.values.registers = self.reader.registers(function, self.start, 1)?;
+            }
+            Item::AndMask => self.number("AND mask", |mask| format!("keeps the bits of {mask:016b}"))?,
+            Item::OrMask => {
+                let and = self.values.numbers.last().copied().unwrap_or_default();
+                self.number("OR mask", |mask| format!("sets {:016b} of the others", mask & !and))?;
+            }
+            Item::SubFunction => {
+                self.number("sub-function", |code| format!("{code} / 0x{code:04X} {}", names::diagnostic(code)))?;
+            }
+            Item::Data => self.data()?,
+            Item::Bits => {
+                let count = self.count.map_or(8 * self.bytes, |count| usize::from(count).min(8 * self.bytes));
+                self.values.bits = self.reader.bits(function, self.start, count)?;
+            }
+            Item::Registers => {
+                let count = self.count.filter(|_| self.counts).map_or(self.bytes / 2, usize::from);
+                self.values.registers = self.reader.registers(function, self.start, count.min(self.bytes / 2))?;
+            }
+            Item::WordCount => {
+                self.bytes = self.reader.word("byte count", |count| format!("{count} bytes follow"))?.into();
+            }
+            Item::FifoCount => {
+                self.number("FIFO count", |count| format!("{} queued", counted(count.into(), "register")))?;
+                let count = usize::from(*self.values.numbers.last()?);
+                if self.bytes != 2 + 2 * count {
+                    self.reader.wrong(format!("byte count says {}, {} fit", self.bytes, 2 + 2 * count));
+                }
+                (self.start, self.bytes) = (None, 2 * count);
+            }
+            Item::ExceptionStatus => {
+                let label = |status| format!("{status:08b}, highest first: the device says what they mean");
+                self.values.numbers.push(self.reader.byte("status", label)?.into());
+            }
+            Item::CommStatus => self.number("status", |status| comm_status(status).to_owned())?,
+            Item::EventCount => {
+                self.number("event count", |count| format!("{} done", counted(count.into(), "message")))?
+            }
+            Item::MessageCount => {
+                self.number("message count", |count| format!("{} seen", counted(count.into(), "message")))?;
+            }
+            Item::Events => {
+                if self.bytes < 6 {
+                    self.reader.wrong(format!("byte count says {}, expected 6 or more", self.bytes));
+                }
+                let count = self.bytes.saturating_sub(6);
+                self.reader.bytes("events", count, |_| "one byte an event, the latest first".into())?;
+            }
+            Item::ServerId => {
+                let label = |bytes: &[u8]| format!("{}, run state FF on, 00 off", text(bytes));
+                let id = self.reader.bytes("id and run", self.bytes, label)?;
+                self.values.parts.push(text(id));
+            }
+            Item::FileRequests | Item::FileWrites | Item::FileRecords => self.groups(item)?,
+            Item::ReadCode => {
+                let label = |code| format!("{code} {}", names::identification(code));
+                self.values.numbers.push(self.reader.byte("read code", label)?.into());
+            }
+            Item::ObjectId => {
+                let id = self.reader.byte("object", |id| format!("from {id} {}", names::object(id)))?;
+                self.values.numbers.push(id.into());
+            }
+            Item::Conformity => {
+                self.reader.byte("conformity", |level| {
+                    let one_by_one = if level & 0x80 == 0 { "as a list only" } else { "as a list and one by one" };
+                    format!("{}, {one_by_one}", names::identification(level & 0x7F))
+                })?;
+            }
+            Item::MoreFollows => {
+                let more = self.reader.byte("more follows", |more| if more == 0 { "no" } else { "yes" }.into())?;
+                self.values.numbers.push(more.into());
+            }
+            Item::NextObject => {
+                let more = self.values.numbers.last() != Some(&0);
+                self.reader.byte("next object", |id| match more {
+                    false => "none".into(),
+                    true => format!("ask on from {id} {}", names::object(id)),
+                })?;
+            }
+            Item::Objects => self.objects()?,
+            Item::ByteCount | Item::MeiType => {}
+        }
+        Some(())
+    }
+
+    /// A number of two bytes that is kept.
+    fn number(&mut self, name: &str, label: impl FnOnce(u16) -> String) -> Option<()> {
+        let number = self.reader.word(name, label)?;
+        self.values.numbers.push(number);
+        Some(())
+    }
+
+    /// The byte count must fit what `next` needs.
+    fn byte_count(&mut self, next: Option<Item>) -> Option<()> {
+        self.bytes = usize::from(self.reader.byte("byte count", follow)?);
+        let bytes = self.bytes;
+        let expected = match (next, self.count.map(usize::from)) {
+            (Some(Item::Bits), Some(count)) => count.div_ceil(8),
+            (Some(Item::Registers), Some(count)) if self.counts => 2 * count,
+            _ => bytes,
+        };
+        if bytes != expected {
+            self.reader.wrong(format!("byte count says {bytes}, {expected} fit"));
+        } else if next == Some(Item::Registers) && bytes % 2 == 1 {
+            self.reader.wrong(format!("byte count {bytes} is odd, registers have two bytes"));
+        }
+        Some(())
+    }
+
+    /// What function 08 sends and gets back.
+    fn data(&mut self) -> Option<()> {
+        let words = |bytes: &[u8]| match bytes {
+            [high, low] => u16::from_be_bytes([*high, *low]).to_string(),
+            [..] => counted(bytes.len(), "byte"),
+        };
+        let name = if self.direction == Direction::Request { "data" } else { "result" };
+        let count = self.reader.left().max(2);
+        let bytes = self.reader.bytes(name, count, words)?;
+        self.values.parts.push(format!("{name} {}", crate::bus::frame::hex(bytes)));
+        Some(())
+    }
+
+    /// The kind of an encapsulated transport.
+    fn mei_type(&mut self) -> Option<u8> {
+        self.reader.byte("MEI type", |kind| match kind {
+            0x0D => "13 / 0x0D CANopen".into(),
+            0x0E => "14 / 0x0E read device identification".into(),
+            _ => format!("{kind} / 0x{kind:02X} unknown"),
+        })
+    }
+
+    fn groups(&mut self, item: Item) -> Option<()> {
+        let end = self.reader.at + self.bytes;
+        while self.reader.at < end {
+            let group = if item == Item::FileRecords { self.file_record() } else { self.file_group(item) }?;
+            self.values.parts.push(group);
+        }
+        Some(())
+    }
+
+    /// Length, reference type and registers.
+    fn file_record(&mut self) -> Option<String> {
+        let length = usize::from(self.reader.byte("group length", follow)?);
+        self.reference()?;
+        Some(hex_words(&self.reader.registers(0x03, None, length.saturating_sub(1) / 2)?))
+    }
+
+    /// Reference type, file, record and length; and the registers to write.
+    fn file_group(&mut self, item: Item) -> Option<String> {
+        self.reference()?;
+        let file = self.reader.word("file", |file| format!("file {file}"))?;
+        let record = self.reader.word("record", |record| format!("from record {record}"))?;
+        let length = self.reader.word("length", |length| counted(length.into(), "register"))?;
+        let registers = if item == Item::FileWrites { usize::from(length) } else { 0 };
+        let data = hex_words(&self.reader.registers(0x03, None, registers)?);
+        let data = if data.is_empty() { String::new() } else { format!(": {data}") };
+        Some(format!("file {file} record {record}, {}{data}", counted(length.into(), "register")))
+    }
+
+    fn reference(&mut self) -> Option<()> {
+        let kind = self.reader.byte("reference", |kind| if kind == 6 { "file record" } else { "must be 06" }.into())?;
+        if kind != 6 {
+            self.reader.wrong(format!("reference type {kind:02X}, expected 06"));
+        }
+        Some(())
+    }
+
+    fn objects(&mut self) -> Option<()> {
+        let count = self.reader.byte("objects", |count| counted(count.into(), "object"))?;
+        for _ in 0..count {
+            let id = self.reader.byte("object", |id| format!("{id} {}", names::object(id)))?;
+            let length = self.reader.byte("length", |length| counted(length.into(), "byte"))?;
+            let value = self.reader.bytes(names::object(id), length.into(), text)?;
+            self.values.parts.push(format!("{} {}", names::object(id), text(value)));
+        }
+        Some(())
+    }
+}
+
+/// `on` or `off`; `None` for any other value of a coil.
+pub(super) fn coil_state(value: u16) -> Option<&'static str> {
+    match value {
+        0x0000 => Some("off"),
+        0xFF00 => Some("on"),
+        _ => None,
+    }
+}
+
+/// The status of functions 0B and 0C.
+pub(super) fn comm_status(status: u16) -> &'static str {
+    match status {
+        0x0000 => "ready",
+        0xFFFF => "busy",
+        _ => "unknown status",
+    }
+}
+
+fn follow(count: u8) -> String {
+    match count {
+        1 => "1 byte follows".into(),
+        _ => format!("{count} bytes follow"),
+    }
+}

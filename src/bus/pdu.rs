@@ -1,0 +1,256 @@
+//! The layout of every function, one row each (Modbus application protocol V1.1b3, section 6). The link of the master, the
+//! simulated devices, the check before sending and the decoder of frames all read this table.
+
+use crate::plant::tag::Table;
+
+use self::Item::*;
+
+/// A field of a request or response, behind the function code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Item {
+    /// Wire address, with a prefix of its name.
+    Address(&'static str),
+    /// Count of bits or registers, from 1 to `most`, with a prefix of its name and what is done to them.
+    Count {
+        prefix: &'static str,
+        verb: &'static str,
+        most: u16,
+    },
+    /// FF00 or 0000.
+    CoilState,
+    /// The value of one register.
+    Register,
+    /// The masks of function 22.
+    AndMask,
+    OrMask,
+    /// What function 08 does.
+    SubFunction,
+    /// The data of function 08: usually two bytes.
+    Data,
+    /// One byte: how many bytes follow. The next fields are what they hold.
+    ByteCount,
+    /// The same in two bytes.
+    WordCount,
+    FifoCount,
+    Bits,
+    Registers,
+    ExceptionStatus,
+    CommStatus,
+    EventCount,
+    MessageCount,
+    Events,
+    ServerId,
+    /// Groups of reference, file, record and length: without and with the registers of the records.
+    FileRequests,
+    FileWrites,
+    /// Groups of length, reference and registers.
+    FileRecords,
+    /// Kind of an encapsulated transport; only 0E, device identification, has a known layout.
+    MeiType,
+    ReadCode,
+    ObjectId,
+    Conformity,
+    MoreFollows,
+    NextObject,
+    /// Count of objects, then id, length and text of each.
+    Objects,
+}
+
+impl Item {
+    /// Bytes that it has at least. What a byte count precedes has none of its own.
+    pub fn size(self) -> usize {
+        match self {
+            Bits | Registers | Events | ServerId | FileRequests | FileWrites | FileRecords => 0,
+            ByteCount | ExceptionStatus | MeiType | ReadCode | ObjectId => 1,
+            Conformity | MoreFollows | NextObject | Objects => 1,
+            Address(_) | Count { .. } | CoilState | Register | AndMask | OrMask | SubFunction | Data => 2,
+            WordCount | FifoCount | CommStatus | EventCount | MessageCount => 2,
+        }
+    }
+}
+
+/// A function of the standard.
+#[derive(Debug)]
+pub struct Function {
+    pub code: u8,
+    pub name: &'static str,
+    /// The table that it works on.
+    pub table: Table,
+    pub request: &'static [Item],
+    pub response: &'static [Item],
+}
+
+impl Function {
+    /// Is the response a copy of the request?
+    pub fn echoes(&self) -> bool {
+        self.request == self.response && !self.request.is_empty()
+    }
+
+    /// Does the response begin with four bytes of the request?
+    pub(super) fn repeats_start(&self) -> bool {
+        matches!(self.response, [Address(_) | SubFunction, ..])
+    }
+
+    /// Does it change values, so that it may be sent to all units at once?
+    pub fn writes(&self) -> bool {
+        self.repeats_start() && self.code != 0x08 || self.code == 0x15
+    }
+}
+
+/// Device identification (V1.1b3, 6.21).
+pub const MEI_IDENTIFICATION: u8 = 0x0E;
+
+const fn count(verb: &'static str, most: u16) -> Item {
+    Count { prefix: "", verb, most }
+}
+
+const READ_BITS: &[Item] = &[Address(""), count("to read", 2000)];
+const READ_REGISTERS: &[Item] = &[Address(""), count("to read", 125)];
+const BITS: &[Item] = &[ByteCount, Bits];
+const REGISTERS: &[Item] = &[ByteCount, Registers];
+const WRITE_COIL: &[Item] = &[Address(""), CoilState];
+const WRITE_REGISTER: &[Item] = &[Address(""), Register];
+const WRITTEN: &[Item] = &[Address(""), count("written", u16::MAX)];
+const DIAGNOSTICS: &[Item] = &[SubFunction, Data];
+const MASK_WRITE: &[Item] = &[Address(""), AndMask, OrMask];
+const WRITE_FILES: &[Item] = &[ByteCount, FileWrites];
+const READ_WRITE: &[Item] = &[
+    Address("read "),
+    Count { prefix: "read ", verb: "to read", most: 125 },
+    Address("write "),
+    Count { prefix: "write ", verb: "to write", most: 121 },
+    ByteCount,
+    Registers,
+];
+const EVENT_LOG: &[Item] = &[ByteCount, CommStatus, EventCount, MessageCount, Events];
+const IDENTIFICATION: &[Item] = &[MeiType, ReadCode, Conformity, MoreFollows, NextObject, Objects];
+
+#[rustfmt::skip]
+const FUNCTIONS: &[Function] = &[
+    row(0x01, "read coils", Table::Coil, READ_BITS, BITS),
+    row(0x02, "read discrete inputs", Table::Discrete, READ_BITS, BITS),
+    row(0x03, "read holding registers", Table::Holding, READ_REGISTERS, REGISTERS),
+    row(0x04, "read input registers", Table::Input, READ_REGISTERS, REGISTERS),
+    row(0x05, "write single coil", Table::Coil, WRITE_COIL, WRITE_COIL),
+    row(0x06, "write single register", Table::Holding, WRITE_REGISTER, WRITE_REGISTER),
+    row(0x07, "read exception status", Table::Holding, &[], &[ExceptionStatus]),
+    row(0x08, "diagnostics", Table::Holding, DIAGNOSTICS, DIAGNOSTICS),
+    row(0x0B, "get comm event counter", Table::Holding, &[], &[CommStatus, EventCount]),
+    row(0x0C, "get comm event log", Table::Holding, &[], EVENT_LOG),
+    row(0x0F, "write multiple coils", Table::Coil, &[Address(""), count("to write", 1968), ByteCount, Bits], WRITTEN),
+    row(0x10, "write multiple registers", Table::Holding, &[Address(""), count("to write", 123), ByteCount, Registers], WRITTEN),
+    row(0x11, "report server id", Table::Holding, &[], &[ByteCount, ServerId]),
+    row(0x14, "read file record", Table::Holding, &[ByteCount, FileRequests], &[ByteCount, FileRecords]),
+    row(0x15, "write file record", Table::Holding, WRITE_FILES, WRITE_FILES),
+    row(0x16, "mask write register", Table::Holding, MASK_WRITE, MASK_WRITE),
+    row(0x17, "read/write multiple registers", Table::Holding, READ_WRITE, REGISTERS),
+    row(0x18, "read FIFO queue", Table::Holding, &[Address("FIFO ")], &[WordCount, FifoCount, Registers]),
+    row(0x2B, "encapsulated interface transport", Table::Holding, &[MeiType, ReadCode, ObjectId], IDENTIFICATION),
+];
+
+const fn row(
+    code: u8,
+    name: &'static str,
+    table: Table,
+    request: &'static [Item],
+    response: &'static [Item],
+) -> Function {
+    Function { code, name, table, request, response }
+}
+
+/// The row of a function; `None` for one that the standard does not know, and for an exception.
+pub fn function(code: u8) -> Option<&'static Function> {
+    FUNCTIONS.iter().find(|function| function.code == code)
+}
+
+/// Length of a message: unit and PDU.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Length {
+    Known(usize),
+    /// Too little has come to tell.
+    TooEarly,
+    /// Only silence ends it.
+    BySilence,
+}
+
+impl Length {
+    pub fn known(self) -> Option<usize> {
+        match self {
+            Length::Known(length) => Some(length),
+            Length::TooEarly | Length::BySilence => None,
+        }
+    }
+}
+
+/// Length of the request message that begins in `received`.
+pub fn request_length(received: &[u8]) -> Length {
+    length(received, |function| function.request)
+}
+
+/// Length of the response message that begins in `received`; an exception has three bytes.
+pub fn response_length(received: &[u8]) -> Length {
+    match received.get(1) {
+        Some(0x80..) => Length::Known(3),
+        _ => length(received, |function| function.response),
+    }
+}
+
+fn length(received: &[u8], items: impl Fn(&'static Function) -> &'static [Item]) -> Length {
+    let Some(code) = received.get(1) else { return Length::TooEarly };
+    let Some(function) = function(*code) else { return Length::BySilence };
+    if items(function).first() == Some(&MeiType) && received.get(2).is_some_and(|mei| *mei != MEI_IDENTIFICATION) {
+        return Length::BySilence;
+    }
+    measure(received, items(function)).map_or(Length::TooEarly, Length::Known)
+}
+
+/// The end of the items in a message; `None` while a count that is needed has not come.
+fn measure(message: &[u8], items: &[Item]) -> Option<usize> {
+    let byte = |at: usize| message.get(at).map(|byte| usize::from(*byte));
+    let mut end = 2;
+    for item in items {
+        match item {
+            ByteCount => return Some(end + 1 + byte(end)?),
+            WordCount => return Some(end + 2 + (byte(end)? << 8 | byte(end + 1)?)),
+            Objects => return (0..byte(end)?).try_fold(end + 1, |end, _| Some(end + 2 + byte(end + 1)?)),
+            _ => end += item.size(),
+        }
+    }
+    Some(end)
+}
+
+/// The fields of a request PDU: one number each, and the bytes behind the byte count. `None` if its length is wrong.
+pub fn request_fields(pdu: &[u8]) -> Option<(Vec<u16>, &[u8])> {
+    let (code, mut rest) = pdu.split_first()?;
+    let mut fields = Vec::new();
+    for item in function(*code)?.request {
+        match (item, rest) {
+            (ByteCount, [count, data @ ..]) if usize::from(*count) == data.len() => return Some((fields, data)),
+            (ByteCount, _) => return None,
+            (_, [byte, tail @ ..]) if item.size() == 1 => {
+                fields.push(u16::from(*byte));
+                rest = tail;
+            }
+            (_, [high, low, tail @ ..]) if item.size() == 2 => {
+                fields.push(u16::from_be_bytes([*high, *low]));
+                rest = tail;
+            }
+            _ => return None,
+        }
+    }
+    rest.is_empty().then_some((fields, rest))
+}
+
+/// The objects of a device identification response PDU, id and text, as far as they are whole.
+pub fn identification_objects(pdu: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+    let (count, mut rest) = match pdu {
+        [0x2B, MEI_IDENTIFICATION, _, _, _, _, count, rest @ ..] => (*count, rest),
+        _ => (0, &[][..]),
+    };
+    (0..count).map_while(move |_| {
+        let [id, length, tail @ ..] = rest else { return None };
+        let (text, tail) = tail.split_at(tail.len().min(usize::from(*length)));
+        rest = tail;
+        Some((*id, text))
+    })
+}
