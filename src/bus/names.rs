@@ -61,6 +61,15 @@ pub fn identification(code: u8) -> &'static str {
     }
 }
 
+/// The status of functions 0B and 0C.
+pub(super) fn comm_status(status: u16) -> &'static str {
+    match status {
+        0x0000 => "ready",
+        0xFFFF => "busy",
+        _ => "unknown status",
+    }
+}
+
 /// What a technician does about an exception.
 pub fn advice(code: u8) -> &'static str {
     match code {

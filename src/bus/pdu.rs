@@ -1,12 +1,12 @@
 //! The layout of every function, one row each (Modbus application protocol V1.1b3, section 6). The link of the master, the
 //! simulated devices, the check before sending and the decoder of frames all read this table.
 
+use self::Item::*;
+use super::names::{self, counted};
 use crate::plant::tag::Table;
 
-use self::Item::*;
-
 /// A field of a request or response, behind the function code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Item {
     /// Wire address, with a prefix of its name.
     Address(&'static str),
@@ -20,11 +20,11 @@ pub enum Item {
     CoilState,
     /// The value of one register.
     Register,
-    /// The masks of function 22.
-    AndMask,
+    /// Name and meaning of one byte, or of two.
+    Byte(&'static str, fn(u8) -> String),
+    Word(&'static str, fn(u16) -> String),
+    /// The bits that function 22 sets, of those that it does not keep.
     OrMask,
-    /// What function 08 does.
-    SubFunction,
     /// The data of function 08: usually two bytes.
     Data,
     /// One byte: how many bytes follow. The next fields are what they hold.
@@ -34,10 +34,6 @@ pub enum Item {
     FifoCount,
     Bits,
     Registers,
-    ExceptionStatus,
-    CommStatus,
-    EventCount,
-    MessageCount,
     Events,
     ServerId,
     /// Groups of reference, file, record and length: without and with the registers of the records.
@@ -47,10 +43,7 @@ pub enum Item {
     FileRecords,
     /// Kind of an encapsulated transport; only 0E, device identification, has a known layout.
     MeiType,
-    ReadCode,
-    ObjectId,
-    Conformity,
-    MoreFollows,
+    /// The object to continue with, if more follow.
     NextObject,
     /// Count of objects, then id, length and text of each.
     Objects,
@@ -58,13 +51,11 @@ pub enum Item {
 
 impl Item {
     /// Bytes that it has at least. What a byte count precedes has none of its own.
-    pub fn size(self) -> usize {
+    pub fn size(&self) -> usize {
         match self {
             Bits | Registers | Events | ServerId | FileRequests | FileWrites | FileRecords => 0,
-            ByteCount | ExceptionStatus | MeiType | ReadCode | ObjectId => 1,
-            Conformity | MoreFollows | NextObject | Objects => 1,
-            Address(_) | Count { .. } | CoilState | Register | AndMask | OrMask | SubFunction | Data => 2,
-            WordCount | FifoCount | CommStatus | EventCount | MessageCount => 2,
+            ByteCount | Byte(..) | MeiType | NextObject | Objects => 1,
+            Address(_) | Count { .. } | CoilState | Register | Word(..) | OrMask | Data | WordCount | FifoCount => 2,
         }
     }
 }
@@ -78,22 +69,19 @@ pub struct Function {
     pub table: Table,
     pub request: &'static [Item],
     pub response: &'static [Item],
+    /// The response is a copy of the request.
+    pub echoes: bool,
 }
 
 impl Function {
-    /// Is the response a copy of the request?
-    pub fn echoes(&self) -> bool {
-        self.request == self.response && !self.request.is_empty()
-    }
-
     /// Does the response begin with four bytes of the request?
     pub(super) fn repeats_start(&self) -> bool {
-        matches!(self.response, [Address(_) | SubFunction, ..])
+        self.code == 0x08 || matches!(self.response, [Address(_), ..])
     }
 
     /// Does it change values, so that it may be sent to all units at once?
     pub fn writes(&self) -> bool {
-        self.repeats_start() && self.code != 0x08 || self.code == 0x15
+        matches!(self.code, 0x05 | 0x06 | 0x0F | 0x10 | 0x15 | 0x16)
     }
 }
 
@@ -108,12 +96,14 @@ const READ_BITS: &[Item] = &[Address(""), count("to read", 2000)];
 const READ_REGISTERS: &[Item] = &[Address(""), count("to read", 125)];
 const BITS: &[Item] = &[ByteCount, Bits];
 const REGISTERS: &[Item] = &[ByteCount, Registers];
-const WRITE_COIL: &[Item] = &[Address(""), CoilState];
-const WRITE_REGISTER: &[Item] = &[Address(""), Register];
 const WRITTEN: &[Item] = &[Address(""), count("written", u16::MAX)];
-const DIAGNOSTICS: &[Item] = &[SubFunction, Data];
-const MASK_WRITE: &[Item] = &[Address(""), AndMask, OrMask];
-const WRITE_FILES: &[Item] = &[ByteCount, FileWrites];
+const DIAGNOSTICS: &[Item] =
+    &[Word("sub-function", |code| format!("{code} / 0x{code:04X} {}", names::diagnostic(code))), Data];
+const MASK_WRITE: &[Item] = &[Address(""), Word("AND mask", |mask| format!("keeps the bits of {mask:016b}")), OrMask];
+const STATUS: Item = Byte("status", |status| format!("{status:08b}, highest first: the device says what they mean"));
+const COMM_STATUS: Item = Word("status", |status| names::comm_status(status).to_owned());
+const EVENT_COUNT: Item = Word("event count", |count| format!("{} done", counted(count.into(), "message")));
+const MESSAGE_COUNT: Item = Word("message count", |count| format!("{} seen", counted(count.into(), "message")));
 const READ_WRITE: &[Item] = &[
     Address("read "),
     Count { prefix: "read ", verb: "to read", most: 125 },
@@ -122,8 +112,19 @@ const READ_WRITE: &[Item] = &[
     ByteCount,
     Registers,
 ];
-const EVENT_LOG: &[Item] = &[ByteCount, CommStatus, EventCount, MessageCount, Events];
-const IDENTIFICATION: &[Item] = &[MeiType, ReadCode, Conformity, MoreFollows, NextObject, Objects];
+const READ_CODE: Item = Byte("read code", |code| format!("{code} {}", names::identification(code)));
+const IDENTIFY: &[Item] = &[MeiType, READ_CODE, Byte("object", |id| format!("from {id} {}", names::object(id)))];
+const IDENTIFICATION: &[Item] = &[
+    MeiType,
+    READ_CODE,
+    Byte("conformity", |level| {
+        let one_by_one = if level & 0x80 == 0 { "as a list only" } else { "as a list and one by one" };
+        format!("{}, {one_by_one}", names::identification(level & 0x7F))
+    }),
+    Byte("more follows", |more| if more == 0 { "no" } else { "yes" }.into()),
+    NextObject,
+    Objects,
+];
 
 #[rustfmt::skip]
 const FUNCTIONS: &[Function] = &[
@@ -131,21 +132,21 @@ const FUNCTIONS: &[Function] = &[
     row(0x02, "read discrete inputs", Table::Discrete, READ_BITS, BITS),
     row(0x03, "read holding registers", Table::Holding, READ_REGISTERS, REGISTERS),
     row(0x04, "read input registers", Table::Input, READ_REGISTERS, REGISTERS),
-    row(0x05, "write single coil", Table::Coil, WRITE_COIL, WRITE_COIL),
-    row(0x06, "write single register", Table::Holding, WRITE_REGISTER, WRITE_REGISTER),
-    row(0x07, "read exception status", Table::Holding, &[], &[ExceptionStatus]),
-    row(0x08, "diagnostics", Table::Holding, DIAGNOSTICS, DIAGNOSTICS),
-    row(0x0B, "get comm event counter", Table::Holding, &[], &[CommStatus, EventCount]),
-    row(0x0C, "get comm event log", Table::Holding, &[], EVENT_LOG),
+    echo(0x05, "write single coil", Table::Coil, &[Address(""), CoilState]),
+    echo(0x06, "write single register", Table::Holding, &[Address(""), Register]),
+    row(0x07, "read exception status", Table::Holding, &[], &[STATUS]),
+    echo(0x08, "diagnostics", Table::Holding, DIAGNOSTICS),
+    row(0x0B, "get comm event counter", Table::Holding, &[], &[COMM_STATUS, EVENT_COUNT]),
+    row(0x0C, "get comm event log", Table::Holding, &[], &[ByteCount, COMM_STATUS, EVENT_COUNT, MESSAGE_COUNT, Events]),
     row(0x0F, "write multiple coils", Table::Coil, &[Address(""), count("to write", 1968), ByteCount, Bits], WRITTEN),
     row(0x10, "write multiple registers", Table::Holding, &[Address(""), count("to write", 123), ByteCount, Registers], WRITTEN),
     row(0x11, "report server id", Table::Holding, &[], &[ByteCount, ServerId]),
     row(0x14, "read file record", Table::Holding, &[ByteCount, FileRequests], &[ByteCount, FileRecords]),
-    row(0x15, "write file record", Table::Holding, WRITE_FILES, WRITE_FILES),
-    row(0x16, "mask write register", Table::Holding, MASK_WRITE, MASK_WRITE),
+    echo(0x15, "write file record", Table::Holding, &[ByteCount, FileWrites]),
+    echo(0x16, "mask write register", Table::Holding, MASK_WRITE),
     row(0x17, "read/write multiple registers", Table::Holding, READ_WRITE, REGISTERS),
     row(0x18, "read FIFO queue", Table::Holding, &[Address("FIFO ")], &[WordCount, FifoCount, Registers]),
-    row(0x2B, "encapsulated interface transport", Table::Holding, &[MeiType, ReadCode, ObjectId], IDENTIFICATION),
+    row(0x2B, "encapsulated interface transport", Table::Holding, IDENTIFY, IDENTIFICATION),
 ];
 
 const fn row(
@@ -155,7 +156,11 @@ const fn row(
     request: &'static [Item],
     response: &'static [Item],
 ) -> Function {
-    Function { code, name, table, request, response }
+    Function { code, name, table, request, response, echoes: false }
+}
+
+const fn echo(code: u8, name: &'static str, table: Table, items: &'static [Item]) -> Function {
+    Function { echoes: true, ..row(code, name, table, items, items) }
 }
 
 /// The row of a function; `None` for one that the standard does not know, and for an exception.
@@ -198,7 +203,7 @@ pub fn response_length(received: &[u8]) -> Length {
 fn length(received: &[u8], items: impl Fn(&'static Function) -> &'static [Item]) -> Length {
     let Some(code) = received.get(1) else { return Length::TooEarly };
     let Some(function) = function(*code) else { return Length::BySilence };
-    if items(function).first() == Some(&MeiType) && received.get(2).is_some_and(|mei| *mei != MEI_IDENTIFICATION) {
+    if matches!(items(function), [MeiType, ..]) && received.get(2).is_some_and(|mei| *mei != MEI_IDENTIFICATION) {
         return Length::BySilence;
     }
     measure(received, items(function)).map_or(Length::TooEarly, Length::Known)

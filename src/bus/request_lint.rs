@@ -107,7 +107,7 @@ fn expected_length(row: &pdu::Function, message: &[u8]) -> Option<usize> {
         // Function 08 takes any data.
         Length::Known(_) if message.get(1) == Some(&0x08) => None,
         Length::Known(length) => Some(length),
-        Length::TooEarly => Some(2 + row.request.iter().map(|item| item.size()).sum::<usize>()),
+        Length::TooEarly => Some(2 + row.request.iter().map(Item::size).sum::<usize>()),
         Length::BySilence => None,
     }
 }

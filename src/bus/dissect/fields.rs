@@ -90,13 +90,11 @@ impl<'r, 'a> Fields<'r, 'a> {
             Item::Register => {
                 self.values.registers = self.reader.registers(function, self.start, 1)?;
             }
-            Item::AndMask => self.number("AND mask", |mask| format!("keeps the bits of {mask:016b}"))?,
+            Item::Byte(name, label) => self.values.numbers.push(self.reader.byte(name, label)?.into()),
+            Item::Word(name, label) => self.number(name, label)?,
             Item::OrMask => {
                 let and = self.values.numbers.last().copied().unwrap_or_default();
                 self.number("OR mask", |mask| format!("sets {:016b} of the others", mask & !and))?;
-            }
-            Item::SubFunction => {
-                self.number("sub-function", |code| format!("{code} / 0x{code:04X} {}", names::diagnostic(code)))?;
             }
             Item::Data => self.data()?,
             Item::Bits => {
@@ -118,17 +116,6 @@ impl<'r, 'a> Fields<'r, 'a> {
                 }
                 (self.start, self.bytes) = (None, 2 * count);
             }
-            Item::ExceptionStatus => {
-                let label = |status| format!("{status:08b}, highest first: the device says what they mean");
-                self.values.numbers.push(self.reader.byte("status", label)?.into());
-            }
-            Item::CommStatus => self.number("status", |status| comm_status(status).to_owned())?,
-            Item::EventCount => {
-                self.number("event count", |count| format!("{} done", counted(count.into(), "message")))?
-            }
-            Item::MessageCount => {
-                self.number("message count", |count| format!("{} seen", counted(count.into(), "message")))?;
-            }
             Item::Events => {
                 if self.bytes < 6 {
                     self.reader.wrong(format!("byte count says {}, expected 6 or more", self.bytes));
@@ -142,24 +129,6 @@ impl<'r, 'a> Fields<'r, 'a> {
                 self.values.parts.push(text(id));
             }
             Item::FileRequests | Item::FileWrites | Item::FileRecords => self.groups(item)?,
-            Item::ReadCode => {
-                let label = |code| format!("{code} {}", names::identification(code));
-                self.values.numbers.push(self.reader.byte("read code", label)?.into());
-            }
-            Item::ObjectId => {
-                let id = self.reader.byte("object", |id| format!("from {id} {}", names::object(id)))?;
-                self.values.numbers.push(id.into());
-            }
-            Item::Conformity => {
-                self.reader.byte("conformity", |level| {
-                    let one_by_one = if level & 0x80 == 0 { "as a list only" } else { "as a list and one by one" };
-                    format!("{}, {one_by_one}", names::identification(level & 0x7F))
-                })?;
-            }
-            Item::MoreFollows => {
-                let more = self.reader.byte("more follows", |more| if more == 0 { "no" } else { "yes" }.into())?;
-                self.values.numbers.push(more.into());
-            }
             Item::NextObject => {
                 let more = self.values.numbers.last() != Some(&0);
                 self.reader.byte("next object", |id| match more {
@@ -184,14 +153,14 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn byte_count(&mut self, next: Option<Item>) -> Option<()> {
         self.bytes = usize::from(self.reader.byte("byte count", follow)?);
         let bytes = self.bytes;
-        let expected = match (next, self.count.map(usize::from)) {
+        let expected = match (&next, self.count.map(usize::from)) {
             (Some(Item::Bits), Some(count)) => count.div_ceil(8),
             (Some(Item::Registers), Some(count)) if self.counts => 2 * count,
             _ => bytes,
         };
         if bytes != expected {
             self.reader.wrong(format!("byte count says {bytes}, {expected} fit"));
-        } else if next == Some(Item::Registers) && bytes % 2 == 1 {
+        } else if matches!(next, Some(Item::Registers)) && bytes % 2 == 1 {
             self.reader.wrong(format!("byte count {bytes} is odd, registers have two bytes"));
         }
         Some(())
@@ -222,8 +191,11 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn groups(&mut self, item: Item) -> Option<()> {
         let end = self.reader.at + self.bytes;
         while self.reader.at < end {
-            let group = if item == Item::FileRecords { self.file_record() } else { self.file_group(item) }?;
-            self.values.parts.push(group);
+            let group = match item {
+                Item::FileRecords => self.file_record(),
+                _ => self.file_group(matches!(item, Item::FileWrites)),
+            };
+            self.values.parts.push(group?);
         }
         Some(())
     }
@@ -236,12 +208,12 @@ impl<'r, 'a> Fields<'r, 'a> {
     }
 
     /// Reference type, file, record and length; and the registers to write.
-    fn file_group(&mut self, item: Item) -> Option<String> {
+    fn file_group(&mut self, with_data: bool) -> Option<String> {
         self.reference()?;
         let file = self.reader.word("file", |file| format!("file {file}"))?;
         let record = self.reader.word("record", |record| format!("from record {record}"))?;
         let length = self.reader.word("length", |length| counted(length.into(), "register"))?;
-        let registers = if item == Item::FileWrites { usize::from(length) } else { 0 };
+        let registers = if with_data { usize::from(length) } else { 0 };
         let data = hex_words(&self.reader.registers(0x03, None, registers)?);
         let data = if data.is_empty() { String::new() } else { format!(": {data}") };
         Some(format!("file {file} record {record}, {}{data}", counted(length.into(), "register")))
@@ -273,15 +245,6 @@ pub(super) fn coil_state(value: u16) -> Option<&'static str> {
         0x0000 => Some("off"),
         0xFF00 => Some("on"),
         _ => None,
-    }
-}
-
-/// The status of functions 0B and 0C.
-pub(super) fn comm_status(status: u16) -> &'static str {
-    match status {
-        0x0000 => "ready",
-        0xFFFF => "busy",
-        _ => "unknown status",
     }
 }
 

@@ -168,9 +168,7 @@ impl Readings {
         let mbap = envelope.framing == Some(Framing::Mbap);
         let same = match message.get(1) {
             Some(code @ 0..=0x7F) => match pdu::function(*code) {
-                Some(function) if function.echoes() => {
-                    Some("the answer repeats the request: these bytes may be either")
-                }
+                Some(function) if function.echoes => Some("the answer repeats the request: these bytes may be either"),
                 Some(_) => None,
                 None => Some("the standard has no such function: request and answer cannot be told apart"),
             },

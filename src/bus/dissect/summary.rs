@@ -2,13 +2,13 @@
 
 use super::{
     Direction,
-    fields::{Fields, Values, coil_state, comm_status},
+    fields::{Fields, Values, coil_state},
     reader::{Reader, bit_words, hex_words},
 };
 use crate::{
     bus::{
         frame,
-        names::{self, counted, modicon, span},
+        names::{self, comm_status, counted, modicon, span},
         pdu,
     },
     plant::event::ExceptionCode,
@@ -107,7 +107,7 @@ fn of_response(row: &pdu::Function, values: &Values) -> String {
         (0x14, _) => format!("file records {}", values.parts.join(", ")),
         (0x15 | 0x16, _) => format!("done: {}", of_request(row, values)),
         (0x18, [count]) => format!("{count} queued: {registers}"),
-        (0x2B, [_, _]) => values.parts.join(", "),
+        (0x2B, [_, _, _]) => values.parts.join(", "),
         (0x08, _) => of_request(row, values),
         _ => row.name.to_owned(),
     }
