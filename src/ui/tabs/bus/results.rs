@@ -120,7 +120,7 @@ fn came_back(
             && dissect::message_of(sent, framing).is_some_and(|message| message.first() == Some(&0))
     };
     if bytes.is_empty() && matches!(&run.diagnostic, Diagnostic::Send(sent) if to_all(sent)) {
-        return vec![plain("sent to all; nobody answers a broadcast", theme.normal())];
+        return vec![plain("sent to all units; a broadcast has no response", theme.normal())];
     }
     if bytes.is_empty() {
         return vec![plain(format!("✗ nothing came back within {}", ms(at.settings.timeout)), theme.trouble())];

@@ -307,7 +307,7 @@ fn writes_and_broadcasts_are_asked_first() {
         ("01 06 03 EA 00 32", vec![1, 6, 3, 0xEA, 0, 0x32], "This is past all limits of the plant file"),
         ("00 06 03 EA 00 32", vec![0, 6, 3, 0xEA, 0, 0x32], "Every device of the line obeys, none answers."),
         ("01 08 00 01 00 00", vec![1, 8, 0, 1, 0, 0], "This is past all limits"),
-        ("00 03 03 EA 00 01", vec![0, 3, 3, 0xEA, 0, 1], "nobody answers a broadcast"),
+        ("00 03 03 EA 00 01", vec![0, 3, 3, 0xEA, 0, 1], "no unit answers a broadcast"),
     ] {
         let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tt{typed}"));
         let before = screen(&mut model, 80, 24);
