@@ -11,7 +11,7 @@ use crate::{
         names::{self, comm_status, counted, modicon, span},
         pdu,
     },
-    plant::event::ExceptionCode,
+    plant::{event::ExceptionCode, number::to_u8},
 };
 
 /// Reads the fields behind the function code. Gives the summary, without the unit; `None` if the message is cut short.
@@ -70,7 +70,7 @@ fn of_request(row: &pdu::Function, values: &Values) -> String {
         (0x17, [read, write], _) => format!("read {}, write {}: {registers}", range(code, *read), range(code, *write)),
         (0x18, [(address, _)], _) => format!("read FIFO queue {} (0x{address:04X})", modicon(code, *address)),
         (0x2B, _, &[code, object]) => {
-            let (what, object) = (names::identification(code as u8), names::object(object as u8));
+            let (what, object) = (names::identification(to_u8(code)), names::object(to_u8(object)));
             format!("read device identification, {what} from {object}")
         }
         _ => row.name.to_owned(),
