@@ -11,7 +11,7 @@
 
 use crate::plant::{
     number::{to_f32, to_i64, to_u16, to_u64},
-    tag::{ByteOrder, DataType, Point},
+    tag::{ByteOrder, DataType, Encoding, Point},
     visible::is_printable,
 };
 
@@ -25,19 +25,15 @@ pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
     if let Some((low, width)) = point.field {
         return Some(((bits >> low) & mask(width)) as f64);
     }
-    match point.kind {
-        DataType::Bool => Some(f64::from(u8::from(bits != 0))),
-        DataType::I16 => Some(f64::from((bits as u16).cast_signed())),
-        DataType::U16 => Some(f64::from(bits as u16)),
-        DataType::I32 => Some(f64::from((bits as u32).cast_signed())),
-        DataType::U32 => Some(f64::from(bits as u32)),
-        DataType::I64 => Some(bits.cast_signed() as f64),
-        DataType::U64 => Some(bits as f64),
-        DataType::F32 => Some(f64::from(f32::from_bits(bits as u32))).filter(|value| value.is_finite()),
-        DataType::F64 => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
-        DataType::Bcd16 => from_bcd(bits, 4),
-        DataType::Bcd32 => from_bcd(bits, 8),
-        DataType::Text(_) => None,
+    let size = 16 * u32::from(point.kind.registers());
+    match point.kind.encoding() {
+        Encoding::Bit => Some(f64::from(u8::from(bits != 0))),
+        Encoding::Unsigned => Some(bits as f64),
+        Encoding::Signed => Some(((bits << (64 - size)).cast_signed() >> (64 - size)) as f64),
+        Encoding::Float if size == 32 => Some(f64::from(f32::from_bits(bits as u32))).filter(|value| value.is_finite()),
+        Encoding::Float => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
+        Encoding::Bcd => from_bcd(bits, size / 4),
+        Encoding::Text => None,
     }
 }
 
@@ -78,22 +74,19 @@ pub fn encode(point: Point, value: f64) -> Option<Vec<u16>> {
     if point.field.is_some() || !value.is_finite() {
         return None;
     }
-    let whole = |low: f64, high: f64| {
-        (value.fract() == 0.0 && low <= value && value <= high).then(|| to_i64(value).cast_unsigned())
+    let whole = || {
+        let (low, high) = point.kind.whole_range()?;
+        let fits = value.fract() == 0.0 && low.max(-EXACT) <= value && value <= high.min(EXACT);
+        fits.then(|| to_i64(value).cast_unsigned())
     };
-    let bits = match point.kind {
-        DataType::Bool => whole(0.0, 1.0)?,
-        DataType::I16 => whole(f64::from(i16::MIN), f64::from(i16::MAX))?,
-        DataType::U16 => whole(0.0, f64::from(u16::MAX))?,
-        DataType::I32 => whole(f64::from(i32::MIN), f64::from(i32::MAX))?,
-        DataType::U32 => whole(0.0, f64::from(u32::MAX))?,
-        DataType::I64 => whole(-EXACT, EXACT)?,
-        DataType::U64 => whole(0.0, EXACT)?,
-        DataType::F32 => u64::from(Some(to_f32(value)).filter(|value| value.is_finite())?.to_bits()),
-        DataType::F64 => value.to_bits(),
-        DataType::Bcd16 => to_bcd(whole(0.0, 9_999.0)?),
-        DataType::Bcd32 => to_bcd(whole(0.0, 99_999_999.0)?),
-        DataType::Text(_) => return None,
+    let bits = match point.kind.encoding() {
+        Encoding::Bit | Encoding::Unsigned | Encoding::Signed => whole()?,
+        Encoding::Bcd => to_bcd(whole()?),
+        Encoding::Float if point.kind.registers() == 2 => {
+            u64::from(Some(to_f32(value)).filter(|value| value.is_finite())?.to_bits())
+        }
+        Encoding::Float => value.to_bits(),
+        Encoding::Text => return None,
     };
     let count = usize::from(point.kind.registers()) * 2;
     Some(from_bytes(point.order, &bits.to_be_bytes()[8 - count..]))

@@ -17,6 +17,7 @@ pub mod line;
 pub mod line_check;
 pub mod program;
 pub mod traffic;
+pub mod data_type;
 pub mod def;
 pub mod simulate;
 pub mod tag;

@@ -1,6 +1,6 @@
 //! Raw numbers to values in engineering units and back.
 
-use super::tag::{DataType, TagDef};
+use super::tag::{Encoding, TagDef};
 use crate::plant::number::to_f32;
 
 /// The value of a raw number: `raw · scale · 10^-decimals + offset`. `decimals` are those that the device
@@ -12,20 +12,10 @@ pub fn to_value(tag: &TagDef, raw: f64, decimals: u8) -> f64 {
 /// The raw number to write for a value, rounded to what the type can hold; `None` if it does not fit the type.
 pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
     let exact = (value - tag.offset) / (tag.scale * 10f64.powi(-i32::from(decimals)));
-    let raw = match tag.point.kind {
-        DataType::F32 => f64::from(to_f32(exact)),
-        DataType::F64 => exact,
-        DataType::Bool
-        | DataType::I16
-        | DataType::U16
-        | DataType::I32
-        | DataType::U32
-        | DataType::I64
-        | DataType::U64
-        | DataType::Bcd16
-        | DataType::Bcd32 => exact.round(),
-        // Words are no number.
-        DataType::Text(_) => return None,
+    let raw = match tag.point.kind.encoding() {
+        Encoding::Float => as_held(tag, exact),
+        Encoding::Bit | Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => exact.round(),
+        Encoding::Text => return None,
     };
     let (low, high) = limits(tag);
     (raw.is_finite() && low <= raw && raw <= high).then_some(raw)
@@ -38,21 +28,21 @@ pub fn held(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
 
 /// Do two raw numbers of a tag mean the same stored value?
 pub fn same_raw(tag: &TagDef, one: f64, other: f64) -> bool {
-    match tag.point.kind {
-        DataType::F32 => to_f32(one) == to_f32(other),
+    match tag.point.kind.encoding() {
         // What was lost in scaling forth and back is lost in the value, which an offset makes much larger than the raw number.
-        DataType::F64 => alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0)),
-        DataType::Bool => (one != 0.0) == (other != 0.0),
-        DataType::Text(_) => false,
-        DataType::I16
-        | DataType::U16
-        | DataType::I32
-        | DataType::U32
-        | DataType::I64
-        | DataType::U64
-        | DataType::Bcd16
-        | DataType::Bcd32 => one == other,
+        Encoding::Float if tag.point.kind.registers() == 4 => {
+            alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0))
+        }
+        Encoding::Float => as_held(tag, one) == as_held(tag, other),
+        Encoding::Bit => (one != 0.0) == (other != 0.0),
+        Encoding::Text => false,
+        Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => one == other,
     }
+}
+
+/// A float in the precision of its type.
+fn as_held(tag: &TagDef, exact: f64) -> f64 {
+    if tag.point.kind.registers() == 2 { f64::from(to_f32(exact)) } else { exact }
 }
 
 /// The same number but for what scaling forth and back rounds: within two units in the last place.
@@ -73,20 +63,12 @@ fn limits(tag: &TagDef) -> (f64, f64) {
     }
     // An f64 counts whole numbers up to 2^53; beyond, a 64-bit value would silently become another one.
     let exact = 2f64.powi(53);
-    match tag.point.kind {
-        DataType::Bool => (0.0, 1.0),
-        DataType::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
-        DataType::U16 => (0.0, f64::from(u16::MAX)),
-        DataType::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
-        DataType::U32 => (0.0, f64::from(u32::MAX)),
-        DataType::I64 => (-exact, exact),
-        DataType::U64 => (0.0, exact),
-        DataType::F32 => (f64::from(f32::MIN), f64::from(f32::MAX)),
-        DataType::F64 => (f64::MIN, f64::MAX),
-        DataType::Bcd16 => (0.0, 9_999.0),
-        DataType::Bcd32 => (0.0, 99_999_999.0),
+    match (tag.point.kind.whole_range(), tag.point.kind.encoding(), tag.point.kind.registers()) {
+        (Some((low, high)), ..) => (low.max(-exact), high.min(exact)),
+        (None, Encoding::Float, 2) => (f64::from(f32::MIN), f64::from(f32::MAX)),
+        (None, Encoding::Float, _) => (f64::MIN, f64::MAX),
         // An empty range: nothing is inside.
-        DataType::Text(_) => (0.0, -1.0),
+        (None, ..) => (0.0, -1.0),
     }
 }
 
@@ -99,7 +81,7 @@ fn multiply(raw: f64, factor: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::fixture;
+    use crate::plant::{fixture, tag::DataType};
 
     #[test]
     fn values_come_out_as_a_person_would_write_them() {

@@ -4,6 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
+pub use super::data_type::{DataType, Encoding};
 use super::{
     id::{DeviceId, TagId},
     role::Reauthentication,
@@ -251,49 +252,6 @@ impl Table {
         let number = u32::from(address) + 1;
         if number <= 9_999 { format!("{}{number:04}", self.digit()) } else { format!("{}{number:05}", self.digit()) }
     }
-}
-
-/// Type of a raw value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum DataType {
-    /// One bit of a bit table, or a whole word not zero.
-    Bool,
-    /// 16 bits, two's complement.
-    I16,
-    /// 16 bits.
-    U16,
-    /// 32 bits, two's complement.
-    I32,
-    /// 32 bits.
-    U32,
-    /// 64 bits, two's complement.
-    I64,
-    /// 64 bits.
-    U64,
-    /// IEEE 754 single.
-    F32,
-    /// IEEE 754 double.
-    F64,
-    /// Four decimal digits.
-    Bcd16,
-    /// Eight decimal digits.
-    Bcd32,
-    /// So many bytes of text, two a register. It has no number: see [`super::snapshot::Snapshot::text`].
-    Text(u8),
-}
-
-impl DataType {
-    /// Registers it takes.
-    pub fn registers(self) -> u16 {
-        match self {
-            DataType::Bool | DataType::I16 | DataType::U16 | DataType::Bcd16 => 1,
-            DataType::I32 | DataType::U32 | DataType::F32 | DataType::Bcd32 => 2,
-            DataType::I64 | DataType::U64 | DataType::F64 => 4,
-            DataType::Text(bytes) => u16::from(bytes).div_ceil(2),
-        }
-    }
-    /// Longest text, bytes: what one read of 125 registers holds.
-    pub const TEXT_MAX: u8 = 250;
 }
 
 /// Sequence of the bytes A B C D (A most significant) on the wire.

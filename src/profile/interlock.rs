@@ -8,7 +8,7 @@ use super::{
 };
 use crate::plant::{
     interlock::{ActuatorDef, ControlLogic, InterlockCondition, InterlockDef, SequenceDef, stops},
-    tag::{Access, DataType, Decimals, TagDef},
+    tag::{Access, Decimals, TagDef},
 };
 
 /// All that the plant file says about commands.
@@ -79,12 +79,7 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
 /// The bits that can be told from the value of a tag; none where it is not the raw number, or no binary one.
 pub(super) fn bits_of(of: &TagDef) -> u16 {
     let is_raw = of.scale == 1.0 && of.offset == 0.0 && matches!(of.decimals, Decimals::Fixed(_));
-    let is_binary = match of.point.kind {
-        DataType::I16 | DataType::U16 | DataType::I32 | DataType::U32 | DataType::I64 | DataType::U64 => {
-            !of.point.table.is_bits()
-        }
-        DataType::Bool | DataType::F32 | DataType::F64 | DataType::Bcd16 | DataType::Bcd32 | DataType::Text(_) => false,
-    };
+    let is_binary = of.point.kind.is_binary() && !of.point.table.is_bits();
     match of.point.field {
         _ if !is_raw || !is_binary => 0,
         Some((_, bits)) => u16::from(bits),

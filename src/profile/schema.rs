@@ -587,26 +587,11 @@ impl super::reader::Value for TypeName {
             }
             return count.map(|count| TypeName(DataType::Text(count)));
         }
-        let found = TYPES.iter().find(|(name, _)| *name == word);
+        let found = DataType::NUMBERS.into_iter().find(|kind| kind.name() == word);
         if found.is_none() {
-            let names = TYPES.iter().map(|(name, _)| *name);
+            let names = DataType::NUMBERS.into_iter().map(DataType::name);
             problems.add(at, format!("unknown type `{word}`")).label("not a type").suggest(&word, names);
         }
-        found.map(|(_, kind)| TypeName(*kind))
+        found.map(TypeName)
     }
 }
-
-/// The names of the types, as Telegraf and its kin write them.
-const TYPES: &[(&str, DataType)] = &[
-    ("int16", DataType::I16),
-    ("uint16", DataType::U16),
-    ("int32", DataType::I32),
-    ("uint32", DataType::U32),
-    ("int64", DataType::I64),
-    ("uint64", DataType::U64),
-    ("float32", DataType::F32),
-    ("float64", DataType::F64),
-    ("bcd16", DataType::Bcd16),
-    ("bcd32", DataType::Bcd32),
-    ("bool", DataType::Bool),
-];

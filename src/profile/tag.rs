@@ -13,7 +13,7 @@ use super::{
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
     number::to_u8,
-    tag::{Access, Bound, ByteOrder, Confidence, DataType, Decimals, Point, Poll, PollClass, Table, TagDef},
+    tag::{Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, Table, TagDef},
 };
 
 /// What a tag must know of its device.
@@ -247,8 +247,7 @@ fn bit_field(field: &At<Choice>, kind: DataType, table: Table, problems: &mut Pr
         },
     };
     let size = kind.registers() * 16;
-    let whole = !table.is_bits()
-        && !matches!(kind, DataType::F32 | DataType::F64 | DataType::Bcd16 | DataType::Bcd32 | DataType::Text(_));
+    let whole = !table.is_bits() && (kind.is_binary() || kind == DataType::Bool);
     let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size && whole);
     if valid.is_none() {
         let problem = problems.add(field.at, "this is not a field of bits");
@@ -270,7 +269,7 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
         }
         return decimals.value;
     }
-    if matches!(kind, Some((DataType::F32 | DataType::F64, _))) {
+    if kind.is_some_and(|(kind, _)| kind.encoding() == Encoding::Float) {
         return 2;
     }
     let scale = row.scale.map_or(1.0, |scale| scale.value);
@@ -328,18 +327,7 @@ fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
     if let Some(bits) = field {
         return Some((0.0, 2f64.powi(i32::from(bits)) - 1.0));
     }
-    match kind {
-        DataType::Bool => Some((0.0, 1.0)),
-        DataType::I16 => Some((f64::from(i16::MIN), f64::from(i16::MAX))),
-        DataType::U16 => Some((0.0, f64::from(u16::MAX))),
-        DataType::I32 => Some((f64::from(i32::MIN), f64::from(i32::MAX))),
-        DataType::U32 => Some((0.0, f64::from(u32::MAX))),
-        DataType::I64 => Some((i64::MIN as f64, i64::MAX as f64)),
-        DataType::U64 => Some((0.0, u64::MAX as f64)),
-        DataType::Bcd16 => Some((0.0, 9_999.0)),
-        DataType::Bcd32 => Some((0.0, 99_999_999.0)),
-        DataType::F32 | DataType::F64 | DataType::Text(_) => None,
-    }
+    kind.whole_range()
 }
 
 /// Words have no scale, no limits and no names of numbers, and are neither written nor kept in the history.

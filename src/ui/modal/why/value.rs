@@ -4,7 +4,6 @@ use super::{
     Row,
     facts::{row, span, words},
     service::line_words,
-    wire::kind,
 };
 use crate::{
     bus::{
@@ -156,7 +155,7 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     let hex = found.map(|found| found.words.iter().map(|word| format!(" {word:04X}")).collect::<String>());
     let Some(raw) = from_answer.or(shown) else {
         return match hex {
-            Some(hex) => format!("none:{hex} is no {}", kind(def.point.kind)),
+            Some(hex) => format!("none:{hex} is no {}", def.point.kind),
             None => "none".to_owned(),
         };
     };

@@ -12,7 +12,7 @@ use crate::{
     plant::{
         def::DeviceDef,
         event::LineState,
-        tag::{Access, ByteOrder, DataType, Poll, TagDef},
+        tag::{Access, ByteOrder, Poll, TagDef},
         traffic::Exchange,
     },
     ui::{
@@ -121,7 +121,7 @@ pub(super) fn point(def: &TagDef) -> String {
         (true, _) => "one bit".to_owned(),
         (false, Some((low, 1))) => format!("bit {low} of a word"),
         (false, Some((low, bits))) => format!("bits {low}–{} of a word", low + bits - 1),
-        (false, None) => kind(point.kind),
+        (false, None) => point.kind.to_string(),
     };
     let order = match (point.table.is_bits(), point.order) {
         (true, _) => "",
@@ -135,23 +135,4 @@ pub(super) fn point(def: &TagDef) -> String {
     };
     let address = point.address;
     format!("{function}  {} / 0x{address:04X}  {what}{order}", point.table.modicon(address))
-}
-
-/// The word of a type in the profiles.
-pub(super) fn kind(kind: DataType) -> String {
-    let word = match kind {
-        DataType::Text(bytes) => return format!("string({bytes})"),
-        DataType::Bool => "bool",
-        DataType::I16 => "int16",
-        DataType::U16 => "uint16",
-        DataType::I32 => "int32",
-        DataType::U32 => "uint32",
-        DataType::I64 => "int64",
-        DataType::U64 => "uint64",
-        DataType::F32 => "float32",
-        DataType::F64 => "float64",
-        DataType::Bcd16 => "bcd16",
-        DataType::Bcd32 => "bcd32",
-    };
-    word.to_owned()
 }
