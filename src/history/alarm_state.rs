@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn a_file_of_a_later_version_and_no_file_at_all_are_not_read_as_no_alarms() {
         assert!(parse(b"").is_err_and(|why| why.contains("line 1")));
-        assert!(parse(b"sightglass alarm state 2\n").is_err_and(|why| why.contains("line 1")));
+        assert!(parse(b"sightglass alarm state 3\n").is_err_and(|why| why.contains("line 1")));
         assert!(parse(HEADER.as_bytes()).unwrap().is_empty());
     }
 }

@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn what_an_operator_would_have_to_guess_is_named_with_its_place() {
         let bare = format!("[[alarm]]\n{HOT}\n");
-        check(&bare, &["small.toml:30:8: the alarm `hot` of D1.T has no `cause`, `effect`, `action`, `response_time`"]);
+        check(&bare, &["small.toml:30:11: the alarm `hot` of D1.T has no `cause`, `effect`, `action`, `response_time`"]);
         check(&alarm(HOT).replace("stop it", " "), &["has no `action` (not complete; an alarm that nobody can do"]);
         check(&alarm(HOT).replace("response_time = \"10min\"\n", ""), &["has no `response_time`"]);
     }

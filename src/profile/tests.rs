@@ -476,7 +476,7 @@ fn the_alarm_of_an_overloaded_line_may_be_written() {
 #[test]
 fn two_alarms_of_one_name_would_share_their_state_and_are_refused() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\nmessage = \"hot\"\n[mimic]";
-    check("[mimic]", second, &["[small.toml:36:8]", "duplicate alarm `hot` of D1.T", "first here"]);
+    check("[mimic]", second, &["[small.toml:36:11]", "duplicate alarm `hot` of D1.T", "first here"]);
     let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\nmessage = \"not responding\"\n[mimic]";
     check("[mimic]", own, &["duplicate alarm `not responding` of D1", "expected another text"]);
 }
@@ -761,7 +761,7 @@ fn characters_that_hide_or_move_the_cursor_are_refused_where_they_stand() {
         assert!(!text.contains(['\u{1b}', '\u{202E}', '\u{2066}']), "{text:?}");
     }
     check("priority = \"high\"", "priority = \"high\"\n\"a\\u0007\" = 1", &["[small.toml:", "U+0007"]);
-    check("message = \"hot\"", "message = \"hot\\u200f\"", &["[small.toml:29:8]", "U+200F"]);
+    check("message = \"hot\"", "message = \"hot\\u200f\"", &["[small.toml:29:11]", "U+200F"]);
     let meter = METER.replace("ACME", "AC\\u009BME");
     let text = load(PLANT.as_bytes(), &meter, PLC).expect_err("a profile too").to_string();
     assert!(text.contains("U+009B") && text.contains("[meter.toml:1:10]"), "{text}");
