@@ -187,7 +187,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// `150.1 ms`, rounded up: what is told is never less than what is.
+/// `150.1 ms`, rounded up, never down.
 fn ms(span: Duration) -> String {
     let tenths = span.as_micros().div_ceil(100);
     if tenths.is_multiple_of(10) {

@@ -107,7 +107,7 @@ pub struct Scan {
     pub first: u8,
     /// Last unit address.
     pub last: u8,
-    /// Serial parameters to try; empty for those that the line has. While others are tried the line polls nobody.
+    /// Serial parameters to try; empty for those that the line has. While others are tried the line polls no device.
     pub serials: Vec<Serial>,
     /// How long an answer may take.
     pub timeout: Duration,

@@ -186,7 +186,7 @@ pub enum Fault {
     #[error("echo of the write differs from the request")]
     WrongEcho,
     /// Unsolicited frames came: the answer may be one of them.
-    #[error("frames that were not asked for: answers cannot be trusted")]
+    #[error("unsolicited frames: responses are not reliable")]
     OutOfSync,
     /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).
     #[error("the registers hold no number of this type")]
@@ -275,7 +275,7 @@ pub enum LineState {
     },
     /// Closed by an operator.
     Disconnected,
-    /// An operator's test has the line for itself: nobody is polled.
+    /// An operator's test has the line for itself: no device is polled.
     Testing,
 }
 
@@ -305,7 +305,7 @@ pub struct LineCounters {
     pub corrupt: u64,
     /// Exception answers.
     pub exceptions: u64,
-    /// Frames or bytes that nobody had asked for any more.
+    /// Unsolicited frames or bytes.
     pub stale: u64,
     /// Of these, answers to requests that had been given up.
     pub late: u64,

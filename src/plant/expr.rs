@@ -42,7 +42,7 @@ pub enum Compare {
 }
 
 impl Expr {
-    /// Whether it is true; `None` if that cannot be told from the tags that are known. `value` gives the trusted value of a
+    /// Whether it is true; `None` if the known tags do not decide it. `value` gives the good value of a
     /// tag.
     pub fn holds(&self, value: &impl Fn(TagId) -> Option<f64>) -> Option<bool> {
         match self {

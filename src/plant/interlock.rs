@@ -17,7 +17,7 @@ use super::{
 pub struct ControlLogic {
     /// What keeps a command from acting.
     pub interlocks: Vec<InterlockDef>,
-    /// What is commanded, and how it tells that it obeys.
+    /// What is commanded, and which output confirms it.
     pub actuators: Vec<ActuatorDef>,
     /// Sequences that are started and stopped.
     pub sequences: Vec<SequenceDef>,
@@ -36,7 +36,7 @@ pub struct InterlockDef {
     pub when: InterlockCondition,
     /// `no heating below 5 cm of water`.
     pub message: String,
-    /// The station refuses the command while it is certainly blocked; else the operator is only told.
+    /// The station refuses the command while it is certainly blocked; else it only warns the operator.
     pub refuse: bool,
 }
 
@@ -60,7 +60,7 @@ pub enum InterlockStatus {
     Free,
     /// It blocks.
     Blocked,
-    /// Nobody can tell: the tag that decides is not good.
+    /// Unknown: the tag that decides is not good.
     Unknown(Cause),
 }
 
@@ -80,10 +80,10 @@ impl InterlockDef {
     }
 }
 
-/// A valve, pump, agitator or heater: its command, and the output that tells what it does.
+/// A valve, pump, agitator or heater: its command, and the output that shows what it does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActuatorDef {
-    /// What tells its state. Zero is off.
+    /// Its state; 0 is off.
     pub output: TagId,
     /// What commands it by hand.
     pub command: TagId,
@@ -126,7 +126,7 @@ impl ControlLogic {
         self.actuators.iter().enumerate().find(|(_, actuator)| actuator.output == tag || actuator.command == tag)
     }
 
-    /// Is the actuator in this place certainly not doing what it is certainly told to do?
+    /// Does the actuator certainly not follow its command?
     fn differs(&self, actuator: &ActuatorDef, sample: &impl Fn(TagId) -> Sample) -> bool {
         let (Some(command), Some(output)) =
             (sample(actuator.command).good_value(), sample(actuator.output).good_value())
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn an_actuator_that_obeys_again_starts_anew() {
+    fn an_actuator_that_obeys_again_starts_over() {
         let (logic, mut watch) = (logic(true), ActuatorTracker::default());
         for (second, output, expect) in [(0, 0.0, None), (5, 0.0, Some(5)), (6, 1.0, None), (7, 0.0, None)] {
             let sample = |tag: TagId| [good(0.0), good(1.0), good(output), good(9.0)][tag.index()];

@@ -205,7 +205,7 @@ impl Parity {
 /// Who switches the direction of an RS-485 driver on a serial port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Rs485 {
-    /// Nobody needs to: RS-232, or an adapter that does it itself.
+    /// None: RS-232, or an adapter that does it itself.
     #[default]
     Off,
     /// The kernel, by RTS high while sending.

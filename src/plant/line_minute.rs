@@ -50,7 +50,7 @@ impl LineMinute {
     }
 }
 
-/// The minute that ends `at`, from the totals before and after it. Counters that have begun anew count from zero.
+/// The minute that ends `at`, from the totals before and after it. Counters that were reset count from zero.
 pub fn minute(line: Arc<str>, before: &LineReport, after: &LineReport, at: Timestamp) -> LineMinute {
     let (old, new) = (&before.counters, &after.counters);
     let anew = new.requests < old.requests || new.sent_bytes < old.sent_bytes;
@@ -93,7 +93,7 @@ fn since(stats: &RequestStats, before: Option<&RequestStats>) -> RequestStats {
     before.map_or_else(|| stats.clone(), |before| stats.since(before))
 }
 
-/// Earlier reports of a line, to tell what was counted since.
+/// Earlier reports of a line, to count the difference.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct LineWatch {
     /// The running minute, and the totals at its beginning.
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn counters_that_begin_anew_count_from_zero() {
+    fn counters_that_were_reset_count_from_zero() {
         let minute = minute("L1".into(), &report(1_000, 400, 9), &report(20, 10, 1), at(60));
         assert_eq!((minute.requests, minute.ok, minute.timeouts), (21, 20, 1));
         assert!(minute.reply_max_ms.is_some_and(|ms| ms < 12.1), "{:?}", minute.reply_max_ms);

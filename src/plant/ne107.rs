@@ -15,7 +15,7 @@ use super::{
 pub enum Signal {
     /// Its values are not valid.
     Failure,
-    /// Its values are not valid for the moment, because somebody works on it.
+    /// Its values are not valid for the moment, because it is being worked on.
     FunctionCheck,
     /// It works outside of what it is meant for: values are late or missing now and then.
     OutOfSpecification,
@@ -119,7 +119,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// What the judgement stands on.
+/// What a diagnosis is made from.
 #[derive(Debug, Clone, Copy)]
 pub struct DiagnosisInput<'a> {
     /// The device.
@@ -153,7 +153,7 @@ pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
         LineState::Waiting { .. } => return Some(Reason::NotConnected),
         LineState::Connecting | LineState::Connected => {}
     }
-    // A device that was told to be busy is not one that has failed.
+    // A device that is busy with a command has not failed.
     if input.settling {
         return Some(Reason::Settling);
     }

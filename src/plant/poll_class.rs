@@ -1,4 +1,4 @@
-//! Which tags are alarm inputs, which process values and which identification, as far as the plant itself tells.
+//! Which tags are alarm inputs, which process values and which identification, as far as the plant file shows.
 
 use super::{
     def::{AlarmDef, Subject},
@@ -6,7 +6,7 @@ use super::{
     tag::{Poll, PollClass, TagDef},
 };
 
-/// The class of each tag, by [`TagId`]: critical if an alarm watches it, compares with it or needs it to judge such a tag; background
+/// The class of each tag, by [`TagId`]: critical if an alarm watches it, compares with it or needs it for such a tag; background
 /// if it is read once; else normal. What is `written` for a tag in a file stands above all that.
 pub fn classes(tags: &[TagDef], alarms: &[AlarmDef], written: &[Option<PollClass>]) -> Vec<PollClass> {
     let mut critical = vec![false; tags.len()];
@@ -60,7 +60,7 @@ mod tests {
         def.tags[RUN.index()].poll = Poll::Once;
         assert_eq!(of(&def, &[], RUN), PollClass::Background);
         def.tags[DP.index()].poll = Poll::Once;
-        assert_eq!(of(&def, &[], DP), PollClass::Critical, "read once, but nothing can be judged without it");
+        assert_eq!(of(&def, &[], DP), PollClass::Critical, "read once, but nothing can be evaluated without it");
         assert_eq!(of(&def, &[Some(PollClass::Normal)], PV), PollClass::Normal, "the engineer knows better");
     }
 }

@@ -1,4 +1,4 @@
-//! The values of all tags: raw answers become samples, doubts and ages take their trust away, changes are stored.
+//! The values of all tags: raw responses become samples, faults and age make them uncertain, changes are stored.
 
 use std::{sync::Arc, time::Duration};
 
@@ -23,7 +23,7 @@ pub const STORE_EVERY: Duration = Duration::from_secs(60);
 
 /// More decimals than any device announces.
 const DECIMALS_MAX: f64 = 6.0;
-/// A value that is never read by itself is doubted after this time.
+/// A value that is never polled becomes uncertain after this time.
 const NEVER_READ_AGAIN: Duration = Duration::from_secs(60);
 
 /// What is known of every tag.
@@ -45,12 +45,12 @@ pub struct ProcessImage {
     dependents: Vec<Vec<TagId>>,
 }
 
-/// A raw number, when it was read, and what has made it doubtful since.
+/// A raw number, when it was read, and what has made it uncertain since.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
     raw: f64,
     at: Timestamp,
-    doubt: Option<Cause>,
+    uncertain: Option<Cause>,
 }
 
 impl ProcessImage {
@@ -89,14 +89,14 @@ impl ProcessImage {
     /// Takes the raw numbers of one answer. A fault word or decimals among them count for their dependents at once.
     pub fn read(&mut self, values: &[(TagId, f64)], at: Timestamp) {
         for (tag, raw) in values {
-            self.raw[tag.index()] = Some(Reading { raw: *raw, at, doubt: None });
+            self.raw[tag.index()] = Some(Reading { raw: *raw, at, uncertain: None });
         }
         for (tag, _) in values {
-            self.settle(*tag);
+            self.recompute_sample(*tag);
         }
         for (tag, _) in values {
             for dependent in self.dependents[tag.index()].clone() {
-                self.settle(dependent);
+                self.recompute_sample(dependent);
             }
         }
     }
@@ -119,19 +119,19 @@ impl ProcessImage {
     /// A request for these tags failed: they lose trust, and at once their value where the fault says that there is none.
     pub fn failed(&mut self, tags: &[TagId], fault: Fault, at: Timestamp) {
         for tag in tags {
-            match judge(fault) {
-                // The last value of a device that is known to be gone is not doubtful but past.
-                // The reading is doubted all the same: what has made it bad may go before it is read again.
-                Verdict::Doubt(cause) if self.sample(*tag).quality == Quality::Bad(Cause::NotRead) => {
+            match effect_of(fault) {
+                // The last value of a device that is down is bad, not uncertain. The reading is marked all the same:
+                // what has made it bad may go before it is read again.
+                FaultEffect::Uncertain(cause) if self.sample(*tag).quality == Quality::Bad(Cause::NotRead) => {
                     self.set(*tag, Sample::bad(cause, at));
                 }
-                Verdict::Doubt(cause) if self.sample(*tag).quality.is_bad() => {
+                FaultEffect::Uncertain(cause) if self.sample(*tag).quality.is_bad() => {
                     if let Some(reading) = &mut self.raw[tag.index()] {
-                        reading.doubt = Some(cause);
+                        reading.uncertain = Some(cause);
                     }
                 }
-                Verdict::Doubt(cause) => self.doubt(*tag, cause),
-                Verdict::Gone(cause) => self.drop_value(*tag, cause, at),
+                FaultEffect::Uncertain(cause) => self.mark_uncertain(*tag, cause),
+                FaultEffect::Gone(cause) => self.drop_value(*tag, cause, at),
             }
         }
     }
@@ -168,13 +168,13 @@ impl ProcessImage {
             } else if period * PERIODS_BAD < age {
                 self.drop_value(tag.id, Cause::Stale, at);
             } else if period * PERIODS_UNCERTAIN < age && sample.quality.is_good() {
-                self.doubt(tag.id, Cause::Stale);
+                self.mark_uncertain(tag.id, Cause::Stale);
             }
         }
     }
 
     /// The records due at `at`: changes beyond the deadband, changes of quality, and unchanged values once a minute.
-    /// Doubts are stored with the time at which they arose, not with the time of the value that they doubt.
+    /// A loss of quality is stored with the time at which it arose, not with the time of the value.
     pub fn records(&mut self, at: Timestamp) -> Vec<Record> {
         let mut records = Vec::new();
         let mut touched = std::mem::take(&mut self.touched);
@@ -232,17 +232,17 @@ impl ProcessImage {
         self.raw[tag.index()].map(|reading| reading.raw)
     }
 
-    fn doubt(&mut self, tag: TagId, cause: Cause) {
+    fn mark_uncertain(&mut self, tag: TagId, cause: Cause) {
         if let Some(reading) = &mut self.raw[tag.index()] {
-            reading.doubt = Some(cause);
+            reading.uncertain = Some(cause);
         }
         let sample = self.sample(tag);
         // A text is kept beside the sample, which has no number to show for it.
-        let doubted = match self.texts[tag.index()] {
+        let uncertain = match self.texts[tag.index()] {
             Some(_) => Sample { quality: Quality::Uncertain(cause), ..sample },
             None => sample.uncertain(cause),
         };
-        self.set(tag, doubted);
+        self.set(tag, uncertain);
     }
 
     fn drop_value(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
@@ -261,10 +261,10 @@ impl ProcessImage {
         self.touched.push(tag);
     }
 
-    /// Makes the sample of a tag from its reading and all that it depends on. A doubt stays until the tag itself is
-    /// read again: nobody else's answer revives it.
-    fn settle(&mut self, tag: TagId) {
-        let Some(Reading { raw, at, doubt }) = self.raw[tag.index()] else { return };
+    /// Makes the sample of a tag from its reading and all that it depends on. It stays uncertain until the tag itself
+    /// is read again.
+    fn recompute_sample(&mut self, tag: TagId) {
+        let Some(Reading { raw, at, uncertain }) = self.raw[tag.index()] else { return };
         let def = self.def.clone();
         let tag = def.tag(tag);
         if let Some(decimals) = self.scaling_decimals(tag) {
@@ -286,7 +286,7 @@ impl ProcessImage {
                 None => sample.uncertain(word.quality.cause().unwrap_or(Cause::NotRead)),
             },
         };
-        let sample = match doubt {
+        let sample = match uncertain {
             Some(cause) if !sample.quality.is_bad() => sample.uncertain(cause),
             Some(_) | None => sample,
         };
@@ -303,15 +303,15 @@ fn needs(tag: &TagDef) -> impl Iterator<Item = TagId> {
     decimals.into_iter().chain(tag.quality_from.map(|(from, _)| from))
 }
 
-enum Verdict {
-    Doubt(Cause),
+enum FaultEffect {
+    Uncertain(Cause),
     Gone(Cause),
 }
 
 /// What a fault means for the values that were asked for.
-fn judge(fault: Fault) -> Verdict {
+fn effect_of(fault: Fault) -> FaultEffect {
     match fault {
-        Fault::Timeout => Verdict::Doubt(Cause::Timeout),
+        Fault::Timeout => FaultEffect::Uncertain(Cause::Timeout),
         Fault::Crc { .. }
         | Fault::Lrc { .. }
         | Fault::NotHex(_)
@@ -320,13 +320,13 @@ fn judge(fault: Fault) -> Verdict {
         | Fault::WrongFunction { .. }
         | Fault::WrongLength { .. }
         | Fault::WrongEcho
-        | Fault::OutOfSync => Verdict::Doubt(Cause::Corrupt),
+        | Fault::OutOfSync => FaultEffect::Uncertain(Cause::Corrupt),
         // 05 acknowledge and 06 busy pass; any other exception means that there is no such value.
-        Fault::Exception(ExceptionCode(0x05 | 0x06)) => Verdict::Doubt(Cause::Exception),
-        Fault::Exception(_) => Verdict::Gone(Cause::Exception),
-        Fault::NotANumber => Verdict::Gone(Cause::SensorFault),
-        Fault::NotConnected => Verdict::Gone(Cause::NotConnected),
-        Fault::BackedOff => Verdict::Gone(Cause::DeviceDown),
+        Fault::Exception(ExceptionCode(0x05 | 0x06)) => FaultEffect::Uncertain(Cause::Exception),
+        Fault::Exception(_) => FaultEffect::Gone(Cause::Exception),
+        Fault::NotANumber => FaultEffect::Gone(Cause::SensorFault),
+        Fault::NotConnected => FaultEffect::Gone(Cause::NotConnected),
+        Fault::BackedOff => FaultEffect::Gone(Cause::DeviceDown),
     }
 }
 
@@ -345,156 +345,4 @@ fn is_due(tag: &TagDef, sample: Sample, stored: Option<Sample>, at: Timestamp) -
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::plant::fixture::{self, DP, FAULT, PV, RUN, TIC};
-    use crate::plant::tag::DataType;
-
-    fn at(second: i64) -> Timestamp {
-        Timestamp::from_second(second).expect("a small number")
-    }
-
-    fn image() -> ProcessImage {
-        let mut image = ProcessImage::new(fixture::shared(), at(0));
-        image.read(&[(PV, 724.0), (DP, 1.0), (FAULT, 0.0)], at(0));
-        image
-    }
-
-    #[test]
-    fn a_value_needs_its_decimals_and_a_silent_fault_word() {
-        let mut image = ProcessImage::new(fixture::shared(), at(0));
-        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::NotRead));
-        image.read(&[(PV, 724.0), (FAULT, 0.0)], at(1));
-        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::Unscaled), "never 724 for 72.4");
-        image.read(&[(DP, 1.0)], at(2));
-        assert_eq!(image.sample(PV), Sample::good(72.4, at(1)), "as old as its own reading");
-        image.read(&[(FAULT, 2.0)], at(3));
-        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::SensorFault));
-        assert_eq!(image.sample(PV).value, None);
-    }
-
-    #[test]
-    fn a_value_that_stays_bad_keeps_the_time_since_when() {
-        let mut image = image();
-        for second in [3, 30, 60] {
-            image.read(&[(PV, 724.0), (FAULT, 2.0)], at(second));
-            assert_eq!(image.sample(PV), Sample::bad(Cause::SensorFault, at(3)), "read at {second} s");
-        }
-        image.read(&[(PV, 724.0), (FAULT, 0.0)], at(61));
-        assert_eq!(image.sample(PV), Sample::good(72.4, at(61)));
-    }
-
-    #[test]
-    fn a_text_is_trusted_and_doubted_like_a_number_and_never_stored() {
-        let mut def = fixture::plant();
-        (def.tags[PV.index()].point.kind, def.tags[PV.index()].store) = (DataType::Text(8), false);
-        let mut image = ProcessImage::new(Arc::new(def), at(0));
-        assert_eq!(image.texts()[PV.index()], None);
-        image.read_texts(&[(PV, "PXR4".into())], at(1));
-        assert_eq!(image.sample(PV), Sample { value: None, quality: Quality::Good, at: at(1) });
-        image.failed(&[PV], Fault::Timeout, at(2));
-        assert_eq!(image.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
-        assert_eq!(image.texts()[PV.index()].as_deref(), Some("PXR4"), "doubtful, not gone");
-        image.gone(TIC, Cause::NotConnected, at(3));
-        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::NotConnected));
-        assert_eq!(image.texts()[PV.index()], None, "what is not known is not shown");
-        let stored = |record: &Record| matches!(record, Record::Sample(tag, _) if *tag == PV);
-        assert!(!image.records(at(4)).iter().any(stored));
-    }
-
-    #[test]
-    fn an_impossible_number_of_decimals_is_no_scale() {
-        for decimals in [65_535.0, -1.0, 7.0, 0.5] {
-            let mut image = image();
-            image.read(&[(DP, decimals), (PV, 724.0)], at(1));
-            assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::Unscaled), "{decimals} decimals");
-        }
-    }
-
-    #[test]
-    fn a_signed_fault_word_counts_with_all_its_bits() {
-        let mut image = image();
-        image.read(&[(FAULT, f64::from(i16::MIN)), (PV, 724.0)], at(1));
-        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::SensorFault));
-        image.failed(&[PV], Fault::Timeout, at(2));
-        image.read(&[(FAULT, 0.0)], at(3));
-        assert_eq!(image.sample(PV).quality, Quality::Uncertain(Cause::Timeout), "not read since");
-    }
-
-    #[test]
-    fn trust_goes_with_failures() {
-        use Quality::{Bad, Uncertain};
-        for (fault, quality) in [
-            (Fault::Timeout, Uncertain(Cause::Timeout)),
-            (Fault::Crc { got: 1, computed: 2 }, Uncertain(Cause::Corrupt)),
-            (Fault::Exception(ExceptionCode(2)), Bad(Cause::Exception)),
-            (Fault::Exception(ExceptionCode(6)), Uncertain(Cause::Exception)),
-            (Fault::NotANumber, Bad(Cause::SensorFault)),
-            (Fault::NotConnected, Bad(Cause::NotConnected)),
-            (Fault::BackedOff, Bad(Cause::DeviceDown)),
-        ] {
-            let mut image = image();
-            image.failed(&[PV], fault, at(1));
-            let sample = image.sample(PV);
-            assert_eq!(sample.quality, quality);
-            assert_eq!(sample.value.is_none(), quality.is_bad(), "{fault}: a bad sample has no value");
-        }
-    }
-
-    #[test]
-    fn nobody_elses_answer_revives_a_doubtful_value() {
-        let mut image = image();
-        image.failed(&[PV], Fault::Timeout, at(1));
-        image.read(&[(FAULT, 0.0), (DP, 1.0)], at(2));
-        assert_eq!(image.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
-        image.age(at(11));
-        image.read(&[(FAULT, 0.0), (DP, 1.0)], at(12));
-        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::Stale));
-        image.read(&[(PV, 725.0)], at(13));
-        assert_eq!(image.sample(PV), Sample::good(72.5, at(13)));
-    }
-
-    #[test]
-    fn values_age_by_their_own_period() {
-        let mut image = image();
-        for (second, quality) in [
-            (3, Quality::Good),
-            (4, Quality::Uncertain(Cause::Stale)),
-            (10, Quality::Uncertain(Cause::Stale)),
-            (11, Quality::Bad(Cause::Stale)),
-        ] {
-            image.age(at(second));
-            assert_eq!(image.sample(PV).quality, quality, "after {second} s");
-        }
-        assert_eq!(image.sample(RUN).quality, Quality::Bad(Cause::NotRead));
-    }
-
-    #[test]
-    fn a_device_that_is_gone_takes_its_values_with_it() {
-        let mut image = image();
-        image.gone(TIC, Cause::NotConnected, at(5));
-        assert_eq!(image.shown_decimals(fixture::shared().tag(PV)), 1, "what was keeps its decimals");
-        assert_eq!(image.sample(PV), Sample::bad(Cause::NotConnected, at(5)));
-        image.failed(&[PV], Fault::Timeout, at(6));
-        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::NotConnected), "a probe in vain changes nothing");
-    }
-
-    #[test]
-    fn changes_are_stored_and_unchanged_values_once_a_minute() {
-        let mut image = image();
-        let count = |image: &mut ProcessImage, second| {
-            let pv = |record: &Record| matches!(record, Record::Sample(tag, _) if *tag == PV);
-            image.records(at(second)).iter().filter(|record| pv(record)).count()
-        };
-        assert_eq!(count(&mut image, 0), 1);
-        for (second, raw, expect) in [(1, 724.0, 0), (2, 725.0, 1), (61, 725.0, 0), (62, 725.0, 1), (121, 725.0, 0)] {
-            image.read(&[(PV, raw)], at(second));
-            assert_eq!(count(&mut image, second), expect, "at {second} s");
-        }
-        image.failed(&[PV], Fault::Timeout, at(122));
-        let records = image.records(at(122));
-        let doubted = Sample { value: Some(72.5), quality: Quality::Uncertain(Cause::Timeout), at: at(122) };
-        assert!(records.contains(&Record::Sample(PV, doubted)), "the doubt begins at 122 s: {records:?}");
-        assert_eq!(count(&mut image, 123), 0);
-    }
-}
+mod tests;

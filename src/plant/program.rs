@@ -1,4 +1,4 @@
-//! A ramp/soak program: which tags it is told and read by, and how long it has been where it is.
+//! A ramp/soak program: which tags command and show it, and how long it has been in its step.
 
 use std::time::Duration;
 
@@ -66,7 +66,7 @@ impl ProgramDef {
             Some(half) => ProgramPosition::Soak(half / 2),
         }
     }
-    /// The steps that a pattern runs, first and last, from 0; `None` for a pattern that nobody has described.
+    /// The steps that a pattern runs, first and last, from 0; `None` for a pattern that the profile does not describe.
     pub fn steps_of(&self, pattern: Option<f64>) -> Option<(usize, usize)> {
         match (self.pattern, self.patterns.is_empty()) {
             (None, _) | (_, true) => Some((0, self.steps.len().saturating_sub(1))),
@@ -75,7 +75,7 @@ impl ProgramDef {
     }
 }
 
-/// How long a program has been where it is. The device does not tell: it is counted here, without the time in halt.
+/// How long a program has been where it is. The device does not report it: it is counted here, without the time in halt.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ProgramWatch {
     position: Option<f64>,
@@ -86,14 +86,14 @@ pub struct ProgramWatch {
 }
 
 impl ProgramWatch {
-    /// Takes what is known at `at`: the position and the command, `None` where they are not to be trusted.
+    /// Takes what is known at `at`: the position and the command, `None` where they are not good.
     pub fn take(&mut self, def: &ProgramDef, position: Option<f64>, command: Option<f64>, at: Timestamp) {
         let since = self
             .at
             .replace(at)
             .map_or(Duration::ZERO, |before| Duration::try_from(at.duration_since(before)).unwrap_or_default());
         match (position, self.position) {
-            // What happens while nobody can see it is not counted, and that is remembered.
+            // What happens while the position is unknown is not counted, and that is remembered.
             (None, _) => self.seen = false,
             (Some(now), Some(before)) if now == before => {
                 if command == Some(def.run) {
@@ -141,7 +141,7 @@ mod tests {
         check(5.0, ProgramPosition::Ended);
         check(17.0, ProgramPosition::Ended);
         assert_eq!(def().steps_of(Some(2.0)), Some((0, 1)));
-        assert_eq!(def().steps_of(Some(3.0)), None, "nobody has said what pattern 3 is");
+        assert_eq!(def().steps_of(Some(3.0)), None, "the profile does not say what pattern 3 is");
         assert_eq!(def().steps_of(None), None);
     }
 

@@ -42,7 +42,7 @@ pub enum Cause {
     OutOfRange = 10,
     /// The station was not running.
     StationOff = 11,
-    /// There is a value, but nobody who may see it is logged in here. Never stored.
+    /// There is a value, but no user who may see it is logged in here. Never stored.
     NotAuthorised = 12,
     /// It was stored, but the file is damaged there. Never stored.
     Unreadable = 13,

@@ -55,7 +55,7 @@ pub struct Snapshot {
     pub alarms: Arc<Vec<ActiveAlarm>>,
     /// Alarms that are suppressed, in the order of the plant file: never annunciated, always listed.
     pub suppressed: Arc<Vec<SuppressedAlarm>>,
-    /// An active alarm that nobody has acknowledged came after the last silence.
+    /// An unacknowledged active alarm came after the last silence.
     pub sound: bool,
     /// How good the alarm system is: the rates of this moment, and the figures of the last 24 hours.
     pub alarm_metrics: AlarmMetrics,
@@ -207,7 +207,7 @@ pub struct LineStatus {
     pub counters: LineCounters,
     /// Settings, polls and frames; `None` until the line has reported.
     pub report: Option<Arc<LineReport>>,
-    /// Settings as they were before somebody tried others.
+    /// Settings as they were before others were tried.
     pub settings_before: Option<Arc<LineDef>>,
     /// The test at work, or the last one.
     pub test: Option<Arc<DiagnosticRun>>,
@@ -262,7 +262,7 @@ pub struct ActiveAlarm {
     pub state: AlarmState,
     /// When it was raised.
     pub raised_at: Timestamp,
-    /// When an operator was last told of it; names what he saw, see [`super::alarm::AlarmCommand::Acknowledge`].
+    /// When it was last annunciated; identifies what the operator saw, see [`super::alarm::AlarmCommand::Acknowledge`].
     pub annunciated_at: Timestamp,
     /// When it returned to normal, if it did.
     pub returned_at: Option<Timestamp>,

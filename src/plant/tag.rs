@@ -79,7 +79,7 @@ pub struct TagDef {
     pub source: String,
     /// How a simulated device fills it; `None` holds what is written.
     pub simulate: Option<Arc<Simulate>>,
-    /// What the maker sets it to before delivery, in the tag's unit; `None` where nobody says.
+    /// What the maker sets it to before delivery, in the tag's unit; `None` if the profile is silent.
     pub default: Option<f64>,
     /// Part of a parameter set: a setting, not a command and not a measurement.
     pub in_sets: bool,
@@ -126,7 +126,7 @@ impl TagDef {
             in_sets: false,
         }
     }
-    /// The tags without which its value cannot be shown or judged.
+    /// The tags without which its value cannot be shown or evaluated.
     pub fn needs(&self) -> impl Iterator<Item = TagId> {
         let decimals = match self.decimals {
             Decimals::From(tag) => Some(tag),

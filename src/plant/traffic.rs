@@ -38,7 +38,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Appends newer frames; the oldest beyond [`FRAMES_MAX`] are let go.
+    /// Appends newer frames; the oldest beyond [`FRAMES_MAX`] are dropped.
     pub fn extend(&mut self, newer: Vec<Frame>) {
         if newer.is_empty() {
             return;
@@ -51,7 +51,7 @@ impl Frames {
         }
     }
 
-    /// Lets go of all frames before this number and appends newer ones, as the line itself has done it elsewhere.
+    /// Drops all frames before this number and appends newer ones, as the line itself has done it elsewhere.
     pub fn follow(&mut self, number: u64, newer: Vec<Frame>) {
         self.forget_before(number);
         if !newer.is_empty() {
@@ -91,7 +91,7 @@ impl Frames {
     }
 }
 
-/// How they are kept in pieces is nobody's business.
+/// How they are kept in pieces is private.
 impl PartialEq for Frames {
     fn eq(&self, other: &Frames) -> bool {
         self.count == other.count && self.iter().eq(other.iter())

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::plant::role::{AccessDef, Role};
 
-/// Passwords shorter than this are nobody's business to permit (NIST SP 800-63B rev 4, 8 with a second factor).
+/// Shorter passwords are never permitted (NIST SP 800-63B rev 4, 8 with a second factor).
 const CHARS_LEAST: u16 = 8;
 /// Most failed logins that can be permitted (the same, 3.2.2).
 const LOGIN_ATTEMPTS_MOST: u16 = 100;

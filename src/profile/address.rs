@@ -16,7 +16,7 @@ pub(super) enum Location {
     Name(String),
 }
 
-/// Where an address leads: the table, if the name of the address tells it, and the 0-based number on the wire.
+/// Where an address leads: the table, if the name of the address says it, and the 0-based number on the wire.
 pub(super) type TableAddress = (Option<Table>, u16);
 
 /// Resolves an address. `None` after the problem was added.

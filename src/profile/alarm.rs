@@ -4,12 +4,12 @@
 use std::{collections::HashMap, time::Duration};
 
 use super::{
-    condition,
+    condition::{self, AlarmTable, Need},
     diagnostic::Problems,
     expr,
     names::{Defs, Unique},
     reader::{At, text},
-    schema::{AlarmTable, Need, PlantFile},
+    schema::PlantFile,
 };
 use crate::plant::{
     def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, LineDef, Priority, Subject},

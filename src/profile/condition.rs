@@ -1,4 +1,4 @@
-//! The condition of an alarm: exactly one, on what it fits, with what it needs beside it.
+//! The keys of an alarm and its condition: exactly one, on what it fits, with what it needs beside it.
 
 use std::time::Duration;
 
@@ -6,14 +6,83 @@ use super::{
     diagnostic::{Problems, Span},
     interlock::bits_of,
     names::{Defs, number_of},
-    reader::At,
-    schema::AlarmTable,
+    reader::{At, Choice, table, words},
     tag::range_of,
 };
 use crate::plant::{
-    def::{Condition, Level, Subject},
+    def::{AlarmClass, Condition, Level, Priority, Subject},
+    ne107::Signal,
     tag::{Bound, TagDef},
 };
+
+table!(
+    /// An `[[alarm]]`.
+    AlarmTable, "an alarm" {
+        opt "tag" tag: String,
+        opt "device" device: String,
+        opt "high_high" high_high: f64,
+        opt "high" high: f64,
+        opt "low" low: f64,
+        opt "low_low" low_low: f64,
+        opt "deviation" deviation: f64,
+        opt "from" from: String,
+        opt "is" is: Choice,
+        opt "bit" bit: u8,
+        /// Tag's unit per minute, measured `over` a time; below 0 for a fall.
+        opt "rate" rate: f64,
+        opt "over" over: Duration,
+        opt "no_change" no_change: Duration,
+        opt "no_update" no_update: Duration,
+        /// So many changes `within` a time.
+        opt "changes" changes: u32,
+        opt "within" within: Duration,
+        opt "line" line: String,
+        /// With `line`: it has too much to do, instead of not connected.
+        opt "overloaded" overloaded: bool,
+        /// `F`, `C`, `S` or `M`.
+        opt "ne107" ne107: Signal,
+        opt "enabled_when" enabled_when: String,
+        opt "class" class: AlarmClass,
+        opt "area" area: String,
+        opt "latch" latch: bool,
+        opt "ack_comment" ack_comment: Need,
+        opt "re_alarm" re_alarm: Duration,
+        opt "deadband" deadband: f64,
+        opt "on_delay" on_delay: Duration,
+        opt "off_delay" off_delay: Duration,
+        need "priority" priority: Priority,
+        need "message" message: String,
+        opt "cause" cause: String,
+        opt "effect" effect: String,
+        opt "action" action: String,
+        opt "response_time" response_time: Duration,
+    }
+);
+
+/// Whether something must be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Need {
+    /// It must.
+    Required,
+    /// It may.
+    Optional,
+}
+
+words!(Need, "need for a comment" {
+    "required" => Need::Required, "optional" => Need::Optional,
+});
+
+words!(AlarmClass, "class of alarms" {
+    "process" => AlarmClass::Process, "system" => AlarmClass::System,
+});
+
+words!(Signal, "signal of NE 107" {
+    "F" => Signal::Failure, "C" => Signal::FunctionCheck, "S" => Signal::OutOfSpecification, "M" => Signal::Maintenance,
+});
+
+words!(Priority, "priority" {
+    "critical" => Priority::Critical, "high" => Priority::High, "medium" => Priority::Medium, "low" => Priority::Low,
+});
 
 /// Most changes that can be counted.
 const CHANGES_MAX: u32 = 100;
@@ -190,7 +259,7 @@ fn rate_over(table: &AlarmTable, rate: At<f64>, problems: &mut Problems) -> Opti
 /// A time in which something can happen.
 fn some_time(time: At<Duration>, problems: &mut Problems) -> Duration {
     if time.value < Duration::from_secs(1) {
-        problems.add(time.at, "nothing can be told in so short a time").label("expected at least \"1s\"");
+        problems.add(time.at, "this time is too short").label("expected at least \"1s\"");
     }
     time.value
 }

@@ -151,7 +151,7 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
             let foreign = target.labels.iter().find(|(_, unit)| !units::known(unit));
             if *what == "unit_from" && (target.labels.is_empty() || foreign.is_some()) {
                 let found = foreign.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
-                problems.add(need.at, format!("{} does not tell a unit: {found}", target.name)).label("unit_from");
+                problems.add(need.at, format!("{} gives no unit: {found}", target.name)).label("unit_from");
             }
             if target.is_text() {
                 problems.add(need.at, format!("{} is a text", target.name)).label("expected a tag that holds a number");

@@ -261,8 +261,8 @@ impl Problems {
         let (mut list, severity) = if good { (self.warnings, Severity::Warning) } else { (self.list, Severity::Error) };
         list.sort_by(|a, b| (a.at, &a.message).cmp(&(b.at, &b.message)));
         list.dedup();
-        let told = Errors { sources: self.sources, list, severity };
-        if good { Ok((value, told)) } else { Err(told) }
+        let errors = Errors { sources: self.sources, list, severity };
+        if good { Ok((value, errors)) } else { Err(errors) }
     }
 }
 

@@ -34,13 +34,13 @@ fn interlock(
     let when = blocking(table, of, problems)?;
     let device = defs.devices.iter().find(|device| device.id == tag.device)?;
     let stops: Vec<f64> = stops(logic, &device.actions, tag.id).collect();
-    // Where nothing says which value stops, 0 is taken for it, and another may be it all the same: that one is only told.
+    // Where nothing says which value stops, 0 counts as the stop; another value may be it all the same, so it only warns.
     let off = stops.contains(&value) || (stops.is_empty() && value == 0.0);
     if let Some(refuse) = table.refuse.filter(|refuse| refuse.value && off) {
         let problem = problems.add(refuse.at, "switching off is never refused");
         problem
             .label("expected refuse = false")
-            .help("a stop must always be possible; the operator is told all the same");
+            .help("a stop must always be possible; the operator is warned all the same");
     }
     let refuse = table.refuse.map_or(!off && !stops.is_empty(), |refuse| refuse.value);
     Some(InterlockDef { tag: tag.id, value, of: of.id, when, message: text(&table.message), refuse })
@@ -76,7 +76,7 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
     }
 }
 
-/// The bits that can be told from the value of a tag; none where it is not the raw number, or no binary one.
+/// The bits that the value of a tag has; none where it is not the raw number, or no binary one.
 pub(super) fn bits_of(of: &TagDef) -> u16 {
     let is_raw = of.scale == 1.0 && of.offset == 0.0 && matches!(of.decimals, Decimals::Fixed(_));
     let is_binary = of.point.kind.is_binary() && !of.point.table.is_bits();

@@ -152,7 +152,7 @@ fn known<const N: usize>(spans: [(Key, Option<Span>); N]) -> Vec<(Key, Span)> {
 /// The port of Modbus TCP.
 pub const TCP_PORT: u16 = 502;
 
-/// Data bits that a line has if nobody says how many.
+/// Default data bits of a line.
 pub fn usual_data_bits(ascii: bool) -> u8 {
     if ascii { 7 } else { 8 }
 }

@@ -6,10 +6,9 @@
 use std::collections::BTreeMap;
 
 use super::{
-    condition::conditions_of,
+    condition::{AlarmTable, conditions_of},
     diagnostic::{Problems, Span},
     reader::At,
-    schema::AlarmTable,
 };
 use crate::plant::def::Priority;
 
@@ -48,7 +47,7 @@ fn incomplete(table: &AlarmTable, problems: &mut Problems) {
     let message = format!("{} has no {}", name(table), missing.join(", "));
     let problem = problems.warn(place(table), message);
     problem.label("not complete").help(match missing.contains(&"`action`") {
-        true => "an alarm that nobody can do anything about is none: leave it out, or say what to do",
+        true => "an alarm without an operator action is no alarm: leave it out, or say what to do",
         false => "say what may be wrong, what follows, what to do and within what time",
     });
 }
@@ -176,8 +175,14 @@ mod tests {
     #[test]
     fn what_an_operator_would_have_to_guess_is_named_with_its_place() {
         let bare = format!("[[alarm]]\n{HOT}\n");
-        check(&bare, &["small.toml:30:11: the alarm `hot` of D1.T has no `cause`, `effect`, `action`, `response_time`"]);
-        check(&alarm(HOT).replace("stop it", " "), &["has no `action` (not complete; an alarm that nobody can do"]);
+        check(
+            &bare,
+            &["small.toml:30:11: the alarm `hot` of D1.T has no `cause`, `effect`, `action`, `response_time`"],
+        );
+        check(
+            &alarm(HOT).replace("stop it", " "),
+            &["has no `action` (not complete; an alarm without an operator action"],
+        );
         check(&alarm(HOT).replace("response_time = \"10min\"\n", ""), &["has no `response_time`"]);
     }
 
@@ -222,7 +227,7 @@ mod tests {
             warnings(&alarms(urgent, all)).into_iter().filter(|line| line.contains("critical")).collect()
         };
         assert_eq!(split(4, 20), [""; 0]);
-        assert_eq!(split(19, 19), [""; 0], "too few to judge");
+        assert_eq!(split(19, 19), [""; 0], "too few to say");
         let told = split(5, 20);
         assert_eq!(told.len(), 1);
         assert!(

@@ -193,7 +193,7 @@ fn sequence(item: SequenceItem, defs: &Defs, problems: &mut Problems) -> Option<
     })
 }
 
-/// Nothing is drawn outside the canvas, where nobody would miss it.
+/// Nothing may lie outside the canvas: it would not be drawn.
 fn check_inside(item: &MimicItem, at: Span, size: (u16, u16), problems: &mut Problems) {
     let corner = |place: &MimicRect| (place.x.saturating_add(place.width), place.y.saturating_add(place.height));
     let (right, bottom) = match item {
@@ -242,7 +242,7 @@ fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut 
     Some(MimicCommand { key: letter?, label: text(&table.label), tag: tag.id, value })
 }
 
-/// Most pens of a group: more curves cannot be told apart.
+/// Most pens of a group: more curves cannot be distinguished.
 const PENS_MAX: usize = 8;
 
 /// The groups of pens; one is made up if the plant file has none.

@@ -55,7 +55,7 @@ pub use self::{
 use crate::plant::def::PlantDef;
 pub use crate::plant::line_check::BAUDS;
 
-/// Loads a plant, or tells everything that is wrong with it.
+/// Loads a plant, or returns every error in it.
 ///
 /// `plant` is the path of a plant file, or the name of a plant (`tank`) in a configuration folder or in the program.
 /// A path such as `profiles/plants/tank.toml` that does not exist on disk but is shipped is taken from the program.
@@ -89,7 +89,7 @@ pub struct Checked {
 }
 
 /// Checks a plant file or a device profile, by path or name. A device is checked as the only one of a plant of its own,
-/// unit 1 on a serial line of 9600 baud, so that its read plan can be told.
+/// unit 1 on a serial line of 9600 baud, so that it has a read plan.
 pub fn check(file: &Path, search: &Search) -> Result<Checked, Errors> {
     let Some((stem, text)) = io::device_file(file, search) else {
         return load_warned(file, search).map(|(checked, _)| checked);

@@ -38,7 +38,7 @@ pub(super) struct Library<'a> {
     pub names: Vec<String>,
 }
 
-/// Builds the plant called `name` and tells what could be better in its texts, or tells everything that is wrong with them.
+/// Builds the plant called `name`, with the warnings; or returns every error in its texts.
 pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(PlantDef, Errors), Errors> {
     let mut problems = Problems::default();
     let raw = reader::parse(&plant.file, &plant.bytes, &mut problems);
@@ -180,7 +180,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     Some(Devices { devices, tags, names, classes })
 }
 
-/// Unit 0 of a serial line is everybody: it can be written, and nobody answers a read.
+/// Unit 0 of a serial line is a broadcast: it can be written, and no unit answers a read.
 fn check_broadcasts(
     devices: &[DeviceDef],
     known: &[ResolvedDevice],
@@ -194,7 +194,7 @@ fn check_broadcasts(
         let readable = tags.iter().find(|tag| tag.device == device.id && tag.access != Access::Write);
         if let (true, 0, Some(unit), Some(tag)) = (serial, device.unit, known.table.unit, readable) {
             problems
-                .add(unit.at, format!("unit 0 is a broadcast, which nobody answers: {} can never be read", tag.name))
+                .add(unit.at, format!("unit 0 is a broadcast, which no unit answers: {} can never be read", tag.name))
                 .label("expected 1 to 247, or a profile whose tags all have access = \"w\"");
         }
     }

@@ -1,4 +1,4 @@
-//! The ramp/soak program of a profile: which tags tell it, and that it can be started and stopped with them.
+//! The ramp/soak program of a profile: which tags show it, and which start and stop it.
 
 use super::{
     diagnostic::Problems,

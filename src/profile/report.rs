@@ -60,7 +60,7 @@ fn dialect(table: &CsvTable, problems: &mut Problems) -> CsvDialect {
     if let Some(at) = table.decimal.as_ref().or(table.separator.as_ref()).map(|word| word.at)
         && separator == decimal
     {
-        problems.add(at, "separator and decimal are the same").label("columns could not be told apart");
+        problems.add(at, "separator and decimal are the same").label("the columns would be ambiguous");
     }
     CsvDialect { separator, decimal, bom: table.bom.map_or(usual.bom, |bom| bom.value) }
 }

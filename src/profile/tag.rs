@@ -1,18 +1,20 @@
 //! One row of a register map becomes the definition of a tag, and is checked against itself and its device.
 
+mod bits;
+
 use std::time::Duration;
 
+use self::bits::{bit_field, bit_labels, labels};
 use super::{
     address::{check_modicon, locate},
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
-    reader::{At, Choice, Numbered, Raw, either, supersede, text},
+    reader::{At, Choice, Raw, either, supersede, text},
     schema::{PollWord, Scheme, SimulateTable, TagTable},
     units,
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
-    number::to_u8,
     tag::{Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, Table, TagDef},
 };
 
@@ -236,26 +238,6 @@ fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) 
     true
 }
 
-/// `"5-4"` or `3`: lowest bit and number of bits.
-fn bit_field(field: &At<Choice>, kind: DataType, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
-    let bounds = match &field.value {
-        Choice::Number(bit) if bit.fract() == 0.0 && (0.0..64.0).contains(bit) => Some((to_u8(*bit), to_u8(*bit))),
-        Choice::Number(_) => None,
-        Choice::Word(word) => match word.split_once('-') {
-            Some((high, low)) => high.trim().parse().ok().zip(low.trim().parse().ok()),
-            None => word.trim().parse().ok().map(|bit: u8| (bit, bit)),
-        },
-    };
-    let size = kind.registers() * 16;
-    let whole = !table.is_bits() && (kind.is_binary() || kind == DataType::Bool);
-    let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size && whole);
-    if valid.is_none() {
-        let problem = problems.add(field.at, "this is not a field of bits");
-        problem.label(format!("expected \"HIGH-LOW\" or one bit, 0 to {} of a whole number", size - 1));
-    }
-    valid.map(|(high, low)| (low, high - low + 1))
-}
-
 /// Bits inside the word of another tag.
 pub(super) fn field_of(field: &At<Choice>, point: Point, problems: &mut Problems) -> Option<(u8, u8)> {
     bit_field(field, point.kind, point.table, problems)
@@ -400,36 +382,6 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
         }
     }
     access
-}
-
-fn labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i64, String)> {
-    let Some(Numbered(rows)) = row.labels.as_ref().map(|labels| &labels.value) else { return Vec::new() };
-    let range = kind.and_then(raw_range);
-    for (number, text) in rows {
-        let outside = range.filter(|(low, high)| (number.value as f64) < *low || (number.value as f64) > *high);
-        if let Some((low, high)) = outside {
-            let problem =
-                problems.add(number.at, format!("enum value {} ({text}) does not fit the type", number.value));
-            problem.label(format!("the type holds {low} to {high}"));
-        }
-    }
-    rows.iter().map(|(number, text)| (number.value, text.clone())).collect()
-}
-
-fn bit_labels(bits: &Option<At<Numbered>>, kind: Option<Raws>, problems: &mut Problems) -> Vec<(u8, String)> {
-    let Some(Numbered(rows)) = bits.as_ref().map(|bits| &bits.value) else { return Vec::new() };
-    let size = kind.map_or(64, |(kind, field)| field.map_or(i64::from(kind.registers()) * 16, i64::from));
-    let mut labels = Vec::new();
-    for (bit, text) in rows {
-        match u8::try_from(bit.value).ok().filter(|_| bit.value < size) {
-            Some(number) => labels.push((number, text.clone())),
-            None => {
-                let problem = problems.add(bit.at, format!("there is no bit {}", bit.value));
-                problem.label(format!("expected 0 to {}", size - 1));
-            }
-        }
-    }
-    labels
 }
 
 fn fixed(bound: &Option<At<f64>>) -> Option<Bound> {

@@ -109,7 +109,7 @@ async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_save
     fs::write(&path, &text).unwrap();
     let outcome = send_command(&mut session, 3, CommandKind::SaveSettings(L1)).await;
     let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };
-    assert!(why.contains("was changed by somebody"), "{why}");
+    assert!(why.contains("was changed since"), "{why}");
     assert_eq!(fs::read_to_string(&path).unwrap(), text);
     drop(session);
     station.stop().await;

@@ -173,11 +173,7 @@ impl AlarmManager {
         at: Timestamp,
         by: &Arc<str>,
     ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
-        let alarm = self.alarm(id)?;
-        if self.machine(id).shelved().is_none() {
-            return Err(AlarmRefusal::NotShelved);
-        }
-        Ok(self.back(&alarm, AlarmEvent::Unshelved, value, at, by))
+        self.put_back(id, AlarmEvent::Unshelved, value, at, by)
     }
 
     /// Takes an alarm out of service.
@@ -204,23 +200,28 @@ impl AlarmManager {
         at: Timestamp,
         by: &Arc<str>,
     ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
-        let alarm = self.alarm(id)?;
-        if self.machine(id).out_of_service().is_none() {
-            return Err(AlarmRefusal::InService);
-        }
-        Ok(self.back(&alarm, AlarmEvent::InService, value, at, by))
+        self.put_back(id, AlarmEvent::InService, value, at, by)
     }
 
-    fn back(
+    fn put_back(
         &mut self,
-        alarm: &AlarmDef,
+        id: AlarmId,
         event: AlarmEvent,
         value: Option<f64>,
         at: Timestamp,
         by: &Arc<str>,
-    ) -> Vec<AlarmRecord> {
-        let back = self.record_action(alarm, event, at, value, by, None);
-        [Some(back), self.raise_anew(alarm, at, value)].into_iter().flatten().collect()
+    ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        let machine = self.machine(id);
+        let (is_away, refusal) = match event {
+            AlarmEvent::Unshelved => (machine.shelved().is_some(), AlarmRefusal::NotShelved),
+            _ => (machine.out_of_service().is_some(), AlarmRefusal::InService),
+        };
+        if !is_away {
+            return Err(refusal);
+        }
+        let back = self.record_action(&alarm, event, at, value, by, None);
+        Ok([Some(back), self.raise_again(&alarm, at, value)].into_iter().flatten().collect())
     }
 
     fn record_action(
@@ -236,7 +237,7 @@ impl AlarmManager {
         self.take(alarm.id, AlarmRecord { by: Some(by.clone()), reason: reason.cloned(), ..record })
     }
 
-    /// An id may come over the socket from another plant's terminal: it is not believed.
+    /// An id may come over the socket from another plant's terminal: it is checked.
     fn alarm(&self, id: AlarmId) -> Result<AlarmDef, AlarmRefusal> {
         self.def.alarms.get(id.index()).cloned().ok_or(AlarmRefusal::NoSuchAlarm)
     }

@@ -1,13 +1,172 @@
-//! Does a condition hold? Pure comparison with a deadband, a memory where it looks back, and an honest "unknown".
+//! The conditions of alarms: what each watches, whether it holds, and what its limit is. A new one is added here, and its
+//! TOML keys in `profile::condition`.
 
-use crate::plant::{
-    def::{Condition, Level},
-    number::to_i64,
-};
 use std::{collections::VecDeque, time::Duration};
+
+use serde::{Deserialize, Serialize};
+
+use crate::plant::{id::TagId, ne107::Signal, number::to_i64, station::StationFault};
 
 /// Points that the memory of a rate keeps: finer than any window needs.
 const POINTS_MAX: u32 = 32;
+
+/// When an alarm is active. Limits and deadbands are in the tag's unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Condition {
+    /// A fixed limit; it returns when the value is back by the deadband.
+    Limit {
+        /// Which side, which level.
+        level: Level,
+        /// The limit.
+        limit: f64,
+        /// How far back inside before it returns.
+        deadband: f64,
+    },
+    /// The value is further than `limit` from another tag (its SV), either side.
+    Deviation {
+        /// The tag to compare with.
+        from: TagId,
+        /// Greatest distance.
+        limit: f64,
+        /// How far back inside before it returns.
+        deadband: f64,
+    },
+    /// A discrete tag has this value.
+    State {
+        /// The abnormal value.
+        is: f64,
+    },
+    /// This bit of a word is set.
+    Bit {
+        /// From 0, the lowest.
+        bit: u8,
+    },
+    /// The value rises faster than a limit above 0, or falls faster than one below.
+    Rate {
+        /// Tag's unit per minute.
+        limit: f64,
+        /// The time over which the rate is measured.
+        over: Duration,
+        /// How much slower before it returns, tag's unit per minute.
+        deadband: f64,
+    },
+    /// The value has stayed within `deadband` for so long, as if stuck.
+    NoChange {
+        /// So long.
+        lasts: Duration,
+        /// What is no change.
+        deadband: f64,
+    },
+    /// There has been no good value for so long.
+    NoUpdate {
+        /// So long.
+        lasts: Duration,
+    },
+    /// The value has changed so often within a time.
+    Changes {
+        /// So often, 2 to 100.
+        count: u32,
+        /// Within this time.
+        within: Duration,
+        /// What is no change.
+        deadband: f64,
+    },
+    /// The device does not answer, or gives no values.
+    NotAnswering,
+    /// The device has this signal of NE 107.
+    Health {
+        /// Which.
+        signal: Signal,
+    },
+    /// The line is not connected although it should be.
+    NotConnected,
+    /// The line has no time for all of its polls: some are read less often.
+    Overloaded,
+    /// The station has this fault.
+    Station(StationFault),
+}
+
+/// The four levels of a limit alarm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Level {
+    /// Above the high-high limit.
+    HighHigh,
+    /// Above the high limit.
+    High,
+    /// Below the low limit.
+    Low,
+    /// Below the low-low limit.
+    LowLow,
+}
+
+impl Condition {
+    /// Looks back in time: starts over when the alarm is enabled.
+    pub fn looks_back(self) -> bool {
+        self.traits().looks_back
+    }
+    /// The tag that the value is compared with.
+    pub fn reference(self) -> Option<TagId> {
+        self.traits().reference
+    }
+    /// The limit that stands on the scale of the value itself.
+    pub fn on_scale(self) -> Option<f64> {
+        let traits = self.traits();
+        traits.limit.filter(|_| traits.is_on_scale)
+    }
+    /// The limit that the journal names.
+    pub fn limit(self) -> Option<f64> {
+        self.traits().limit
+    }
+    /// The condition in signs, `> 72.0`; empty where the message alone says it. `number` writes a value of the watched
+    /// tag, `name` another tag.
+    pub fn text(self, number: impl Fn(f64) -> String, name: impl Fn(TagId) -> String) -> String {
+        let traits = self.traits();
+        match (self, traits.sign) {
+            (Condition::State { is }, sign) => format!("{sign} {}", number(is)),
+            (Condition::Rate { limit, .. }, sign) => format!("{sign} {limit}/min"),
+            (_, sign) => match (traits.limit, traits.reference) {
+                (Some(limit), Some(from)) => format!("{sign} {} off {}", number(limit), name(from)),
+                (Some(limit), None) => format!("{sign} {}", number(limit)),
+                (None, _) => String::new(),
+            },
+        }
+    }
+
+    fn traits(self) -> Traits {
+        let none = Traits { limit: None, is_on_scale: false, reference: None, looks_back: false, sign: ">" };
+        match self {
+            Condition::Limit { level: Level::High | Level::HighHigh, limit, .. } => {
+                Traits { limit: Some(limit), is_on_scale: true, ..none }
+            }
+            Condition::Limit { level: Level::Low | Level::LowLow, limit, .. } => {
+                Traits { limit: Some(limit), is_on_scale: true, sign: "<", ..none }
+            }
+            Condition::Deviation { from, limit, .. } => Traits { limit: Some(limit), reference: Some(from), ..none },
+            Condition::State { .. } => Traits { sign: "=", ..none },
+            Condition::Rate { limit, .. } => {
+                Traits { limit: Some(limit), looks_back: true, sign: if limit < 0.0 { "<" } else { ">" }, ..none }
+            }
+            Condition::NoChange { .. } | Condition::NoUpdate { .. } | Condition::Changes { .. } => {
+                Traits { looks_back: true, ..none }
+            }
+            Condition::Bit { .. }
+            | Condition::NotAnswering
+            | Condition::Health { .. }
+            | Condition::NotConnected
+            | Condition::Overloaded
+            | Condition::Station(_) => none,
+        }
+    }
+}
+
+/// What the rest of the program needs to know of a condition.
+struct Traits {
+    limit: Option<f64>,
+    is_on_scale: bool,
+    reference: Option<TagId>,
+    looks_back: bool,
+    sign: &'static str,
+}
 
 /// What a condition is evaluated by. `None` is "not known now".
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -16,7 +175,7 @@ pub struct Facts {
     pub value: Option<f64>,
     /// The good value of the tag that a deviation is measured from.
     pub reference: Option<f64>,
-    /// For a device or line: whether it is in the state that the alarm tells.
+    /// For a device or line: whether it is in the state that the alarm reports.
     pub ill: Option<bool>,
     /// Whether the alarm is enabled by design.
     pub enabled: Option<bool>,
@@ -39,7 +198,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Begins anew.
+    /// Starts over.
     pub fn clear(&mut self) {
         self.points.clear();
         *self = Memory { points: std::mem::take(&mut self.points), ..Memory::default() };
@@ -133,7 +292,7 @@ pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memo
         }
         Condition::Changes { count, within, deadband } => {
             let busy = memory.changes(facts.value?, now, count, within, deadband);
-            // After a restart nobody can tell that it is calm before it was watched for that long.
+            // After a restart it counts as calm only once it was watched for that long.
             let watched = within <= now.saturating_sub(*memory.since.get_or_insert(now));
             (busy || !active || watched).then_some(busy)
         }
@@ -150,158 +309,5 @@ pub fn is_set(value: f64, bit: u8) -> bool {
     to_i64(value).cast_unsigned().checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1
 }
 
-/// The limit that the journal names, if the condition has one.
-pub fn limit_of(condition: Condition) -> Option<f64> {
-    match condition {
-        Condition::Limit { limit, .. } | Condition::Deviation { limit, .. } | Condition::Rate { limit, .. } => {
-            Some(limit)
-        }
-        Condition::State { .. }
-        | Condition::Bit { .. }
-        | Condition::NoChange { .. }
-        | Condition::NoUpdate { .. }
-        | Condition::Changes { .. }
-        | Condition::NotAnswering
-        | Condition::Health { .. }
-        | Condition::NotConnected
-        | Condition::Overloaded
-        | Condition::Station(_) => None,
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::plant::def::TagId;
-
-    fn sec(seconds: u64) -> Duration {
-        Duration::from_secs(seconds)
-    }
-
-    /// The verdicts over values at instants, in seconds.
-    fn over_time(condition: Condition, values: &[(u64, Option<f64>)]) -> Vec<Option<bool>> {
-        let (mut memory, mut active) = (Memory::default(), false);
-        let verdict = |(second, value): &(u64, Option<f64>)| {
-            let facts = Facts { value: *value, ..Facts::default() };
-            let holds = holds(condition, facts, active, &mut memory, sec(*second));
-            active = holds.unwrap_or(active);
-            holds
-        };
-        values.iter().map(verdict).collect()
-    }
-
-    #[test]
-    fn every_condition_holds_beyond_its_limit_and_returns_by_its_deadband() {
-        let limit = |level, limit| Condition::Limit { level, limit, deadband: 2.0 };
-        let deviation = Condition::Deviation { from: TagId(1), limit: 5.0, deadband: 1.0 };
-        for (condition, value, active, expect) in [
-            (limit(Level::High, 75.0), Some(75.0), false, Some(false)),
-            (limit(Level::High, 75.0), Some(75.1), false, Some(true)),
-            (limit(Level::HighHigh, 75.0), Some(73.5), true, Some(true)),
-            (limit(Level::High, 75.0), Some(73.0), true, Some(false)),
-            (limit(Level::Low, 10.0), Some(9.9), false, Some(true)),
-            (limit(Level::LowLow, 10.0), Some(11.9), true, Some(true)),
-            (limit(Level::Low, 10.0), Some(12.0), true, Some(false)),
-            (limit(Level::Low, 10.0), None, true, None),
-            (deviation, Some(75.1), false, Some(true)),
-            (deviation, Some(64.9), false, Some(true)),
-            (deviation, Some(65.5), true, Some(true)),
-            (deviation, Some(66.0), true, Some(false)),
-            (Condition::State { is: 2.0 }, Some(2.0), false, Some(true)),
-            (Condition::State { is: 2.0 }, Some(1.0), true, Some(false)),
-            (Condition::Bit { bit: 2 }, Some(4.0), false, Some(true)),
-            (Condition::Bit { bit: 2 }, Some(3.0), true, Some(false)),
-            (Condition::Bit { bit: 15 }, Some(-32_768.0), false, Some(true)),
-            (Condition::Bit { bit: 2 }, None, true, None),
-        ] {
-            let facts = Facts { value, reference: Some(70.0), ..Facts::default() };
-            let holds = holds(condition, facts, active, &mut Memory::default(), Duration::ZERO);
-            assert_eq!(holds, expect, "{condition:?} at {value:?}, active {active}");
-        }
-    }
-
-    #[test]
-    fn a_deviation_from_an_unknown_set_value_is_unknown() {
-        let facts = Facts { value: Some(99.0), ..Facts::default() };
-        let deviation = Condition::Deviation { from: TagId(1), limit: 5.0, deadband: 0.0 };
-        assert_eq!(holds(deviation, facts, false, &mut Memory::default(), Duration::ZERO), None);
-    }
-
-    #[test]
-    fn silence_is_judged_by_the_device_alone() {
-        for ill in [Some(true), Some(false), None] {
-            let facts = Facts { ill, ..Facts::default() };
-            assert_eq!(holds(Condition::NotAnswering, facts, false, &mut Memory::default(), Duration::ZERO), ill);
-        }
-    }
-
-    #[test]
-    fn a_fast_change_is_told_once_the_window_is_full_and_not_after_a_gap() {
-        let rising = Condition::Rate { limit: 6.0, over: sec(30), deadband: 2.0 };
-        let (no, yes) = (Some(false), Some(true));
-        let events = [(0, 20.0), (15, 21.6), (30, 23.2), (60, 25.4), (90, 27.0)].map(|(at, value)| (at, Some(value)));
-        assert_eq!(over_time(rising, &events), [None, None, yes, yes, no], "6.4, 4.4, 3.2 a minute");
-        let falling = Condition::Rate { limit: -6.0, over: sec(30), deadband: 2.0 };
-        assert_eq!(over_time(falling, &events), [None, None, no, no, no], "it rises");
-        let fall = [(0, Some(20.0)), (30, Some(10.0)), (60, None), (120, Some(0.0)), (150, Some(0.0))];
-        assert_eq!(over_time(falling, &fall), [None, yes, None, None, no]);
-    }
-
-    #[test]
-    fn a_value_that_stands_still_is_stuck_and_an_unknown_one_is_not() {
-        let stuck = Condition::NoChange { lasts: sec(60), deadband: 0.2 };
-        let (no, yes) = (Some(false), Some(true));
-        let check = |values: &[(u64, Option<f64>)], expect: &[Option<bool>]| {
-            assert_eq!(over_time(stuck, values), expect, "{values:?}");
-        };
-        check(&[(0, Some(20.0)), (30, Some(20.2)), (60, Some(20.1)), (61, Some(20.3))], &[no, no, yes, no]);
-        check(&[(0, Some(20.0)), (59, Some(20.3)), (60, Some(20.3))], &[no, no, no]);
-        check(&[(0, Some(20.0)), (50, None), (60, Some(20.0)), (110, Some(20.0))], &[no, None, no, yes]);
-        check(&[(0, Some(20.0)), (60, Some(20.0)), (70, None), (80, Some(20.0))], &[no, yes, None, yes]);
-    }
-
-    #[test]
-    fn no_update_is_told_from_unknown_values_alone() {
-        let silent = Condition::NoUpdate { lasts: sec(30) };
-        let (no, yes) = (Some(false), Some(true));
-        let values = [(0, None), (29, None), (30, None), (31, None), (32, Some(1.0)), (61, None), (63, None)];
-        assert_eq!(over_time(silent, &values), [no, no, yes, yes, no, no, yes]);
-    }
-
-    #[test]
-    fn a_signal_that_changes_too_often_is_told_until_it_calms_down() {
-        let busy = Condition::Changes { count: 3, within: sec(10), deadband: 0.0 };
-        let (no, yes) = (Some(false), Some(true));
-        let values =
-            [(0, 0.0), (1, 1.0), (5, 0.0), (8, 1.0), (11, 1.0), (12, 1.0)].map(|(at, value)| (at, Some(value)));
-        assert_eq!(over_time(busy, &values), [no, no, no, yes, yes, no]);
-    }
-
-    #[test]
-    fn an_alarm_of_before_a_restart_returns_only_when_its_value_has_moved_or_was_calm_for_long_enough() {
-        let (no, yes) = (Some(false), Some(true));
-        let check = |condition, values: &[(u64, f64, Option<bool>)]| {
-            let mut memory = Memory::default();
-            for (second, value, expect) in values {
-                let facts = Facts { value: Some(*value), ..Facts::default() };
-                assert_eq!(holds(condition, facts, true, &mut memory, sec(*second)), *expect, "at {second} s");
-            }
-        };
-        let stuck = Condition::NoChange { lasts: sec(60), deadband: 0.2 };
-        check(stuck, &[(0, 20.0, None), (59, 20.1, None), (60, 20.0, yes)]);
-        check(stuck, &[(0, 20.0, None), (10, 20.5, no), (11, 20.5, no)]);
-        let busy = Condition::Changes { count: 2, within: sec(10), deadband: 0.0 };
-        check(busy, &[(0, 0.0, None), (9, 0.0, None), (10, 0.0, no)]);
-        check(busy, &[(0, 0.0, None), (1, 1.0, None), (2, 0.0, yes), (12, 0.0, no)]);
-    }
-
-    #[test]
-    fn what_has_been_is_forgotten_when_an_alarm_is_enabled_anew() {
-        let stuck = Condition::NoChange { lasts: sec(60), deadband: 0.2 };
-        let (mut memory, facts) = (Memory::default(), Facts { value: Some(20.0), ..Facts::default() });
-        assert_eq!(holds(stuck, facts, false, &mut memory, sec(0)), Some(false));
-        memory.clear();
-        assert_eq!(holds(stuck, facts, false, &mut memory, sec(60)), Some(false));
-        assert_eq!(holds(stuck, facts, false, &mut memory, sec(120)), Some(true));
-    }
-}
+mod tests;

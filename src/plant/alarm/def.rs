@@ -4,11 +4,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+pub use super::condition::{Condition, Level};
 use crate::plant::{
     expr::Expr,
     id::{AlarmId, DeviceId, LineId, TagId},
-    ne107::Signal,
-    station::StationFault,
 };
 
 /// An alarm: a condition on a tag, device or line, with what the operator should know and do.
@@ -82,7 +81,7 @@ impl Default for AlarmRules {
     }
 }
 
-/// Whose trouble an alarm tells. System trouble is kept apart, so that it does not flood the list of the process.
+/// What an alarm is about. System alarms are listed apart, so that they do not flood the process list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum AlarmClass {
     /// The process.
@@ -112,154 +111,6 @@ pub enum Subject {
     Line(LineId),
     /// The station itself.
     Station,
-}
-
-/// When an alarm is active. Limits and deadbands are in the tag's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Condition {
-    /// A fixed limit; it returns when the value is back by the deadband.
-    Limit {
-        /// Which side, which level.
-        level: Level,
-        /// The limit.
-        limit: f64,
-        /// How far back inside before it returns.
-        deadband: f64,
-    },
-    /// The value is further than `limit` from another tag (its SV), either side.
-    Deviation {
-        /// The tag to compare with.
-        from: TagId,
-        /// Greatest distance.
-        limit: f64,
-        /// How far back inside before it returns.
-        deadband: f64,
-    },
-    /// A discrete tag has this value.
-    State {
-        /// The abnormal value.
-        is: f64,
-    },
-    /// This bit of a word is set.
-    Bit {
-        /// From 0, the lowest.
-        bit: u8,
-    },
-    /// The value rises faster than a limit above 0, or falls faster than one below.
-    Rate {
-        /// Tag's unit per minute.
-        limit: f64,
-        /// The time over which the rate is measured.
-        over: Duration,
-        /// How much slower before it returns, tag's unit per minute.
-        deadband: f64,
-    },
-    /// The value has stayed within `deadband` for so long, as if stuck.
-    NoChange {
-        /// So long.
-        lasts: Duration,
-        /// What is no change.
-        deadband: f64,
-    },
-    /// There has been no good value for so long.
-    NoUpdate {
-        /// So long.
-        lasts: Duration,
-    },
-    /// The value has changed so often within a time.
-    Changes {
-        /// So often, 2 to 100.
-        count: u32,
-        /// Within this time.
-        within: Duration,
-        /// What is no change.
-        deadband: f64,
-    },
-    /// The device does not answer, or gives no values.
-    NotAnswering,
-    /// The device has this signal of NE 107.
-    Health {
-        /// Which.
-        signal: Signal,
-    },
-    /// The line is not connected although it should be.
-    NotConnected,
-    /// The line has no time for all of its polls: some are read less often.
-    Overloaded,
-    /// The station has this fault.
-    Station(StationFault),
-}
-
-impl Condition {
-    /// Looks back in time: begins anew when the alarm is enabled.
-    pub fn looks_back(self) -> bool {
-        match self {
-            Condition::Rate { .. }
-            | Condition::NoChange { .. }
-            | Condition::NoUpdate { .. }
-            | Condition::Changes { .. } => true,
-            Condition::Limit { .. }
-            | Condition::Deviation { .. }
-            | Condition::State { .. }
-            | Condition::Bit { .. }
-            | Condition::NotAnswering
-            | Condition::Health { .. }
-            | Condition::NotConnected
-            | Condition::Overloaded
-            | Condition::Station(_) => false,
-        }
-    }
-
-    /// The tag that the value is compared with.
-    pub fn reference(self) -> Option<TagId> {
-        match self {
-            Condition::Deviation { from, .. } => Some(from),
-            Condition::Limit { .. }
-            | Condition::State { .. }
-            | Condition::Bit { .. }
-            | Condition::Rate { .. }
-            | Condition::NoChange { .. }
-            | Condition::NoUpdate { .. }
-            | Condition::Changes { .. }
-            | Condition::NotAnswering
-            | Condition::Health { .. }
-            | Condition::NotConnected
-            | Condition::Overloaded
-            | Condition::Station(_) => None,
-        }
-    }
-
-    /// The limit that stands on the scale of the value itself.
-    pub fn on_scale(self) -> Option<f64> {
-        match self {
-            Condition::Limit { limit, .. } => Some(limit),
-            Condition::Deviation { .. }
-            | Condition::State { .. }
-            | Condition::Bit { .. }
-            | Condition::Rate { .. }
-            | Condition::NoChange { .. }
-            | Condition::NoUpdate { .. }
-            | Condition::Changes { .. }
-            | Condition::NotAnswering
-            | Condition::Health { .. }
-            | Condition::NotConnected
-            | Condition::Overloaded
-            | Condition::Station(_) => None,
-        }
-    }
-}
-
-/// The four levels of a limit alarm.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Level {
-    /// Above the high-high limit.
-    HighHigh,
-    /// Above the high limit.
-    High,
-    /// Below the low limit.
-    Low,
-    /// Below the low-low limit.
-    LowLow,
 }
 
 /// Priority of an alarm, the most urgent first.

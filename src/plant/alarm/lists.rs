@@ -20,7 +20,7 @@ pub struct Lists {
     pub active: Arc<Vec<ActiveAlarm>>,
     /// What is suppressed, in the order of the plant file.
     pub suppressed: Arc<Vec<SuppressedAlarm>>,
-    /// An active alarm that nobody has acknowledged came after the last silence.
+    /// An unacknowledged active alarm came after the last silence.
     pub sound: bool,
 }
 

@@ -9,7 +9,7 @@ use std::{
 use jiff::Timestamp;
 
 use super::{
-    condition::{Facts, Memory, holds, limit_of},
+    condition::{Facts, Memory, holds},
     lists::Lists,
     state::{AlarmDelays, AlarmState, AlarmStateMachine},
 };
@@ -40,7 +40,7 @@ pub struct AlarmManager {
     /// Counts what sounds, so that silence ends what was before it and nothing else.
     pub(super) edges: u64,
     pub(super) silenced: u64,
-    /// Made when somebody looks, forgotten when something changes.
+    /// Built on demand, dropped when something changes.
     pub(super) lists: OnceLock<Arc<Lists>>,
 }
 
@@ -61,7 +61,7 @@ impl AlarmManager {
         }
     }
 
-    /// Evaluates every alarm at an instant; `facts` tells what is known for an alarm.
+    /// Evaluates every alarm at an instant; `facts` gives what is known for an alarm.
     pub fn evaluate(&mut self, at: Timestamp, facts: impl Fn(&AlarmDef) -> Facts) -> Vec<AlarmRecord> {
         let passed = self.evaluated_at.replace(at).map(|before| at.duration_since(before));
         // A clock that was set back lets no time pass; delays go on from where they were.
@@ -80,7 +80,7 @@ impl AlarmManager {
         records
     }
 
-    /// Takes up the alarms that the journal remembers from before a restart: of each alarm at least the last event of every
+    /// Restores the alarms from the journal after a restart: of each alarm at least the last event of every
     /// kind, oldest first. Steps of alarms that the plant no longer has are passed over.
     pub fn restore(&mut self, events: &[AlarmRecord]) {
         let name = |alarm: &AlarmDef| (subject_name(&self.def, alarm.subject).to_owned(), alarm.message.clone());
@@ -118,9 +118,9 @@ impl AlarmManager {
         let (machine, memory) = (&mut self.machines[alarm.id.index()], &mut self.memories[alarm.id.index()]);
         // What is not known to be enabled again is still not evaluated by what it remembers.
         let disabled = is_disabled(alarm, facts) || machine.suppressed().is_some() && facts.enabled != Some(true);
-        let begins_anew = disabled && alarm.condition.looks_back();
+        let starts_over = disabled && alarm.condition.looks_back();
         let returned = is_disabled(alarm, facts) && machine.suppressed().is_none();
-        let event = if begins_anew {
+        let event = if starts_over {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
             memory.clear();
             machine.evaluate(Some(false), self.ran, AlarmDelays::default())
@@ -158,7 +158,7 @@ impl AlarmManager {
         let Some(shelving) = self.machine(alarm.id).shelved() else { return };
         if shelving.until <= at {
             records.push(self.event(alarm, AlarmEvent::Unshelved, at, facts.value));
-            records.extend(self.raise_anew(alarm, at, facts.value));
+            records.extend(self.raise_again(alarm, at, facts.value));
         } else if let Some(until) = shelving.moved(at) {
             let (by, reason) = (shelving.note.by.clone(), shelving.note.reason.clone());
             let record = self.record(alarm, AlarmEvent::Shelved, at, facts.value);
@@ -187,7 +187,7 @@ impl AlarmManager {
     }
 
     /// An alarm that is active when its suppression ends is raised again.
-    pub(super) fn raise_anew(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<f64>) -> Option<AlarmRecord> {
+    pub(super) fn raise_again(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<f64>) -> Option<AlarmRecord> {
         let machine = self.machine(alarm.id);
         let due = machine.is_active() && !machine.state().is_suppressed();
         due.then(|| self.event(alarm, AlarmEvent::Raised, at, value))
@@ -256,7 +256,7 @@ impl AlarmManager {
     pub(super) fn record(&self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
         let record =
             AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.message, alarm.priority, event);
-        AlarmRecord { value, limit: limit_of(alarm.condition), ..record }
+        AlarmRecord { value, limit: alarm.condition.limit(), ..record }
     }
 }
 

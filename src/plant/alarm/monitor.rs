@@ -32,12 +32,11 @@ const CHATTER_TIME: Duration = Duration::from_secs(60);
 const FLEETING: Duration = Duration::from_secs(10);
 /// Stale: active for longer (ISA-18.2).
 const STALE_S: i64 = 86_400;
-/// What happened so long before a period is looked at too, to know whether a flood was under way; longer floods begin
-/// at the period.
+/// Events so long before a period are read too: a flood may be under way when it begins.
 pub const LEAD: Duration = Duration::from_secs(86_400);
-/// What a monitor that starts again must be told of the time before: the hours of the running figures.
+/// How far back a monitor that starts again reads the journal: the hours of the running figures.
 pub const RUNNING: Duration = Duration::from_secs((HOURS * HOUR_S) as u64);
-/// The running figures are formed anew after so many seconds.
+/// The running figures are computed again after so many seconds.
 const REFRESH_S: i64 = 10;
 
 /// Counts activations. Steps come in order of time.
@@ -121,7 +120,7 @@ impl AlarmMonitor {
         self.watched.insert(window);
     }
 
-    /// Takes up an alarm that was active before anything is counted.
+    /// Notes an alarm that was active before anything is counted.
     pub fn already(&mut self, event: &AlarmRecord) {
         let history = self.alarms.entry(named(event)).or_default();
         match event.event {
@@ -295,7 +294,7 @@ impl AlarmMonitor {
         }
     }
 
-    /// Lets go of what is older than the running figures.
+    /// Drops what is older than the running figures.
     fn forget(&mut self) {
         let first = (self.rate.now().div_euclid(HOUR_S) - (HOURS - 1)) * HOUR_S;
         // Nearly always none goes, and then nothing is looked through.
@@ -305,7 +304,7 @@ impl AlarmMonitor {
         while self.sums.front().is_some_and(|(hour, _)| *hour < first) {
             self.sums.pop_front();
             self.stale.retain(|(_, until)| first < *until);
-            // Nothing is lost with an alarm that has not come for an hour: it counts anew.
+            // Nothing is lost with an alarm that has not come for an hour: it counts from 1 again.
             let recent = |at: &Timestamp| self.rate.now() - HOUR_S < second(*at);
             self.alarms.retain(|_, history| history.active.is_some() || history.raised.back().is_some_and(recent));
         }
@@ -336,9 +335,7 @@ impl AlarmMonitor {
             suppressed: all.suppressed,
         }
     }
-}
 
-impl AlarmMonitor {
     /// The windows of a span in which a station ran, and the time of the span that lies in them.
     fn watched_in(&self, from: Timestamp, until: Timestamp) -> (u64, Duration) {
         let (from, until, width) = (from.as_microsecond(), until.as_microsecond(), WINDOW_S * 1_000_000);

@@ -57,7 +57,7 @@ impl Rate {
         self.in_hour = self.in_hour.saturating_add(1);
     }
 
-    /// Goes on to a later second, and tells the spans (from, until) of the seconds left that were flooded. A clock that
+    /// Advances to a later second; returns the spans (from, until) of the seconds left that were flooded. A clock that
     /// went back changes nothing until it is where it was.
     pub fn advance(&mut self, to: i64) -> Vec<(i64, i64)> {
         let mut flooded: Vec<(i64, i64)> = Vec::new();
@@ -95,7 +95,7 @@ fn place(second: i64) -> usize {
 mod tests {
     use super::*;
 
-    /// Raises one alarm at each of the seconds, then tells the flooded spans until `end`.
+    /// Raises one alarm at each of the seconds, then returns the flooded spans until `end`.
     fn floods(seconds: impl IntoIterator<Item = i64>, end: i64) -> Vec<(i64, i64)> {
         let mut rate = Rate::new(0);
         let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! Writes settings into the plant file: the whole file anew beside it, then over it in one step.
+//! Writes settings into the plant file: the whole file beside it, then renamed over it.
 
 use std::{
     fs::{self, File},
@@ -36,12 +36,12 @@ impl PlantFile {
 
     /// Puts the settings of a line into the file; everything else in it stays as it is, comments included. `Err` says in
     /// words for the operator why nothing was written: the file has changed since, cannot be written, or the settings
-    /// cannot be told in it. Blocks while the disk works.
+    /// cannot be written in it. Blocks while the disk works.
     pub fn save(&mut self, settings: &LineDef) -> Result<(), String> {
         let file = self.path.display();
         let now = read(&self.path).map_err(|why| format!("{file} cannot be read: {why}"))?;
         if now != self.bytes {
-            return Err(format!("{file} was changed by somebody since this station has started; restart it first"));
+            return Err(format!("{file} was changed since this station has started; restart it first"));
         }
         let text = std::str::from_utf8(&now).map_err(|_| format!("{file} is not UTF-8"))?;
         let text = edit::with_line(text, settings)?;
@@ -176,12 +176,12 @@ unit = 1
     }
 
     #[test]
-    fn somebody_elses_changes_are_not_overwritten() {
+    fn changes_by_others_are_not_overwritten() {
         let mut plant = plant();
         let other = TEXT.replace("Small", "Large");
         fs::write(&plant.path, &other).unwrap();
         let refused = plant.file.save(&plant.line);
-        assert!(refused.as_ref().is_err_and(|why| why.contains("was changed by somebody")), "{refused:?}");
+        assert!(refused.as_ref().is_err_and(|why| why.contains("was changed since")), "{refused:?}");
         assert_eq!(fs::read_to_string(&plant.path).unwrap(), other);
     }
 

@@ -5,7 +5,7 @@ use ratatui::style::Style;
 use crate::{
     plant::{
         alarm::AlarmState,
-        def::{AlarmDef, AlarmId, Condition, Level, Subject},
+        def::{AlarmDef, AlarmId, Subject},
         number::to_u16,
         snapshot::ActiveAlarm,
         station::STATION,
@@ -215,20 +215,5 @@ pub fn condition_words(cx: &ViewContext, alarm: AlarmId) -> String {
         Subject::Tag(tag) => cx.snapshot.format(tag, value),
         Subject::Device(_) | Subject::Line(_) | Subject::Station => value.to_string(),
     };
-    match def.condition {
-        Condition::Limit { level: Level::HighHigh | Level::High, limit, .. } => format!("> {}", number(limit)),
-        Condition::Limit { level: Level::Low | Level::LowLow, limit, .. } => format!("< {}", number(limit)),
-        Condition::Deviation { from, limit, .. } => format!("> {} off {}", number(limit), cx.def().tag(from).short),
-        Condition::State { is } => format!("= {}", number(is)),
-        Condition::Rate { limit, .. } => format!("{} {limit}/min", if limit < 0.0 { "<" } else { ">" }),
-        Condition::Bit { .. }
-        | Condition::NoChange { .. }
-        | Condition::NoUpdate { .. }
-        | Condition::Changes { .. }
-        | Condition::NotAnswering
-        | Condition::Health { .. }
-        | Condition::NotConnected
-        | Condition::Overloaded
-        | Condition::Station(_) => String::new(),
-    }
+    def.condition.text(number, |tag| cx.def().tag(tag).short.clone())
 }

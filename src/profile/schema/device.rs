@@ -1,0 +1,295 @@
+//! Every table and key of a device profile.
+
+use std::time::Duration;
+
+use crate::{
+    plant::{
+        def::Reauthentication,
+        tag::{Access, ByteOrder, Confidence, DataType, PollClass, Table},
+    },
+    profile::{
+        address::{Location, Modicon},
+        diagnostic::{Problems, Span},
+        reader::{Choice, Node, Numbered, Raw, Value, table, words},
+        simulate::Choices,
+    },
+};
+
+table!(
+    /// A device profile.
+    ProfileFile, "the device profile" {
+        need "vendor" vendor: String,
+        need "model" model: String,
+        opt "revision" revision: String,
+        /// How well the map is known: `verified`, `manual` or `partial`.
+        need "status" status: Status,
+        need "source" source: String,
+        opt "notes" notes: String,
+        /// Always 0.
+        opt "address_base" address_base: u8,
+        opt "scheme" scheme: Scheme,
+        /// The function codes that the device knows.
+        list "functions" functions: u8,
+        opt "limits" limits: Raw,
+        /// Keys that every tag has unless it says otherwise.
+        opt "default" default: Raw,
+        list "tag" tags: Raw,
+        list "action" actions: ActionTable,
+        opt "faceplate" faceplate: FaceplateTable,
+        opt "program" program: ProgramTable,
+    }
+);
+
+table!(
+    /// What one request may hold.
+    LimitsTable, "limits" {
+        opt "read_registers_max" read_registers_max: u16,
+        opt "read_bits_max" read_bits_max: u16,
+        opt "write_registers_max" write_registers_max: u16,
+        opt "gap_registers_max" gap_registers_max: u16,
+        opt "alignment" alignment: u16,
+        opt "in_flight_max" in_flight_max: u16,
+        opt "request_gap_ms" request_gap_ms: u16,
+        opt "write_gap_ms" write_gap_ms: u16,
+    }
+);
+
+table!(
+    /// A `[[tag]]` of a profile, or a `[[device.tag]]` of a plant file.
+    TagTable, "a tag" {
+        need "name" name: String,
+        opt "label" label: String,
+        opt "meaning" meaning: String,
+        opt "table" table: Table,
+        need "address" address: Location,
+        opt "modicon" modicon: Modicon,
+        opt "type" kind: TypeName,
+        opt "order" order: ByteOrder,
+        opt "field" field: Choice,
+        opt "scale" scale: f64,
+        opt "offset" offset: f64,
+        opt "decimals" decimals: u8,
+        opt "decimals_from" decimals_from: String,
+        opt "unit" unit: String,
+        opt "unit_from" unit_from: String,
+        opt "min" min: f64,
+        opt "max" max: f64,
+        opt "min_from" min_from: String,
+        opt "max_from" max_from: String,
+        opt "access" access: Access,
+        opt "verify" verify: bool,
+        opt "confirm" confirm: String,
+        /// What must be given again to write it.
+        opt "reauthenticate" reauthenticate: Reauthentication,
+        opt "enum" labels: Numbered,
+        opt "bits" bits: Numbered,
+        list "bad_if" bad_if: i64,
+        opt "quality_from" quality_from: String,
+        opt "quality_mask" quality_mask: u64,
+        opt "write_fc" write_fc: u8,
+        opt "write_unlock" write_unlock: UnlockTable,
+        opt "group" group: String,
+        opt "poll" poll: PollWord,
+        opt "poll_class" poll_class: PollClass,
+        opt "deadband" deadband: f64,
+        opt "store" store: bool,
+        /// Counts up, or not: by its unit if this is not said.
+        opt "counter" counter: bool,
+        opt "confidence" confidence: Confidence,
+        opt "source" source: String,
+        opt "simulate" simulate: SimulateTable,
+        /// What the maker delivers it with.
+        opt "default" default: Choice,
+        /// Part of parameter sets, or not.
+        opt "set" in_sets: bool,
+    }
+);
+
+table!(
+    /// How a simulated device fills a tag.
+    SimulateTable, "simulate" {
+        opt "start" start: Choice,
+        list "case" cases: CaseTable,
+        opt "range" range: [f64; 2],
+        opt "noise" noise: f64,
+        opt "pulse" pulse: Duration,
+        opt "oscillate" oscillate: [f64; 2],
+        opt "period" period: Duration,
+        opt "follow" follow: String,
+        list "sum" sum: String,
+        list "mean" mean: String,
+        list "product" product: String,
+        list "difference" difference: String,
+        list "quotient" quotient: String,
+        list "reactive" reactive: String,
+        opt "angle" angle: String,
+        opt "integrate" integrate: String,
+        opt "time_base" time_base: Duration,
+        opt "rate" rate: f64,
+        opt "lag" lag: Duration,
+        opt "gain" gain: f64,
+        opt "offset" offset: f64,
+        opt "when" when: CheckTable,
+        opt "idle" idle: f64,
+    }
+);
+
+table!(
+    /// A condition on another tag; without `is`, `above` and `below`: is it not 0?
+    CheckTable, "when" {
+        need "tag" tag: String,
+        opt "field" field: Choice,
+        opt "is" is: Choices,
+        opt "above" above: f64,
+        opt "below" below: f64,
+        list "and" and: CheckTable,
+    }
+);
+
+table!(
+    /// A value for when something is so.
+    CaseTable, "a case" {
+        need "when" when: CheckTable,
+        need "value" value: Choice,
+    }
+);
+
+table!(
+    /// What must be written before a tag takes a write.
+    UnlockTable, "write_unlock" {
+        need "tag" tag: String,
+        need "value" value: Choice,
+    }
+);
+
+table!(
+    /// An `[[action]]` of a profile.
+    ActionTable, "an action" {
+        need "name" name: String,
+        need "tag" tag: String,
+        need "value" value: Choice,
+        opt "settle_ms" settle_ms: u32,
+        opt "stop" stop: bool,
+        need "confirm" confirm: String,
+        opt "saves" saves: bool,
+    }
+);
+
+table!(
+    /// Which tags a controller is operated by.
+    FaceplateTable, "the faceplate" {
+        need "pv" pv: String,
+        need "sv" sv: String,
+        /// The set value in use, where a program or a ramp may move it.
+        opt "sv_used" sv_used: String,
+        opt "mv" mv: String,
+        opt "run" run: String,
+        opt "mode" mode: String,
+        opt "tune" tune: String,
+        list "tunes" tunes: String,
+    }
+);
+
+table!(
+    /// The ramp/soak program of a controller.
+    ProgramTable, "the program" {
+        need "position" position: String,
+        need "command" command: String,
+        need "run" run: Choice,
+        opt "halt" halt: Choice,
+        need "off" off: Choice,
+        opt "pattern" pattern: String,
+        /// First and last step of each pattern, from 1, in the order of the pattern's values.
+        list "patterns" patterns: [u16; 2],
+        opt "mode" mode: String,
+        list "steps" steps: StepTable,
+    }
+);
+
+table!(
+    /// A step of a program.
+    StepTable, "a step of the program" {
+        need "sv" sv: String,
+        need "ramp" ramp: String,
+        need "soak" soak: String,
+    }
+);
+
+words!(Table, "table" {
+    "coil" => Table::Coil, "discrete" => Table::Discrete, "input" => Table::Input, "holding" => Table::Holding,
+});
+
+words!(ByteOrder, "order" {
+    "ABCD" => ByteOrder::Abcd, "CDAB" => ByteOrder::Cdab, "BADC" => ByteOrder::Badc, "DCBA" => ByteOrder::Dcba,
+});
+
+words!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" => Access::Write, });
+
+words!(Confidence, "confidence" {
+    "proven" => Confidence::Proven, "high" => Confidence::High, "medium" => Confidence::Medium, "low" => Confidence::Low,
+});
+
+words!(PollClass, "poll class" { "critical" => PollClass::Critical, "normal" => PollClass::Normal, "background" => PollClass::Background, });
+
+words!(Reauthentication, "reauthenticate" { "password" => Reauthentication::Password, "second user" => Reauthentication::SecondUser, });
+
+/// How addresses are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Scheme {
+    /// 0-based numbers, as sent.
+    #[default]
+    Modbus,
+    /// Octal `V40500`, `Y17`, `X23`, `C54` of KOYO and AutomationDirect.
+    DirectLogic,
+}
+words!(Scheme, "scheme" { "modbus" => Scheme::Modbus, "directlogic" => Scheme::DirectLogic, });
+
+/// How well a register map is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Status {
+    /// Tried on the device.
+    Verified,
+    /// Taken from the maker's manual.
+    Manual,
+    /// Parts are known.
+    Partial,
+}
+words!(Status, "status" { "verified" => Status::Verified, "manual" => Status::Manual, "partial" => Status::Partial, });
+
+/// How often a tag is read; the device says what fast and slow are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PollWord {
+    Fast,
+    Slow,
+    Once,
+    Never,
+}
+words!(PollWord, "poll" {
+    "fast" => PollWord::Fast, "slow" => PollWord::Slow, "once" => PollWord::Once, "never" => PollWord::Never,
+});
+
+/// The type of a raw value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct TypeName(pub DataType);
+
+impl Value for TypeName {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let word = <String as Value>::read(value, at, problems)?;
+        if let Some(rest) = word.strip_prefix("string") {
+            let count = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
+            let count =
+                count.and_then(|count| count.trim().parse().ok()).filter(|n| (1..=DataType::TEXT_MAX).contains(n));
+            if count.is_none() {
+                let problem = problems.add(at, format!("`{word}` does not say how long the text is"));
+                problem.label(format!("expected \"string(N)\" with N bytes, 1 to {}", DataType::TEXT_MAX));
+            }
+            return count.map(|count| TypeName(DataType::Text(count)));
+        }
+        let found = DataType::NUMBERS.into_iter().find(|kind| kind.name() == word);
+        if found.is_none() {
+            let names = DataType::NUMBERS.into_iter().map(DataType::name);
+            problems.add(at, format!("unknown type `{word}`")).label("not a type").suggest(&word, names);
+        }
+        found.map(TypeName)
+    }
+}

@@ -1,0 +1,57 @@
+//! Tags that hold text.
+
+use super::*;
+
+/// A tag that holds text, added to the small plant's meter.
+fn with_text(keys: &str) -> Result<PlantDef, Errors> {
+    let text = "\n[[tag]]\nname = \"MODEL\"\ntable = \"holding\"\naddress = 2000\n";
+    load(PLANT.as_bytes(), &format!("{METER}{text}{keys}\n"), PLC)
+}
+
+#[test]
+fn a_text_is_read_and_never_stored() {
+    let plant = with_text("type = \"string(9)\"\norder = \"BADC\"").unwrap();
+    let tag = plant.tag(plant.tag_named("D1.MODEL").unwrap());
+    assert_eq!((tag.point.kind, tag.point.len()), (DataType::Text(9), 5));
+    assert!(tag.is_text() && !tag.store && !tag.writable());
+}
+
+#[test]
+fn a_text_takes_no_key_that_is_for_numbers() {
+    for (key, expect) in [
+        ("scale = 0.1", "`scale` is for numbers, this is a text"),
+        ("unit = \"s\"", "`unit` is for numbers"),
+        ("max = 5", "`max` is for numbers"),
+        ("enum = { 0 = \"a\" }", "`enum` is for numbers"),
+        ("bad_if = [0]", "`bad_if` is for numbers"),
+        ("field = 3", "this is not a field of bits"),
+        ("order = \"CDAB\"", "the words of a text are never reversed"),
+        ("access = \"rw\"", "a text can only be read"),
+        ("store = true", "the history keeps numbers, this is a text"),
+    ] {
+        let text = with_text(&format!("type = \"string(8)\"\n{key}")).expect_err(key).to_string();
+        assert!(text.contains(expect), "{key}: {text}");
+    }
+    let long = with_text("type = \"string(250)\"").expect_err("60 registers are read at most").to_string();
+    assert!(long.contains("the value takes 125 registers, the device reads at most 60"), "{long}");
+}
+
+#[test]
+fn nothing_counts_with_a_text() {
+    let text = "\n[[tag]]\nname = \"MODEL\"\ntable = \"holding\"\naddress = 2000\ntype = \"string(8)\"\n";
+    let meter = format!("{METER}{text}");
+    for (from, to) in [
+        ("tag = \"D1.T\"\nhigh", "tag = \"D1.MODEL\"\nhigh"),
+        ("\n[mimic]", "\n[[trend]]\nname = \"t\"\npens = [{ tag = \"D1.MODEL\" }]\n\n[mimic]"),
+        ("\n[mimic]", "\n[report]\ntags = [\"D1.MODEL\"]\n\n[mimic]"),
+    ] {
+        assert!(PLANT.contains(from), "{from}");
+        let text = load(PLANT.replace(from, to).as_bytes(), &meter, PLC).expect_err(to).to_string();
+        assert!(text.contains("D1.MODEL is a text"), "{to}: {text}");
+    }
+    let shown = PLANT.replace("y = 1, tag = \"D1.T\"", "y = 1, tag = \"D1.MODEL\"");
+    assert!(load(shown.as_bytes(), &meter, PLC).is_ok(), "the mimic may show it");
+    let scaled = meter.replace("decimals_from = \"DP\"", "decimals_from = \"MODEL\"");
+    let text = load(PLANT.as_bytes(), &scaled, PLC).expect_err("no decimals").to_string();
+    assert!(text.contains("D1.MODEL is a text"), "{text}");
+}
