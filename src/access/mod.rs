@@ -5,11 +5,13 @@ pub mod session_request;
 pub mod password;
 pub mod user;
 pub mod lockout;
+mod rate_limit;
 pub mod control;
 pub mod audit_log;
 pub mod sealing;
 pub mod io;
 
 pub use control::{AccessControl, Effect, Peer};
+pub(crate) use rate_limit::RateLimit;
 pub use session_request::{Credentials, Durability, Secret, SessionRequest, SessionRow, SessionStatus, UserRow, Who};
 pub use user::Users;

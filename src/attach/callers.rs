@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
+use crate::access::RateLimit;
+
 /// Terminals of all users at once.
 pub const TERMINALS_MAX: usize = 64;
 /// Terminals of one user at once, except root and the user who runs the station.
@@ -13,9 +15,10 @@ pub const STRANGERS_MAX: usize = 8;
 /// The same of all users: the oldest one of the user with the most is dropped.
 const STRANGERS_OF_ALL_MAX: usize = 64;
 /// Terminals of one user that may attach: so many at once, and one more each time.
-const ATTACHES: Rate = Rate { burst: 128, every: Duration::from_millis(125) };
+const ATTACHES: RateLimit = RateLimit::new(ATTACHES_BURST, Duration::from_millis(125));
+const ATTACHES_BURST: u32 = 128;
 /// Lines about one user in the log.
-const LINES: Rate = Rate { burst: 20, every: Duration::from_secs(2) };
+const LINES: RateLimit = RateLimit::new(20, Duration::from_secs(2));
 /// Lines that were left out are counted, and the count is logged so often.
 const COUNT_EVERY: Duration = Duration::from_secs(60);
 /// Users that are counted each by itself; further ones share one count.
@@ -23,38 +26,19 @@ const USERS_MAX: usize = 256;
 /// Stands for all the others.
 const OTHERS: u32 = u32::MAX;
 
-/// So many at once, and one more each time.
-#[derive(Debug, Clone, Copy)]
-struct Rate {
-    burst: u32,
-    every: Duration,
-}
-
-/// What is left of a [`Rate`]. Times are counted from any one instant.
-#[derive(Debug, Default)]
-struct Allowance {
-    /// Everything may be taken again from then on.
-    full_at: Duration,
-}
-
-impl Allowance {
-    fn take(&mut self, rate: Rate, now: Duration) -> bool {
-        let after = self.full_at.max(now) + rate.every;
-        let some = after <= now + rate.every * rate.burst;
-        if some {
-            self.full_at = after;
-        }
-        some
-    }
-}
-
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Caller {
     terminals: usize,
-    attaches: Allowance,
-    lines: Allowance,
+    attaches: RateLimit,
+    lines: RateLimit,
     unlogged: u64,
     counted: Duration,
+}
+
+impl Default for Caller {
+    fn default() -> Caller {
+        Caller { terminals: 0, attaches: ATTACHES, lines: LINES, unlogged: 0, counted: Duration::ZERO }
+    }
 }
 
 /// All users that have connected, by uid.
@@ -78,7 +62,7 @@ impl Callers {
         let host = self.hosts.contains(&user);
         let user = self.counted_as(user, now);
         let caller = self.users.entry(user).or_default();
-        if !caller.attaches.take(ATTACHES, now) {
+        if !caller.attaches.take(now) {
             return Err("too many terminals of this user have attached just now, wait a moment".to_owned());
         }
         if TERMINALS_OF_USER_MAX <= caller.terminals && !host {
@@ -103,7 +87,7 @@ impl Callers {
     pub fn may_log(&mut self, user: u32, now: Duration) -> bool {
         let user = self.counted_as(user, now);
         let caller = self.users.entry(user).or_default();
-        let some = caller.lines.take(LINES, now);
+        let some = caller.lines.take(now);
         if !some {
             caller.unlogged += 1;
         }
@@ -124,7 +108,7 @@ impl Callers {
     fn counted_as(&mut self, user: u32, now: Duration) -> u32 {
         let is_new = |users: &BTreeMap<u32, Caller>| USERS_MAX <= users.len() && !users.contains_key(&user);
         if is_new(&self.users) {
-            let rests = |caller: &Caller| caller.attaches.full_at <= now && caller.lines.full_at <= now;
+            let rests = |caller: &Caller| caller.attaches.is_full(now) && caller.lines.is_full(now);
             self.users.retain(|_, caller| caller.terminals > 0 || caller.unlogged > 0 || !rests(caller));
         }
         if is_new(&self.users) { OTHERS } else { user }
@@ -190,7 +174,7 @@ mod tests {
             let attached = callers.attach(EVE, seconds(100)).is_ok();
             attached.then(|| callers.detach(EVE)).is_some()
         });
-        assert_eq!(quick.count(), ATTACHES.burst as usize);
+        assert_eq!(quick.count(), ATTACHES_BURST as usize);
     }
 
     #[test]

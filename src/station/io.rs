@@ -129,7 +129,7 @@ fn begin(
     if let Some(state) = guarded.as_ref().and_then(|(access, _)| users_fault(access, &recorder.opened)) {
         plant.on_fault(StationFault::UsersFile, state);
     }
-    audit_queue.started(&def.name, file.as_ref(), users, clock.utc());
+    audit_queue.put_start(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
     let persistence =
         Persistence { records: Some(records), store, past, audit: Some(audit_queue), sets: Some(sets), observer };

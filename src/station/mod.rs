@@ -26,6 +26,8 @@
 
 pub mod session;
 mod audit_queue;
+mod durability;
+mod entries;
 mod session_server;
 mod past;
 mod plant_task;

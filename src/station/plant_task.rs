@@ -10,7 +10,8 @@ use tokio::{
 };
 
 use super::{
-    audit_queue::{self, AuditMessage, AuditQueue},
+    audit_queue::{AuditMessage, AuditQueue, RecorderFaults},
+    entries,
     past::{self, Past},
     sets,
 };
@@ -138,7 +139,7 @@ impl PlantTask {
         }
         loop {
             // What a snapshot shows as done is on disk, or marked.
-            let due = self.persistence.audit.as_ref().map_or(next, |audit| audit.due(next));
+            let due = self.persistence.audit.as_ref().map_or(next, |audit| audit.publish_at(next));
             tokio::select! {
                 biased;
                 () = tokio::time::sleep_until(due), if changed => {
@@ -215,9 +216,9 @@ impl PlantTask {
         }
         let ended = self.plant.on_stop();
         self.keep(ended.records);
-        let stopped = audit_queue::stopped(&self.plant.def().name, self.clock.utc());
+        let stopped = entries::stopped(&self.plant.def().name, self.clock.utc());
         if let Some(audit) = &mut self.persistence.audit {
-            audit.tell_all();
+            audit.send_all();
             self.write_down(vec![stopped], Vec::new());
         }
         self.publish();
@@ -237,7 +238,7 @@ impl PlantTask {
         let Some(past) = self.persistence.past.take() else { return };
         let Restored { steps, recent, chain_hashes } = past.join(restored);
         if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
-            audit.stored(chain_hashes);
+            audit.compare(chain_hashes);
         }
         if !steps.is_empty() {
             tracing::info!(steps = steps.len(), "the state of the alarms is taken from the journal");
@@ -250,16 +251,16 @@ impl PlantTask {
     fn handle_audit_message(&mut self, message: AuditMessage) {
         match (message, &mut self.persistence.audit) {
             (AuditMessage::Entry(action), _) => self.keep(vec![Record::Action(action)]),
-            (AuditMessage::Reply(reply, answer), Some(audit)) => audit.answer(reply, answer),
+            (AuditMessage::Reply(sender, result), Some(audit)) => audit.reply(sender, result),
             // A terminal that has left needs no answer.
             (AuditMessage::Reply(reply, answer), None) => drop(reply.send(answer.map(|()| Durability::NotRecorded))),
-            (AuditMessage::Lost(count), Some(audit)) => audit.lost(count),
+            (AuditMessage::Lost(count), Some(audit)) => audit.count_lost(count),
             (AuditMessage::Lost(_), None) => {}
         }
     }
 
     fn tell_answers(&mut self) {
-        let left = self.persistence.audit.as_mut().map(AuditQueue::tell).unwrap_or_default();
+        let left = self.persistence.audit.as_mut().map(AuditQueue::send_due).unwrap_or_default();
         self.store(left.into_iter().map(Record::Action).collect());
     }
 
@@ -272,7 +273,7 @@ impl PlantTask {
 
     fn clock_stepped(&mut self, old: Timestamp, new: Timestamp) {
         self.store(vec![Record::ClockSet]);
-        self.write_down(vec![audit_queue::clock_step(old, new)], Vec::new());
+        self.write_down(vec![entries::clock_step(old, new)], Vec::new());
         let words = format!("the clock was set from {old:.0} to {new:.0}; times follow it from here on");
         tracing::warn!("{words}");
         let state = FaultState::Occurred(words.into());
@@ -433,7 +434,7 @@ impl PlantTask {
         let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));
         status.trouble = [status.trouble, lost].into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
         if let Some(audit) = &mut self.persistence.audit {
-            let (lost, log, alarms) = audit.trouble();
+            let RecorderFaults { lost, log, alarms } = audit.faults();
             status.lost += lost;
             status.audit = audit.last();
             let parts: Vec<String> = [&status.trouble, &log, &alarms].into_iter().flatten().cloned().collect();

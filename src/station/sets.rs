@@ -44,22 +44,15 @@ fn write(folder: &Path, def: &PlantDef, set: &ParameterSet, replace: bool) -> Re
     let path = folder.join(format!("{}.toml", set.name));
     let failed = |error: std::io::Error| format!("{} cannot be written: {error}", path.display());
     fs::create_dir_all(folder).map_err(failed)?;
-    let beside = atomic::beside(&path);
-    let text = text_of_set(set, def);
-    let written = atomic::write_beside(&beside, text.as_bytes(), 0o640).and_then(|_| {
-        if replace {
-            return fs::rename(&beside, &path);
-        }
-        // A link fails where the name is taken, so nobody's set is lost between a look and a write.
-        fs::hard_link(&beside, &path)
+    let written = atomic::write_placed(&path, text_of_set(set, def).as_bytes(), 0o640, |_, new| {
+        // A link fails if the name is taken: no set is replaced between a check and the write.
+        if replace { fs::rename(new, &path) } else { fs::hard_link(new, &path) }
     });
-    // After a rename there is nothing left to remove.
-    let _ = fs::remove_file(&beside);
     match written {
         Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
             Err(format!("there is a set {} already", set.name))
         }
-        written => written.map_err(failed),
+        written => written.map(drop).map_err(failed),
     }
 }
 

@@ -25,7 +25,7 @@ impl AccessControl {
     pub(super) fn within_rate(&mut self, terminal: u32, at: Timestamp) -> bool {
         let Some(session) = self.sessions.get_mut(&terminal) else { return false };
         // The station's own process shares its fate anyway.
-        if session.peer.own || session.requests.take(at) {
+        if session.peer.own || session.takes_request(at) {
             return true;
         }
         let origin = session.origin.clone();
@@ -35,7 +35,7 @@ impl AccessControl {
 
     /// Whether one more refusal, attach or detach of this user gets an entry of its own.
     pub(super) fn may_record(&mut self, origin: &Arc<str>, at: Timestamp) -> bool {
-        self.refusals_of(origin, at).one(at)
+        self.refusals_of(origin, at).count(at)
     }
 
     fn refusals_of(&mut self, origin: &Arc<str>, at: Timestamp) -> &mut Refusals {

@@ -1,16 +1,19 @@
 //! The state of one attached terminal: its user, its lock, its request rate.
 
-use std::{collections::VecDeque, sync::Arc};
+use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::Peer;
-use crate::{access::Who, plant::command::CommandId};
+use super::{Peer, passed};
+use crate::{
+    access::{RateLimit, Who},
+    plant::command::CommandId,
+};
 
-/// Requests a second of one terminal that are answered in the long run, and so many at once.
-const REQUESTS: (f64, f64) = (20.0, 40.0);
-/// Refusals a second of one place that are put on record each by itself, and so many at once.
-const REFUSALS: (f64, f64) = (0.5, 20.0);
+/// Requests of one terminal.
+const REQUESTS: RateLimit = RateLimit::new(40, Duration::from_millis(50));
+/// Refusals of one user of the operating system that get an audit entry each.
+const REFUSALS: RateLimit = RateLimit::new(20, Duration::from_secs(2));
 
 /// Commands that did not reach the plant and are remembered for their terminal: as many as may come at once.
 const UNDELIVERED_MAX: usize = 64;
@@ -34,8 +37,7 @@ pub struct SessionState {
     pub locked: bool,
     /// When a key was last pressed.
     pub active: Timestamp,
-    /// What it may still ask.
-    pub requests: Bucket,
+    requests: RateLimit,
     /// The number of its last command: each has a higher one.
     pub last_command: Option<u32>,
     /// Its latest commands that did not reach the plant, and why.
@@ -46,7 +48,6 @@ impl SessionState {
     /// A terminal that has just attached.
     pub fn new(peer: Peer, at: Timestamp) -> SessionState {
         let origin = origin(&peer);
-        let requests = Bucket::full(REQUESTS, at);
         SessionState {
             peer,
             origin,
@@ -56,13 +57,18 @@ impl SessionState {
             trusted: false,
             locked: false,
             active: at,
-            requests,
+            requests: REQUESTS,
             last_command: None,
             undelivered: VecDeque::new(),
         }
     }
 
-    /// Who sits there, unless the terminal is locked.
+    /// Takes one request; `false` above the rate limit.
+    pub fn takes_request(&mut self, at: Timestamp) -> bool {
+        self.requests.take(steady(at))
+    }
+
+    /// The user, unless the terminal is locked.
     pub fn acting(&self) -> Option<&Who> {
         self.who.as_ref().filter(|_| !self.locked)
     }
@@ -96,55 +102,30 @@ fn origin(peer: &Peer) -> Arc<str> {
     }
 }
 
-/// So much a second, and so much at once.
-#[derive(Debug, Clone, Copy)]
-pub struct Bucket {
-    rate: f64,
-    size: f64,
-    left: f64,
-    at: Timestamp,
-}
-
-impl Bucket {
-    fn full((rate, size): (f64, f64), at: Timestamp) -> Bucket {
-        Bucket { rate, size, left: size, at }
-    }
-
-    /// Takes one out; `false` when it is empty.
-    pub fn take(&mut self, at: Timestamp) -> bool {
-        let since = at.duration_since(self.at).as_secs_f64().max(0.0);
-        self.left = (self.left + since * self.rate).min(self.size);
-        self.at = self.at.max(at);
-        let some = 1.0 <= self.left;
-        if some {
-            self.left -= 1.0;
-        }
-        some
-    }
-}
-
-/// What a place was refused: the first times each on record, then only counted.
+/// The refusals of one user of the operating system: the first have an entry each, further ones are counted.
 #[derive(Debug)]
 pub struct Refusals {
-    bucket: Bucket,
-    /// Not on record yet.
+    limit: RateLimit,
+    /// Refusals without an entry.
     pub unrecorded: u64,
     /// When refusals were last recorded.
     pub recorded_at: Timestamp,
 }
 
 impl Refusals {
-    /// Nothing was refused yet.
     pub fn new(at: Timestamp) -> Refusals {
-        Refusals { bucket: Bucket::full(REFUSALS, at), unrecorded: 0, recorded_at: at }
+        Refusals { limit: REFUSALS, unrecorded: 0, recorded_at: at }
     }
 
-    /// One more. `true` if it may be on record by itself; otherwise it is counted.
-    pub fn one(&mut self, at: Timestamp) -> bool {
-        let some = self.bucket.take(at);
-        if !some {
-            self.unrecorded += 1;
-        }
-        some
+    /// Counts a refusal; `true` if it gets an entry of its own.
+    pub fn count(&mut self, at: Timestamp) -> bool {
+        let recorded = self.limit.take(steady(at));
+        self.unrecorded += u64::from(!recorded);
+        recorded
     }
+}
+
+/// The time of the station, as rate limits count it.
+fn steady(at: Timestamp) -> Duration {
+    passed(Timestamp::UNIX_EPOCH, at)
 }

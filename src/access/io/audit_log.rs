@@ -19,6 +19,7 @@ use crate::{
     },
     history::io::chain::CHAIN_HASHES_MAX,
     plant::record::{ActionRecord, ChainHash},
+    profile::io::atomic,
 };
 
 /// Why the files beside a history that another process has are left alone.
@@ -182,8 +183,7 @@ impl AuditLog {
         audit_log.note(last)?;
         audit_log.head.sync_all()?;
         // The names must outlive a loss of power too.
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        File::open(folder)?.sync_all()?;
+        atomic::sync_folder(path)?;
         Ok((audit_log, opened))
     }
 

@@ -52,17 +52,15 @@ pub fn make(log: &Path, made: Timestamp) -> io::Result<VerificationKey> {
     };
     let bytes = random().map_err(io::Error::other)?;
     let first = Key::new(last.map_or(0, |last| last + 1), bytes);
-    let new = atomic::beside(&path);
-    let file = atomic::write_beside(&new, first.text().as_bytes(), 0o600)?;
-    let owner = fs::metadata(log).or_else(|_| fs::metadata(path.parent().unwrap_or(Path::new("."))))?;
-    let own = file.metadata()?.uid();
-    // Unlike a rename, a link never replaces a key that is there.
-    let placed =
-        if own == 0 && owner.uid() != own { fchown(&file, Some(owner.uid()), Some(owner.gid())) } else { Ok(()) }
-            .and_then(|()| fs::hard_link(&new, &path));
-    fs::remove_file(&new)?;
-    placed?;
-    atomic::sync_folder(&path)?;
+    atomic::write_placed(&path, first.text().as_bytes(), 0o600, |file, new| {
+        let owner = fs::metadata(log).or_else(|_| fs::metadata(path.parent().unwrap_or(Path::new("."))))?;
+        let own = file.metadata()?.uid();
+        if own == 0 && owner.uid() != own {
+            fchown(file, Some(owner.uid()), Some(owner.gid()))?;
+        }
+        // Unlike a rename, a link never replaces a key that is there.
+        fs::hard_link(new, &path)
+    })?;
     Ok(VerificationKey { first, made })
 }
 

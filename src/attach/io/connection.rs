@@ -6,15 +6,12 @@ use tokio::{
     io::{AsyncRead, AsyncWrite},
     sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot},
     task::{AbortHandle, JoinSet},
-    time::{Instant, sleep_until, timeout},
+    time::{Instant, sleep, sleep_until, timeout},
 };
 
-use super::{
-    rate_limit::RateLimit,
-    wire::{self, WireError},
-};
+use super::wire::{self, WireError};
 use crate::{
-    access::{Credentials, SessionRequest, SessionStatus},
+    access::{Credentials, RateLimit, SessionRequest, SessionStatus},
     attach::{
         check,
         delta::Delta,
@@ -32,6 +29,8 @@ use crate::{
     station::{Request, Session},
 };
 
+/// Messages of one terminal: as fast as a person, so that no terminal fills the queue of all.
+const REQUESTS: RateLimit = RateLimit::new(64, Duration::from_millis(20));
 /// Real time between two snapshots to one terminal.
 pub const SNAPSHOT_EVERY: Duration = Duration::from_millis(250);
 /// A terminal that takes nothing for so long is let go.
@@ -104,11 +103,11 @@ struct Inbound {
 impl Inbound {
     /// Takes one message after the other, no faster than a person asks. What waits, waits in the terminal.
     async fn run(mut self, mut read: impl AsyncRead + Unpin) -> Result<std::convert::Infallible, ConnectionEnd> {
-        let mut rate_limit = RateLimit::new();
+        let (mut rate_limit, began) = (REQUESTS, Instant::now());
         loop {
             let bytes = wire::read(&mut read, REQUEST_BYTES_MAX).await?;
             let asked = protocol::decode(&bytes, "message of a terminal").map_err(WireError::from)?;
-            rate_limit.acquire().await;
+            sleep(rate_limit.reserve(began.elapsed())).await;
             match asked {
                 ClientMessage::Command(command, credentials) => self.send_command(*command, credentials).await,
                 ClientMessage::Ask { ticket, query } => self.ask(ticket, query).await,

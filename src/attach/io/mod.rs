@@ -2,7 +2,6 @@
 
 pub mod connect;
 pub mod find;
-mod rate_limit;
 mod client_task;
 mod connection;
 pub mod serve;

@@ -28,6 +28,7 @@ use crate::{
         callers::{Callers, makes_room},
         protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, Place, ProtocolError},
     },
+    profile::io::atomic::with_suffix,
     station::SessionAcceptor,
 };
 
@@ -115,7 +116,7 @@ pub fn listen(path: &Path) -> Result<Listener, ListenError> {
 }
 
 fn lock(path: &Path) -> Result<File, ListenError> {
-    let lock = beside(path, ".lock");
+    let lock = with_suffix(path, ".lock");
     let file =
         OpenOptions::new().create(true).truncate(false).write(true).mode(0o600).open(&lock).map_err(failed(&lock))?;
     match flock(&file, FlockOperation::NonBlockingLockExclusive) {
@@ -127,7 +128,7 @@ fn lock(path: &Path) -> Result<File, ListenError> {
 
 /// Under another name until its rights are set, then in place of whatever was there: never too open, never absent.
 fn bind(path: &Path) -> Result<UnixListener, ListenError> {
-    let new = beside(path, ".new");
+    let new = with_suffix(path, ".new");
     match std::fs::remove_file(&new) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(&new)(error)),
         Ok(()) | Err(_) => {}
@@ -136,12 +137,6 @@ fn bind(path: &Path) -> Result<UnixListener, ListenError> {
     std::fs::set_permissions(&new, Permissions::from_mode(0o660)).map_err(failed(&new))?;
     std::fs::rename(&new, path).map_err(failed(path))?;
     Ok(socket)
-}
-
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(ending);
-    PathBuf::from(name)
 }
 
 fn failed(path: &Path) -> impl FnOnce(io::Error) -> ListenError + use<> {
@@ -252,7 +247,7 @@ impl Listener {
 
     /// Makes the socket, its lock and their folder again if they were removed. Attached terminals stay attached.
     fn keep(&mut self) {
-        let locked = is_at(&self.lock, &beside(&self.path, ".lock"));
+        let locked = is_at(&self.lock, &with_suffix(&self.path, ".lock"));
         if locked && self.file.is_some() && file_at(&self.path) == self.file {
             return;
         }

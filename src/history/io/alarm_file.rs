@@ -2,9 +2,9 @@
 //! when it has grown.
 
 use std::{
-    fs::{self, File, OpenOptions},
+    fs::{self, File},
     io::{self, Read, Write},
-    os::unix::fs::{MetadataExt, OpenOptionsExt},
+    os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
 };
 
@@ -13,6 +13,7 @@ use jiff::Timestamp;
 use crate::{
     history::alarm_state::{HEADER, LatestSteps, line, parse},
     plant::record::AlarmRecord,
+    profile::io::atomic,
 };
 
 /// Largest file that is read: many times what a station writes.
@@ -105,21 +106,8 @@ impl AlarmFile {
 
     /// A power failure leaves the old file or the new one.
     fn write_whole(&self) -> io::Result<Written> {
-        let beside = self.path.with_extension("new");
         let text: String = std::iter::once(HEADER.to_owned()).chain(self.steps.iter().map(line)).collect();
-        let written = create(&beside).and_then(|mut file| {
-            file.write_all(text.as_bytes())?;
-            file.sync_all()?;
-            fs::rename(&beside, &self.path)?;
-            Ok(file)
-        });
-        if written.is_err() {
-            // An incomplete file is of no use.
-            let _ = fs::remove_file(&beside);
-        }
-        let file = written?;
-        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        File::open(folder)?.sync_all()?;
+        let file = atomic::write_placed(&self.path, text.as_bytes(), 0o640, |_, new| fs::rename(new, &self.path))?;
         Ok(Written { file, bytes: text.len() as u64, lines: self.steps.len() })
     }
 }
@@ -159,15 +147,6 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.take(BYTES_MAX + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
-}
-
-fn create(path: &Path) -> io::Result<File> {
-    // Never through a link; what an earlier try has left is of no use.
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        Ok(()) | Err(_) => {}
-    }
-    OpenOptions::new().append(true).create_new(true).mode(0o640).open(path)
 }
 
 #[cfg(test)]

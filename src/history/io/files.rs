@@ -3,7 +3,6 @@
 //! The database file itself is never opened here: closing it would drop the locks that DuckDB holds on it.
 
 use std::{
-    ffi::OsString,
     fs::{self, File, TryLockError},
     io::{Read, Seek, Write},
     os::unix::fs::MetadataExt,
@@ -12,7 +11,7 @@ use std::{
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use crate::{history::HistoryError, plant::def::HistoryDef};
+use crate::{history::HistoryError, plant::def::HistoryDef, profile::io::atomic::with_suffix};
 
 /// Opens that never ended before the log is set aside, as the part that is replayed; after one more, the file too.
 pub const FAILED_OPENS_MAX: u32 = 2;
@@ -44,7 +43,7 @@ pub fn refuse_foreign(db: &Path) -> Result<(), HistoryError> {
 impl Opening {
     /// Marks that the store is being opened. [`HistoryError::Locked`] if another process is just opening it.
     pub fn begin(db: &Path) -> Result<Opening, HistoryError> {
-        let path = beside(db, ".opening");
+        let path = with_suffix(db, ".opening");
         let wrong = |error: std::io::Error| HistoryError::Engine(format!("{}: {error}", path.display()));
         if let Some(folder) = db.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             fs::create_dir_all(folder).map_err(wrong)?;
@@ -96,7 +95,7 @@ pub enum Part {
 
 /// Is there a log beside the database?
 pub fn has_log(db: &Path) -> bool {
-    LOGS.iter().any(|log| beside(db, log).exists())
+    LOGS.iter().any(|log| with_suffix(db, log).exists())
 }
 
 /// Moves a database and its log, or the log alone, aside under the time of day; returns the new path of the database
@@ -105,8 +104,8 @@ pub fn set_aside(db: &Path, part: Part, now: Timestamp) -> Result<PathBuf, Histo
     let stamp = now.to_zoned(TimeZone::UTC).strftime("%Y%m%dT%H%M%SZ").to_string();
     let target = (1..)
         .map(|n| match n {
-            1 => beside(db, &format!(".damaged-{stamp}")),
-            n => beside(db, &format!(".damaged-{stamp}-{n}")),
+            1 => with_suffix(db, &format!(".damaged-{stamp}")),
+            n => with_suffix(db, &format!(".damaged-{stamp}-{n}")),
         })
         .find(|path| !path.exists() && !has_log(path))
         .expect("some number is free");
@@ -116,7 +115,7 @@ pub fn set_aside(db: &Path, part: Part, now: Timestamp) -> Result<PathBuf, Histo
         Part::Everything => Some(""),
     };
     for suffix in LOGS.into_iter().chain(file) {
-        let (from, to) = (beside(db, suffix), beside(&target, suffix));
+        let (from, to) = (with_suffix(db, suffix), with_suffix(&target, suffix));
         if from.exists() {
             fs::rename(&from, &to).map_err(|error| HistoryError::Engine(format!("{}: {error}", from.display())))?;
         }
@@ -127,7 +126,7 @@ pub fn set_aside(db: &Path, part: Part, now: Timestamp) -> Result<PathBuf, Histo
 /// Removes a database that was never more than begun, as a full disk leaves it.
 pub fn remove(db: &Path) {
     for suffix in LOGS.into_iter().chain([""]) {
-        let path = beside(db, suffix);
+        let path = with_suffix(db, suffix);
         if path.is_file() {
             let _ = fs::remove_file(path);
         }
@@ -136,7 +135,7 @@ pub fn remove(db: &Path) {
 
 /// Bytes of the database and its log.
 pub fn size(db: &Path) -> u64 {
-    let bytes = |suffix| fs::metadata(beside(db, suffix)).map_or(0, |meta| meta.len());
+    let bytes = |suffix| fs::metadata(with_suffix(db, suffix)).map_or(0, |meta| meta.len());
     LOGS.into_iter().chain([""]).map(bytes).sum()
 }
 
@@ -157,13 +156,6 @@ fn nearly_full(free: u64, all: u64, least: HistoryDef) -> Option<String> {
         free < u64::from(least.disk_free_mib_min) << 20 && free < all / 100 * u64::from(least.disk_free_percent_min);
     // In steps, so that the words do not change with every record.
     full.then(|| format!("{} MiB of the disk are free ({} %)", free >> 20 >> 3 << 3, free * 100 / all.max(1)))
-}
-
-/// The path with something appended: DuckDB itself names its log so.
-pub fn beside(db: &Path, suffix: &str) -> PathBuf {
-    let mut name = OsString::from(db.as_os_str());
-    name.push(suffix);
-    name.into()
 }
 
 /// What a failure to open means.
@@ -285,13 +277,13 @@ mod tests {
         let mut targets = Vec::new();
         for text in ["one", "two"] {
             fs::write(&db, text).unwrap();
-            fs::write(beside(&db, ".wal"), text).unwrap();
+            fs::write(with_suffix(&db, ".wal"), text).unwrap();
             targets.push(set_aside(&db, Part::Everything, at("2026-11-21T06:00:00Z")).unwrap());
         }
         assert!(targets[0].ends_with("x.duckdb.damaged-20261121T060000Z"));
         for (target, text) in targets.iter().zip(["one", "two"]) {
             assert_eq!(fs::read_to_string(target).unwrap(), text);
-            assert_eq!(fs::read_to_string(beside(target, ".wal")).unwrap(), text);
+            assert_eq!(fs::read_to_string(with_suffix(target, ".wal")).unwrap(), text);
         }
         assert!(!db.exists());
     }
@@ -307,8 +299,8 @@ mod tests {
         assert!(matches!(Opening::begin(&db), Err(HistoryError::Locked { .. })));
         drop(first);
         // A process that died leaves the count behind.
-        fs::write(beside(&db, ".opening"), "2").unwrap();
+        fs::write(with_suffix(&db, ".opening"), "2").unwrap();
         assert_eq!(Opening::begin(&db).unwrap().failed, 2);
-        assert!(!beside(&db, ".opening").exists());
+        assert!(!with_suffix(&db, ".opening").exists());
     }
 }

@@ -9,7 +9,7 @@ use std::{
 
 use jiff::Timestamp;
 
-use super::files;
+use crate::profile::io::atomic::with_suffix;
 
 /// A commit as both the database and the file beside it know it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +35,7 @@ pub enum Noted {
 
 /// Where the file lies.
 pub fn path(db: &Path) -> PathBuf {
-    files::beside(db, ".last")
+    with_suffix(db, ".last")
 }
 
 /// Writes the last commit down, on disk when it returns. It overwrites its one line, so that a full disk hinders it least.

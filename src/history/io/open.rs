@@ -19,6 +19,7 @@ use crate::{
         number::to_u32,
         record::{AlarmRecord, ChainHash},
     },
+    profile::io::atomic::with_suffix,
 };
 
 /// A store as it was opened, and what the operator should know about that.
@@ -259,7 +260,7 @@ const MEMORY: &str = "64MB";
 /// One thread, little memory, nothing from the network; and no bit packing, with which some data make a checkpoint fail
 /// (duckdb/duckdb#22823).
 fn connect(path: &Path, mode: AccessMode) -> duckdb::Result<Connection> {
-    let temporary = files::beside(path, ".tmp");
+    let temporary = with_suffix(path, ".tmp");
     let config = Config::default()
         .access_mode(mode)?
         .threads(1)?

@@ -18,14 +18,31 @@ pub fn write_atomic(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
     if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
         return fs::write(path, bytes);
     }
-    let beside = beside(path);
-    let written = write_beside(&beside, bytes, mode).and_then(|_| fs::rename(&beside, path));
-    if written.is_err() {
-        // A part of a file is of no use.
-        let _ = fs::remove_file(&beside);
-    }
-    written?;
-    sync_folder(path)
+    write_placed(path, bytes, mode, |_, new| fs::rename(new, path)).map(drop)
+}
+
+/// Writes and syncs a new file beside `path`, has `place` put it there by a rename or a link, and syncs the folder. On an
+/// error nothing is left of the new file.
+pub fn write_placed(
+    path: &Path,
+    bytes: &[u8],
+    mode: u32,
+    place: impl FnOnce(&File, &Path) -> io::Result<()>,
+) -> io::Result<File> {
+    let new = beside(path);
+    let written = write_beside(&new, bytes, mode).and_then(|file| place(&file, &new).map(|()| file));
+    // After a rename there is nothing left to remove.
+    let _ = fs::remove_file(&new);
+    let file = written?;
+    sync_folder(path)?;
+    Ok(file)
+}
+
+/// `path` with `suffix` appended to its name: `tank.duckdb.wal` beside `tank.duckdb`.
+pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    name.into()
 }
 
 /// The same for a file of the user; its folder is made if it is not there.

@@ -148,7 +148,7 @@ async fn a_login_is_reported_as_not_recorded_while_the_disk_takes_nothing() {
     let mut station = Station::start(&history).await;
     let answer = |messages: &mpsc::Sender<AuditMessage>| {
         let (reply, answer) = tokio::sync::oneshot::channel();
-        messages.try_send(AuditMessage::Entry(audit_queue::stopped("login", jiff::Timestamp::UNIX_EPOCH))).unwrap();
+        messages.try_send(AuditMessage::Entry(entries::stopped("login", jiff::Timestamp::UNIX_EPOCH))).unwrap();
         messages.try_send(AuditMessage::Reply(reply, Ok(()))).unwrap();
         answer
     };

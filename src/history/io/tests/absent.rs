@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{
-    super::{files::beside, thread, writer::PENDING_MAX, writer::Writer},
+    super::{thread, writer::PENDING_MAX, writer::Writer},
     PV, SV,
     damage::child,
     def, folder, good, means, open, step,
@@ -15,6 +15,7 @@ use super::{
 use crate::{
     bus::io::clock::Clock,
     plant::record::{AlarmEvent, Record},
+    profile::io::atomic::with_suffix,
     report::testing::sec,
 };
 
@@ -54,8 +55,8 @@ fn whatever_stands_in_the_way_records_wait_and_are_caught_up() {
         ),
         (
             "Is a directory",
-            |db| fs::create_dir_all(beside(db, ".opening")).unwrap(),
-            |db| fs::remove_dir(beside(db, ".opening")).unwrap(),
+            |db| fs::create_dir_all(with_suffix(db, ".opening")).unwrap(),
+            |db| fs::remove_dir(with_suffix(db, ".opening")).unwrap(),
         ),
     ];
     for (why, block, free) in ways {
@@ -128,13 +129,13 @@ fn a_log_removed_under_the_station_takes_nothing_with_it() {
     let mut writer = Writer::open(db.clone(), def(), sec(0)).unwrap();
     writer.accept(vec![good(PV, 0, 27.0)]);
     writer.commit(sec(0));
-    fs::remove_file(beside(&db, ".wal")).unwrap();
+    fs::remove_file(with_suffix(&db, ".wal")).unwrap();
     writer.accept(vec![good(PV, 1, 28.0)]);
     writer.commit(sec(1));
     // What a kill leaves behind.
     let copy = db.parent().unwrap().join("copy.duckdb");
     for suffix in ["", ".wal", ".last"] {
-        let _ = fs::copy(beside(&db, suffix), beside(&copy, suffix));
+        let _ = fs::copy(with_suffix(&db, suffix), with_suffix(&copy, suffix));
     }
     assert_eq!(means(&open(&copy, 100), PV, 0, 2, 2), [Some(27.0), Some(28.0)]);
 }

@@ -7,10 +7,11 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use super::{super::files::beside, super::store::Store, PV, def, folder, good, means, open, series, step};
+use super::{super::store::Store, PV, def, folder, good, means, open, series, step};
 use crate::{
     history::HistoryError,
     plant::record::{AlarmEvent, Record},
+    profile::io::atomic::with_suffix,
     report::testing::sec,
 };
 
@@ -22,12 +23,12 @@ fn a_report_without_the_station_reads_but_never_creates() {
     assert!(!db.exists());
     // A station that died with a log: the log is read, the file is not changed, the curve ends.
     die_after_writing(&db);
-    let (before, log) = (fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap());
+    let (before, log) = (fs::read(&db).unwrap(), fs::read(with_suffix(&db, ".wal")).unwrap());
     let store = Store::open_read_only(&db, &def()).unwrap();
     assert_eq!(means(&store, PV, 0, 60, 3), [Some(27.0), None, None]);
     assert!((series(&store, PV, 0, 10, 1).good - 1.0).abs() < 1e-9);
     drop(store);
-    assert_eq!((fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap()), (before, log));
+    assert_eq!((fs::read(&db).unwrap(), fs::read(with_suffix(&db, ".wal")).unwrap()), (before, log));
 }
 
 #[test]
@@ -36,7 +37,7 @@ fn a_file_that_is_not_a_database_is_set_aside_and_recording_begins_anew() {
         let (_folder, db) = folder();
         fs::write(&db, &damage).unwrap();
         let opened = Store::open(&db, &def(), sec(0)).unwrap();
-        let aside = beside(&db, ".damaged-19700101T000000Z");
+        let aside = with_suffix(&db, ".damaged-19700101T000000Z");
         assert_eq!(fs::read(&aside).unwrap(), damage);
         assert!(opened.trouble.unwrap().contains("set aside as"));
         opened.store.append(&[good(PV, 0, 27.0)]).unwrap();
@@ -71,7 +72,7 @@ fn a_file_cut_or_scribbled_over_is_set_aside() {
 fn a_log_torn_at_any_length_never_keeps_the_station_down() {
     let (_folder, db) = folder();
     die_after_writing(&db);
-    let (file, log) = (fs::read(&db).unwrap(), fs::read(beside(&db, ".wal")).unwrap());
+    let (file, log) = (fs::read(&db).unwrap(), fs::read(with_suffix(&db, ".wal")).unwrap());
     assert!(log.len() > 100, "the child left a log");
     let cuts = [0, 1, 7, 20, log.len() / 3, log.len() / 2, log.len() - 9, log.len() - 1];
     let torn = cuts.map(|cut| log[..cut].to_vec());
@@ -82,7 +83,7 @@ fn a_log_torn_at_any_length_never_keeps_the_station_down() {
     });
     for torn in torn.into_iter().chain(flipped) {
         fs::write(&db, &file).unwrap();
-        fs::write(beside(&db, ".wal"), &torn).unwrap();
+        fs::write(with_suffix(&db, ".wal"), &torn).unwrap();
         let opens = open_until_it_lives(&db);
         assert!(opens <= 3, "{opens} opens");
         // What a checkpoint had brought into the file is still there, whatever happened to the log.
@@ -95,23 +96,23 @@ fn a_log_torn_at_any_length_never_keeps_the_station_down() {
 fn files_whose_opening_never_ended_twice_are_set_aside_before_the_third() {
     let (_folder, db) = folder();
     open(&db, 0).append(&[good(PV, 0, 27.0)]).unwrap();
-    fs::write(beside(&db, ".opening"), "1").unwrap();
+    fs::write(with_suffix(&db, ".opening"), "1").unwrap();
     assert_eq!(means(&open(&db, 0), PV, 0, 1, 1), [Some(27.0)]);
     // First the log, because it is what is replayed; the file keeps what it has.
-    let log = beside(&db, ".wal");
+    let log = with_suffix(&db, ".wal");
     fs::write(&log, "poison").unwrap();
-    fs::write(beside(&db, ".opening"), "2").unwrap();
+    fs::write(with_suffix(&db, ".opening"), "2").unwrap();
     let opened = Store::open(&db, &def(), sec(0)).unwrap();
     assert!(opened.trouble.unwrap().contains("the last minutes of the history are damaged (opening it never ended)"));
     assert_eq!(means(&opened.store, PV, 0, 1, 1), [Some(27.0)]);
-    assert_eq!(fs::read(beside(&db, ".damaged-19700101T000000Z.wal")).unwrap(), b"poison");
+    assert_eq!(fs::read(with_suffix(&db, ".damaged-19700101T000000Z.wal")).unwrap(), b"poison");
     drop(opened.store);
     // If that did not help, the file.
-    fs::write(beside(&db, ".opening"), "3").unwrap();
+    fs::write(with_suffix(&db, ".opening"), "3").unwrap();
     let opened = Store::open(&db, &def(), sec(0)).unwrap();
     assert!(opened.trouble.unwrap().contains("the history is damaged (opening it never ended)"));
-    assert!(beside(&db, ".damaged-19700101T000000Z-2").exists());
-    assert!(!beside(&db, ".opening").exists());
+    assert!(with_suffix(&db, ".damaged-19700101T000000Z-2").exists());
+    assert!(!with_suffix(&db, ".opening").exists());
 }
 
 #[test]
@@ -137,7 +138,7 @@ fn a_second_process_is_told_who_has_the_file() {
             other => panic!("{other:?}"),
         }
     }
-    assert!(!beside(&db, ".opening").exists());
+    assert!(!with_suffix(&db, ".opening").exists());
     open(&db, 0);
 }
 

@@ -10,13 +10,14 @@ use std::{
 };
 
 use super::{
-    super::{files::beside, last, store::Store},
+    super::{last, store::Store},
     PV, SV, action,
     damage::{FILE, child},
     def, good, step,
 };
 use crate::{
     plant::record::{AlarmEvent, Record},
+    profile::io::atomic::with_suffix,
     report::testing::sec,
 };
 
@@ -46,13 +47,13 @@ struct Files {
 impl Files {
     fn read(db: &Path) -> Files {
         let read = |path: &Path| fs::read(path).unwrap();
-        Files { db: read(db), log: read(&beside(db, ".wal")), last: read(&last::path(db)) }
+        Files { db: read(db), log: read(&with_suffix(db, ".wal")), last: read(&last::path(db)) }
     }
 
     fn write(&self, db: &Path) {
         fs::create_dir_all(db.parent().unwrap()).unwrap();
         fs::write(db, &self.db).unwrap();
-        fs::write(beside(db, ".wal"), &self.log).unwrap();
+        fs::write(with_suffix(db, ".wal"), &self.log).unwrap();
         fs::write(last::path(db), &self.last).unwrap();
     }
 }
@@ -122,7 +123,7 @@ pub(super) fn job(job: &str) -> bool {
     let first: usize = first.parse().unwrap();
     for case in first.. {
         let db = path.join(case.to_string()).join("tank.duckdb");
-        if !db.exists() && !beside(&db, ".wal").exists() {
+        if !db.exists() && !with_suffix(&db, ".wal").exists() {
             break;
         }
         // On a line of its own, whatever the test harness prints.

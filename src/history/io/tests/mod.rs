@@ -16,13 +16,7 @@ use std::{
 
 use jiff::Timestamp;
 
-use super::{
-    files::{self, beside},
-    sql,
-    store::Store,
-    thread,
-    writer::Writer,
-};
+use super::{files, sql, store::Store, thread, writer::Writer};
 use crate::{
     bus::io::clock::Clock,
     history::{Answer, HistoryError, Query, Series, io::QueryRequest},
@@ -32,6 +26,7 @@ use crate::{
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut, Record},
         sample::{Cause, Sample},
     },
+    profile::io::atomic::with_suffix,
     report::{
         Period,
         testing::{THREE, plant, sec, tag},
@@ -514,7 +509,7 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
         .unwrap();
     assert_eq!(quality, 139);
     assert!(Timestamp::from_microsecond(last).unwrap() < sec(100));
-    assert!(!beside(&db, ".wal").exists(), "the log was written into the file");
+    assert!(!with_suffix(&db, ".wal").exists(), "the log was written into the file");
 }
 
 #[test]

@@ -1,0 +1,160 @@
+//! When an outcome may be shown as recorded: which batches of actions and alarm steps the disk has. Pure: the state of the
+//! disk and the time since the start are arguments.
+
+use std::{
+    collections::{HashMap, VecDeque},
+    sync::Arc,
+    time::Duration,
+};
+
+use crate::plant::{
+    Snapshot,
+    alarm::manager::subject_name,
+    command::{CommandId, CommandStatus},
+    def::AlarmId,
+    record::{ActionRecord, AlarmRecord},
+};
+
+/// A snapshot that shows an outcome, and the reply to a request, wait this long for the disk. After that both say that it is
+/// not recorded.
+pub(super) const WAIT_MAX: Duration = Duration::from_secs(1);
+/// Ended commands whose batch is remembered: twice what a snapshot shows.
+const COMMANDS_MAX: usize = 64;
+
+/// What the recorder has reported.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Disk {
+    /// Batches on disk.
+    pub batches: u64,
+    /// The recorder still runs.
+    pub alive: bool,
+}
+
+/// A wait for a batch.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wait {
+    batch: u64,
+    since: Duration,
+}
+
+impl Wait {
+    pub fn is_recorded(self, disk: Disk) -> bool {
+        self.batch <= disk.batches
+    }
+
+    /// When it ends by itself; `None` if it is over already.
+    pub fn ends_at(self, disk: Disk) -> Option<Duration> {
+        (disk.alive && !self.is_recorded(disk)).then(|| self.since + WAIT_MAX)
+    }
+
+    pub fn is_over(self, disk: Disk, now: Duration) -> bool {
+        self.ends_at(disk).is_none_or(|end| end <= now)
+    }
+}
+
+/// Batches on their way to the disk, and what each of them records.
+#[derive(Debug)]
+pub(super) struct CommitBarrier {
+    sent: u64,
+    /// The last batch with an action of an operator.
+    needed: Wait,
+    /// Ended commands, each with the batch of its action.
+    ended: VecDeque<(CommandId, u64)>,
+    /// Alarms, by subject and message, with the batch of the last step of an operator that is not on disk.
+    steps: HashMap<(Arc<str>, Arc<str>), u64>,
+}
+
+impl CommitBarrier {
+    pub fn new(now: Duration) -> CommitBarrier {
+        let needed = Wait { batch: 0, since: now };
+        CommitBarrier { sent: 0, needed, ended: VecDeque::new(), steps: HashMap::new() }
+    }
+
+    /// Actions and steps join the next batch.
+    pub fn put(&mut self, actions: &[ActionRecord], steps: &[AlarmRecord], disk: Disk, now: Duration) {
+        let by_operators = || steps.iter().filter(|step| step.by.is_some());
+        if !actions.is_empty() || by_operators().next().is_some() {
+            // The wait of an earlier batch goes on.
+            let since = if self.needed.batch == disk.batches { now } else { self.needed.since };
+            self.needed = Wait { batch: self.sent + 1, since };
+        }
+        let batch = self.needed.batch;
+        self.steps.extend(by_operators().map(|step| ((step.subject.clone(), step.message.clone()), batch)));
+    }
+
+    /// The next batch has been sent.
+    pub fn sent(&mut self) {
+        self.sent += 1;
+    }
+
+    /// The wait for everything that was put so far.
+    pub fn wait(&self, now: Duration) -> Wait {
+        Wait { since: now, ..self.needed }
+    }
+
+    /// Until when a snapshot must wait; `None` if it can be published now.
+    pub fn hold_until(&self, disk: Disk) -> Option<Duration> {
+        self.needed.ends_at(disk)
+    }
+
+    /// Whether the disk has taken longer than [`WAIT_MAX`].
+    pub fn is_late(&self, disk: Disk, now: Duration) -> bool {
+        !self.needed.is_recorded(disk) && self.needed.since + WAIT_MAX <= now
+    }
+
+    /// Marks in a snapshot what is not on disk: ended commands, and operator notes of alarms.
+    pub fn mark(&mut self, snapshot: &mut Snapshot, disk: Disk) {
+        let needed = self.needed.batch;
+        let has_ended = |status: &&mut CommandStatus| !status.is_pending();
+        for status in snapshot.commands.iter_mut().rev().filter(has_ended) {
+            let known = self.ended.iter().find(|(id, _)| *id == status.command.id).map(|(_, batch)| *batch);
+            let batch = known.unwrap_or_else(|| {
+                self.ended.push_back((status.command.id, needed));
+                needed
+            });
+            status.recorded = batch <= disk.batches;
+        }
+        let excess = self.ended.len().saturating_sub(COMMANDS_MAX);
+        self.ended.drain(..excess);
+        self.steps.retain(|_, batch| disk.batches < *batch);
+        if self.steps.is_empty() {
+            return;
+        }
+        let is_recorded = |id: AlarmId| {
+            let alarm = snapshot.def.alarm(id);
+            let name = (subject_name(&snapshot.def, alarm.subject).into(), alarm.message.as_str().into());
+            !self.steps.contains_key(&name)
+        };
+        for alarm in Arc::make_mut(&mut snapshot.alarms) {
+            alarm.acknowledged.iter_mut().for_each(|note| note.recorded = is_recorded(alarm.id));
+        }
+        for alarm in Arc::make_mut(&mut snapshot.suppressed) {
+            alarm.note.recorded = is_recorded(alarm.id);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::station::entries::stopped;
+
+    #[test]
+    fn a_wait_ends_with_the_disk_or_after_its_time() {
+        let (second, half) = (Duration::from_secs(1), Duration::from_millis(500));
+        let disk = |batches| Disk { batches, alive: true };
+        let action = [stopped("tank", jiff::Timestamp::UNIX_EPOCH)];
+        let mut barrier = CommitBarrier::new(Duration::ZERO);
+        assert_eq!(barrier.hold_until(disk(0)), None, "nothing to record");
+        barrier.put(&action, &[], disk(0), second);
+        barrier.sent();
+        let reply = barrier.wait(second + half);
+        assert_eq!(barrier.hold_until(disk(0)), Some(2 * second));
+        assert_eq!((barrier.hold_until(disk(1)), barrier.hold_until(Disk { batches: 0, alive: false })), (None, None));
+        barrier.put(&action, &[], disk(0), 2 * second);
+        assert_eq!(barrier.hold_until(disk(1)), Some(2 * second), "the wait of the first batch goes on");
+        assert!(!barrier.is_late(disk(1), second + half) && barrier.is_late(disk(1), 2 * second));
+        assert!(!reply.is_over(disk(0), 2 * second) && reply.is_over(disk(0), 2 * second + half));
+        assert!(reply.is_over(disk(1), second) && reply.is_recorded(disk(1)) && !reply.is_recorded(disk(0)));
+    }
+}

@@ -1,0 +1,89 @@
+//! Audit entries of the station itself: start, stop, plant file, users file, clock steps.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+
+use crate::{
+    access::{
+        audit_log::{PLANT_FILE, USERS_FILE, sha256},
+        io::audit_log::Opened,
+    },
+    plant::record::ActionRecord,
+    profile::PlantFile,
+};
+
+/// The hashes of plant file and users file that were recorded last.
+#[derive(Debug, Default)]
+pub(super) struct RecordedFiles {
+    plant: Option<Arc<str>>,
+    users: Option<Arc<str>>,
+}
+
+impl RecordedFiles {
+    pub fn new(opened: &Opened) -> RecordedFiles {
+        RecordedFiles { plant: opened.plant_file.clone(), users: opened.users_file.clone() }
+    }
+
+    /// The first entries of a station: its start, then plant file and users if they differ from the last ones recorded. `users`
+    /// is their [`crate::access::Users::digest`]; `None` without login.
+    pub fn started(
+        &mut self,
+        plant: &str,
+        file: Option<&PlantFile>,
+        users: Option<String>,
+        at: Timestamp,
+    ) -> Vec<ActionRecord> {
+        let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
+        let start = ActionRecord { new: Some(version.into()), ..entry(at, "start station", plant, "done") };
+        let changed = file.and_then(|file| self.plant_file(file, at));
+        let found = |change| with_change(entry(at, USERS_FILE, "users", "done: found"), change);
+        let users = users.and_then(|users| replace(&mut self.users, users)).map(found);
+        [start].into_iter().chain(changed).chain(users).collect()
+    }
+
+    /// The entry of a plant file; `None` if it is the last one recorded.
+    pub fn plant_file(&mut self, file: &PlantFile, at: Timestamp) -> Option<ActionRecord> {
+        let change = replace(&mut self.plant, sha256(file.bytes()))?;
+        Some(with_change(entry(at, PLANT_FILE, &file.path().display().to_string(), "done"), change))
+    }
+}
+
+/// The old hash and the new one.
+type Change = (Option<Arc<str>>, Arc<str>);
+
+/// Replaces a hash; `None` if it is the same.
+fn replace(recorded: &mut Option<Arc<str>>, new: String) -> Option<Change> {
+    let new: Arc<str> = new.into();
+    (recorded.as_ref() != Some(&new)).then(|| (recorded.replace(new.clone()), new))
+}
+
+fn with_change(entry: ActionRecord, (old, new): Change) -> ActionRecord {
+    ActionRecord { old, new: Some(new), ..entry }
+}
+
+/// The system clock was set, from `old` to `new`.
+pub(super) fn clock_step(old: Timestamp, new: Timestamp) -> ActionRecord {
+    let text = |at: Timestamp| at.strftime("%Y-%m-%dT%H:%M:%SZ").to_string().into();
+    with_change(entry(new, "clock step", "system clock", "done: followed at once"), (Some(text(old)), text(new)))
+}
+
+/// The last entry of a station.
+pub(super) fn stopped(plant: &str, at: Timestamp) -> ActionRecord {
+    entry(at, "stop station", plant, "done")
+}
+
+fn entry(at: Timestamp, action: &str, target: &str, outcome: &str) -> ActionRecord {
+    ActionRecord {
+        at,
+        by: "station".into(),
+        from: "".into(),
+        action: action.into(),
+        target: target.into(),
+        old: None,
+        new: None,
+        outcome: outcome.into(),
+        note: None,
+        chain_hash: None,
+    }
+}
