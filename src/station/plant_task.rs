@@ -1,5 +1,7 @@
 //! The loop around the reducer of facts: events, commands and ticks in; requests, records and snapshots out.
 
+mod files;
+
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
@@ -9,6 +11,7 @@ use tokio::{
     time::Instant,
 };
 
+use self::files::{Saving, filed, saved};
 use super::{
     audit_queue::{AuditMessage, AuditQueue, RecorderFaults},
     entries,
@@ -21,8 +24,8 @@ use crate::{
     history::io::{open::Restored, thread::offer},
     plant::{
         Effects, Plant, SetWork, Snapshot,
-        command::{BusRequest, CommandId, CommandStatus, WriteJob},
-        def::{LineDef, LineId},
+        command::{BusRequest, CommandStatus, WriteJob},
+        def::LineId,
         event::Event,
         record::{ActionRecord, AlarmRecord, Record},
         snapshot::HistoryStatus,
@@ -58,36 +61,6 @@ pub(super) struct Persistence {
     /// The folder of parameter sets.
     pub sets: Option<PathBuf>,
     pub observer: Option<RecordObserver>,
-}
-
-/// Said where there is nothing to save into.
-const NO_FILE: &str =
-    "this plant is part of the program; write it to a file with `sightglass profiles NAME` and start that";
-
-/// The plant file on its way to the disk, and for whom.
-struct Saving {
-    command: CommandId,
-    settings: LineDef,
-    work: JoinHandle<(PlantFile, Result<(), String>)>,
-}
-
-/// For whom, and how it ended.
-type Saved = (CommandId, LineDef, Result<(PlantFile, Result<(), String>), tokio::task::JoinError>);
-
-/// Waits for the end of a save; for ever without one.
-async fn saved(saving: &mut Option<Saving>) -> Saved {
-    let Some(Saving { command, settings, work }) = saving else { return std::future::pending().await };
-    let saved = (*command, settings.clone(), work.await);
-    *saving = None;
-    saved
-}
-
-/// Waits for the end of the work with the sets; for ever without any.
-async fn filed(filing: &mut Option<JoinHandle<sets::Done>>) -> Result<sets::Done, tokio::task::JoinError> {
-    let Some(work) = filing else { return std::future::pending().await };
-    let done = work.await;
-    *filing = None;
-    done
 }
 
 /// The loop around the reducer: sole owner of the plant.
@@ -295,75 +268,6 @@ impl PlantTask {
         if let Some(work) = effects.sets {
             self.file_sets(work);
         }
-    }
-
-    /// Has the folder of parameter sets worked on beside the loop, one work at a time.
-    fn file_sets(&mut self, work: SetWork) {
-        let refused = match (&self.persistence.sets, &self.filing) {
-            (Some(folder), None) => {
-                let (folder, def) = (folder.clone(), self.plant.def().clone());
-                self.filing = Some(tokio::task::spawn_blocking(move || sets::work(&folder, &def, work)));
-                return;
-            }
-            (Some(_), Some(_)) => "another set is just being saved, try again",
-            (None, _) => "this station keeps nothing",
-        };
-        // What is being done ends with the folder read, so a request to read is granted already.
-        if let SetWork::Write { command, .. } = work {
-            let effects = self.plant.on_set_written(command, Err(refused.to_owned()));
-            self.keep(effects.records);
-        }
-    }
-
-    fn take_filed(&mut self, done: Result<sets::Done, tokio::task::JoinError>) {
-        let (written, sets) = match done {
-            Ok(done) => done,
-            // Whoever has requested it hears of it when his command is given up.
-            Err(error) => return tracing::error!(%error, "the work with the sets ended badly"),
-        };
-        self.plant.on_sets(sets);
-        if let Some((command, result)) = written {
-            let effects = self.plant.on_set_written(command, result);
-            self.keep(effects.records);
-        }
-    }
-
-    /// Has the plant file written beside the loop; the outcome comes to [`PlantTask::take_saved`].
-    fn save(&mut self, command: CommandId, settings: LineDef) {
-        match (self.file.take(), &self.saving) {
-            (Some(mut file), _) => {
-                let saved = settings.clone();
-                let work = tokio::task::spawn_blocking(move || {
-                    let result = file.save(&settings);
-                    (file, result)
-                });
-                self.saving = Some(Saving { command, settings: saved, work });
-            }
-            (None, Some(_)) => self.tell_saved(command, &settings, Err("other settings are just being saved".into())),
-            (None, None) => self.tell_saved(command, &settings, Err(NO_FILE.into())),
-        }
-    }
-
-    fn take_saved(&mut self, (command, settings, done): Saved) {
-        let result = match done {
-            Ok((file, result)) => {
-                let now = self.clock.utc();
-                let changed = self.persistence.audit.as_mut().and_then(|audit| audit.plant_file(&file, now));
-                self.write_down(changed.into_iter().collect(), Vec::new());
-                self.file = Some(file);
-                result
-            }
-            Err(error) => {
-                tracing::error!(%error, "saving settings ended badly");
-                Err("internal error, see the log".to_owned())
-            }
-        };
-        self.tell_saved(command, &settings, result);
-    }
-
-    fn tell_saved(&mut self, command: CommandId, settings: &LineDef, result: Result<(), String>) {
-        let effects = self.plant.on_saved(command, settings, result);
-        self.keep(effects.records);
     }
 
     fn send(&mut self, line: LineId, request: BusRequest) {

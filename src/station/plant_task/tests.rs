@@ -9,7 +9,7 @@ use crate::{
     history::io::alarm_file::{self, AlarmFile},
     plant::{
         alarm::AlarmCommand,
-        command::{Command, CommandKind, CommandStatus, Outcome},
+        command::{Command, CommandId, CommandKind, CommandStatus, Outcome},
         def::{AlarmId, TagId},
         event::Fault,
         fixture,

@@ -66,3 +66,29 @@ fn a_stop_is_never_one_request_too_many() {
     let off = CommandKind::Write { tag: fixture::RUN, value: 0.0 };
     assert_eq!(bench.send_command(1, off, None).unwrap().1, None);
 }
+
+#[test]
+fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "tech", TECH).unwrap();
+    let credentials = |user: Option<&str>, password: &str| {
+        Some(Credentials { user: user.map(str::to_owned), password: password.into() })
+    };
+    let wrong = "wrong name or password; wait 1 s";
+    let refused = [
+        (None, "this tag requires a second user"),
+        (credentials(None, TECH), "this tag requires a second user"),
+        (credentials(Some("Tech"), TECH), "the second user must be another user"),
+        (credentials(Some("view"), VIEW), "view cannot approve this: it is for a technician"),
+        (credentials(Some("boss"), "guess"), wrong),
+        (credentials(Some("nobody"), BOSS), "wrong name or password; wait 1 s"),
+    ];
+    for (credentials, why) in refused {
+        let (_, refused) = bench.send_command(1, SV, credentials).unwrap();
+        assert_eq!(refused, Some(Refusal::NotReauthenticated(why.into())));
+        bench.later(2);
+    }
+    let (command, refused) = bench.send_command(1, SV, credentials(Some("BOSS"), BOSS)).unwrap();
+    assert_eq!((refused, command.command.note.as_deref()), (None, Some("why; approved by boss")));
+}

@@ -1,0 +1,101 @@
+//! Commands to the plant: rate, run, role, and the reauthentication that a tag requires.
+
+use jiff::Timestamp;
+
+use super::{
+    AccessControl, Effect, TOO_MANY,
+    audit_entries::{actor_name, clean},
+    right,
+};
+use crate::{
+    access::Credentials,
+    plant::{
+        command::{self, Command, CommandId, CommandStatus, Refusal},
+        interlock,
+    },
+};
+
+/// Said of a command that was made before the station was started again, with the same plant file or with another.
+const OTHER_RUN: &str = "the station was started again since this was shown: look and confirm again";
+
+impl AccessControl {
+    /// Checks a command of a terminal and passes it on to the plant, permitted or refused.
+    pub fn on_command(
+        &mut self,
+        terminal: u32,
+        mut command: Command,
+        credentials: Option<Credentials>,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        // A terminal speaks for itself only.
+        command.id.terminal = terminal;
+        command.note = command.note.map(|note| clean(&note).into());
+        // A stop is never one command too many.
+        let stops = command.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
+        if !self.within_rate(terminal, at) && !stops {
+            return self.undelivered(command.id, TOO_MANY);
+        }
+        if command.run != self.run {
+            // On record it would name what the plant file of this run has in its place.
+            return self.undelivered(command.id, OTHER_RUN);
+        }
+        let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
+        let number = command.id.number;
+        if session.last_command.is_some_and(|last| number <= last) {
+            // Its outcome would be taken for that of the command that had the number first.
+            return self.undelivered(command.id, "this command has the number of an earlier one, give it again");
+        }
+        session.last_command = Some(number);
+        if !session.locked {
+            session.active = at;
+        }
+        match self.may(terminal, Some(right::needs(&command.kind))) {
+            Err(why) => self.refuse_command(terminal, command, Refusal::NotPermitted(why), at),
+            Ok(_) => self.reauthenticate(terminal, command, credentials, at),
+        }
+    }
+
+    /// The role is enough, and so is the reauthentication.
+    pub(super) fn let_through(
+        &self,
+        terminal: u32,
+        mut command: Command,
+        approver: Option<&str>,
+        outcome: command::Outcome,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
+        command.note = match (command.note, approver) {
+            (note, None) => note,
+            (None, Some(approver)) => Some(format!("approved by {approver}").into()),
+            (Some(note), Some(approver)) => Some(format!("{note}; approved by {approver}").into()),
+        };
+        let from = session.peer.from.clone();
+        let status = CommandStatus { from, outcome, ..CommandStatus::new(command, actor_name(session), at) };
+        vec![Effect::Command(status)]
+    }
+
+    /// A command did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
+    pub fn undelivered(&mut self, id: CommandId, why: &str) -> Vec<Effect> {
+        let Some(session) = self.sessions.get_mut(&id.terminal) else { return Vec::new() };
+        session.undelivered(id, why);
+        vec![Effect::SessionStatus(id.terminal)]
+    }
+
+    /// The plant puts it on record and into the snapshot, so that whoever gave the command sees what became of it. Too many of
+    /// them are only told.
+    pub(super) fn refuse_command(
+        &mut self,
+        terminal: u32,
+        command: Command,
+        why: Refusal,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
+        let (origin, own) = (session.origin.clone(), session.peer.own);
+        if !own && !self.may_record(&origin, at) {
+            return self.undelivered(command.id, &why.to_string());
+        }
+        self.let_through(terminal, command, None, command::Outcome::Refused(why), at)
+    }
+}

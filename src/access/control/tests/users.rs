@@ -1,0 +1,115 @@
+//! User administration, as terminals see it.
+
+use super::*;
+
+#[test]
+fn a_supervisor_ends_a_lock_out() {
+    let mut bench = Bench::new(AccessDef { login_attempts_max: 1, ..AccessDef::default() });
+    bench.open(1, "10.0.0.1");
+    bench.open(2, "10.0.0.2");
+    bench.open(3, "10.0.0.3");
+    bench.login(2, "boss", BOSS).unwrap();
+    bench.login(1, "tech", "guess").unwrap_err();
+    let rows = bench.access.session_status(2, bench.now).users;
+    assert!(rows.iter().any(|row| &*row.user == "tech" && row.locked_until.is_some()));
+    bench.request(2, SessionRequest::Disable { user: "tech".into(), disabled: false }).unwrap();
+    bench.login(3, "tech", TECH).unwrap();
+}
+
+#[test]
+fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station() {
+    let mut bench =
+        Bench::of(AccessControl::with_users(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
+    let first =
+        || SessionRequest::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
+    bench.open(1, "10.0.0.1");
+    assert!(!bench.access.session_status(1, bench.now).first);
+    bench.request(1, first()).unwrap_err();
+    bench.login(1, "anna", "").unwrap_err();
+    let peer = Peer { from: "pts/0".into(), unix_user: Some("sight".into()), own: false };
+    bench.access.open(2, peer, bench.now);
+    assert!(bench.access.session_status(2, bench.now).first);
+    assert!(
+        bench.request(2, SessionRequest::FirstSupervisor { user: "anna".into(), password: "short".into() }).is_err()
+    );
+    bench.request(2, first()).unwrap();
+    assert_eq!(bench.who(2).as_deref(), Some("anna"));
+    assert!(
+        bench
+            .request(
+                2,
+                SessionRequest::FirstSupervisor { user: "bert".into(), password: "a horse in a tank of water".into() }
+            )
+            .is_err()
+    );
+    assert!(!bench.access.session_status(2, bench.now).first);
+}
+
+#[test]
+fn whoever_got_a_password_from_somebody_must_first_choose_his_own() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.open(2, "10.0.0.2");
+    bench.login(1, "boss", BOSS).unwrap();
+    let (given, own) = ("given by the boss", "chosen by dora herself");
+    bench
+        .request(1, SessionRequest::AddUser { user: "dora".into(), role: Role::Supervisor, password: given.into() })
+        .unwrap();
+    bench.login(2, "dora", given).unwrap();
+    assert!(bench.send_command(2, RUN, None).unwrap().1.is_some());
+    assert!(bench.request(2, SessionRequest::Stop).is_err());
+    bench.request(2, SessionRequest::ChangePassword { old: given.into(), new: given.into() }).unwrap_err();
+    bench.request(2, SessionRequest::ChangePassword { old: given.into(), new: own.into() }).unwrap();
+    assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None);
+    assert_eq!(&*bench.kept.as_ref().unwrap().get("dora").unwrap().hash, own);
+}
+
+#[test]
+fn a_change_acts_on_those_who_are_in_at_once_and_one_that_was_not_saved_is_none() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "boss", BOSS).unwrap();
+    let changes = [
+        SessionRequest::SetRole { user: "tech".into(), role: Role::Viewer },
+        SessionRequest::SetRole { user: "tech".into(), role: Role::Technician },
+        SessionRequest::Disable { user: "tech".into(), disabled: true },
+        SessionRequest::Disable { user: "tech".into(), disabled: false },
+        SessionRequest::DeleteUser { user: "tech".into() },
+    ];
+    for (terminal, change) in changes.into_iter().enumerate() {
+        let terminal = terminal as u32 + 2;
+        bench.open(terminal, &format!("10.0.0.{terminal}"));
+        let came_in = bench.login(terminal, "tech", TECH).is_ok();
+        bench.disk_full = true;
+        assert!(bench.request(1, change.clone()).is_err());
+        assert_eq!(bench.who(terminal).is_some(), came_in, "nothing was changed");
+        bench.disk_full = false;
+        bench.request(1, change).unwrap();
+        assert_eq!(bench.who(terminal), None);
+    }
+    assert!(
+        bench.request(1, SessionRequest::DeleteUser { user: "boss".into() }).is_err(),
+        "the last supervisor remains"
+    );
+    assert_eq!(
+        bench.last(),
+        ("boss delete user", "boss", "refused: at least one supervisor who is not disabled must remain")
+    );
+}
+
+#[test]
+fn a_change_that_comes_while_last_logins_are_written_waits_for_them() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "boss", BOSS).unwrap();
+    let writing = bench.access.tick(bench.now);
+    assert!(matches!(&writing[..], [Effect::Save(users)] if users.get("boss").unwrap().last_login.is_some()));
+    let request = |user: &str| SessionRequest::DeleteUser { user: user.into() };
+    assert_eq!(bench.access.on_request(1, 71, request("view"), bench.now), [], "not answered yet");
+    assert!(bench.request(1, request("tech")).is_err(), "one at a time");
+    let effects = bench.access.on_saved(Ok(()), bench.now);
+    let effects = bench.work(effects);
+    assert!(effects.contains(&Effect::Reply(71, Ok(()))));
+    let kept = bench.kept.unwrap();
+    assert!(kept.get("view").is_none() && kept.get("tech").is_some());
+}
