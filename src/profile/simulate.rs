@@ -213,30 +213,33 @@ mod tests {
     /// The row of the temperature, which each case simulates in its own way.
     const ROW: &str = "modicon = 41003";
 
-    fn wrong(words: &str, expect: &[&str]) {
+    fn check_wrong(words: &str, expect: &[&str]) {
         check(ROW, &format!("{ROW}\nsimulate = {{ {words} }}"), expect);
     }
 
     #[test]
     fn a_word_that_cannot_be_is_named() {
-        wrong("folow = 'DP'", &["unknown key `folow` in simulate", "did you mean `follow`", "[meter.toml:15:14]"]);
-        wrong("follow = 'DQ'", &["unknown tag `DQ` in D1", "did you mean `DP`"]);
-        wrong("oscillate = [5, 1]", &["oscillate from 5 to 1 has no room", "expected [lowest, highest]"]);
-        wrong("follow = 'DP', rate = 0", &["a rate is how much a second, above 0"]);
-        wrong("follow = 'DP', rate = 1, lag = '5s'", &["`rate` and `lag` exclude each other"]);
-        wrong("follow = 'DP', oscillate = [0, 1]", &["a value can go one way only"]);
-        wrong("gain = 2", &["`gain` says nothing without a source such as `follow`"]);
-        wrong("start = 3, period = '1min'", &["`period` says nothing without `oscillate`"]);
-        wrong("pulse = '0s'", &["pulse takes some time"]);
-        wrong("noise = -1", &["noise cannot be negative"]);
-        wrong("start = 'hot'", &["`hot` is not a state of D1.T", "expected a number"]);
-        wrong(
+        check_wrong(
+            "folow = 'DP'",
+            &["unknown key `folow` in simulate", "did you mean `follow`", "[meter.toml:15:14]"],
+        );
+        check_wrong("follow = 'DQ'", &["unknown tag `DQ` in D1", "did you mean `DP`"]);
+        check_wrong("oscillate = [5, 1]", &["oscillate from 5 to 1 has no room", "expected [lowest, highest]"]);
+        check_wrong("follow = 'DP', rate = 0", &["a rate is how much a second, above 0"]);
+        check_wrong("follow = 'DP', rate = 1, lag = '5s'", &["`rate` and `lag` exclude each other"]);
+        check_wrong("follow = 'DP', oscillate = [0, 1]", &["a value can go one way only"]);
+        check_wrong("gain = 2", &["`gain` says nothing without a source such as `follow`"]);
+        check_wrong("start = 3, period = '1min'", &["`period` says nothing without `oscillate`"]);
+        check_wrong("pulse = '0s'", &["pulse takes some time"]);
+        check_wrong("noise = -1", &["noise cannot be negative"]);
+        check_wrong("start = 'hot'", &["`hot` is not a state of D1.T", "expected a number"]);
+        check_wrong(
             "case = [{ when = { tag = 'MODE', is = 'onn' }, value = 1 }]",
             &["`onn` is not a state of D1.MODE", "on"],
         );
-        wrong("case = [{ when = { tag = 'MODE' } }]", &["a case needs `value`"]);
-        wrong("follow = 'DP', when = { tag = 'MODE', is = 1, above = 3 }", &["one query at a time", "`and`"]);
-        wrong("follow = 'DP', when = { tag = 'MODE', field = '3-9', is = 1 }", &["this is not a field of bits"]);
+        check_wrong("case = [{ when = { tag = 'MODE' } }]", &["a case needs `value`"]);
+        check_wrong("follow = 'DP', when = { tag = 'MODE', is = 1, above = 3 }", &["one query at a time", "`and`"]);
+        check_wrong("follow = 'DP', when = { tag = 'MODE', field = '3-9', is = 1 }", &["this is not a field of bits"]);
     }
 
     #[test]

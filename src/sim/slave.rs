@@ -184,7 +184,7 @@ mod tests {
     use crate::sim::dl06::Dl06;
     use crate::sim::pxr::Pxr;
 
-    fn ask(slave: &mut Slave<Dl06>, request: &[u8], expect: &[u8]) {
+    fn assert_reply(slave: &mut Slave<Dl06>, request: &[u8], expect: &[u8]) {
         assert_eq!(slave.respond(request).as_deref(), Some(expect), "request {request:02X?}");
     }
 
@@ -199,30 +199,30 @@ mod tests {
     #[test]
     fn an_echo_brings_back_every_byte() {
         let slave = &mut Slave::new(Dl06::new());
-        ask(slave, &[8, 0, 0, 0xA5, 0x37], &[8, 0, 0, 0xA5, 0x37]);
-        ask(slave, &[8, 0, 0], &[8, 0, 0]);
-        ask(slave, &[8, 0, 0, 1, 2, 3, 4, 5], &[8, 0, 0, 1, 2, 3, 4, 5]);
-        ask(slave, &[8, 0, 0x0B, 0, 1], &[0x88, 3]);
-        ask(slave, &[8, 0, 0x15, 0, 0], &[0x88, 1]);
-        ask(slave, &[8, 0], &[0x88, 3]);
+        assert_reply(slave, &[8, 0, 0, 0xA5, 0x37], &[8, 0, 0, 0xA5, 0x37]);
+        assert_reply(slave, &[8, 0, 0], &[8, 0, 0]);
+        assert_reply(slave, &[8, 0, 0, 1, 2, 3, 4, 5], &[8, 0, 0, 1, 2, 3, 4, 5]);
+        assert_reply(slave, &[8, 0, 0x0B, 0, 1], &[0x88, 3]);
+        assert_reply(slave, &[8, 0, 0x15, 0, 0], &[0x88, 1]);
+        assert_reply(slave, &[8, 0], &[0x88, 3]);
     }
 
     #[test]
     fn what_happens_on_the_line_is_counted() {
         let slave = &mut Slave::new(Dl06::new());
-        ask(slave, &[3, 4, 0, 0, 1], &[3, 2, 0, 0]);
-        ask(slave, &[3, 4, 0, 0, 0], &[0x83, 3]);
+        assert_reply(slave, &[3, 4, 0, 0, 1], &[3, 2, 0, 0]);
+        assert_reply(slave, &[3, 4, 0, 0, 0], &[0x83, 3]);
         slave.hear();
         slave.hear_corrupt();
         slave.obey(&[6, 4, 0x10, 0, 1]);
         slave.refuse(&[3, 4, 0, 0, 1], 6);
         slave.refuse(&[3, 4, 0, 0, 1], 7);
         assert_eq!(counters(slave), [6, 1, 3, 5, 1, 1, 1, 0]);
-        ask(slave, &[0x0B], &[0x0B, 0, 0, 0, 2]);
+        assert_reply(slave, &[0x0B], &[0x0B, 0, 0, 0, 2]);
         // Newest first; the request for the log is in it already.
         let log = [0x80, 0x40, 0x80, 0x48, 0x80, 0x44, 0x80, 0x40, 0xC0, 0x82, 0x41, 0x80, 0x40, 0x80];
-        ask(slave, &[0x0C], &[&[0x0C, 20, 0, 0, 0, 2, 0, 8], &log[..]].concat());
-        ask(slave, &[8, 0, 0x0A, 0, 0], &[8, 0, 0x0A, 0, 0]);
+        assert_reply(slave, &[0x0C], &[&[0x0C, 20, 0, 0, 0, 2, 0, 8], &log[..]].concat());
+        assert_reply(slave, &[8, 0, 0x0A, 0, 0], &[8, 0, 0x0A, 0, 0]);
         assert_eq!(counters(slave), [0; 8]);
     }
 
@@ -240,7 +240,7 @@ mod tests {
         slave.obey(&[8, 0, 0x0A, 0, 0]);
         slave.obey(&[6, 4, 0x20, 0x12, 0x34]);
         slave.obey(&[]);
-        ask(slave, &[3, 4, 0x20, 0, 1], &[3, 2, 0x12, 0x34]);
+        assert_reply(slave, &[3, 4, 0x20, 0, 1], &[3, 2, 0x12, 0x34]);
         assert_eq!(counters(slave)[ADDRESSED], 4);
     }
 

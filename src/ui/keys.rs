@@ -185,7 +185,7 @@ const GLOBAL: &[Key<Global>] = &[
 mod tests {
     use super::*;
 
-    fn no_clash(name: &str, chords: Vec<Chord>) {
+    fn assert_no_clash(name: &str, chords: Vec<Chord>) {
         let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global())).collect();
         for (n, chord) in all.iter().enumerate() {
             assert!(!all[..n].contains(chord), "{name}: {} means two things", chord.name());
@@ -194,9 +194,9 @@ mod tests {
 
     #[test]
     fn no_key_means_two_things_on_one_tab() {
-        no_clash("global", vec![]);
+        assert_no_clash("global", vec![]);
         for (page, chords) in Tab::ALL.iter().flat_map(|tab| tab.chords()) {
-            no_clash(page, chords);
+            assert_no_clash(page, chords);
         }
     }
 

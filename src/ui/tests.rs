@@ -55,7 +55,7 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
 }
 
 /// A key for a row that changed after it was drawn does nothing and says so; once the change is drawn, it acts.
-pub fn acts_only_on_what_was_drawn(model: &mut Model, change: impl FnOnce(&mut Model), key: &str) {
+pub fn assert_acts_only_on_what_was_drawn(model: &mut Model, change: impl FnOnce(&mut Model), key: &str) {
     screen(model, 80, 24);
     change(model);
     assert_eq!((type_keys(model, key), &model.modal), (Vec::new(), &None), "{key} acts on a row that was not drawn");

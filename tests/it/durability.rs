@@ -187,7 +187,7 @@ fn history_on(disk: &SmallDisk) -> PathBuf {
 }
 
 /// The disk takes nothing when the station starts, and is mended while it runs.
-fn an_outage_at_the_start(outage: &Outage) {
+fn check_an_outage_at_the_start(outage: &Outage) {
     let Some(disk) = SmallDisk::mount() else { return };
     (outage.begin)(&disk);
     let (sim, port) = simulated_tank();
@@ -206,7 +206,7 @@ fn an_outage_at_the_start(outage: &Outage) {
 
 /// The same for a station that has recorded before, and is killed after. A disk that is read-only is noticed with the first
 /// checkpoint, some seconds after the start: until then what is open is written.
-fn an_outage_in_the_middle(outage: &Outage) {
+fn check_an_outage_in_the_middle(outage: &Outage) {
     let Some(disk) = SmallDisk::mount() else { return };
     let (sim, port) = simulated_tank();
     let mut station = station_on(&disk, &port, &["--log", "-"]);
@@ -227,20 +227,20 @@ fn an_outage_in_the_middle(outage: &Outage) {
 
 #[test]
 fn a_disk_that_is_full_at_the_start_costs_no_record() {
-    an_outage_at_the_start(&FULL);
+    check_an_outage_at_the_start(&FULL);
 }
 
 #[test]
 fn a_disk_that_fills_up_costs_no_record() {
-    an_outage_in_the_middle(&FULL);
+    check_an_outage_in_the_middle(&FULL);
 }
 
 #[test]
 fn a_disk_that_is_read_only_at_the_start_costs_no_record() {
-    an_outage_at_the_start(&PROTECTED);
+    check_an_outage_at_the_start(&PROTECTED);
 }
 
 #[test]
 fn a_disk_that_becomes_read_only_costs_no_record() {
-    an_outage_in_the_middle(&PROTECTED);
+    check_an_outage_in_the_middle(&PROTECTED);
 }

@@ -140,7 +140,7 @@ const BROADCAST: &str = "broadcast [500] [500]";
 const END: &str = "end";
 
 /// Lets a foreign master ask the simulated plant and compares every line it prints.
-fn asked_by(library: &str, mode: &str, args: &[&str], beyond: &[&str]) {
+fn check_asked_by(library: &str, mode: &str, args: &[&str], beyond: &[&str]) {
     let Some(python) = python() else { return };
     let (_sim, place) = sim(&[&["--mode", mode], args].concat(), "serves");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/master.py");
@@ -151,32 +151,32 @@ fn asked_by(library: &str, mode: &str, args: &[&str], beyond: &[&str]) {
 
 #[test]
 fn pymodbus_asks_the_simulated_plant_everything_over_tcp() {
-    asked_by("pymodbus", "tcp", &[], &[&CHANGED[..], &[QUEUE], &PYMODBUS].concat());
+    check_asked_by("pymodbus", "tcp", &[], &[&CHANGED[..], &[QUEUE], &PYMODBUS].concat());
 }
 
 #[test]
 fn pymodbus_asks_the_simulated_plant_everything_in_rtu() {
-    asked_by("pymodbus", "rtu", &[], &[&CHANGED[..], &PYMODBUS, &[BROADCAST]].concat());
+    check_asked_by("pymodbus", "rtu", &[], &[&CHANGED[..], &PYMODBUS, &[BROADCAST]].concat());
 }
 
 #[test]
 fn pymodbus_asks_the_simulated_plant_everything_in_rtu_over_tcp() {
-    asked_by("pymodbus", "rtu-over-tcp", &[], &[&CHANGED[..], &PYMODBUS, &[BROADCAST]].concat());
+    check_asked_by("pymodbus", "rtu-over-tcp", &[], &[&CHANGED[..], &PYMODBUS, &[BROADCAST]].concat());
 }
 
 #[test]
 fn pymodbus_asks_the_simulated_plant_everything_in_ascii() {
     for bits in ["7", "8"] {
         let beyond = [&CHANGED[..], &[QUEUE], &PYMODBUS, &[BROADCAST]].concat();
-        asked_by("pymodbus", "ascii", &["--data-bits", bits], &beyond);
+        check_asked_by("pymodbus", "ascii", &["--data-bits", bits], &beyond);
     }
 }
 
 #[test]
 fn minimalmodbus_reads_and_writes_the_simulated_plant() {
-    asked_by("minimalmodbus", "rtu", &[], &[]);
-    asked_by("minimalmodbus", "ascii", &[], &[]);
-    asked_by("minimalmodbus", "ascii", &["--data-bits", "7"], &[]);
+    check_asked_by("minimalmodbus", "rtu", &[], &[]);
+    check_asked_by("minimalmodbus", "ascii", &[], &[]);
+    check_asked_by("minimalmodbus", "ascii", &["--data-bits", "7"], &[]);
 }
 
 /// Register N holds N, and no answer is over before a line of 9600 baud could have carried it.

@@ -56,7 +56,7 @@ fn plant(name: &str) -> PathBuf {
 }
 
 /// Runs the station until it has read everything, and compares what it prints.
-fn read_all_from(port: &str) {
+fn check_all_are_read_from(port: &str) {
     let said = station(Path::new("tank"), port, "12s");
     check(&said, &SEEN);
 }
@@ -67,7 +67,7 @@ fn the_station_reads_pymodbus_over_a_serial_line() {
     let folder = folder();
     let cable = Cable::plug(folder.path());
     let _slave = slave(&python, "rtu", cable.ends[1].to_str().unwrap());
-    read_all_from(cable.ends[0].to_str().unwrap());
+    check_all_are_read_from(cable.ends[0].to_str().unwrap());
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn the_station_reads_pymodbus_over_tcp() {
     let Some(python) = python() else { return };
     let port = free_port();
     let _slave = slave(&python, "tcp", &port.to_string());
-    read_all_from(&format!("127.0.0.1:{port}"));
+    check_all_are_read_from(&format!("127.0.0.1:{port}"));
 }
 
 /// A unit that is well and one for each way to answer wrongly: name, unit and the register that it is asked for, which says

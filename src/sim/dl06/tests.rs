@@ -14,7 +14,7 @@ const HALF_FULL: Readings = Readings {
     heater_w: 0.0,
 };
 
-fn ask(plc: &mut Dl06, request: &[u8], expect: &[u8]) {
+fn assert_reply(plc: &mut Dl06, request: &[u8], expect: &[u8]) {
     assert_eq!(serve(plc, request).as_deref(), Some(expect), "request {request:02X?}");
 }
 
@@ -22,12 +22,12 @@ fn ask(plc: &mut Dl06, request: &[u8], expect: &[u8]) {
 fn a_written_output_stays_unless_the_sequence_drives_it() {
     let plc = &mut Dl06::new();
     plc.scan(false, &HALF_FULL);
-    ask(plc, &[6, 0x41, 0x40, 0xFF, 0xFF], &[6, 0x41, 0x40, 0xFF, 0xFF]);
+    assert_reply(plc, &[6, 0x41, 0x40, 0xFF, 0xFF], &[6, 0x41, 0x40, 0xFF, 0xFF]);
     plc.scan(false, &HALF_FULL);
-    ask(plc, &[1, 8, 0, 0, 16], &[1, 2, 0xFF, 0xFF]);
-    ask(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
+    assert_reply(plc, &[1, 8, 0, 0, 16], &[1, 2, 0xFF, 0xFF]);
+    assert_reply(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
     plc.scan(false, &HALF_FULL);
-    ask(plc, &[3, 0x41, 0x40, 0, 1], &[3, 2, 0, 0]);
+    assert_reply(plc, &[3, 0x41, 0x40, 0, 1], &[3, 2, 0, 0]);
 }
 
 #[test]
@@ -37,13 +37,13 @@ fn in_manual_the_sequence_waits_where_it_is() {
     plc.scan(false, &HALF_FULL);
     plc.scan(false, &HALF_FULL);
     assert_eq!(plc.step(), Step::Heat);
-    ask(plc, &[5, 0x0C, 1, 0, 0], &[5, 0x0C, 1, 0, 0]);
+    assert_reply(plc, &[5, 0x0C, 1, 0, 0], &[5, 0x0C, 1, 0, 0]);
     plc.scan(true, &HALF_FULL);
     assert_eq!((plc.step(), plc.outputs()), (Step::Heat, Outputs::default()));
-    ask(plc, &[5, 0x0C, 1, 0xFF, 0], &[5, 0x0C, 1, 0xFF, 0]);
+    assert_reply(plc, &[5, 0x0C, 1, 0xFF, 0], &[5, 0x0C, 1, 0xFF, 0]);
     plc.scan(true, &HALF_FULL);
     assert_eq!(plc.step(), Step::Hold);
-    ask(plc, &[5, 0x0C, 0, 0, 0], &[5, 0x0C, 0, 0, 0]);
+    assert_reply(plc, &[5, 0x0C, 0, 0, 0], &[5, 0x0C, 0, 0, 0]);
     plc.scan(true, &HALF_FULL);
     assert_eq!(plc.step(), Step::Idle);
 }
@@ -51,10 +51,10 @@ fn in_manual_the_sequence_waits_where_it_is() {
 #[test]
 fn stopping_turns_everything_off_once() {
     let plc = &mut Dl06::new();
-    ask(plc, &[15, 0x0C, 0, 0, 4, 1, 0b1101], &[15, 0x0C, 0, 0, 4]);
+    assert_reply(plc, &[15, 0x0C, 0, 0, 4, 1, 0b1101], &[15, 0x0C, 0, 0, 4]);
     plc.scan(false, &HALF_FULL);
     assert_eq!(plc.outputs(), Outputs { pump: true, agitator: true, ..Outputs::default() });
-    ask(plc, &[5, 0x0C, 0, 0, 0], &[5, 0x0C, 0, 0, 0]);
+    assert_reply(plc, &[5, 0x0C, 0, 0, 0], &[5, 0x0C, 0, 0, 0]);
     plc.scan(false, &HALF_FULL);
     assert_eq!(plc.outputs(), Outputs::default());
 }
@@ -65,11 +65,11 @@ fn the_interlocks_hold_in_manual_and_behind_forced_lamps() {
         let mut expect = Outputs { pump: true, agitator: true, drain_valve: true, fill_valve: true, heater: true };
         blocked(&mut expect);
         let mut plc = Dl06::new();
-        ask(&mut plc, &[15, 0x0C, 0, 0, 7, 1, 0b111_1101], &[15, 0x0C, 0, 0, 7]);
+        assert_reply(&mut plc, &[15, 0x0C, 0, 0, 7, 1, 0b111_1101], &[15, 0x0C, 0, 0, 7]);
         plc.scan(false, &readings);
         assert_eq!(plc.outputs(), expect, "in manual at {readings:?}");
         let mut forced = Dl06::new();
-        ask(&mut forced, &[6, 0x41, 0x40, 0xFF, 0xFF], &[6, 0x41, 0x40, 0xFF, 0xFF]);
+        assert_reply(&mut forced, &[6, 0x41, 0x40, 0xFF, 0xFF], &[6, 0x41, 0x40, 0xFF, 0xFF]);
         let actuators = forced.actuators(&readings, 100.0);
         let reached = Outputs {
             pump: actuators.pump,
@@ -91,7 +91,7 @@ fn the_interlock_word_shows_blocks_before_a_command() {
     let check = |readings: Readings, expect: u8| {
         let mut plc = Dl06::new();
         plc.scan(false, &readings);
-        ask(&mut plc, &[3, 4, 3, 0, 1], &[3, 2, 0, expect]);
+        assert_reply(&mut plc, &[3, 4, 3, 0, 1], &[3, 2, 0, expect]);
     };
     check(HALF_FULL, 0b000);
     check(Readings { level_cm: 4.9, ..HALF_FULL }, 0b001);
@@ -104,9 +104,9 @@ fn the_fill_of_a_batch_can_be_set_within_its_bounds() {
     let check = |written: u16, expect: u16| {
         let mut plc = Dl06::new();
         let [[high, low], answer] = [written.to_be_bytes(), expect.to_be_bytes()];
-        ask(&mut plc, &[6, 4, 4, high, low], &[6, 4, 4, high, low]);
+        assert_reply(&mut plc, &[6, 4, 4, high, low], &[6, 4, 4, high, low]);
         plc.scan(false, &HALF_FULL);
-        ask(&mut plc, &[3, 4, 4, 0, 1], &[3, 2, answer[0], answer[1]]);
+        assert_reply(&mut plc, &[3, 4, 4, 0, 1], &[3, 2, answer[0], answer[1]]);
     };
     check(0x0050, 0x0050);
     check(0x0200, 0x0200);
@@ -119,7 +119,7 @@ fn the_fill_of_a_batch_can_be_set_within_its_bounds() {
 #[test]
 fn a_large_batch_is_not_stopped_by_the_level_of_a_full_tank() {
     let plc = &mut Dl06::new();
-    ask(plc, &[6, 4, 4, 2, 0], &[6, 4, 4, 2, 0]);
+    assert_reply(plc, &[6, 4, 4, 2, 0], &[6, 4, 4, 2, 0]);
     plc.start();
     let half_way = Readings { level_cm: 30.0, ..HALF_FULL };
     plc.scan(false, &half_way);
@@ -132,20 +132,20 @@ fn a_large_batch_is_not_stopped_by_the_level_of_a_full_tank() {
 #[test]
 fn panel_switches_drive_in_manual() {
     let plc = &mut Dl06::new();
-    ask(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
+    assert_reply(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
     plc.set_switch(2, true);
     plc.set_switch(4, true);
     plc.scan(false, &HALF_FULL);
     assert_eq!(plc.outputs(), Outputs { drain_valve: true, ..Outputs::default() });
-    ask(plc, &[2, 8, 0, 0, 20], &[2, 3, 0b100, 0, 0]);
+    assert_reply(plc, &[2, 8, 0, 0, 20], &[2, 3, 0b100, 0, 0]);
 }
 
 #[test]
 fn numbers_stand_in_v_memory_as_documented() {
     let plc = &mut Dl06::new();
     plc.scan(true, &Readings { flow_in: 0.75, heater_w: 1600.0, ..HALF_FULL });
-    ask(plc, &[4, 4, 8, 0, 7], &[4, 14, 0, 102, 0, 150, 0, 0, 0, 75, 0, 0, 0, 0, 0x06, 0x40]);
-    ask(plc, &[3, 0x41, 0, 0, 2], &[3, 4, 0, 0b1_0000, 0, 0]);
+    assert_reply(plc, &[4, 4, 8, 0, 7], &[4, 14, 0, 102, 0, 150, 0, 0, 0, 75, 0, 0, 0, 0, 0x06, 0x40]);
+    assert_reply(plc, &[3, 0x41, 0, 0, 2], &[3, 4, 0, 0b1_0000, 0, 0]);
     for (value, expect) in [(0, 0), (7, 7), (180, 0x180), (1234, 0x1234), (10_000, 0x9999)] {
         assert_eq!(bcd(value), expect);
         assert_eq!(from_bcd(expect), Some(value.min(9999)));

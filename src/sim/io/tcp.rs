@@ -100,7 +100,7 @@ mod tests {
     use crate::plant::def::{LineId, Serial};
     use crate::sim::{io::SimulatorHandle, rig::Rig, simulator::Simulator};
 
-    async fn exchange(client: &mut TcpStream, request: &[u8], expect: &[u8]) {
+    async fn assert_reply(client: &mut TcpStream, request: &[u8], expect: &[u8]) {
         client.write_all(request).await.expect("the server takes requests");
         let mut reply = vec![0; expect.len()];
         let read = timeout(Duration::from_secs(5), client.read_exact(&mut reply)).await;
@@ -129,13 +129,13 @@ mod tests {
         let connect = || async { TcpStream::connect(address).await.expect("the server accepts") };
         let (mut one, mut two) = (connect().await, connect().await);
         let write = [0, 7, 0, 0, 0, 6, 1, 6, 0x03, 0xEA, 0x01, 0xF4];
-        exchange(&mut one, &write, &write).await;
+        assert_reply(&mut one, &write, &write).await;
         let read = [0, 8, 0, 0, 0, 6, 1, 3, 0x03, 0xEA, 0, 1];
-        exchange(&mut two, &read, &[0, 8, 0, 0, 0, 5, 1, 3, 2, 0x01, 0xF4]).await;
+        assert_reply(&mut two, &read, &[0, 8, 0, 0, 0, 5, 1, 3, 2, 0x01, 0xF4]).await;
         // A request that is not Modbus ends its own connection and no other.
         one.write_all(b"GET / HTTP/1.1\r\n").await.expect("the server takes bytes");
         assert!(ends(&mut one).await);
-        exchange(&mut two, &read, &[0, 8, 0, 0, 0, 5, 1, 3, 2, 0x01, 0xF4]).await;
+        assert_reply(&mut two, &read, &[0, 8, 0, 0, 0, 5, 1, 3, 2, 0x01, 0xF4]).await;
     }
 
     #[tokio::test]
@@ -145,8 +145,8 @@ mod tests {
         let segment =
             [&read(1, 3)[..], &[0, 2, 0, 0, 0, 6, 0, 6, 0x03, 0xEA, 0, 9], &read(3, 1), &read(4, 3)[..7]].concat();
         let answered = [&[0, 1, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC][..], &[0, 3, 0, 0, 0, 3, 1, 0x81, 1]].concat();
-        exchange(&mut client, &segment, &answered).await;
-        exchange(&mut client, &read(4, 3)[7..], &[0, 4, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]).await;
+        assert_reply(&mut client, &segment, &answered).await;
+        assert_reply(&mut client, &read(4, 3)[7..], &[0, 4, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]).await;
         // A length that no frame has.
         client.write_all(&[0, 5, 0, 0, 1, 0, 1]).await.expect("the server takes bytes");
         assert!(ends(&mut client).await);
@@ -159,7 +159,7 @@ mod tests {
         for transaction in 0..CLIENTS_MAX as u8 {
             let mut client = TcpStream::connect(address).await.expect("the server accepts");
             let read = [0, transaction, 0, 0, 0, 6, 1, 3, 0x03, 0xEA, 0, 1];
-            exchange(&mut client, &read, &[0, transaction, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]).await;
+            assert_reply(&mut client, &read, &[0, transaction, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]).await;
             clients.push(client);
         }
         assert!(ends(&mut TcpStream::connect(address).await.expect("the system accepts")).await);
@@ -171,7 +171,7 @@ mod tests {
         let mut client = TcpStream::connect(serve(rtu).await).await.expect("the server accepts");
         let broadcast = with_crc(&[0, 6, 0x03, 0xEA, 0, 50]);
         let requests = [&broadcast[..], &with_crc(&[1, 3, 0x03, 0xEA, 0, 1])].concat();
-        exchange(&mut client, &requests, &with_crc(&[1, 3, 2, 0, 50])).await;
-        exchange(&mut client, &with_crc(&[2, 3, 0x03, 0xEA, 0, 1]), &with_crc(&[2, 3, 2, 0, 50])).await;
+        assert_reply(&mut client, &requests, &with_crc(&[1, 3, 2, 0, 50])).await;
+        assert_reply(&mut client, &with_crc(&[2, 3, 0x03, 0xEA, 0, 1]), &with_crc(&[2, 3, 2, 0, 50])).await;
     }
 }

@@ -24,7 +24,7 @@ fn bytes(hex: &str) -> Vec<u8> {
 }
 
 /// Sends a frame as it is written in the manuals and notes, and compares what a master would see.
-fn exchange(rig: &mut Rig, sent: &str, answered: &str) {
+fn assert_reply(rig: &mut Rig, sent: &str, answered: &str) {
     let frame = bytes(sent);
     let (message, _) = frame.split_at(frame.len() - 2);
     assert_eq!(with_crc(message), frame, "{sent} has a wrong check");
@@ -36,24 +36,24 @@ fn exchange(rig: &mut Rig, sent: &str, answered: &str) {
 fn the_golden_frames_are_answered_byte_for_byte() {
     let rig = &mut Rig::new();
     rig.advance(Duration::from_secs(1));
-    let mut echo = |sent| exchange(rig, sent, sent);
+    let mut echo = |sent| assert_reply(rig, sent, sent);
     echo("01 06 03 EB 00 00 F9 BA");
     echo("01 06 03 EB 00 01 38 7A");
     echo("01 06 03 E8 00 01 C8 7A");
     echo("02 05 08 00 FF 00 8E 69");
-    exchange(rig, "02 01 08 00 00 10 3F 95", "02 01 02 01 00 FC 6C");
-    exchange(rig, "02 02 08 00 00 14 7A 56", "02 02 03 00 00 00 78 7D");
-    exchange(rig, "02 03 41 40 00 01 91 D1", "02 03 02 00 01 3D 84");
-    exchange(rig, "02 03 41 00 00 02 D0 04", "02 03 04 00 00 00 00 C9 33");
-    exchange(rig, "02 03 04 00 00 01 85 09", "02 03 02 00 00 FC 44");
-    exchange(rig, "01 03 03 EA 00 01 A5 BA", "01 03 02 02 BC B8 95");
+    assert_reply(rig, "02 01 08 00 00 10 3F 95", "02 01 02 01 00 FC 6C");
+    assert_reply(rig, "02 02 08 00 00 14 7A 56", "02 02 03 00 00 00 78 7D");
+    assert_reply(rig, "02 03 41 40 00 01 91 D1", "02 03 02 00 01 3D 84");
+    assert_reply(rig, "02 03 41 00 00 02 D0 04", "02 03 04 00 00 00 00 C9 33");
+    assert_reply(rig, "02 03 04 00 00 01 85 09", "02 03 02 00 00 FC 44");
+    assert_reply(rig, "01 03 03 EA 00 01 A5 BA", "01 03 02 02 BC B8 95");
     let measured = "01 04 14 01 0E 02 BC 01 AE 27 10 00 00 00 01 00 00 00 00 00 00 00 00";
-    exchange(rig, "01 04 03 E8 00 0A F0 7D", &spell(measured));
+    assert_reply(rig, "01 04 03 E8 00 0A F0 7D", &spell(measured));
     let settings = "01 03 14 00 00 02 BC 00 01 00 00 00 32 09 60 02 58 00 0A 00 0A 00 00";
-    exchange(rig, "01 03 03 E9 00 0A 14 7D", &spell(settings));
-    exchange(rig, "01 03 03 F7 00 05 34 7F", &spell("01 03 0A 00 01 00 00 00 00 07 3A 00 01"));
-    exchange(rig, &spell("01 03 07 D0 00 01"), "01 83 02 C0 F1");
-    exchange(rig, &spell("01 04 07 D0 00 01"), "01 84 02 C2 C1");
+    assert_reply(rig, "01 03 03 E9 00 0A 14 7D", &spell(settings));
+    assert_reply(rig, "01 03 03 F7 00 05 34 7F", &spell("01 03 0A 00 01 00 00 00 00 07 3A 00 01"));
+    assert_reply(rig, &spell("01 03 07 D0 00 01"), "01 83 02 C0 F1");
+    assert_reply(rig, &spell("01 04 07 D0 00 01"), "01 84 02 C2 C1");
 }
 
 fn spell(message: &str) -> String {
@@ -64,8 +64,8 @@ fn spell(message: &str) -> String {
 fn the_two_recorded_exchanges_happen_again() {
     let rig = &mut Rig::new();
     // The thesis's controller showed no decimals, so its 50 is 5.0 °C on our face.
-    exchange(rig, "01 06 03 EA 00 32 29 AF", "01 06 03 EA 00 32 29 AF");
-    exchange(rig, "02 06 41 40 FF FF 9D A1", "02 06 41 40 FF FF 9D A1");
+    assert_reply(rig, "01 06 03 EA 00 32 29 AF", "01 06 03 EA 00 32 29 AF");
+    assert_reply(rig, "02 06 41 40 FF FF 9D A1", "02 06 41 40 FF FF 9D A1");
     rig.advance(Duration::from_secs(2));
     assert_eq!(rig.state().sv_c, 5.0);
     assert_eq!(rig.respond(2, &[1, 8, 0, 0, 16]), Some(vec![1, 2, 0xFF, 0xFF]));

@@ -146,7 +146,7 @@ fn no_size_is_too_small_to_survive() {
         for (width, height) in sizes.clone().chain(large) {
             for tab in all {
                 model.tabs.shown = tab;
-                screen(&mut model, width, height);
+                assert!(screen(&mut model, width, height).lines().count() <= usize::from(height));
             }
         }
         for keys in
@@ -156,7 +156,7 @@ fn no_size_is_too_small_to_survive() {
             screen(&mut model, 80, 24);
             type_keys(&mut model, keys);
             for (width, height) in sizes.clone().chain(large) {
-                screen(&mut model, width, height);
+                assert!(screen(&mut model, width, height).lines().count() <= usize::from(height));
             }
         }
     }

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys};
+use super::{assert_acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys};
 use crate::{
     access::{
         Credentials, Durability, SessionRequest, SessionStatus, Who,
@@ -611,7 +611,7 @@ fn keys_for_users_act_only_on_the_user_that_was_drawn() {
             let change = |model: &mut Model| {
                 change_session(model, |session| change(Arc::make_mut(&mut session.users)));
             };
-            acts_only_on_what_was_drawn(&mut model, change, key);
+            assert_acts_only_on_what_was_drawn(&mut model, change, key);
         }
     }
 }
@@ -634,5 +634,5 @@ fn an_audit_entry_is_opened_only_as_it_was_drawn() {
     let newer = |model: &mut Model| {
         update(model, Msg::Answer(again, Ok(Answer::Actions(vec![row(38), row(37), row(36)]))));
     };
-    acts_only_on_what_was_drawn(&mut model, newer, "⏎");
+    assert_acts_only_on_what_was_drawn(&mut model, newer, "⏎");
 }

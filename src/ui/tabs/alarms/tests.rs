@@ -23,7 +23,7 @@ use crate::{
         fixture::{self, Fixture, now},
         modal::Modal,
         tabs::Tab,
-        tests::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys},
+        tests::{assert_acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys},
         theme::{Colours, Glyphs, Theme},
         update,
     },
@@ -139,7 +139,7 @@ fn shown(fixture: &Fixture, theme: Theme, keys: &str) -> Model {
 }
 
 /// Pictures at both sizes in full looks, and at 80x24 in plain ones.
-fn pictures(name: &str, fixture: &Fixture, keys: &str) {
+fn assert_pictures(name: &str, fixture: &Fixture, keys: &str) {
     for (look, theme, width, height) in
         [("80x24", Theme::FULL, 80, 24), ("120x40", Theme::FULL, 120, 40), ("plain", Theme::PLAIN, 80, 24)]
     {
@@ -152,10 +152,10 @@ fn pictures(name: &str, fixture: &Fixture, keys: &str) {
 
 #[test]
 fn a_storm_is_folded_and_counted() {
-    pictures("storm", &storm(), "");
-    pictures("storm_unfolded", &storm(), " ");
-    pictures("system", &storm(), "vv");
-    pictures("guidance_acknowledged", &storm(), " ↓↓↓↓↓↓↓↓↓↓");
+    assert_pictures("storm", &storm(), "");
+    assert_pictures("storm_unfolded", &storm(), " ");
+    assert_pictures("system", &storm(), "vv");
+    assert_pictures("guidance_acknowledged", &storm(), " ↓↓↓↓↓↓↓↓↓↓");
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn an_acknowledgement_that_is_not_on_disk_is_marked_in_list_and_guidance() {
 
 #[test]
 fn suppressed_alarms_are_listed_and_counted_on_every_page() {
-    pictures("suppressed", &suppressed(), "v");
+    assert_pictures("suppressed", &suppressed(), "v");
     let mut model = shown(&suppressed(), Theme::FULL, "");
     assert!(screen(&mut model, 120, 40).contains("suppressed 3"));
     let mut quiet = suppressed();
@@ -195,7 +195,7 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     fixture.alarm_metrics.day = Arc::new(figures());
     (fixture.alarm_metrics.last_10_min, fixture.alarm_metrics.last_hour) = (15, 22);
     fixture.alarm_metrics.flood_since = Some(ago(50));
-    pictures("metrics", &fixture, "vvvv");
+    assert_pictures("metrics", &fixture, "vvvv");
     let mut model = shown(&fixture, Theme::FULL, "");
     let banner = screen(&mut model, 80, 24).lines().nth(2).map(str::to_owned).unwrap_or_default();
     assert!(banner.contains("FLOOD") && banner.contains("UNACK"), "{banner}");
@@ -522,6 +522,6 @@ fn a_suppressed_alarm_is_put_back_only_as_it_was_drawn() {
         let mut model = shown(&fixture, Theme::FULL, "v");
         change(&mut fixture.suppressed);
         let change = |model: &mut Model| drop(update(model, Msg::Snapshot(fixture.snapshot())));
-        acts_only_on_what_was_drawn(&mut model, change, "u");
+        assert_acts_only_on_what_was_drawn(&mut model, change, "u");
     }
 }

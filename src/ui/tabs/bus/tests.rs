@@ -24,7 +24,7 @@ use crate::{
         fixture::{Fixture, now},
         modal::Modal,
         tabs::Tab,
-        tests::{acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys},
+        tests::{assert_acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys},
         theme::Theme,
         update,
     },
@@ -110,7 +110,7 @@ fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
         // The page takes new frames in every other second.
         (0..4).for_each(|_| drop(update(model, Msg::Tick { silent: Duration::ZERO })));
     };
-    acts_only_on_what_was_drawn(&mut model, newer, "⏎");
+    assert_acts_only_on_what_was_drawn(&mut model, newer, "⏎");
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "P");
     let other_plan = |model: &mut Model| {
         let mut fixture = Fixture::traffic();
@@ -119,7 +119,7 @@ fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
         fixture.line.report = Some(Arc::new(report));
         update(model, Msg::Snapshot(fixture.snapshot()));
     };
-    acts_only_on_what_was_drawn(&mut model, other_plan, "⏎");
+    assert_acts_only_on_what_was_drawn(&mut model, other_plan, "⏎");
 }
 
 #[test]
@@ -453,7 +453,7 @@ fn no_size_breaks_a_page_or_a_window() {
     for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "Tb⏎", "Ts"] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         for (width, height) in [(60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)] {
-            screen(&mut model, width, height);
+            assert!(screen(&mut model, width, height).lines().count() <= usize::from(height));
         }
     }
 }

@@ -60,7 +60,7 @@ fn with_sets() -> Fixture {
 }
 
 /// The screen after some keys in both sizes.
-fn seen(name: &str, fixture: &Fixture, theme: Theme, keys: &str) {
+fn assert_seen(name: &str, fixture: &Fixture, theme: Theme, keys: &str) {
     for (width, height) in SIZES {
         let mut model = model(fixture, theme);
         type_keys(&mut model, keys);
@@ -97,25 +97,25 @@ fn tuning(fixture: &Fixture, ended: bool) -> Tuning {
 
 #[test]
 fn every_page_in_every_mood() {
-    seen("list_one_trouble", &trouble(2), Theme::FULL, "4");
-    seen("list_of_31", &trouble(31), Theme::FULL, "4");
-    seen("device_normal", &many(2), Theme::FULL, "4⏎");
-    seen("device_alarm", &trouble(2), Theme::FULL, "4⏎d");
-    seen("device_down", &trouble(2), Theme::FULL, "4⏎→");
-    seen("device_plc", &Fixture::normal(), Theme::FULL, "4↓⏎");
-    seen("device_ascii", &trouble(2), Theme::PLAIN, "4⏎");
+    assert_seen("list_one_trouble", &trouble(2), Theme::FULL, "4");
+    assert_seen("list_of_31", &trouble(31), Theme::FULL, "4");
+    assert_seen("device_normal", &many(2), Theme::FULL, "4⏎");
+    assert_seen("device_alarm", &trouble(2), Theme::FULL, "4⏎d");
+    assert_seen("device_down", &trouble(2), Theme::FULL, "4⏎→");
+    assert_seen("device_plc", &Fixture::normal(), Theme::FULL, "4↓⏎");
+    assert_seen("device_ascii", &trouble(2), Theme::PLAIN, "4⏎");
     let mut running = many(1);
     running.into = Some((Duration::from_secs(192), true));
-    seen("program_running", &running, Theme::FULL, "4g");
-    seen("program_ascii", &running, Theme::PLAIN, "4g");
-    seen("program_down", &trouble(2), Theme::FULL, "4↓⏎g");
-    seen("sets", &with_sets(), Theme::FULL, "4⏎s");
-    seen("sets_none", &many(1), Theme::FULL, "4s");
-    seen("sets_spoiled", &with_sets(), Theme::FULL, "4⏎s⏎");
-    seen("compare", &with_sets(), Theme::FULL, "4⏎s↓⏎");
-    seen("compare_ascii", &with_sets(), Theme::PLAIN, "4⏎s↓⏎=");
-    seen("restore_asked", &with_sets(), Theme::FULL, "4⏎s↓⏎⏎");
-    seen("guide", &many(1), Theme::FULL, "4h→→→");
+    assert_seen("program_running", &running, Theme::FULL, "4g");
+    assert_seen("program_ascii", &running, Theme::PLAIN, "4g");
+    assert_seen("program_down", &trouble(2), Theme::FULL, "4↓⏎g");
+    assert_seen("sets", &with_sets(), Theme::FULL, "4⏎s");
+    assert_seen("sets_none", &many(1), Theme::FULL, "4s");
+    assert_seen("sets_spoiled", &with_sets(), Theme::FULL, "4⏎s⏎");
+    assert_seen("compare", &with_sets(), Theme::FULL, "4⏎s↓⏎");
+    assert_seen("compare_ascii", &with_sets(), Theme::PLAIN, "4⏎s↓⏎=");
+    assert_seen("restore_asked", &with_sets(), Theme::FULL, "4⏎s↓⏎⏎");
+    assert_seen("guide", &many(1), Theme::FULL, "4h→→→");
 }
 
 #[test]
@@ -123,10 +123,10 @@ fn a_tuning_shows_how_it_goes_and_what_it_has_found() {
     let mut fixture = many(2);
     fixture.set("TIC-1.AT", 1.0);
     fixture.tunings[0] = Some(tuning(&fixture, false));
-    seen("tuning", &fixture, Theme::FULL, "4⏎");
+    assert_seen("tuning", &fixture, Theme::FULL, "4⏎");
     fixture.set("TIC-1.AT", 0.0);
     fixture.tunings[0] = Some(tuning(&fixture, true));
-    seen("tuned", &fixture, Theme::FULL, "4⏎");
+    assert_seen("tuned", &fixture, Theme::FULL, "4⏎");
 }
 
 #[test]
@@ -165,9 +165,9 @@ fn a_restore_shows_each_write_and_where_it_stopped() {
     // The first write is done.
     fixture.set("TIC-1.P", 5.0);
     fixture.restores = vec![running];
-    seen("restore_running", &fixture, Theme::FULL, "4⏎s↓⏎");
+    assert_seen("restore_running", &fixture, Theme::FULL, "4⏎s↓⏎");
     fixture.restores = vec![failed];
-    seen("restore_failed", &fixture, Theme::FULL, "4⏎s↓⏎");
+    assert_seen("restore_failed", &fixture, Theme::FULL, "4⏎s↓⏎");
     (reading.state, reading.steps) = (State::Reading, Vec::new());
     fixture.restores = vec![reading];
     let mut model = model(&fixture, Theme::FULL);

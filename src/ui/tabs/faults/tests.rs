@@ -15,7 +15,7 @@ use crate::{
         Effect, Model, Msg,
         fixture::{self, Fixture},
         tabs::Tab,
-        tests::{acts_only_on_what_was_drawn, model, screen, type_keys},
+        tests::{assert_acts_only_on_what_was_drawn, model, screen, type_keys},
         theme::Theme,
         update,
     },
@@ -133,7 +133,7 @@ fn a_fault_is_switched_only_as_it_was_drawn() {
     let mut set = status(&fixture);
     set.active.push(ActiveFault { target: FaultTarget::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
     let set = |model: &mut Model| drop(update(model, Msg::Extension(Arc::new(set))));
-    acts_only_on_what_was_drawn(&mut model, set, "⏎");
+    assert_acts_only_on_what_was_drawn(&mut model, set, "⏎");
 }
 
 #[test]

@@ -268,7 +268,7 @@ fn no_size_is_too_small_to_survive() {
         stand.terminal();
         stand.answer(true);
         stand.press("↓↓↓↓↓e");
-        stand.terminal();
+        assert_eq!(stand.terminal().backend().buffer().area.width, width);
     }
 }
 

@@ -373,7 +373,7 @@ fn no_size_is_too_small_to_survive() {
             let mut stand = Stand::new(Theme::FULL, width, height);
             stand.press(keys);
             stand.answer();
-            stand.terminal();
+            assert_eq!(stand.terminal().backend().buffer().area.width, width);
         }
     }
 }
