@@ -100,15 +100,14 @@ fn make_key(args: &KeyArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Reads a verification key.
 fn read_key(path: &Path) -> Result<VerificationKey, CliError> {
-    let failed = |error| CliError::Io { what: format!("cannot read {}", path.display()), error };
+    let failed = CliError::io(format!("cannot read {}", path.display()));
     let from: Box<dyn Read> = match path == Path::new("-") {
         true => Box::new(io::stdin()),
-        false => Box::new(File::open(path).map_err(failed)?),
+        false => Box::new(File::open(path).map_err(&failed)?),
     };
     let mut text = String::new();
-    from.take(KEY_BYTES_MAX).read_to_string(&mut text).map_err(failed)?;
+    from.take(KEY_BYTES_MAX).read_to_string(&mut text).map_err(&failed)?;
     let wrong = || CliError::Usage(format!("{}: expected the key that `sightglass audit key` printed", path.display()));
     VerificationKey::parse(&text).ok_or_else(wrong)
 }

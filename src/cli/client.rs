@@ -140,7 +140,7 @@ pub async fn open(plant: Option<&str>) -> Result<Session, CliError> {
 
 /// The password as it is typed, or a line of standard input.
 fn password(user: &str) -> Result<String, CliError> {
-    let failed = |error| CliError::Io { what: "cannot read the password".into(), error };
+    let failed = CliError::io("cannot read the password");
     if std::io::stdin().is_terminal() {
         return rpassword::prompt_password(format!("password of {user}: ")).map_err(failed);
     }

@@ -66,7 +66,7 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
     let (mut frames, mut corrupt, mut wrong) = (0, 0, 0);
     let mut asked: Option<Dissection> = None;
     for (index, line) in input.split(b'\n').enumerate() {
-        let line = line.map_err(|error| CliError::Io { what: "cannot read standard input".into(), error })?;
+        let line = line.map_err(CliError::io("cannot read standard input"))?;
         let line = String::from_utf8_lossy(&line);
         if line.trim().is_empty() {
             continue;

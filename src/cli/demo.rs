@@ -156,8 +156,7 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
     }
     if let Some(path) = &args.report {
         let bytes = report::FORMATS[0].render(&report, &last.def, last.def.report.csv);
-        write_for_user(path, &bytes)
-            .map_err(|error| CliError::Io { what: format!("cannot write {}", path.display()), error })?;
+        write_for_user(path, &bytes).map_err(CliError::io(format!("cannot write {}", path.display())))?;
         say(&format!("report written: {}", path.display()));
     }
     Ok(())
@@ -203,7 +202,7 @@ impl Scratch {
         let folder = std::env::temp_dir().join(format!("sightglass-demo-{}-{started}", std::process::id()));
         std::os::unix::fs::DirBuilderExt::mode(&mut std::fs::DirBuilder::new(), 0o700)
             .create(&folder)
-            .map_err(|error| CliError::Io { what: format!("cannot make {}", folder.display()), error })?;
+            .map_err(CliError::io(format!("cannot make {}", folder.display())))?;
         Ok(Scratch { history: folder.join("demo.duckdb"), folder: Some(folder) })
     }
 }

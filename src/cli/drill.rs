@@ -99,7 +99,7 @@ fn rehearse(
         .enable_time()
         .start_paused(true)
         .build()
-        .map_err(|error| CliError::Io { what: "cannot start".into(), error })?;
+        .map_err(CliError::io("cannot start"))?;
     runtime.block_on(async {
         let time = Clock::starting_at(morning(&def), 1.0);
         let simulator = SimulatorHandle::spawn_for(&def, simulator(&def, Some(&scenario))?, time);

@@ -164,6 +164,12 @@ impl From<StartError> for CliError {
 }
 
 impl CliError {
+    /// An error of input or output, with what could not be done.
+    fn io(what: impl Into<String>) -> impl Fn(std::io::Error) -> CliError {
+        let what = what.into();
+        move |error| CliError::Io { what: what.clone(), error }
+    }
+
     fn exit_code(&self) -> u8 {
         match self {
             CliError::Profile(_) | CliError::Usage(_) | CliError::History(HistoryError::Foreign { .. }) => 2,
@@ -285,7 +291,7 @@ fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
         .worker_threads(2)
         .enable_all()
         .build()
-        .map_err(|error| CliError::Io { what: "cannot start".into(), error })
+        .map_err(CliError::io("cannot start"))
 }
 
 /// Does the work in a runtime of its own. What a hung disk still holds up when it is done is left behind.

@@ -20,7 +20,6 @@ pub fn state_folder() -> PathBuf {
     state.or_else(home).unwrap_or_else(|| PathBuf::from("/var/lib")).join("sightglass")
 }
 
-/// The history of a plant.
 pub fn history_of(plant: &str) -> PathBuf {
     state_folder().join(format!("{plant}.duckdb"))
 }

@@ -132,9 +132,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
 
 /// The socket of a plant, before anything else: it also keeps a second station of the plant away.
 fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
-    let path = find::Places::here()
-        .socket(&def.name)
-        .map_err(|error| CliError::Io { what: "cannot make a socket".into(), error })?;
+    let path = find::Places::here().socket(&def.name).map_err(CliError::io("cannot make a socket"))?;
     serve::listen(&path).map_err(CliError::from)
 }
 

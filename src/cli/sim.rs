@@ -115,8 +115,7 @@ impl Link {
         if std::fs::read_link(&link).is_ok_and(|old| old.starts_with("/dev/pts")) {
             let _ = std::fs::remove_file(&link);
         }
-        std::os::unix::fs::symlink(target, &link)
-            .map_err(|error| CliError::Io { what: format!("cannot link {}", link.display()), error })?;
+        std::os::unix::fs::symlink(target, &link).map_err(CliError::io(format!("cannot link {}", link.display())))?;
         Ok(Link(link))
     }
 }

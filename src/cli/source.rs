@@ -140,7 +140,7 @@ impl Source {
                 session.request(SessionRequest::Exported { file, sha256 }).await.map_err(CliError::Failed)?;
             client::warn_not_recorded(&exported, durability);
         }
-        let failed = |error| CliError::Io { what: format!("cannot write {}", path.display()), error };
+        let failed = CliError::io(format!("cannot write {}", path.display()));
         if path.as_os_str() == "-" {
             return put_out(bytes).map_err(failed);
         }

@@ -7,8 +7,7 @@ const UNIT: &str = include_str!("sightglass@.service");
 
 /// Prints the unit for this very program.
 pub fn main() -> Result<(), CliError> {
-    let exe = std::env::current_exe()
-        .map_err(|error| CliError::Io { what: "cannot find the path of this program".into(), error })?;
+    let exe = std::env::current_exe().map_err(CliError::io("cannot find the path of this program"))?;
     say(unit(&exe.to_string_lossy()).trim_end());
     Ok(())
 }

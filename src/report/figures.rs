@@ -81,7 +81,6 @@ impl Figures {
         Figures { seconds, steps: StepSeries::new(from, until), stats: None, counted: 0.0 }
     }
 
-    /// The next sample.
     pub fn next(&mut self, sample: Sample) {
         if let Some(span) = self.steps.next(sample) {
             self.add(span);

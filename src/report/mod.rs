@@ -1,15 +1,15 @@
 //! Reports: the shift calendar, the figures of a shift, and the formats of its report; pure, rows in and bytes out.
 
-pub mod shift;
+pub(crate) mod shift;
 pub mod period_parser;
 pub mod step_series;
-pub mod figures;
-pub mod alarm_metrics;
+pub(crate) mod figures;
+pub(crate) mod alarm_metrics;
 mod csv;
-pub mod shift_csv;
+pub(crate) mod shift_csv;
 mod record_csv;
-pub mod export;
-pub mod text;
+pub(crate) mod export;
+pub(crate) mod text;
 #[cfg(test)]
 pub(crate) mod testing;
 

@@ -27,11 +27,6 @@ pub fn previous(def: &PlantDef, period: &Period) -> Option<Period> {
     shift_at(def, period.from.checked_sub(1.nanosecond()).ok()?)
 }
 
-/// The shift after a period.
-pub fn next(def: &PlantDef, period: &Period) -> Option<Period> {
-    shift_at(def, period.to)
-}
-
 /// The last `n` shifts, newest first, the running one included.
 pub fn recent(def: &PlantDef, now: Timestamp, n: usize) -> Vec<Period> {
     std::iter::successors(shift_at(def, now), |period| previous(def, period)).take(n).collect()
@@ -146,7 +141,7 @@ mod tests {
         let list = recent(&def, at("2026-11-21T09:00+07"), 4);
         let names: Vec<_> = list.iter().map(|period| period.name.as_str()).collect();
         assert_eq!(names, ["morning 2026-11-21", "night 2026-11-20", "afternoon 2026-11-20", "morning 2026-11-20"]);
-        assert_eq!(next(&def, &list[1]).as_ref(), Some(&list[0]));
+        assert_eq!(shift_at(&def, list[1].to).as_ref(), Some(&list[0]));
     }
 
     const ZONES: [&str; 8] = [
@@ -183,7 +178,7 @@ mod tests {
                 for instant in [period.from, middle, period.to - 1.nanosecond()] {
                     prop_assert_eq!(shift_at(&def, instant), Some(period.clone()));
                 }
-                let following = next(&def, &period).unwrap();
+                let following = shift_at(&def, period.to).unwrap();
                 prop_assert_eq!(following.from, period.to);
                 prop_assert_eq!(previous(&def, &following), Some(period));
                 period = following;

@@ -23,7 +23,6 @@ pub enum SimCommand {
 pub struct Status {
     /// The faults that can be injected, by target.
     pub available: Arc<[AvailableFaults]>,
-    /// The active faults.
     pub active: Vec<ActiveFault>,
     /// Actual values by tag.
     pub actual: ActualValues,

@@ -1,4 +1,4 @@
-//! Faults on demand: which are in force where, and what leaves a device because of them.
+//! Injected faults: which are active, and their effect on what leaves a device.
 
 pub mod target;
 pub mod process;
@@ -15,7 +15,10 @@ pub use self::{
     syntax::{Fault, Position, TargetKind, Valve},
     target::{AvailableFaults, FaultTarget, available_faults, why_not_applicable},
 };
-use super::simulator::Simulator;
+use super::{
+    random::{GOLDEN, splitmix64},
+    simulator::Simulator,
+};
 use crate::{
     bus::{ascii, frame::with_crc},
     plant::{
@@ -24,7 +27,7 @@ use crate::{
         number::{to_u16, to_usize},
     },
 };
-use process::Troubles;
+use process::ProcessFaults;
 use values::{Memory, Values};
 
 /// The active faults.
@@ -35,7 +38,7 @@ pub struct Faults {
     tags: BTreeMap<TagId, ((LineId, u8), Values)>,
     memories: BTreeMap<FaultTarget, Memory>,
     /// Messages on noisy lines so far: the same drill has the same noise.
-    dice: u64,
+    messages: u64,
 }
 
 /// A fault that is active.
@@ -128,9 +131,9 @@ impl Faults {
                 }
             }
             (FaultTarget::Process, _) => {
-                let troubles = Troubles::of(self.at(FaultTarget::Process, TargetKind::Process));
+                let process_faults = ProcessFaults::of(self.at(FaultTarget::Process, TargetKind::Process));
                 if let Some(rig) = simulator.rig_mut() {
-                    rig.set_troubles(troubles);
+                    rig.set_process_faults(process_faults);
                 }
             }
             _ => {}
@@ -152,7 +155,7 @@ impl Faults {
         let answer = |pdu, damage, delay| Answer { unit, pdu, damage, delay };
         let mut answer = match self.on_the_line(line, unit) {
             Some(Fault::Silent) => {
-                simulator.overhear(line, unit);
+                simulator.count_for_others(line, unit);
                 return None;
             }
             Some(Fault::Exception(code)) => {
@@ -199,18 +202,10 @@ impl Faults {
         let Some(Fault::Noise(percent)) = self.at(FaultTarget::Line(line), TargetKind::Line).next() else {
             return None;
         };
-        self.dice += 1;
-        let number = scatter(self.dice);
+        self.messages += 1;
+        let number = splitmix64(self.messages.wrapping_mul(GOLDEN));
         (number % 100 < u64::from(percent)).then_some(number / 100)
     }
-}
-
-/// A reproducible pseudo-random number (the finaliser of SplitMix64).
-fn scatter(count: u64) -> u64 {
-    let mut mixed = count.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    mixed ^ (mixed >> 31)
 }
 
 impl Answer {

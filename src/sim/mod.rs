@@ -14,19 +14,20 @@
 //!  experiment: the six of the thesis, on the rig alone
 //! ```
 
-pub mod tank;
+pub(crate) mod tank;
 pub mod pdu;
-pub mod slave;
-pub mod pxr;
-pub mod dl06;
+pub(crate) mod slave;
+pub(crate) mod pxr;
+pub(crate) mod dl06;
 pub mod rig;
-pub mod experiment;
-pub mod model;
+pub(crate) mod experiment;
+pub(crate) mod model;
+mod random;
 pub mod simulator;
 pub mod faults;
-pub mod scenario;
-pub mod ground_truth;
-pub mod drill;
-pub mod ascii;
+pub(crate) mod scenario;
+pub(crate) mod ground_truth;
+pub(crate) mod drill;
+pub(crate) mod ascii;
 pub mod wire;
 pub mod io;

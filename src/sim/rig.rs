@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::dl06::sequence::Step;
 use super::dl06::{Dl06, Outputs, SCAN};
-use super::faults::process::Troubles;
+use super::faults::process::ProcessFaults;
 use super::pxr::{Pxr, SAMPLE, Sensor};
 use super::slave::Slave;
 use super::tank::{AMBIENT_C, Actuators, Readings, Tank};
@@ -52,7 +52,7 @@ pub struct Rig {
     pxr: Slave<Pxr>,
     plc: Slave<Dl06>,
     sensor_open: bool,
-    troubles: Troubles,
+    process_faults: ProcessFaults,
     moving: Actuators,
     owed: Duration,
     steps: u32,
@@ -104,7 +104,7 @@ impl Rig {
             pxr,
             plc,
             sensor_open: false,
-            troubles: Troubles::default(),
+            process_faults: ProcessFaults::default(),
             moving: Actuators::default(),
             owed: Duration::ZERO,
             steps: 0,
@@ -136,8 +136,8 @@ impl Rig {
     }
 
     /// Breaks parts of the process, and repairs all others.
-    pub fn set_troubles(&mut self, troubles: Troubles) {
-        self.troubles = troubles;
+    pub fn set_process_faults(&mut self, process_faults: ProcessFaults) {
+        self.process_faults = process_faults;
     }
 
     /// Turns a panel switch X0–X3 of the PLC.
@@ -176,9 +176,9 @@ impl Rig {
         }
         self.plc.device.scan(self.pxr.device.at_sv(), &readings);
         let wanted = self.plc.device.actuators(&readings, self.pxr.device.mv_percent());
-        self.moving = self.troubles.bend(wanted);
+        self.moving = self.process_faults.apply(wanted);
         self.tank.step(SCAN.as_secs_f64(), &self.moving);
-        self.tank.spill(SCAN.as_secs_f64(), self.troubles.leak_l_per_min());
+        self.tank.spill(SCAN.as_secs_f64(), self.process_faults.leak_l_per_min());
         self.steps = self.steps.wrapping_add(1);
     }
 }

@@ -53,7 +53,6 @@ pub enum Start {
     /// In the middle of work.
     #[default]
     Running,
-    /// At rest.
     Rest,
 }
 
@@ -64,7 +63,6 @@ pub struct FaultEvent {
     pub at: Duration,
     /// Where.
     pub target: FaultTarget,
-    /// What.
     pub fault: Fault,
     /// `false`: the fault is cleared.
     pub begins: bool,
@@ -75,7 +73,6 @@ pub struct FaultEvent {
 pub struct OperatorStep {
     /// When.
     pub at: Duration,
-    /// What.
     pub action: OperatorAction,
 }
 
@@ -114,7 +111,6 @@ pub struct Expect {
     pub from: Duration,
     /// Until when.
     pub until: Duration,
-    /// What.
     pub expectation: Expectation,
 }
 
@@ -173,7 +169,6 @@ impl Scenario {
         timeline
     }
 
-    /// All points that there are.
     pub fn points(&self) -> u32 {
         self.expect.iter().map(|expect| expect.points).sum()
     }

@@ -100,7 +100,7 @@ impl Simulator {
             self.broadcast(line, pdu, |_| true);
             return None;
         }
-        self.overhear(line, unit);
+        self.count_for_others(line, unit);
         self.unit(line, unit)?.respond(pdu)
     }
 
@@ -120,12 +120,12 @@ impl Simulator {
 
     /// A unit refuses a request with this code, whatever it says.
     pub fn refuse(&mut self, line: LineId, unit: u8, pdu: &[u8], code: u8) -> Option<Vec<u8>> {
-        self.overhear(line, unit);
+        self.count_for_others(line, unit);
         self.unit(line, unit)?.refuse(pdu, code)
     }
 
     /// The other units of the line count a message that is not theirs.
-    pub fn overhear(&mut self, line: LineId, unit: u8) {
+    pub fn count_for_others(&mut self, line: LineId, unit: u8) {
         for other in self.units(line).into_iter().filter(|other| *other != unit) {
             if let Some(other) = self.unit(line, other) {
                 other.hear();

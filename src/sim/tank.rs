@@ -98,7 +98,6 @@ pub struct Readings {
 /// Heat that crossed the border of the rig in one step, in joules; positive is into the water.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Heat {
-    /// From the heater.
     pub heater_j: f64,
     /// To the room (negative when the water is colder than the room).
     pub loss_j: f64,
@@ -109,7 +108,6 @@ pub struct Heat {
 pub struct Vessel {
     /// Water in litres.
     pub volume_l: f64,
-    /// Temperature in °C.
     pub temperature_c: f64,
     /// Most that it holds, in litres.
     pub capacity_l: f64,
@@ -187,16 +185,6 @@ impl Tank {
             flow_pump: self.flow_pump,
             heater_w: self.heater_w,
         }
-    }
-
-    /// Water in all tanks, in litres.
-    pub fn total_l(&self) -> f64 {
-        self.cold.volume_l + self.control.volume_l + self.hot.volume_l
-    }
-
-    /// Heat in water and walls, counted from 0 °C, in joules.
-    pub fn energy_j(&self) -> f64 {
-        self.cold.energy_j() + self.control.energy_j() + self.hot.energy_j()
     }
 
     fn move_water(&mut self, dt_s: f64, actuators: &Actuators) {

@@ -26,7 +26,7 @@ impl Fault {
             ),
             Fault::Silent => describe(
                 "The unit has no power, the wrong address or baud rate, or its wire is off.",
-                "Its values are doubted at once and bad after three failed requests, when its alarm \"not answering\" comes; \
+                "Its values are uncertain at once and bad after three failed requests, when its alarm \"not answering\" comes; \
                  other units go on. Whether the unit still works its process cannot be known from here.",
                 "Inspect the unit; treat all it controls as unknown.",
             ),

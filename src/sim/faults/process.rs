@@ -3,9 +3,9 @@
 use super::syntax::{Fault, Position, Valve};
 use crate::sim::tank::Actuators;
 
-/// The faults of the tank that are in force.
+/// The active faults of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Troubles {
+pub struct ProcessFaults {
     heater: bool,
     pump: bool,
     agitator: bool,
@@ -14,26 +14,26 @@ pub struct Troubles {
     leak_l_per_min: f64,
 }
 
-impl Troubles {
-    /// Those among some faults; the others are of lines and units.
-    pub fn of(faults: impl Iterator<Item = Fault>) -> Troubles {
-        let mut troubles = Troubles::default();
+impl ProcessFaults {
+    /// The faults of the process among these.
+    pub fn of(faults: impl Iterator<Item = Fault>) -> ProcessFaults {
+        let mut process_faults = ProcessFaults::default();
         for fault in faults {
             match fault {
-                Fault::HeaterBurnout => troubles.heater = true,
-                Fault::PumpFailed => troubles.pump = true,
-                Fault::AgitatorFailed => troubles.agitator = true,
-                Fault::ValveStuck(Valve::Drain, position) => troubles.drain = Some(position),
-                Fault::ValveStuck(Valve::Fill, position) => troubles.fill = Some(position),
-                Fault::Leak(ml_per_min) => troubles.leak_l_per_min = f64::from(ml_per_min) / 1e3,
+                Fault::HeaterBurnout => process_faults.heater = true,
+                Fault::PumpFailed => process_faults.pump = true,
+                Fault::AgitatorFailed => process_faults.agitator = true,
+                Fault::ValveStuck(Valve::Drain, position) => process_faults.drain = Some(position),
+                Fault::ValveStuck(Valve::Fill, position) => process_faults.fill = Some(position),
+                Fault::Leak(ml_per_min) => process_faults.leak_l_per_min = f64::from(ml_per_min) / 1e3,
                 _ => {}
             }
         }
-        troubles
+        process_faults
     }
 
-    /// What really moves when these are the outputs.
-    pub fn bend(&self, wanted: Actuators) -> Actuators {
+    /// What moves in the process for these outputs.
+    pub fn apply(&self, wanted: Actuators) -> Actuators {
         let valve = |stuck: Option<Position>, wanted| stuck.map_or(wanted, |position| position == Position::Open);
         Actuators {
             pump: wanted.pump && !self.pump,
@@ -59,7 +59,7 @@ mod tests {
 
     fn check(faults: &[&str], wanted: Actuators, expect: Actuators) {
         let faults = faults.iter().map(|text| text.parse().expect("a fault"));
-        assert_eq!(Troubles::of(faults).bend(wanted), expect);
+        assert_eq!(ProcessFaults::of(faults).apply(wanted), expect);
     }
 
     #[test]

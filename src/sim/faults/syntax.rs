@@ -172,41 +172,28 @@ impl Fault {
 
     /// What its number may be, if it has one.
     pub fn parameter(self) -> Option<Parameter> {
-        match self {
-            Fault::Noise(_) => {
-                Some(Parameter { unit: "%", min: 1.0, max: 100.0, steps: &[1.0, 5.0, 10.0, 20.0, 50.0] })
-            }
-            Fault::Late(_) => Some(Parameter { unit: "s", min: 0.05, max: 60.0, steps: &[0.2, 0.5, 1.0, 2.0, 5.0] }),
-            Fault::Exception(_) => Some(Parameter {
-                unit: "",
-                min: 1.0,
-                max: 255.0,
-                steps: &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 11.0],
-            }),
-            Fault::Leak(_) => {
-                Some(Parameter { unit: "l/min", min: 0.01, max: 20.0, steps: &[0.2, 0.5, 1.0, 2.0, 5.0] })
-            }
-            Fault::Silent
-            | Fault::BadCrc
-            | Fault::Cut
-            | Fault::Stuck
-            | Fault::Torn
-            | Fault::WordOrder
-            | Fault::SensorBurnout
-            | Fault::HeaterBurnout
-            | Fault::ValveStuck(..)
-            | Fault::PumpFailed
-            | Fault::AgitatorFailed => None,
-        }
+        self.parameter_and_number().map(|(parameter, _)| parameter)
     }
 
     /// Its number, in the unit of [`Fault::parameter`].
     pub fn number(self) -> Option<f64> {
+        self.parameter_and_number().map(|(_, number)| number)
+    }
+
+    fn parameter_and_number(self) -> Option<(Parameter, f64)> {
+        let parameter = |unit, min, max, steps| Parameter { unit, min, max, steps };
         match self {
-            Fault::Noise(percent) => Some(f64::from(percent)),
-            Fault::Late(by) => Some(by.as_secs_f64()),
-            Fault::Exception(code) => Some(f64::from(code)),
-            Fault::Leak(ml_per_min) => Some(f64::from(ml_per_min) / 1e3),
+            Fault::Noise(percent) => {
+                Some((parameter("%", 1.0, 100.0, &[1.0, 5.0, 10.0, 20.0, 50.0]), f64::from(percent)))
+            }
+            Fault::Late(by) => Some((parameter("s", 0.05, 60.0, &[0.2, 0.5, 1.0, 2.0, 5.0]), by.as_secs_f64())),
+            Fault::Exception(code) => {
+                let steps = &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 11.0];
+                Some((parameter("", 1.0, 255.0, steps), f64::from(code)))
+            }
+            Fault::Leak(ml_per_min) => {
+                Some((parameter("l/min", 0.01, 20.0, &[0.2, 0.5, 1.0, 2.0, 5.0]), f64::from(ml_per_min) / 1e3))
+            }
             Fault::Silent
             | Fault::BadCrc
             | Fault::Cut

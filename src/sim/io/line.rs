@@ -221,11 +221,10 @@ mod tests {
     use crate::plant::def::LineId;
     use crate::plant::def::Parity;
     use crate::sim::faults::Fault;
-    use crate::sim::io::SimulatorHandle;
+    use crate::sim::io::{SimulatorHandle, serving::FOR_EVER};
     use crate::sim::rig::Rig;
     use crate::sim::simulator::Simulator;
 
-    const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
     const L1: LineId = LineId(0);
     const READ_TEN: &[u8] = &[1, 4, 0x03, 0xE8, 0, 10];
     const READ_STEP: &[u8] = &[2, 3, 4, 0, 0, 1];

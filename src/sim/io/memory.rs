@@ -1,12 +1,10 @@
 //! The lines of a simulated plant without ports: streams in memory, for drills in virtual time.
 
-use std::time::Duration;
-
 use tokio::{io::duplex, sync::mpsc};
 
 use super::{
     LineHandle, SimulatorHandle, Wire, serve_line,
-    serving::{Mode, Service},
+    serving::{FOR_EVER, Mode, Service},
     tcp::{TcpFraming, serve_stream},
 };
 use crate::{bus::io::transport::Connector, plant::PlantDef};
@@ -15,7 +13,6 @@ use crate::{bus::io::transport::Connector, plant::PlantDef};
 const OPENINGS: usize = 16;
 /// Bytes under way in one direction: more than any frame.
 const BYTES: usize = 4096;
-const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
 
 /// Serves every line of a plant as it speaks; gives what a station opens its lines with, by
 /// [`LineId`](crate::plant::def::LineId).

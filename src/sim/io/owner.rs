@@ -46,7 +46,7 @@ pub struct LineHandle {
 /// Active faults and actual values of a simulator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
-    /// The faults in force.
+    /// The active faults.
     pub active: Vec<ActiveFault>,
     /// By tag.
     pub actual: ActualValues,
@@ -171,7 +171,7 @@ impl SimulatorHandle {
         self.put(|reply| SimRequest::SetValue(tag, value, reply)).await.unwrap_or(false)
     }
 
-    /// Returns when it is in force. The task lives as long as this handle, except while its runtime shuts down; then
+    /// Returns when it is done. The task lives as long as this handle, except while its runtime shuts down; then
     /// nothing changes.
     async fn change(&self, change: Change) {
         self.put(|reply| SimRequest::Change(change, reply)).await;

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// A pseudo-terminal waits for its client as long as it takes.
-const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
+pub(super) const FOR_EVER: Duration = Duration::from_secs(86_400 * 365);
 
 /// Why a plant cannot be simulated.
 #[derive(Debug, thiserror::Error)]

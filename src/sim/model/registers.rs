@@ -34,7 +34,6 @@ pub struct Model {
 }
 
 impl Chart {
-    /// The chart of a device and its tags.
     pub fn new<'a>(device: &DeviceDef, tags: impl Iterator<Item = &'a TagDef>) -> Chart {
         let tags: Vec<TagDef> = tags.cloned().collect();
         let cells = [Table::Coil, Table::Discrete, Table::Input, Table::Holding]

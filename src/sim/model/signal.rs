@@ -7,6 +7,7 @@ use crate::plant::{
     number::to_u64,
     simulate::{Check, Motion, Operation, Pace, Simulate, Source, Test},
 };
+use crate::sim::random::{GOLDEN, splitmix64};
 
 /// Generates the value of one tag.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +52,7 @@ impl SignalGenerator {
         if let Some(pulse) = how.pulse {
             self.exact = self.pulsed(pulse, step.at);
         }
-        self.exact + how.noise * swing(noise(self.seed, step.at))
+        self.exact + how.noise * noise(self.seed, step.at)
     }
 
     fn moved(&self, motion: &Motion, step: Step, values: &impl Fn(TagId) -> Option<f64>) -> f64 {
@@ -127,17 +128,10 @@ fn oscillate([low, high]: [f64; 2], period: Duration, at: Duration, seed: u64) -
     low + (high - low) * (both + 1.0) / 2.0
 }
 
-/// A pseudo-random number between 0 and 1, the same in every run (splitmix64 of seed and time).
+/// A pseudo-random number between −1 and 1, the same in every run.
 fn noise(seed: u64, at: Duration) -> f64 {
-    let mut bits = seed ^ to_u64(at.as_millis()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((bits ^ (bits >> 31)) >> 11) as f64 / 9_007_199_254_740_992.0
-}
-
-/// From 0–1 to −1–1.
-fn swing(unit: f64) -> f64 {
-    2.0 * unit - 1.0
+    let bits = splitmix64(seed ^ to_u64(at.as_millis()).wrapping_mul(GOLDEN));
+    2.0 * ((bits >> 11) as f64 / 9_007_199_254_740_992.0) - 1.0
 }
 
 #[cfg(test)]

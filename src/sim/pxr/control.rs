@@ -27,7 +27,6 @@ pub enum Law {
 /// What the law needs to know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Which law.
     pub law: Law,
     /// Width of the measuring range in °C.
     pub span_c: f64,

@@ -97,7 +97,6 @@ pub fn row(place: usize) -> Option<&'static Row> {
     ROWS.iter().find(|row| row.places.contains(&place))
 }
 
-/// All rows.
 pub fn rows() -> &'static [Row] {
     ROWS
 }

@@ -72,7 +72,6 @@ pub struct Verdict {
     pub title: String,
     /// One for each expectation.
     pub rows: Vec<Row>,
-    /// Points by now.
     pub points: u32,
     /// Points that there are.
     pub of: u32,
@@ -91,7 +90,6 @@ impl Judge {
         Judge { scenario, def, began, now: Duration::ZERO, marks, lost: 0 }
     }
 
-    /// The scenario.
     pub fn scenario(&self) -> &Arc<Scenario> {
         &self.scenario
     }

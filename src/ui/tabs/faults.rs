@@ -50,9 +50,9 @@ pub enum Action {
     NextTarget,
     /// Inject or clear the fault.
     Toggle,
-    /// Less of it.
+    /// Decrease the parameter.
     Less,
-    /// More of it.
+    /// Increase the parameter.
     More,
     /// Clear all faults.
     ClearAll,
