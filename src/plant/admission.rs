@@ -73,12 +73,12 @@ impl Verdict {
     }
 }
 
-/// A span of time in which a line would have to carry more than goes into it.
+/// A span of time in which the demand exceeds the capacity of a line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OverloadInterval {
     /// How long the span is.
     pub span: Duration,
-    /// How much the line must carry in it.
+    /// The time on the wire that it demands.
     pub demand: Duration,
     /// The poll that has just begun and cannot be interrupted.
     pub blocker: PollWords,
@@ -187,7 +187,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// `150.1 ms`, rounded up, never down.
+/// `150.1 ms`, rounded up.
 fn ms(span: Duration) -> String {
     let tenths = span.as_micros().div_ceil(100);
     if tenths.is_multiple_of(10) {

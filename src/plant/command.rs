@@ -75,7 +75,7 @@ pub enum CommandKind {
     Refresh(DeviceId),
     /// Open (`true`) or close a line.
     Connect(LineId, bool),
-    /// Try other settings on the line of the same id, until the station ends or they are saved or taken back.
+    /// Apply other settings to the line of the same id until the station ends, or they are saved or reverted.
     Configure(Box<LineDef>),
     /// Write the settings in use into the plant file.
     SaveSettings(LineId),
@@ -83,29 +83,29 @@ pub enum CommandKind {
     Test(LineId, Diagnostic),
     /// Stop the test of a line.
     StopTest(LineId),
-    /// Read the folder of parameter sets anew.
+    /// Reload the folder of parameter sets.
     ReadSets,
     /// Save what a device holds as a parameter set.
     SaveSet {
-        /// Of which device.
+        /// The device.
         device: DeviceId,
-        /// Under which name.
+        /// Name of the set.
         name: Arc<str>,
-        /// A set of this name may be there already.
+        /// Replace a set of the same name.
         replace: bool,
     },
-    /// Write a parameter set to a device: what differs, one verified write after the other.
+    /// Write the differences of a parameter set to a device, one verified write after the other.
     Restore(Box<RestoreRequest>),
     /// Stop the restore of a device after the write under way.
     StopRestore(DeviceId),
-    /// Hand the plant over to the next shift; the note of the command tells it what to know.
+    /// Hand the plant over to the next shift; the note of the command is for that shift.
     HandOver,
     /// Take the plant over from the shift before.
     TakeOver,
 }
 
 impl CommandKind {
-    /// The tag and the value that it writes, if it writes one.
+    /// The tag and the value of a write.
     pub fn written(&self) -> Option<(TagId, f64)> {
         match self {
             CommandKind::Write { tag, value } => Some((*tag, *value)),
@@ -139,9 +139,9 @@ pub struct CommandStatus {
     pub at: Timestamp,
     /// The tag's value at that time, for a write.
     pub old: Option<f64>,
-    /// Its outcome by now.
+    /// Its outcome so far.
     pub outcome: Outcome,
-    /// Its end is in the audit log, on disk. Said of ended commands only.
+    /// The audit entry of its outcome is on disk; meaningless while it is pending.
     pub recorded: bool,
 }
 
@@ -152,7 +152,7 @@ impl CommandStatus {
         CommandStatus { command, by, from, at, old: None, outcome, recorded: true }
     }
 
-    /// Has it no outcome yet?
+    /// Is it still without an outcome?
     pub fn is_pending(&self) -> bool {
         self.outcome == Outcome::Pending
     }
@@ -167,12 +167,11 @@ pub enum Outcome {
     Verified,
     /// The device already had this value: nothing was written, memory is spared.
     Unchanged,
-    /// Not done, and certainly without effect on what was to be written; a key that was sent before it has a line of its own
-    /// in the journal.
+    /// Not done, and certainly without effect on the tag. A key that was sent before has an audit entry of its own.
     Refused(Refusal),
-    /// A write that may or may not have taken effect, or has taken another one than was requested.
+    /// A write that may or may not have taken effect, or had another effect than requested.
     NotConfirmed(NotConfirmed),
-    /// No answer to what is no write.
+    /// No response to a command that writes nothing.
     Failed(Fault),
 }
 
@@ -207,17 +206,17 @@ impl fmt::Display for Outcome {
 /// Why a command was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Refusal {
-    /// His role does not permit it, or nobody is logged in.
+    /// The role does not permit it, or no user is logged in.
     #[error("{0}")]
     NotPermitted(String),
     /// The tag requires a password or a second user, which is missing or wrong.
     #[error("{0}")]
     NotReauthenticated(String),
-    /// Somebody or something has changed the value since the operator looked; this is what it is now.
-    #[error("it was changed to {0} since you looked")]
+    /// The value changed after it was shown; this is the present one.
+    #[error("it was changed to {0} after it was shown")]
     ChangedTo(String),
-    /// The command does not say which value it replaces; this is what it is now.
-    #[error("it is {0} now; look and confirm again")]
+    /// The command has no expected value; this is the present one.
+    #[error("it is {0} now; check and confirm again")]
     NotSeen(String),
     /// The profile says read-only.
     #[error("read only")]
@@ -236,7 +235,7 @@ pub enum Refusal {
     /// Not one of the values of the enumeration.
     #[error("not one of the values of this tag")]
     NotAChoice,
-    /// The device said no.
+    /// The device responded with an exception.
     #[error("{0}")]
     Exception(ExceptionCode),
     /// Nothing was sent: line closed, device in backoff.
@@ -251,25 +250,25 @@ pub enum Refusal {
     /// It still waited when a stop of the same tag came, and would have undone it.
     #[error("a stop came before it, nothing was sent")]
     Overtaken,
-    /// The plant file knows that it would have no effect now.
+    /// An interlock of the plant file blocks it now.
     #[error("interlock: {0}")]
     Interlock(String),
     /// A parameter set cannot be written to this device.
     #[error("{0}")]
     NotFit(String),
-    /// What was confirmed is not what would be written now.
-    #[error("the device has changed since you looked; look again")]
+    /// The confirmed changes are not those that are needed now.
+    #[error("the device has changed; check and confirm again")]
     Changed,
-    /// What a step of a restore would write over is another value than the one that was confirmed.
+    /// A step of a restore would overwrite another value than the confirmed one.
     #[error("changed since you confirmed")]
     ChangedSince,
-    /// What a step of a restore would write over is not known.
+    /// A step of a restore would overwrite an unknown value.
     #[error("not known now")]
     NotKnownNow,
-    /// The settings of the line were changed while a restore was at work.
+    /// The settings of the line changed during a restore.
     #[error("the settings of the line were changed meanwhile")]
     LineChanged,
-    /// The device had to be read before a restore, and was not in time.
+    /// The device was not read in time before a restore.
     #[error("the device could not be read within {0} s")]
     NotRead(u64),
     /// Stopped by an operator before anything was written.
@@ -284,7 +283,7 @@ pub enum Refusal {
     /// Settings or a test that a line cannot have.
     #[error("{0}")]
     NotValid(String),
-    /// What was requested of an alarm makes no sense or is not allowed.
+    /// The alarm does not accept the command.
     #[error("{0}")]
     Alarm(AlarmRefusal),
 }
@@ -307,13 +306,13 @@ pub enum NotConfirmed {
     /// Of several writes only some are done.
     #[error("{0}")]
     Partly(String),
-    /// The station was stopped before anybody answered for it.
+    /// The station stopped before the result.
     #[error("the station stopped; it may have taken effect")]
     StationStopped,
-    /// The terminal has lost the station before it knew the outcome.
+    /// The terminal lost the station before the outcome.
     #[error("connection to the station lost; it may have taken effect")]
     ConnectionLost,
-    /// The profile wants no read-back.
+    /// The profile excludes a read-back.
     #[error("accepted, not read back")]
     NoReadBack,
 }

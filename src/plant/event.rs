@@ -1,11 +1,9 @@
 //! Events for the plant: values read, requests that failed, states of lines, outcomes of writes, faults of the station.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
-
-use std::sync::Arc;
 
 use super::{
     diagnostics::DiagnosticRun,
@@ -15,14 +13,14 @@ use super::{
     traffic::Exchange,
 };
 
-/// One fact, mostly from the bus. Every event carries the time at which it became true.
+/// A change, mostly from the bus, with the time at which it became true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Event {
     /// A block was read: raw numbers (typed and ordered, not scaled) of its tags.
     Read {
-        /// When the answer was complete.
+        /// When the response was complete.
         at: Timestamp,
-        /// Who answered.
+        /// The device.
         device: DeviceId,
         /// Raw number of every tag in the block.
         values: Vec<(TagId, f64)>,
@@ -35,9 +33,9 @@ pub enum Event {
     },
     /// A block could not be read.
     Failed {
-        /// When that was certain.
+        /// When the request failed.
         at: Timestamp,
-        /// Who was asked.
+        /// The device.
         device: DeviceId,
         /// The tags without a fresh value.
         tags: Vec<TagId>,
@@ -55,7 +53,7 @@ pub enum Event {
         /// The new state.
         state: LineState,
     },
-    /// What a line says of itself, about once a second.
+    /// The report of a line, about once a second.
     Report {
         /// When.
         at: Timestamp,
@@ -68,12 +66,12 @@ pub enum Event {
     Diagnostic {
         /// When.
         at: Timestamp,
-        /// Where it is at work.
+        /// The line.
         line: LineId,
-        /// How it stands.
+        /// Its progress.
         run: Arc<DiagnosticRun>,
     },
-    /// The key of a write was sent before it: the device now lets itself be written, also by others.
+    /// The key of a write was sent before it: the device now accepts writes, also of others.
     Unlocked {
         /// When.
         at: Timestamp,
@@ -81,7 +79,7 @@ pub enum Event {
         id: WriteId,
         /// The key.
         key: TagId,
-        /// What the device said to the key: accepted, refused or lost.
+        /// Its result: accepted, refused or lost.
         result: WriteResult,
     },
     /// The station itself has a fault, or no longer has it.
@@ -93,18 +91,18 @@ pub enum Event {
         /// Whether it lasts, has occurred or is over.
         state: FaultState,
     },
-    /// A write came to its end on the wire.
+    /// A write ended on the wire.
     Wrote {
         /// When.
         at: Timestamp,
         /// Which.
         id: WriteId,
-        /// What the device said.
+        /// Its result.
         result: WriteResult,
     },
 }
 
-/// How a write ended on the wire. The plant compares and names the outcome.
+/// The result of a write on the wire. The plant compares it and decides the outcome.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum WriteResult {
     /// The device accepted it; then it was read back: this raw number.
@@ -113,7 +111,7 @@ pub enum WriteResult {
     Held(f64),
     /// The device accepted it, but the read-back failed.
     NotRead(Fault),
-    /// The device accepted it; the profile wants no read-back.
+    /// The device accepted it; the profile excludes a read-back.
     Accepted,
     /// The device refused with an exception.
     Refused(ExceptionCode),
@@ -128,7 +126,7 @@ pub enum WriteResult {
 /// Why a request did not end in a valid normal answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum Fault {
-    /// No answer at all, or not a whole one, before the deadline.
+    /// No complete response before the deadline.
     #[error("no answer in time")]
     Timeout,
     /// The check did not fit.
@@ -191,7 +189,7 @@ pub enum Fault {
     /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).
     #[error("the registers hold no number of this type")]
     NotANumber,
-    /// The device said no.
+    /// The device responded with an exception.
     #[error("{0}")]
     Exception(ExceptionCode),
     /// The port or connection is not open.
@@ -236,7 +234,7 @@ impl ExceptionCode {
     }
 
     /// Certainly without effect, if it answers a write: not so for 04 (failed on the way), 05 (accepted, still working)
-    /// and 0B (the gateway has heard nothing back).
+    /// and 0B (the device did not respond to the gateway).
     pub fn is_refusal(self) -> bool {
         !matches!(self.0, 0x04 | 0x05 | 0x0B)
     }
@@ -275,7 +273,7 @@ pub enum LineState {
     },
     /// Closed by an operator.
     Disconnected,
-    /// An operator's test has the line for itself: no device is polled.
+    /// An exclusive diagnostic: no device is polled.
     Testing,
 }
 
@@ -305,7 +303,7 @@ pub struct LineCounters {
     pub corrupt: u64,
     /// Exception answers.
     pub exceptions: u64,
-    /// Unsolicited frames or bytes.
+    /// Frames or bytes without an outstanding request.
     pub stale: u64,
     /// Of these, answers to requests that had been given up.
     pub late: u64,

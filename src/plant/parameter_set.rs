@@ -1,4 +1,4 @@
-//! Named values of a device's settings: taken from a device, compared with one, and brought into a sequence of writes.
+//! Named values of a device's settings: captured, compared with a device, and planned as a sequence of writes.
 
 mod plan;
 #[cfg(test)]
@@ -52,16 +52,16 @@ pub struct SetValue {
     pub value: f64,
 }
 
-/// A set as it lies in the station's folder.
+/// A set in the station's folder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StoredSet {
     /// Its name.
     pub name: String,
-    /// The set, or what is wrong with its file: one line a problem, with file, line, what was found, what was expected.
+    /// The set, or the problems of its file, one a line, with file, line, found and expected.
     pub set: Result<Arc<ParameterSet>, Vec<String>>,
 }
 
-/// The values that are trusted now, by tag: a snapshot's or the image's.
+/// The good values by tag, of a snapshot or the process image.
 pub type Trusted<'a> = &'a dyn Fn(TagId) -> Option<f64>;
 
 /// Most characters of a name.
@@ -89,8 +89,8 @@ pub fn check_name(name: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// What a device holds now, as a set. Settings that are not known are missing from it, and said to be.
-pub fn take(
+/// Captures the settings of a device as a set; unknown settings are listed as missing.
+pub fn capture(
     def: &PlantDef,
     device: DeviceId,
     name: &str,
@@ -137,14 +137,14 @@ pub fn unit_of<'a>(tag: &'a TagDef, trusted: Trusted) -> Option<&'a str> {
     units.iter().find(|(number, _)| *number as f64 == chosen).map(|(_, unit)| unit.as_str())
 }
 
-/// How a setting of a set stands against a device.
+/// A setting of a set compared with a device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Compared {
     /// Its short name.
     pub short: String,
     /// The tag of the device; `None` where it has none of this name.
     pub tag: Option<TagId>,
-    /// In the set; `None` where the set has nothing to say.
+    /// In the set; `None` if it is not there.
     pub set: Option<f64>,
     /// The unit of the value of the set, where the set says one.
     pub unit: Option<String>,

@@ -1,6 +1,7 @@
-//! The reducer of facts: event, command or tick in, effects out. The only place where the plant changes.
+//! The plant's reducer: event, command or tick in, effects out. The only place where the plant changes.
 
 mod alarms;
+mod connection;
 mod health;
 mod measure;
 mod restore;
@@ -9,7 +10,7 @@ mod station;
 #[cfg(test)]
 mod tests;
 
-use std::{mem::discriminant, sync::Arc};
+use std::sync::Arc;
 
 use jiff::{SignedDuration, Timestamp};
 
@@ -17,7 +18,7 @@ use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_words},
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId},
     commands::CommandTracker,
-    def::{DeviceId, LineDef, LineId, PlantDef, TagId},
+    def::{LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     interlock::ActuatorTracker,
     line_minute::LineWatch,
@@ -26,7 +27,6 @@ use super::{
     program::ProgramWatch,
     record::{ActionRecord, Record},
     restore::Restore,
-    sample::Cause,
     snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
     station::StationFaults,
     traffic::Exchange,
@@ -35,7 +35,7 @@ use super::{
 
 pub use restore::SetWork;
 
-/// What must happen outside because of what became true inside.
+/// What the station must do after a change of the plant.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Effects {
     /// Requests for link tasks.
@@ -48,12 +48,12 @@ pub struct Effects {
     pub sets: Option<SetWork>,
 }
 
-/// All that is true. Owned by the plant task, seen by everyone else as [`Snapshot`]s.
+/// The state of the plant. The plant task owns it; everything else sees [`Snapshot`]s.
 #[derive(Debug, Clone)]
 pub struct Plant {
     def: Arc<PlantDef>,
     at: Timestamp,
-    /// Which run of the station, by the instant at which it began.
+    /// The run of the station, identified by its start time in microseconds.
     run: u64,
     image: ProcessImage,
     alarm_manager: AlarmManager,
@@ -71,19 +71,19 @@ pub struct Plant {
     history: HistoryStatus,
     faults: StationFaults,
     speed: f64,
-    /// What lies in the folder of parameter sets.
+    /// The content of the folder of parameter sets.
     sets: Arc<Vec<StoredSet>>,
     /// The latest restore of each device that had one.
     restores: Vec<Arc<Restore>>,
-    /// Writes that the plant itself has requested for its restores.
+    /// Number of the last command that a restore sent.
     numbers: u32,
-    /// Auto-tuning and program of each device, by [`DeviceId`].
+    /// Auto-tuning and program, by device.
     tunings: Vec<TuningWatch>,
     programs: Vec<ProgramWatch>,
 }
 
 impl Plant {
-    /// Nothing read, nothing connected, as of `at`. `speed` is plant seconds per real second, for display.
+    /// A plant without values and connections at `at`. `speed` is plant seconds per real second, for display.
     pub fn new(def: Arc<PlantDef>, at: Timestamp, speed: f64) -> Plant {
         Plant {
             image: ProcessImage::new(def.clone(), at),
@@ -110,19 +110,19 @@ impl Plant {
         }
     }
 
-    /// What never changes.
+    /// The definition of the plant.
     pub fn def(&self) -> &Arc<PlantDef> {
         &self.def
     }
 
-    /// Takes a fact from the bus.
+    /// Applies an event.
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
             Event::Read { at, device, values, texts, reply, exchange } => {
                 self.image.read(&values, at);
                 self.image.read_texts(&texts, at);
                 let tags = values.iter().map(|(tag, _)| *tag).chain(texts.iter().map(|(tag, _)| *tag));
-                self.keep_evidence(tags, exchange);
+                self.keep_source_frames(tags, exchange);
                 let status = &mut self.devices[device.index()];
                 status.state = DeviceState::Answering;
                 status.reply = Some(reply);
@@ -131,7 +131,7 @@ impl Plant {
                 (at, None)
             }
             Event::Failed { at, device, tags, fault, exchange } => {
-                self.keep_evidence(tags.iter().copied(), exchange);
+                self.keep_source_frames(tags.iter().copied(), exchange);
                 self.failed(device, &tags, fault, at);
                 (at, None)
             }
@@ -158,9 +158,9 @@ impl Plant {
             }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
         };
-        let mut effects = self.settle(at);
+        let mut effects = self.evaluate(at);
         effects.records.extend(action.map(Record::Action));
-        self.carry_on(at, &mut effects);
+        self.advance_restores(at, &mut effects);
         self.measure(&effects.records);
         effects
     }
@@ -218,13 +218,13 @@ impl Plant {
             }
         };
         effects.records.extend(action.map(Record::Action));
-        self.carry_on(at, &mut effects);
+        self.advance_restores(at, &mut effects);
         self.at = self.at.max(at);
         self.measure(&effects.records);
         effects
     }
 
-    /// A line has taken a request.
+    /// A line accepted a request.
     pub fn on_delivered(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = self.commands.delivered(line, request, &self.image);
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
@@ -235,7 +235,7 @@ impl Plant {
         self.commands.intent(request, &self.image)
     }
 
-    /// The station ends, and with it all that is under way.
+    /// The station stops: ends all pending commands.
     pub fn on_stop(&mut self) -> Effects {
         let ended = self.commands.stop(&self.image);
         Effects { records: ended.into_iter().map(Record::Action).collect(), ..Effects::default() }
@@ -243,12 +243,12 @@ impl Plant {
 
     /// The queue to a line was full: the request was not sent.
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
-        let action = match self.restore_not_read(request) {
+        let action = match self.refuse_unread_restore(request) {
             true => None,
             false => self.commands.undeliverable(line, request, &self.image),
         };
         let mut effects = Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() };
-        self.carry_on(self.at, &mut effects);
+        self.advance_restores(self.at, &mut effects);
         effects
     }
 
@@ -258,10 +258,10 @@ impl Plant {
         self.faults.tick();
         let expired = self.commands.expire(at, self.speed, &self.image);
         let minutes = self.minutes(at);
-        let mut effects = self.settle(at);
+        let mut effects = self.evaluate(at);
         effects.records.extend(minutes);
         effects.records.extend(expired.into_iter().map(Record::Action));
-        self.carry_on(at, &mut effects);
+        self.advance_restores(at, &mut effects);
         self.measure(&effects.records);
         effects
     }
@@ -300,8 +300,8 @@ impl Plant {
         self.def.device(self.def.tag(tag).device).line
     }
 
-    /// The bytes behind what was just learned of some tags. A value keeps its own when nothing was sent for it.
-    fn keep_evidence(&mut self, tags: impl Iterator<Item = TagId>, exchange: Option<Arc<Exchange>>) {
+    /// Keeps the exchange from which the values of some tags were read, if there was one.
+    fn keep_source_frames(&mut self, tags: impl Iterator<Item = TagId>, exchange: Option<Arc<Exchange>>) {
         let Some(exchange) = exchange else { return };
         let source_frames = Arc::make_mut(&mut self.source_frames);
         for tag in tags {
@@ -309,9 +309,9 @@ impl Plant {
         }
     }
 
-    /// A write ended. Unless it was read back or certainly had no effect, the value held until now is in doubt.
+    /// A write ended. Unless it was read back or certainly had no effect, the present value becomes uncertain.
     fn wrote(&mut self, id: WriteId, result: WriteResult, at: Timestamp) -> Option<ActionRecord> {
-        let in_doubt = match &result {
+        let uncertain = match &result {
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => self.commands.tag_of(id),
             WriteResult::ReadBack(_)
             | WriteResult::Held(_)
@@ -319,92 +319,19 @@ impl Plant {
             | WriteResult::NotSent(_)
             | WriteResult::Overtaken => None,
         };
-        if let Some(tag) = in_doubt {
+        if let Some(tag) = uncertain {
             self.image.failed(&[tag], Fault::Timeout, at);
         }
         self.commands.wrote(id, result, &self.image)
     }
 
-    fn failed(&mut self, device: DeviceId, tags: &[TagId], fault: Fault, at: Timestamp) {
-        self.image.failed(tags, fault, at);
-        let status = &mut self.devices[device.index()];
-        let down = matches!(status.state, DeviceState::Down { .. });
-        match fault {
-            // The bus has given the device up; these are its other tags.
-            Fault::BackedOff => {
-                if !down {
-                    status.state = DeviceState::Down { since: at };
-                }
-                self.image.gone(device, Cause::DeviceDown, at);
-                return;
-            }
-            Fault::NotConnected => return,
-            // A device that says no is there; a gateway that says that it is away speaks for itself.
-            Fault::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Answering,
-            Fault::NotANumber => status.state = DeviceState::Answering,
-            Fault::Exception(_)
-            | Fault::Timeout
-            | Fault::Crc { .. }
-            | Fault::Lrc { .. }
-            | Fault::NotHex(_)
-            | Fault::Truncated { .. }
-            | Fault::WrongUnit { .. }
-            | Fault::WrongFunction { .. }
-            | Fault::WrongLength { .. }
-            | Fault::WrongEcho
-            | Fault::OutOfSync => {
-                status.state = match status.state {
-                    DeviceState::Down { since } => DeviceState::Down { since },
-                    DeviceState::Failing(n) => DeviceState::Failing(n.saturating_add(1)),
-                    DeviceState::Unknown | DeviceState::Answering => DeviceState::Failing(1),
-                };
-            }
-        }
-        status.failed += 1;
-        status.last_fault = Some((at, fault));
-    }
-
-    fn line_changed(&mut self, line: LineId, state: LineState, at: Timestamp) -> Option<ActionRecord> {
-        let status = &mut self.lines[line.index()];
-        status.lost_since = match &state {
-            LineState::Waiting { .. } => status.lost_since.or(Some(at)),
-            LineState::Connecting => status.lost_since,
-            LineState::Connected | LineState::Disconnected | LineState::Testing => None,
-        };
-        if status.since.is_none() || discriminant(&status.state) != discriminant(&state) {
-            status.since = Some(at);
-        }
-        let open = state != LineState::Disconnected;
-        // A closed line is a command of the operator: its devices are not asked, so their silence is no fault.
-        let gone = match &state {
-            LineState::Waiting { .. } => Some(DeviceState::Down { since: at }),
-            LineState::Disconnected | LineState::Testing => Some(DeviceState::Unknown),
-            // Opened anew at once, with other settings perhaps: what was read before may be of another device.
-            LineState::Connecting if self.lines[line.index()].state == LineState::Connected => {
-                Some(DeviceState::Unknown)
-            }
-            LineState::Connecting | LineState::Connected => None,
-        };
-        self.lines[line.index()].state = state;
-        let action = self.commands.connected(line, open, &self.image);
-        let Some(device_state) = gone else { return action };
-        for device in self.def.devices.iter().filter(|device| device.line == line) {
-            let status = &mut self.devices[device.id.index()];
-            if !matches!((status.state, device_state), (DeviceState::Down { .. }, DeviceState::Down { .. })) {
-                status.state = device_state;
-            }
-            self.image.gone(device.id, Cause::NotConnected, at);
-        }
-        action
-    }
-
     /// Evaluates the alarms and gathers what must be stored.
-    fn settle(&mut self, at: Timestamp) -> Effects {
+    fn evaluate(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
         let asked = self.watch_controllers();
         let image = &self.image;
         self.watch.look(&self.def.logic, |tag| image.sample(tag), self.at);
-        let steps = self.judge_alarms();
+        let steps = self.evaluate_alarms();
         let mut records = self.image.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));
         Effects { bus: asked, records, ..Effects::default() }

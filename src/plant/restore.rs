@@ -14,46 +14,46 @@ use super::{
     tag::{Poll, TagDef},
 };
 
-/// The device must have been read anew after this time, else nothing is written: real time, as the bus works in it.
+/// The device must be read within this (real) time, else nothing is written.
 pub const READ_MAX: Duration = Duration::from_secs(60);
 
-/// What an operator has confirmed: this set, and the changes that it meant when he looked.
+/// A parameter set to restore and the changes that the operator confirmed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RestoreRequest {
     /// The device that is written.
     pub device: DeviceId,
-    /// Where the values come from, in words: `winter`, `copy of TIC-2`.
+    /// Label of the origin: `winter`, `copy of TIC-2`.
     pub from: Arc<str>,
     /// The values.
     pub set: Arc<ParameterSet>,
-    /// The changes that were confirmed, in their order. Should the device need others by now, nothing is written.
+    /// The confirmed changes, in order. If the device needs others by then, nothing is written.
     pub changes: Vec<Change>,
 }
 
-/// A restore as it stands.
+/// A restore with its progress.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Restore {
-    /// The command that it carries out.
+    /// The command behind it.
     pub id: CommandId,
     /// Who requested it.
     pub by: Arc<str>,
     /// Where the values come from.
     pub from: Arc<str>,
-    /// The very set that is written.
+    /// The set.
     pub set: Arc<ParameterSet>,
     /// The device that is written.
     pub device: DeviceId,
-    /// When it was begun.
+    /// When it began.
     pub at: Timestamp,
     /// Its writes, in order.
     pub steps: Vec<Step>,
-    /// Running, or how it ended.
+    /// Its state.
     pub state: State,
-    /// An operator wants it to stop after the write under way.
+    /// An operator stopped it; it ends after the write under way.
     pub stopping: bool,
-    /// The settings of the device's line were changed meanwhile: who answers now may be another device.
+    /// The settings of the line changed meanwhile: another device may answer now.
     pub line_changed: bool,
-    /// Why it was given up before its first write.
+    /// Why it ended before its first write.
     pub refused: Option<Refusal>,
 }
 
@@ -64,27 +64,27 @@ pub struct Step {
     pub change: Change,
     /// The command that writes it; `None` before its turn.
     pub command: Option<CommandId>,
-    /// How that ended; `None` before it has.
+    /// The outcome of the write; `None` before its end.
     pub outcome: Option<Outcome>,
 }
 
-/// How a restore stands.
+/// State of a restore.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum State {
-    /// The device is read first: nobody knows how old what is on the image is.
+    /// Reading the device first.
     Reading,
     /// Writing.
     Running,
     /// Every write was verified.
     Done,
-    /// A write was not, or none was begun; those after it were not begun.
+    /// A write was not verified, or none was begun.
     Failed,
-    /// An operator has stopped it.
+    /// Stopped by an operator.
     Stopped,
 }
 
 impl Restore {
-    /// Begins with reading the device.
+    /// A restore that reads its device.
     pub fn new(id: CommandId, by: Arc<str>, request: &RestoreRequest, at: Timestamp) -> Restore {
         let step = |change: &Change| Step { change: *change, command: None, outcome: None };
         let steps = request.changes.iter().map(step).collect();
@@ -103,34 +103,34 @@ impl Restore {
         }
     }
 
-    /// Has it not ended yet?
+    /// Is it still reading or writing?
     pub fn at_work(&self) -> bool {
         matches!(self.state, State::Reading | State::Running)
     }
 
-    /// Has every tag of the set been read since it was requested, and what the set rests on too?
+    /// Have all tags of the set, and those it rests on, been read since the restore began?
     pub fn is_read(&self, def: &PlantDef, sample: impl Fn(TagId) -> Sample) -> bool {
         let named = |short: &str| self.set.values.iter().chain(&self.set.given).any(|held| held.tag == short);
         let fresh = |tag: TagId| {
             let sample = sample(tag);
             sample.quality.is_good() && self.at <= sample.at
         };
-        // What is never read by itself is known from its last write or not at all.
+        // A tag without polling is known from its last write or not at all.
         let asked = |tag: &&TagDef| named(&tag.short) && tag.poll != Poll::Never;
         def.tags_of(self.device).filter(asked).all(|tag| fresh(tag.id))
     }
 
-    /// What was confirmed is what is needed now: the writes may begin.
+    /// Begins the writes.
     pub fn begin(&mut self) {
         self.state = State::Running;
     }
 
-    /// Gives it up before its first write.
+    /// Ends it before its first write.
     pub fn give_up(&mut self, why: Refusal) {
         (self.state, self.refused) = (State::Failed, Some(why));
     }
 
-    /// Writes that are done.
+    /// Number of writes that are done.
     pub fn done(&self) -> usize {
         self.steps.iter().filter(|step| step.outcome.as_ref().is_some_and(is_done)).count()
     }
@@ -140,8 +140,8 @@ impl Restore {
         self.steps.iter().find(|step| step.command.is_some() && step.outcome.is_none()).and_then(|step| step.command)
     }
 
-    /// The write under way has ended.
-    pub fn take(&mut self, outcome: Outcome) {
+    /// Ends the write under way.
+    pub fn end_write(&mut self, outcome: Outcome) {
         let Some(step) = self.steps.iter_mut().find(|step| step.command.is_some() && step.outcome.is_none()) else {
             return;
         };
@@ -151,7 +151,7 @@ impl Restore {
         step.outcome = Some(outcome);
     }
 
-    /// The write whose turn it is, if nothing is under way; ends the restore if there is none or nobody wants more.
+    /// The next write, if none is under way; ends the restore if there is none or it was stopped.
     pub fn begin_next(&mut self) -> Option<&mut Step> {
         if self.state != State::Running || self.current().is_some() {
             return None;
@@ -165,7 +165,7 @@ impl Restore {
         next.filter(|_| self.state == State::Running).map(|next| &mut self.steps[next])
     }
 
-    /// The outcome of the whole, once it has ended.
+    /// The outcome of the restore, once it has ended.
     pub fn outcome(&self, def: &PlantDef) -> Option<Outcome> {
         let (done, all) = (self.done(), self.steps.len());
         let failed = self.steps.iter().find(|step| step.outcome.as_ref().is_some_and(|outcome| !is_done(outcome)));

@@ -39,7 +39,7 @@ pub enum Problem {
     /// The device has no such setting.
     #[error("{0} is no setting of this device")]
     NoSetting(String),
-    /// What the set rests on is otherwise in the device.
+    /// A tag that the set rests on has another value in the device.
     #[error("{tag} is {device} in the device, {set} in the set: the values mean something else")]
     OtherGround {
         /// Which tag.
@@ -83,7 +83,7 @@ pub enum Problem {
         /// What the plant file says about it.
         text: String,
     },
-    /// The limits forbid every sorted.
+    /// The limits forbid every sequence.
     #[error("{0}: no sequence of writes keeps within the limits")]
     NoOrder(String),
 }
@@ -108,7 +108,7 @@ pub fn plan(
         match (tag, row.device) {
             (None, _) => problems.push(Problem::NoSetting(row.short)),
             (Some(_), _) if row.same => {}
-            // Without the old value nobody can say what is about to change.
+            // Without the old value the change is unknown.
             (Some(_), None) => problems.push(Problem::Unknown(row.short)),
             (Some(tag), Some(_)) if carries(def, device, tag.id) => problems.push(Problem::Ground(tag.short.clone())),
             (Some(tag), Some(old)) => changes.push(Change { tag: tag.id, old, new }),
@@ -141,7 +141,7 @@ fn other_ground(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: T
     wrong.chain(other_units(def, device, set, trusted)).collect()
 }
 
-/// Values that the device measures in another unit than the set. What a tag chooses is told of that tag, once.
+/// Values that the device measures in another unit than the set; a tag that chooses units is reported once.
 fn other_units<'a>(
     def: &'a PlantDef,
     device: DeviceId,
@@ -197,7 +197,7 @@ fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, t
     Some(Problem::OutOfRange { tag: tag.short.clone(), value: change.new, min, max })
 }
 
-/// An interlock asks only what is trusted; when it was read does not matter to it.
+/// An interlock needs a good value; its age does not matter.
 fn as_sample(trusted: Option<f64>) -> Sample {
     let at = Timestamp::UNIX_EPOCH;
     trusted.map_or(Sample::bad(Cause::NotRead, at), |value| Sample::good(value, at))

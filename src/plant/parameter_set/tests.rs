@@ -53,7 +53,7 @@ fn device(values: [f64; 4]) -> impl Fn(TagId) -> Option<f64> {
 }
 
 fn set(values: [f64; 4]) -> ParameterSet {
-    take(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &device(values))
+    capture(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &device(values))
 }
 
 fn planned(from: [f64; 4], to: &ParameterSet) -> Result<Vec<(TagId, f64)>, Vec<String>> {
@@ -103,12 +103,12 @@ fn what_cannot_be_written_is_told_before_anything_is() {
 #[test]
 fn a_set_holds_what_is_known_and_names_what_is_not() {
     let trusted = |tag: TagId| device([0., 100., 50., 0.])(tag).filter(|_| tag != SV);
-    let set = take(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &trusted);
+    let set = capture(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &trusted);
     let names: Vec<&str> = set.values.iter().map(|value| value.tag.as_str()).collect();
     assert_eq!((names, set.missing), (vec!["SV-L", "SV-H", "CTRL"], vec!["SV".to_owned()]));
     // Without the unit a number means nothing: only what has no such unit is kept.
     let trusted = |tag: TagId| device([0., 100., 50., 0.])(tag).filter(|_| tag != UNIT);
-    let set = take(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &trusted);
+    let set = capture(&def(), TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &trusted);
     assert_eq!((set.missing, set.given), (vec!["SV-L".to_owned()], Vec::new()));
 }
 
@@ -148,15 +148,16 @@ fn a_name_can_be_a_file() {
 }
 
 #[test]
-fn a_value_in_another_unit_is_another_value_whoever_has_chosen_the_unit() {
+fn a_value_in_another_unit_is_another_value() {
     let unit = |unit: &str| {
         let mut def = def();
         def.tags[SV.index()].unit = unit.to_owned();
         def
     };
     let values = [0., 100., 70., 0.];
-    let take = |def: &PlantDef| take(def, TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &device(values));
-    let set = take(&unit("°C"));
+    let capture_in =
+        |def: &PlantDef| capture(def, TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &device(values));
+    let set = capture_in(&unit("°C"));
     assert_eq!(set.units.get("SV").map(String::as_str), Some("°C"));
     let told = |def: &PlantDef, set: &ParameterSet| {
         let rows = compare(def, TIC, set, &device(values));

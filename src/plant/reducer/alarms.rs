@@ -1,4 +1,4 @@
-//! Alarms in the plant: what they are evaluated by, what operators do with them, what a restart takes up.
+//! Alarms in the plant: the facts that they are evaluated by, the commands of operators, and the state after a restart.
 
 use jiff::Timestamp;
 
@@ -16,7 +16,7 @@ use crate::plant::{
 };
 
 impl Plant {
-    /// Takes up the alarms that the journal remembers from before a restart, oldest step first.
+    /// Restores the alarms from the journal after a restart, oldest event first.
     pub fn restore(&mut self, steps: &[AlarmRecord]) {
         self.alarm_manager.restore(steps);
     }
@@ -29,7 +29,7 @@ impl Plant {
         at: Timestamp,
         effects: &mut Effects,
     ) -> ActionRecord {
-        // The steps of one alarm must not go back in time, whatever the clock does.
+        // The events of one alarm never go back in time, whatever the clock does.
         let now = self.at.max(at);
         let (manager, by, note) = (&mut self.alarm_manager, &status.by, status.command.note.as_ref());
         let done = match alarm_command {
@@ -64,8 +64,8 @@ impl Plant {
         self.commands.finish(status, outcome, &self.image)
     }
 
-    /// Judges every alarm now.
-    pub(super) fn judge_alarms(&mut self) -> Vec<AlarmRecord> {
+    /// Evaluates every alarm.
+    pub(super) fn evaluate_alarms(&mut self) -> Vec<AlarmRecord> {
         let asks_health = |alarm: &AlarmDef| matches!(alarm.condition, Condition::Health { .. });
         let diagnosed = if self.def.alarms.iter().any(asks_health) { self.diagnosed() } else { Vec::new() };
         let (def, image, lines, devices) = (&self.def, &self.image, &self.lines, &self.devices);
@@ -92,7 +92,7 @@ impl Plant {
     }
 }
 
-/// The journal tells with a fault of the station what exactly it was.
+/// Adds the detail of a station fault to its alarm event.
 fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
     if step.event != AlarmEvent::Raised || &*step.subject != STATION {
         return;
@@ -128,7 +128,7 @@ fn answers(state: DeviceState, no_values: bool) -> Option<bool> {
     }
 }
 
-/// Whether a device has a signal; nobody can tell before it was asked.
+/// Whether a device has a signal; unknown before the first request.
 fn has_signal(status: &DeviceStatus, signal: Signal) -> Option<bool> {
     match (status.state, status.diagnosis) {
         (DeviceState::Unknown, None) => None,
@@ -151,7 +151,7 @@ fn is_overloaded(line: &LineStatus) -> Option<bool> {
     report.map(|report| report.strain.is_some())
 }
 
-/// What came of several requests at once: the steps, and an outcome that hides none that was refused.
+/// The events and the common outcome of several acknowledgements; a refusal is not hidden.
 fn together(each: impl Iterator<Item = Result<AlarmRecord, AlarmRefusal>>) -> (Vec<AlarmRecord>, Outcome) {
     let (mut steps, mut refused, mut count) = (Vec::new(), Vec::new(), 0);
     for done in each {

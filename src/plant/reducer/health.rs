@@ -1,4 +1,4 @@
-//! How lines and devices stand over time: a minute of each line for the history, the diagnosis of each device.
+//! Health over time: a minute of each line for the history, the diagnosis of each device.
 
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ impl Plant {
         minutes.map(Record::Line).collect()
     }
 
-    /// Follows auto-tunings and programs; what a tuning has found is asked for as soon as it has ended.
+    /// Follows auto-tunings and programs; reads the result of a tuning as soon as it ends.
     pub(super) fn watch_controllers(&mut self) -> Vec<(LineId, BusRequest)> {
         let (image, at) = (&self.image, self.at);
         let sample = |tag: TagId| image.sample(tag);
@@ -43,7 +43,7 @@ impl Plant {
         asked
     }
 
-    /// Every device with what is wrong with it.
+    /// Every device with its diagnosis.
     pub(super) fn diagnosed(&self) -> Vec<DeviceStatus> {
         let diagnosed = |(def, status): (&crate::plant::def::DeviceDef, &DeviceStatus)| {
             let line = &self.lines[def.line.index()];
@@ -58,7 +58,7 @@ impl Plant {
         self.def.devices.iter().zip(&self.devices).map(diagnosed).collect()
     }
 
-    /// Is a device left alone because an action takes it some time (saving its settings)?
+    /// Is a device busy with an action (saving its settings)?
     fn settling(&self, device: DeviceId) -> bool {
         let actions = &self.def.device(device).actions;
         self.commands.commands().any(|status| match (&status.command.kind, &status.outcome) {

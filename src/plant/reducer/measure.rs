@@ -9,7 +9,7 @@ use crate::plant::{
 };
 
 impl Plant {
-    /// Lets the alarm monitor count what the journal remembers of the last day. `active` are the raising steps of alarms
+    /// Counts the journal of the last day in the alarm monitor. `active` are the raising steps of alarms
     /// that were active before it, `steps` what came since; both oldest first, none after `now`. `watched` are the windows
     /// of that day in which a station ran.
     pub fn remeasure(&mut self, active: &[AlarmRecord], steps: &[AlarmRecord], watched: &[i64], now: Timestamp) {
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn every_screen_has_the_rates_of_the_moment_and_a_restart_keeps_them() {
+    fn a_restart_keeps_the_alarm_rates() {
         let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
         let mut journal = Vec::new();
         for second in 0..44 {

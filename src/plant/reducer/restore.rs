@@ -1,4 +1,4 @@
-//! Parameter sets of devices: taken, kept by the station, written back one verified write at a time.
+//! Parameter sets of devices: captured, stored, and restored one verified write at a time.
 
 #[cfg(test)]
 mod tests;
@@ -17,27 +17,27 @@ use crate::plant::{
     restore::{READ_MAX, Restore, RestoreRequest, State, Step},
 };
 
-/// The terminal number of writes that the plant itself commands for somebody; terminals count from 1.
+/// The terminal number of the writes of a restore; terminals count from 1.
 const PLANT: u32 = 0;
 
-/// What the station is asked to do with the folder of sets. Whatever it was, the folder is read anew.
+/// Work with the folder of parameter sets. The station reads the folder after each.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SetWork {
-    /// Nothing else.
+    /// Read the folder only.
     Read,
     /// Write a set; answered by [`Plant::on_set_written`].
     Write {
-        /// For whom.
+        /// The command that asked for it.
         command: CommandId,
-        /// What.
+        /// The set to write.
         set: Box<parameter_set::ParameterSet>,
-        /// A set of this name may be there already.
+        /// Replace a set of the same name.
         replace: bool,
     },
 }
 
 impl Plant {
-    /// Takes a command about sets; others are not for this place.
+    /// Accepts a command about parameter sets.
     pub(super) fn set_command(
         &mut self,
         status: &CommandStatus,
@@ -53,7 +53,7 @@ impl Plant {
             }
             CommandKind::SaveSet { device, name, replace } => {
                 let trusted = trusted(&self.image);
-                let set = parameter_set::take(&self.def, *device, name, status.by.clone(), at, &trusted);
+                let set = parameter_set::capture(&self.def, *device, name, status.by.clone(), at, &trusted);
                 let problem = match parameter_set::check_name(name) {
                     Err(why) => Some(why),
                     Ok(()) if set.values.is_empty() => Some("no setting of the device is known now".to_owned()),
@@ -83,12 +83,12 @@ impl Plant {
         }
     }
 
-    /// What lies in the folder of sets.
+    /// The folder of parameter sets was read.
     pub fn on_sets(&mut self, sets: Vec<StoredSet>) {
         self.sets = Arc::new(sets);
     }
 
-    /// A set was written into the folder, or not, with the reason.
+    /// A set was written into the folder, or `Err` says why not.
     pub fn on_set_written(&mut self, command: CommandId, result: Result<(), String>) -> Effects {
         let outcome = match result {
             Ok(()) => Outcome::Verified,
@@ -98,7 +98,7 @@ impl Plant {
         Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
     }
 
-    /// A restore begins with a look at the device: what is on the image may be hours old where tags are read seldom.
+    /// Begins a restore by reading the device: the value of a tag that is polled seldom may be hours old.
     fn begin_restore(
         &mut self,
         status: &CommandStatus,
@@ -109,7 +109,7 @@ impl Plant {
         if self.restores.iter().any(|run| run.device == request.device && run.at_work()) {
             return Some(self.commands.finish(status, Outcome::Refused(Refusal::UnderWay), &self.image));
         }
-        if let Some(why) = self.unlike(request.device, &request.set, &request.changes) {
+        if let Some(why) = self.mismatch(request.device, &request.set, &request.changes) {
             return Some(self.commands.finish(status, Outcome::Refused(why), &self.image));
         }
         if request.changes.is_empty() {
@@ -123,8 +123,8 @@ impl Plant {
         None
     }
 
-    /// Why what was confirmed is not to be written as things stand now.
-    fn unlike<'a>(
+    /// Why the confirmed changes can no longer be written.
+    fn mismatch<'a>(
         &self,
         device: DeviceId,
         set: &parameter_set::ParameterSet,
@@ -136,8 +136,8 @@ impl Plant {
         }
     }
 
-    /// The line is about to work with other settings: no restore goes on over it.
-    pub(super) fn restores_lose_line(&mut self, line: LineId) {
+    /// The settings of a line change: its restores must not continue.
+    pub(super) fn mark_restores_line_changed(&mut self, line: LineId) {
         let def = &self.def;
         let here = |run: &&mut Arc<Restore>| run.at_work() && def.device(run.device).line == line;
         for run in self.restores.iter_mut().filter(here) {
@@ -145,8 +145,8 @@ impl Plant {
         }
     }
 
-    /// The line had no room for a request. Was it the look at the device that a restore begins with?
-    pub(super) fn restore_not_read(&mut self, request: &BusRequest) -> bool {
+    /// The queue of a line was full. Refuses the restore whose first read was lost; `false` if it was another request.
+    pub(super) fn refuse_unread_restore(&mut self, request: &BusRequest) -> bool {
         let BusRequest::Refresh { command: Some(id), .. } = request else { return false };
         let reading = |run: &&mut Arc<Restore>| run.id == *id && run.state == State::Reading;
         let Some(run) = self.restores.iter_mut().find(reading) else { return false };
@@ -154,12 +154,12 @@ impl Plant {
         true
     }
 
-    /// Lets every restore go on that nobody was told the end of: takes the end of its write, commands the next, or ends it.
-    pub(super) fn carry_on(&mut self, at: Timestamp, effects: &mut Effects) {
+    /// Advances every pending restore: ends its write, begins the next, or ends the restore.
+    pub(super) fn advance_restores(&mut self, at: Timestamp, effects: &mut Effects) {
         for place in 0..self.restores.len() {
             if self.commands.outcome_of(self.restores[place].id) == Some(&Outcome::Pending) {
                 let mut run = (*self.restores[place]).clone();
-                self.go_on(&mut run, at, effects);
+                self.advance(&mut run, at, effects);
                 if run != *self.restores[place] {
                     self.restores[place] = Arc::new(run);
                 }
@@ -168,19 +168,19 @@ impl Plant {
     }
 
     /// Each turn of the loop ends a write, begins one, or leaves; a restore has a finite number of writes.
-    fn go_on(&mut self, run: &mut Restore, at: Timestamp, effects: &mut Effects) {
+    fn advance(&mut self, run: &mut Restore, at: Timestamp, effects: &mut Effects) {
         if run.state == State::Reading {
-            self.look(run, at);
+            self.begin_when_read(run, at);
         }
         loop {
             if let Some(command) = run.current() {
                 match self.commands.outcome_of(command) {
                     Some(Outcome::Pending) => return,
-                    Some(ended) => run.take(ended.clone()),
-                    // It cannot be followed any more, so nobody can say that it was written.
-                    None => {
-                        run.take(Outcome::NotConfirmed(NotConfirmed::NotAnswered(crate::plant::event::Fault::Timeout)))
-                    }
+                    Some(ended) => run.end_write(ended.clone()),
+                    // The command is forgotten: the write may or may not have taken effect.
+                    None => run.end_write(Outcome::NotConfirmed(NotConfirmed::NotAnswered(
+                        crate::plant::event::Fault::Timeout,
+                    ))),
                 }
             }
             let (by, line_changed, numbers) = (run.by.clone(), run.line_changed, &mut self.numbers);
@@ -209,15 +209,15 @@ impl Plant {
         }
     }
 
-    /// Begins to write once the device has been read and needs just what was confirmed.
-    fn look(&self, run: &mut Restore, at: Timestamp) {
+    /// Begins the writes once the device was read and still needs the confirmed changes.
+    fn begin_when_read(&self, run: &mut Restore, at: Timestamp) {
         let waited = Duration::try_from(at.duration_since(run.at)).unwrap_or_default();
         if run.stopping {
             run.state = State::Stopped;
         } else if run.line_changed {
             run.give_up(Refusal::LineChanged);
         } else if run.is_read(&self.def, |tag| self.image.sample(tag)) {
-            match self.unlike(run.device, &run.set, run.steps.iter().map(|step| &step.change)) {
+            match self.mismatch(run.device, &run.set, run.steps.iter().map(|step| &step.change)) {
                 Some(why) => run.give_up(why),
                 None => run.begin(),
             }
@@ -226,19 +226,19 @@ impl Plant {
         }
     }
 
-    /// The restore of a device, at work or the last one.
+    /// The latest restore of a device.
     #[cfg(test)]
     fn restore_of(&self, device: DeviceId) -> Option<&Restore> {
         self.restores.iter().find(|run| run.device == device).map(Arc::as_ref)
     }
 }
 
-/// What is trusted now.
+/// The good values by tag.
 fn trusted(image: &ProcessImage) -> impl Fn(TagId) -> Option<f64> + '_ {
     |tag| image.sample(tag).good_value()
 }
 
-/// Why a step would write over something else than what was confirmed.
+/// Why a step would overwrite another value than the confirmed one.
 fn overtaken(step: &Step, image: &ProcessImage) -> Option<Refusal> {
     match image.sample(step.change.tag).good_value() {
         None => Some(Refusal::NotKnownNow),
@@ -247,7 +247,7 @@ fn overtaken(step: &Step, image: &ProcessImage) -> Option<Refusal> {
     }
 }
 
-/// The first reason in words, and how many more there are.
+/// The first reason and the number of others.
 fn first_of(problems: &[Problem]) -> String {
     let first = problems.first().map_or(String::new(), Problem::to_string);
     match problems.len() {

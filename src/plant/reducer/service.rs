@@ -1,4 +1,4 @@
-//! Commands of a technician for a line itself: other settings, tests.
+//! Commands of a technician for a line: settings and diagnostics.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ impl Plant {
             }
             CommandKind::Configure(settings) => {
                 self.remember_settings(settings);
-                self.restores_lose_line(settings.id);
+                self.mark_restores_line_changed(settings.id);
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
             }
             CommandKind::Test(line, diagnostic) => {
@@ -56,7 +56,7 @@ impl Plant {
         None
     }
 
-    /// The plant file was written, or not, with the reason.
+    /// The plant file was written, or `Err` says why not.
     pub fn on_saved(&mut self, command: CommandId, saved: &LineDef, result: Result<(), String>) -> Effects {
         let outcome = match result {
             Ok(()) => {
@@ -75,7 +75,7 @@ impl Plant {
         self.lines[line.index()].report.as_ref().map_or(self.def.line(line), |report| &report.settings)
     }
 
-    /// Several tries in a row go back to what was there before the first.
+    /// Keeps the settings before the first of several tries.
     fn remember_settings(&mut self, tried: &LineDef) {
         let in_use = Arc::new(self.settings(tried.id).clone());
         let before = &mut self.lines[tried.id.index()].settings_before;
@@ -114,7 +114,7 @@ mod tests {
         Plant::new(fixture::shared(), at(0), 1.0)
     }
 
-    /// The line says that it works with these settings.
+    /// The line reports these settings.
     fn works_with(plant: &mut Plant, settings: &LineDef) {
         let report = Arc::new(LineReport::new(settings.clone()));
         plant.on_event(Event::Report { at: at(1), line: L1, report });
@@ -125,7 +125,7 @@ mod tests {
         plant.on_command(CommandStatus::new(Command::new(1, id, kind), "anna", at(1)), at(i64::from(number)))
     }
 
-    /// Commands other settings and lets the line take them.
+    /// Sends other settings, which the line accepts.
     fn try_out(plant: &mut Plant, number: u32, settings: LineDef) -> Effects {
         let mut effects = command(plant, number, CommandKind::Configure(Box::new(settings.clone())));
         assert_eq!(actions(&effects), [], "not before the line has it");
@@ -164,7 +164,7 @@ mod tests {
         assert_eq!(before(&plant), None, "there is nothing more to take back");
     }
 
-    /// What the form of the terminal and the plant file refuse, the station refuses too.
+    /// The station refuses what the form of the terminal and the plant file refuse.
     #[test]
     fn what_no_line_can_carry_is_refused_and_never_sent() {
         let used = fixture::plant().lines[0].clone();

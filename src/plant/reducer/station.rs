@@ -1,4 +1,4 @@
-//! Faults of the station in the reducer: what the store says of itself becomes alarms.
+//! Faults of the station: the state of the store becomes alarms.
 
 use super::Plant;
 use crate::plant::{
@@ -7,12 +7,12 @@ use crate::plant::{
 };
 
 impl Plant {
-    /// How a part of the station stands. The alarm follows with the next tick.
+    /// The state of a part of the station. The alarm follows with the next tick.
     pub fn on_fault(&mut self, fault: StationFault, state: FaultState) {
         self.faults.set(fault, state);
     }
 
-    /// The store says how it stands. Alarms follow with the next tick.
+    /// The state of the store. Alarms follow with the next tick.
     pub fn on_history(&mut self, status: HistoryStatus) {
         self.faults.set(StationFault::NotRecording, FaultState::lasting(status.failing.clone()));
         self.faults.set(StationFault::DiskSpace, FaultState::lasting(status.disk.clone()));

@@ -1,5 +1,7 @@
 //! The reducer of facts: what an operator would notice.
 
+mod writes;
+
 use std::time::Duration;
 
 use super::*;
@@ -12,7 +14,7 @@ use crate::plant::{
     interlock::{InterlockCondition, InterlockDef},
     line_report::LineReport,
     record::AlarmEvent,
-    sample::Quality,
+    sample::{Cause, Quality},
 };
 
 const L1: LineId = LineId(0);
@@ -103,7 +105,7 @@ fn a_write_is_verified_only_by_its_own_read_back() {
 }
 
 #[test]
-fn after_a_write_that_may_have_failed_the_old_value_is_not_trusted() {
+fn after_an_uncertain_write_the_old_value_is_not_good() {
     for result in [WriteResult::Lost(Fault::Timeout), WriteResult::NotRead(Fault::Timeout)] {
         let mut plant = running();
         write(&mut plant, 72.5, result);
@@ -157,7 +159,7 @@ fn a_line_is_closed_when_it_says_so() {
 }
 
 #[test]
-fn a_write_leaves_a_trace_before_it_is_sent_and_is_closed_when_the_station_stops() {
+fn a_write_is_recorded_before_it_is_sent() {
     let mut plant = running();
     let effects = plant.on_command(shown(&plant, 1, SV, 61.0), at(1));
     let intent = plant.intent(&effects.bus[0].1).expect("a write is about to be sent");
@@ -191,7 +193,7 @@ fn nothing_is_written_blindly() {
 }
 
 #[test]
-fn a_second_write_waits_for_the_first_and_a_lost_one_is_given_up() {
+fn a_second_write_is_refused_and_a_lost_one_expires() {
     let mut plant = running();
     plant.on_command(shown(&plant, 1, SV, 71.0), at(1));
     plant.on_command(shown(&plant, 2, SV, 72.0), at(2));
@@ -235,7 +237,7 @@ fn a_silent_device_fails_then_is_down_then_comes_back() {
 }
 
 #[test]
-fn an_unplugged_line_takes_all_values_and_a_closed_one_raises_no_alarm() {
+fn a_closed_line_raises_no_alarm_an_unplugged_one_does() {
     let mut plant = running();
     plant.on_event(Event::Line { at: at(1), line: L1, state: LineState::Disconnected });
     assert_eq!(plant.snapshot().sample(PV).quality, Quality::Bad(Cause::NotConnected));
@@ -247,7 +249,7 @@ fn an_unplugged_line_takes_all_values_and_a_closed_one_raises_no_alarm() {
 }
 
 #[test]
-fn a_device_that_refuses_everything_raises_the_alarm_of_a_silent_one() {
+fn a_device_that_refuses_everything_counts_as_silent() {
     let mut plant = running();
     let says = |plant: &mut Plant, second: i64, outcome: Result<(), Fault>| {
         let mut stats = crate::plant::request_stats::RequestStats::default();
@@ -319,7 +321,7 @@ fn a_full_queue_is_told_to_the_operator() {
 }
 
 #[test]
-fn what_an_interlock_blocks_is_refused_with_its_reason_and_a_stop_never() {
+fn an_interlock_refuses_with_its_reason_but_never_a_stop() {
     use crate::plant::interlock::ControlLogic;
     let mut def = fixture::plant();
     let message = "not above 60 °C".to_owned();
@@ -361,209 +363,4 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
     assert_eq!((late(&plant, 4), late(&plant, 6)), (None, Some(6)));
     plant.on_event(read(7, &[(fixture::RUN, 1.0), (FAULT, 1.0)]));
     assert_eq!(late(&plant, 20), None, "it has obeyed");
-}
-
-/// The plant of the tests, whose PLC is stopped by an action.
-fn with_stop() -> Plant {
-    let mut def = fixture::plant();
-    let (settle, confirm) = (Duration::ZERO, String::new());
-    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true, saves: false };
-    def.devices[PLC.index()].actions = vec![stop];
-    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
-    plant.on_event(read(0, &[(RUN, 0.0)]));
-    plant
-}
-
-#[test]
-fn a_stop_is_sent_though_a_start_is_under_way() {
-    let mut plant = with_stop();
-    let mut check = |number, value, expect: Option<(f64, bool)>| {
-        let effects = plant.on_command(shown(&plant, number, RUN, value), at(1));
-        let sent = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => (job.raw, job.urgent),
-            other => panic!("not a write: {other:?}"),
-        });
-        assert_eq!(sent, expect, "command {number}: {:?}", plant.snapshot().commands[0].outcome);
-    };
-    check(1, 1.0, Some((1.0, false)));
-    // The PLC was read as stopped before the start: that makes the stop no less needed.
-    check(2, 0.0, Some((0.0, true)));
-    check(3, 0.0, None);
-    check(4, 1.0, None);
-    assert_eq!(plant.snapshot().commands[1].outcome, Outcome::Refused(Refusal::UnderWay));
-}
-
-#[test]
-fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
-    let mut def = fixture::plant();
-    def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
-    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
-    let keyed = |plant: &mut Plant, number, value| {
-        let effects = plant.on_command(shown(plant, number, SV, value), at(1));
-        match &effects.bus[0].1 {
-            BusRequest::Write(job) => (job.id, job.unlock),
-            other => panic!("not a write: {other:?}"),
-        }
-    };
-    plant.on_event(read(0, &[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
-    let (id, unlock) = keyed(&mut plant, 1, 71.0);
-    assert_eq!(unlock, Some((FAULT, 1.0)));
-    let effects = plant.on_event(Event::Unlocked { at: at(2), id, key: FAULT, result: WriteResult::Accepted });
-    let Some(Record::Action(action)) = effects.records.last() else { panic!("no line for the key") };
-    assert_eq!((&*action.by, &*action.target, action.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
-    assert_eq!(&*action.outcome, "not confirmed: accepted, not read back; for TIC-1.SV");
-    assert!(plant.snapshot().sample(FAULT).good_value().is_none(), "the key is not as it was read before");
-    plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::Refused(ExceptionCode(3)) });
-    // Not read again yet: nobody can tell, so it is sent again.
-    let (id, unlock) = keyed(&mut plant, 2, 71.0);
-    assert_eq!(unlock, Some((FAULT, 1.0)));
-    plant.on_event(Event::Wrote { at: at(3), id, result: WriteResult::ReadBack(710.0) });
-    plant.on_event(read(4, &[(FAULT, 1.0)]));
-    assert_eq!(keyed(&mut plant, 3, 72.0).1, None, "it is turned already");
-}
-
-#[test]
-fn what_will_be_sent_is_blocked_whatever_was_typed() {
-    let mut def = fixture::plant();
-    def.tags[RUN.index()].labels.clear();
-    let message = "not while it is hot".to_owned();
-    let when = InterlockCondition::Above(60.0);
-    def.logic.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, message, refuse: true }];
-    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
-    plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
-    for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {
-        let effects = plant.on_command(shown(&plant, 1, RUN, value), at(1));
-        assert_eq!(effects.bus.is_empty(), refused, "{value}: {:?}", plant.snapshot().commands[0].outcome);
-        assert!(!refused || matches!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
-    }
-}
-
-#[test]
-fn a_lost_refresh_of_the_plant_fails_no_command() {
-    let mut plant = running();
-    let effects = plant.on_command(command(1, CommandKind::Refresh(TIC)), at(1));
-    plant.on_undeliverable(L1, &BusRequest::Refresh { device: TIC, command: None });
-    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Verified);
-    plant.on_command(command(2, CommandKind::Refresh(TIC)), at(2));
-    plant.on_undeliverable(L1, &effects.bus[0].1);
-    let outcomes = plant.snapshot().commands.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
-    assert_eq!(outcomes, [Outcome::Verified, Outcome::Refused(Refusal::Busy)], "newest first");
-}
-
-/// SV in steps of 0.5 °C (scale 5 on a register with one decimal), at 70 °C.
-fn in_steps(max: f64) -> Plant {
-    let mut def = fixture::plant();
-    let sv = &mut def.tags[SV.index()];
-    (sv.scale, sv.max) = (5.0, Some(crate::plant::tag::Bound::Fixed(max)));
-    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
-    plant.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
-    plant.on_event(read(0, &[(PV, 700.0), (SV, 140.0), (DP, 1.0), (FAULT, 0.0)]));
-    plant
-}
-
-/// The line of the journal that an operator's command leaves.
-fn action_of(effects: &Effects) -> &ActionRecord {
-    let action = effects.records.iter().find_map(|record| match record {
-        Record::Action(action) => Some(action),
-        _ => None,
-    });
-    action.expect("it is on record")
-}
-
-#[test]
-fn a_write_is_recorded_with_the_value_that_the_device_holds() {
-    let mut plant = in_steps(100.0);
-    let effects = plant.on_command(shown(&plant, 1, SV, 72.3), at(1));
-    let BusRequest::Write(WriteJob { id, raw, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
-    assert_eq!(raw, 145.0, "72.5 °C goes out");
-    assert_eq!(
-        plant.snapshot().commands[0].command.kind,
-        CommandKind::Write { tag: SV, value: 72.5 },
-        "screens show it too"
-    );
-    let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(raw) });
-    let action = action_of(&effects);
-    assert_eq!((action.new.as_deref(), &*action.outcome), (Some("72.5 °C"), "verified"));
-}
-
-#[test]
-fn rounding_never_leads_beyond_a_limit() {
-    let range = Refusal::OutOfRange { min: "0.0".into(), max: "99.8".into() };
-    for (value, sent, outcome) in [
-        (99.8, None, Outcome::Refused(range.clone())),
-        (99.7, Some(199.0), Outcome::Pending),
-        (99.9, None, Outcome::Refused(range)),
-    ] {
-        let mut plant = in_steps(99.8);
-        let effects = plant.on_command(shown(&plant, 1, SV, value), at(1));
-        let raw = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => job.raw,
-            other => panic!("not a write: {other:?}"),
-        });
-        assert_eq!((raw, plant.snapshot().commands[0].outcome.clone()), (sent, outcome), "{value}");
-    }
-}
-
-#[test]
-fn a_limit_itself_may_be_written_whatever_the_scale() {
-    for (scale, max) in [(1.1, 3.3), (0.3, 0.9), (0.7, 4.9)] {
-        let mut def = fixture::plant();
-        let sv = &mut def.tags[SV.index()];
-        (sv.scale, sv.max) = (scale, Some(crate::plant::tag::Bound::Fixed(max)));
-        let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
-        plant.on_event(read(0, &[(SV, 0.0), (DP, 0.0), (FAULT, 0.0)]));
-        plant.on_command(shown(&plant, 1, SV, max), at(1));
-        assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending, "{max} in steps of {scale}");
-    }
-}
-
-#[test]
-fn an_unchanged_double_is_not_refused_as_changed() {
-    for (raw, scale, offset) in [(0.09, 0.1, 0.0), (0.14, 3.6, 0.0), (0.03, 0.01, 0.0), (20.05, 1.0, 273.15)] {
-        let mut def = fixture::plant();
-        let sv = &mut def.tags[SV.index()];
-        (sv.point.kind, sv.decimals) = (crate::plant::tag::DataType::F64, crate::plant::tag::Decimals::Fixed(2));
-        (sv.scale, sv.offset, sv.min, sv.max) = (scale, offset, None, None);
-        let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
-        plant.on_event(read(0, &[(SV, raw), (DP, 1.0), (FAULT, 0.0)]));
-        plant.on_command(shown(&plant, 1, SV, 5.0), at(1));
-        assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending, "raw {raw}");
-        // What it holds already is not written, however its number came about.
-        let mut again = plant.clone();
-        again.on_event(read(2, &[(SV, raw + raw * f64::EPSILON)]));
-        let held = again.snapshot().sample(SV).value.expect("it was read");
-        let mut fresh = Plant::new(again.def().clone(), at(0), 1.0);
-        fresh.on_event(read(0, &[(SV, raw), (DP, 1.0), (FAULT, 0.0)]));
-        fresh.on_command(shown(&fresh, 1, SV, held), at(1));
-        assert_eq!(fresh.snapshot().commands[0].outcome, Outcome::Unchanged, "raw {raw}");
-    }
-}
-
-#[test]
-fn a_write_that_saw_no_value_is_asked_again_and_a_stop_is_not() {
-    let mut plant = running();
-    let blind = |number, tag, value| command(number, CommandKind::Write { tag, value });
-    let effects = plant.on_command(blind(1, SV, 65.0), at(1));
-    assert_eq!(effects.bus, []);
-    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::NotSeen("70.0 °C".into())));
-    plant.on_command(blind(2, SV, 70.0), at(1));
-    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Unchanged, "there is nothing to overwrite");
-    plant.on_event(fail(2, &[SV], Fault::Timeout));
-    plant.on_command(blind(3, SV, 65.0), at(3));
-    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending, "the station does not know it either");
-    let mut stopped = with_stop();
-    stopped.on_event(read(1, &[(RUN, 1.0)]));
-    stopped.on_command(blind(1, RUN, 0.0), at(1));
-    assert_eq!(stopped.snapshot().commands[0].outcome, Outcome::Pending);
-}
-
-#[test]
-fn a_write_over_a_value_that_came_back_as_another_one_is_refused() {
-    let mut plant = running();
-    plant.on_event(fail(1, &[SV], Fault::Timeout));
-    let write = shown(&plant, 1, SV, 65.0);
-    assert_eq!(write.command.expected_value, Some(70.0), "a doubted value was shown as well");
-    plant.on_event(read(2, &[(SV, 800.0)]));
-    plant.on_command(write, at(3));
-    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::ChangedTo("80.0 °C".into())));
 }

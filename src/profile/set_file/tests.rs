@@ -21,7 +21,7 @@ fn winter(def: &PlantDef) -> ParameterSet {
         "P-F" | "P-DP" | "PTN" => Some(0.0),
         _ => Some(12.0),
     };
-    parameter_set::take(def, device.id, "winter", "anna \"boss\" \\".into(), Timestamp::UNIX_EPOCH, &value)
+    parameter_set::capture(def, device.id, "winter", "anna \"boss\" \\".into(), Timestamp::UNIX_EPOCH, &value)
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn two_devices_of_a_profile_may_have_tags_of_their_own() {
     let name = "PLC-2.RECIPE".to_owned();
     def.tags.push(TagDef { id, device: second, name, short: "RECIPE".into(), in_sets: true, unit: "l".into(), ..base });
     let all = |_| Some(3.0);
-    let set = parameter_set::take(&def, second, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &all);
+    let set = parameter_set::capture(&def, second, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &all);
     assert_eq!(set.values.len(), 1);
     let text = text_of_set(&set, &def);
     assert!(text.contains("\"l\" = [\"RECIPE\"]\n"), "{text}");

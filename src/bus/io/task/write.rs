@@ -76,11 +76,11 @@ impl Task<'_> {
                 self.tell(Event::Read { at: self.clock.now(), device, values, texts: Vec::new(), reply, exchange })
                     .await?;
             }
-            // What the device holds now is not known until it is read again.
+            // The value is unknown until it is read again.
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
                 schedule.refresh(tag.device, self.clock.now());
             }
-            // Perhaps the key is no longer as it was read.
+            // The key may have changed since it was read.
             WriteResult::Refused(_) if tag.write_unlock.is_some() => schedule.refresh(tag.device, self.clock.now()),
             WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken | WriteResult::Held(_) => {}
         }
@@ -91,8 +91,8 @@ impl Task<'_> {
             }
             result => self.tell_wrote(id, result).await?,
         }
-        // It may still lie in this machine or on the way; a closed connection takes it back. A stop that waits does not wait
-        // for another connection, and comes behind it on this one.
+        // It may still be queued here or on the way; closing the connection discards it. A waiting stop does not wait for
+        // another connection and follows it on this one.
         let tcp = self.settings.transport.serial().is_none();
         Ok(if tcp && unanswered && !self.requests.stop_waits() { Err(Leave::Reopen) } else { Ok(()) })
     }
@@ -128,7 +128,7 @@ impl Task<'_> {
         })
     }
 
-    /// Sends one number: accepted, refused, lost, not sent, or overtaken by a stop of any tag. `Err` when the port is gone.
+    /// Sends one number: accepted, refused, lost, not sent, or overtaken by a stop of any tag. `Err`: the port closed.
     async fn send_number(
         &mut self,
         link: &mut Link,
@@ -139,14 +139,14 @@ impl Task<'_> {
     ) -> Result<WriteResult, String> {
         let def = self.def.clone();
         let device = def.device(tag.device);
-        // A stop is sent in any case: a device that is silent may still hear it.
+        // A stop is sent in any case: a silent device may still receive it.
         let backed_off = schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now());
         if backed_off && !urgent {
             return Ok(WriteResult::NotSent(Fault::BackedOff));
         }
         // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
         let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
-        // A stop is not kept waiting for the sake of a clear answer: its refusal may then be reported as a missing answer.
+        // A stop does not wait for an unambiguous response: its refusal may then be reported as a missing response.
         let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
         // Nothing else goes out before a stop that waits.
         if !urgent && self.requests.stop_waits() {
@@ -202,8 +202,8 @@ impl Task<'_> {
         })
     }
 
-    /// An exception names no address: only from a unit without outstanding replies is it certainly the answer to what was sent. `Err`
-    /// when the port is gone.
+    /// An exception names no address: only from a unit without outstanding replies is it certainly the response to this
+    /// write. `Err`: the port closed.
     async fn owes_nothing(&mut self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
         if is_clear(link, device) {
             return Ok(true);
@@ -256,8 +256,8 @@ fn is_clear(link: &Link, device: &DeviceDef) -> bool {
     link.framing() == Framing::Mbap || broadcast || link.outstanding(device.unit).is_clear()
 }
 
-/// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for a
-/// field of bits, 23 where the profile wants the answer to bring the new value along.
+/// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for
+/// a field of bits, 23 where the profile wants the new value in the response.
 fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
     let address = tag.point.address;
     match tag.point.table {
@@ -294,7 +294,7 @@ mod tests {
         tag::{ByteOrder, DataType, Point},
     };
 
-    /// The bytes of the request after the function code, as tokio-modbus would send them, told by its own words.
+    /// The bytes of the request after the function code, as tokio-modbus would send them, by its own encoder.
     fn request(kind: DataType, field: Option<(u8, u8)>, write_fc: Option<u8>, raw: f64) -> Option<Request<'static>> {
         let point = Point { table: Table::Holding, address: 100, kind, order: ByteOrder::Abcd, field };
         write_request(&TagDef { write_fc, ..TagDef::new(TagId(0), DeviceId(0), "D.T", point) }, raw)
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn coils_are_written_one_by_one_unless_the_profile_says_otherwise() {
+    fn coils_are_written_one_by_one_by_default() {
         let point = Point { table: Table::Coil, address: 5, kind: DataType::Bool, order: ByteOrder::Abcd, field: None };
         let coil = TagDef::new(TagId(0), DeviceId(0), "D.C", point);
         assert_eq!(write_request(&coil, 1.0), Some(Request::WriteSingleCoil(5, true)));

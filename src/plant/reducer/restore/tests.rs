@@ -44,7 +44,7 @@ fn read(plant: &mut Plant, second: i64, sv: f64, high: f64) -> Effects {
     plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
 }
 
-/// The look at the device that a restore begins with.
+/// The read of the device that a restore begins with.
 fn look(number: u32) -> BusRequest {
     BusRequest::Refresh { device: TIC, command: Some(CommandId { terminal: 1, number }) }
 }
@@ -93,7 +93,7 @@ fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     effects.bus.iter().filter_map(write).collect()
 }
 
-/// The write under way ends; what follows from it. As on the bus, what was read back is told before the end.
+/// Ends the write under way and returns the effects. As on the bus, the value read back comes before the result.
 fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> Effects {
     let (id, tag, raw) = effects
         .bus
@@ -172,7 +172,7 @@ fn a_device_that_has_changed_since_is_not_written() {
 }
 
 #[test]
-fn nothing_is_written_before_every_value_of_the_set_was_read_anew() {
+fn nothing_is_written_before_every_value_was_read() {
     let mut plant = plant();
     let request = restore_request(&plant, set(40.0, 80.0));
     command(&mut plant, 1, CommandKind::Restore(Box::new(request.clone())));
@@ -191,7 +191,7 @@ fn nothing_is_written_before_every_value_of_the_set_was_read_anew() {
 }
 
 #[test]
-fn a_restore_that_still_reads_can_be_stopped_and_a_full_line_ends_it() {
+fn a_reading_restore_is_stopped_and_a_full_line_ends_it() {
     let check = |end: &dyn Fn(&mut Plant), expect: Refusal| {
         let mut plant = plant();
         let request = restore_request(&plant, set(40.0, 80.0));
@@ -212,7 +212,7 @@ fn a_restore_that_still_reads_can_be_stopped_and_a_full_line_ends_it() {
 }
 
 #[test]
-fn a_value_that_changes_while_a_restore_runs_is_not_written_over() {
+fn a_value_changed_during_a_restore_is_not_overwritten() {
     let check = |meanwhile: &dyn Fn(&mut Plant), expect: &str| {
         let mut plant = plant();
         let request = restore_request(&plant, set(40.0, 80.0));
@@ -258,7 +258,7 @@ fn limits_are_checked_in_the_station_whatever_a_terminal_sends() {
 }
 
 #[test]
-fn an_operator_stops_it_between_two_writes_and_two_never_run_at_once() {
+fn a_restore_stops_between_writes_and_never_runs_twice() {
     let mut plant = plant();
     let request = restore_request(&plant, set(40.0, 80.0));
     let first = begin(&mut plant, 1, request.clone());

@@ -44,7 +44,7 @@ impl Source {
             Source::Device(device) => {
                 let name = &cx.def().device(*device).name;
                 let by: Arc<str> = "".into();
-                Some(Arc::new(parameter_set::take(cx.def(), *device, name, by, cx.now, &trusted(cx))))
+                Some(Arc::new(parameter_set::capture(cx.def(), *device, name, by, cx.now, &trusted(cx))))
             }
         }
     }
@@ -155,7 +155,7 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
 
 /// What a set would hold that was taken now, for the query for its name.
 pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
-    let set = parameter_set::take(cx.def(), device, "", "".into(), cx.now, &trusted(cx));
+    let set = parameter_set::capture(cx.def(), device, "", "".into(), cx.now, &trusted(cx));
     match set.missing.as_slice() {
         [] => format!("all {} settings, for example: winter", set.values.len()),
         missing => {

@@ -152,7 +152,7 @@ fn half_done(fixture: &Fixture, state: State) -> Restore {
     run.steps[0].outcome = Some(Outcome::Verified);
     run.steps[1].command = Some(id);
     if state == State::Failed {
-        run.take(Outcome::Refused(Refusal::NotSent(crate::plant::event::Fault::BackedOff)));
+        run.end_write(Outcome::Refused(Refusal::NotSent(crate::plant::event::Fault::BackedOff)));
     }
     run
 }
@@ -209,7 +209,7 @@ fn a_restore_of_this_morning_hides_nothing_of_what_the_device_holds_now() {
 fn only_an_action_that_saves_is_advised_after_a_restore() {
     let mut fixture = with_sets();
     let mut run = half_done(&fixture, State::Running);
-    run.take(Outcome::Verified);
+    run.end_write(Outcome::Verified);
     run.state = State::Done;
     fixture.restores = vec![run];
     let fix = fixture.def.devices[0].actions[0].clone();

@@ -1,0 +1,91 @@
+//! Failed requests and states of lines: what they mean for devices and values.
+
+use std::mem::discriminant;
+
+use jiff::Timestamp;
+
+use super::Plant;
+use crate::plant::{
+    def::{DeviceId, LineId, TagId},
+    event::{Fault, LineState},
+    record::ActionRecord,
+    sample::Cause,
+    snapshot::DeviceState,
+};
+
+impl Plant {
+    /// Applies a failed request to the tags and the state of its device.
+    pub(super) fn failed(&mut self, device: DeviceId, tags: &[TagId], fault: Fault, at: Timestamp) {
+        self.image.failed(tags, fault, at);
+        let status = &mut self.devices[device.index()];
+        let down = matches!(status.state, DeviceState::Down { .. });
+        match fault {
+            // The device is in backoff; these are its other tags.
+            Fault::BackedOff => {
+                if !down {
+                    status.state = DeviceState::Down { since: at };
+                }
+                self.image.gone(device, Cause::DeviceDown, at);
+                return;
+            }
+            Fault::NotConnected => return,
+            // An exception proves that the device is there, unless a gateway sent it.
+            Fault::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Answering,
+            Fault::NotANumber => status.state = DeviceState::Answering,
+            Fault::Exception(_)
+            | Fault::Timeout
+            | Fault::Crc { .. }
+            | Fault::Lrc { .. }
+            | Fault::NotHex(_)
+            | Fault::Truncated { .. }
+            | Fault::WrongUnit { .. }
+            | Fault::WrongFunction { .. }
+            | Fault::WrongLength { .. }
+            | Fault::WrongEcho
+            | Fault::OutOfSync => {
+                status.state = match status.state {
+                    DeviceState::Down { since } => DeviceState::Down { since },
+                    DeviceState::Failing(n) => DeviceState::Failing(n.saturating_add(1)),
+                    DeviceState::Unknown | DeviceState::Answering => DeviceState::Failing(1),
+                };
+            }
+        }
+        status.failed += 1;
+        status.last_fault = Some((at, fault));
+    }
+
+    /// Applies a new state of a line to its devices.
+    pub(super) fn line_changed(&mut self, line: LineId, state: LineState, at: Timestamp) -> Option<ActionRecord> {
+        let status = &mut self.lines[line.index()];
+        status.lost_since = match &state {
+            LineState::Waiting { .. } => status.lost_since.or(Some(at)),
+            LineState::Connecting => status.lost_since,
+            LineState::Connected | LineState::Disconnected | LineState::Testing => None,
+        };
+        if status.since.is_none() || discriminant(&status.state) != discriminant(&state) {
+            status.since = Some(at);
+        }
+        let open = state != LineState::Disconnected;
+        // An operator closed the line: its devices are not polled, so their silence is no fault.
+        let gone = match &state {
+            LineState::Waiting { .. } => Some(DeviceState::Down { since: at }),
+            LineState::Disconnected | LineState::Testing => Some(DeviceState::Unknown),
+            // Reopened at once, perhaps with other settings: the values may be of another device.
+            LineState::Connecting if self.lines[line.index()].state == LineState::Connected => {
+                Some(DeviceState::Unknown)
+            }
+            LineState::Connecting | LineState::Connected => None,
+        };
+        self.lines[line.index()].state = state;
+        let action = self.commands.connected(line, open, &self.image);
+        let Some(device_state) = gone else { return action };
+        for device in self.def.devices.iter().filter(|device| device.line == line) {
+            let status = &mut self.devices[device.id.index()];
+            if !matches!((status.state, device_state), (DeviceState::Down { .. }, DeviceState::Down { .. })) {
+                status.state = device_state;
+            }
+            self.image.gone(device.id, Cause::NotConnected, at);
+        }
+        action
+    }
+}
