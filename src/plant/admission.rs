@@ -9,7 +9,6 @@ use super::id::{DeviceId, LineId};
 /// What the admission test says about a line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Admission {
-    /// Which line.
     pub line: LineId,
     /// Share of the line's time that its periodic reads take, 0–1 and beyond.
     pub utilisation: f64,
@@ -93,7 +92,6 @@ pub struct OverloadInterval {
 pub struct PollWords {
     /// `TIC-1 input 1000–1007`.
     pub name: String,
-    /// How often.
     pub period: Duration,
     /// Worst time on the wire.
     pub cost: Duration,
@@ -102,7 +100,6 @@ pub struct PollWords {
 /// A device that does not answer: it is probed each 30 s at most, and each probe takes the line until its timeout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeadDevice {
-    /// Which.
     pub device: DeviceId,
     /// `TIC-1`.
     pub name: String,
@@ -120,14 +117,7 @@ pub enum Warning {
     /// A character without parity has two stop bits by the standard (Modbus over serial line V1.02, 2.5.1).
     NoParityOneStopBit,
     /// An answer takes longer on the wire than the timeout of the line.
-    TimeoutBelowAnswer {
-        /// The timeout.
-        timeout: Duration,
-        /// The longest answer.
-        answer: Duration,
-        /// Whose it is.
-        poll: String,
-    },
+    TimeoutBelowAnswer { timeout: Duration, answer: Duration, poll: String },
     /// The reads leave less than the share that is kept for operators' writes.
     NoRoomForWrites {
         /// The share, 0–1.

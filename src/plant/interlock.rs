@@ -161,7 +161,6 @@ pub struct ActuatorTracker {
 }
 
 impl ActuatorTracker {
-    /// Its times.
     pub(super) fn times(&mut self) -> impl Iterator<Item = &mut Timestamp> {
         self.since.iter_mut().flatten()
     }

@@ -14,15 +14,12 @@ pub const WAIT_MAX: Duration = Duration::from_secs(10);
 pub enum Key {
     /// Path of a serial port.
     Port,
-    /// Baud rate.
     Baud,
     /// Bits of a character.
     DataBits,
-    /// Stop bits.
     StopBits,
     /// Host name or address.
     Host,
-    /// TCP port.
     TcpPort,
     /// Longest wait for an answer.
     Timeout,
@@ -39,7 +36,6 @@ pub enum Key {
 /// What is wrong with a setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SettingError {
-    /// Which setting.
     pub key: Key,
     /// `9601 is not a usual baud rate`.
     pub what: String,

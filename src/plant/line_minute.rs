@@ -14,25 +14,18 @@ pub struct LineMinute {
     pub at: Timestamp,
     /// The line by name: the history outlives the plant file.
     pub line: Arc<str>,
-    /// Requests sent.
     pub requests: u64,
     /// Valid normal answers.
     pub ok: u64,
-    /// No answer in time.
     pub timeouts: u64,
-    /// Corrupt answers.
     pub corrupt: u64,
-    /// Exception answers.
     pub exceptions: u64,
-    /// Requests sent again.
     pub retries: u64,
     /// Answers to requests that had been given up.
     pub late: u64,
     /// Polls that were left out.
     pub missed: u64,
-    /// Bytes sent.
     pub sent_bytes: u64,
-    /// Bytes received.
     pub received_bytes: u64,
     /// Share of the minute in which the line was busy, 0–1.
     pub utilisation: f32,

@@ -76,12 +76,10 @@ impl ProcessImage {
         }
     }
 
-    /// All samples, by tag.
     pub fn samples(&self) -> &[Sample] {
         &self.samples
     }
 
-    /// The sample of a tag.
     pub fn sample(&self, tag: TagId) -> Sample {
         self.samples[tag.index()]
     }
@@ -101,7 +99,6 @@ impl ProcessImage {
         }
     }
 
-    /// The texts, by tag.
     pub fn texts(&self) -> &Arc<Vec<Option<Arc<str>>>> {
         &self.texts
     }

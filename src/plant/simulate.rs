@@ -65,7 +65,6 @@ pub struct Motion {
     pub gain: f64,
     /// Added then.
     pub offset: f64,
-    /// How fast it follows.
     pub pace: Pace,
     /// It moves while all of these are so.
     pub when: Vec<Check>,
@@ -87,7 +86,6 @@ pub enum Source {
     Of(Operation, Vec<TagId>),
     /// It adds up another tag: a counter of energy from power.
     Integral {
-        /// What is added up.
         of: TagId,
         /// The time in which a constant 1 adds 1.
         time_base: Duration,
@@ -97,11 +95,8 @@ pub enum Source {
 /// What is made of other tags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Operation {
-    /// All added.
     Sum,
-    /// Their mean.
     Mean,
-    /// All multiplied.
     Product,
     /// The first less the others.
     Difference,
@@ -116,7 +111,6 @@ pub enum Operation {
 /// How fast a value follows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Pace {
-    /// At once.
     AtOnce,
     /// By so much a second.
     Rate(f64),

@@ -40,7 +40,6 @@ pub struct Tuning {
 /// A parameter that auto-tuning finds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Found {
-    /// Which.
     pub tag: TagId,
     /// Before.
     pub old: Option<f64>,
@@ -51,7 +50,6 @@ pub struct Found {
 /// A place where PV has turned.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Extremum {
-    /// When.
     pub at: Timestamp,
     /// The extreme.
     pub pv: f64,
@@ -60,7 +58,6 @@ pub struct Extremum {
 }
 
 impl Tuning {
-    /// Its times.
     pub(super) fn times(&mut self) -> impl Iterator<Item = &mut Timestamp> {
         let extrema = self.extrema.iter_mut().chain(&mut self.extreme).map(|extremum| &mut extremum.at);
         [&mut self.began].into_iter().chain(&mut self.ended).chain(extrema)

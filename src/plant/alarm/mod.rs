@@ -1,14 +1,14 @@
 //! Alarms: when a condition holds, what state follows, the manager of all of them, and how well the alarm system performs.
 
-pub mod manager;
+pub(crate) mod manager;
 pub mod command;
-pub mod condition;
+pub(crate) mod condition;
 pub mod def;
-pub mod lists;
-pub mod monitor;
-pub mod metrics;
-pub mod rate;
-pub mod state;
+pub(crate) mod lists;
+pub(crate) mod monitor;
+pub(crate) mod metrics;
+pub(crate) mod rate;
+pub(crate) mod state;
 #[cfg(test)]
 mod tests;
 

@@ -14,7 +14,6 @@ const FLOOD_BELOW: u32 = 5;
 /// Counts of each second of the last hour, as a ring.
 #[derive(Debug, Clone)]
 pub struct Rate {
-    /// The running second.
     now: i64,
     counts: Box<[u32; HOUR_S]>,
     in_window: u32,
@@ -29,7 +28,6 @@ impl Rate {
         Rate { now: start, counts: Box::new([0; HOUR_S]), in_window: 0, in_hour: 0, flood: None }
     }
 
-    /// The running second.
     pub fn now(&self) -> i64 {
         self.now
     }
