@@ -6,7 +6,7 @@ use super::{
     diagnostic::{Problems, Span},
     interlock::bits_of,
     names::{Defs, number_of},
-    reader::{At, Choice, table, words},
+    reader::{At, Choice, keyword_enum, toml_table},
     tag::range_of,
 };
 use crate::plant::{
@@ -15,7 +15,7 @@ use crate::plant::{
     tag::{Bound, TagDef},
 };
 
-table!(
+toml_table!(
     /// An `[[alarm]]`.
     AlarmTable, "an alarm" {
         opt "tag" tag: String,
@@ -68,19 +68,19 @@ pub(super) enum Need {
     Optional,
 }
 
-words!(Need, "need for a comment" {
+keyword_enum!(Need, "need for a comment" {
     "required" => Need::Required, "optional" => Need::Optional,
 });
 
-words!(AlarmClass, "class of alarms" {
+keyword_enum!(AlarmClass, "class of alarms" {
     "process" => AlarmClass::Process, "system" => AlarmClass::System,
 });
 
-words!(Signal, "signal of NE 107" {
+keyword_enum!(Signal, "signal of NE 107" {
     "F" => Signal::Failure, "C" => Signal::FunctionCheck, "S" => Signal::OutOfSpecification, "M" => Signal::Maintenance,
 });
 
-words!(Priority, "priority" {
+keyword_enum!(Priority, "priority" {
     "critical" => Priority::Critical, "high" => Priority::High, "medium" => Priority::Medium, "low" => Priority::Low,
 });
 

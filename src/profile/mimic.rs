@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Defs, Unique, number_of},
-    reader::{At, Raw, Value, table, text},
+    reader::{At, Raw, Value, text, toml_table},
     schema::{CommandTable, MimicTable, TrendTable},
 };
 use crate::plant::{
@@ -34,7 +34,7 @@ pub(super) fn mimic(table: &MimicTable, defs: &Defs, problems: &mut Problems) ->
 /// Declares the tables of the items: every item has a kind and a place.
 macro_rules! items {
     ($($name:ident, $what:literal { $($mode:ident $key:literal $field:ident: $type:ty,)* })*) => { $(
-        table!(
+        toml_table!(
             #[doc = $what]
             $name, $what {
                 need "kind" _kind: String,
@@ -76,7 +76,7 @@ items! {
     TextItem, "a text" { need "text" text: String, }
 }
 
-table!(
+toml_table!(
     /// A pipe has no place but its points.
     PipeItem, "a pipe" { need "kind" _kind: String, list "points" points: [u16; 2], list "flow" flow: String, }
 );

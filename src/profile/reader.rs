@@ -234,7 +234,7 @@ pub(crate) fn either(layers: &mut [Raw], first: &str, second: &str, problems: &m
 }
 
 /// Declares a table of the format: its keys, their types, and which are needed (`need`), optional (`opt`) or arrays (`list`).
-macro_rules! table {
+macro_rules! toml_table {
     (@type need $type:ty) => { Option<$crate::profile::reader::At<$type>> };
     (@type opt $type:ty) => { Option<$crate::profile::reader::At<$type>> };
     (@type list $type:ty) => { Vec<$crate::profile::reader::At<$type>> };
@@ -247,7 +247,7 @@ macro_rules! table {
             pub at: $crate::profile::diagnostic::Span,
             /// Nothing in it was wrong by itself. If something was, what seems missing is better not asked for.
             pub sound: bool,
-            $($(#[$note])* pub $field: $crate::profile::reader::table!(@type $mode $type),)*
+            $($(#[$note])* pub $field: $crate::profile::reader::toml_table!(@type $mode $type),)*
         }
         impl $name {
             pub fn of(layers: &[$crate::profile::reader::Raw], problems: &mut $crate::profile::diagnostic::Problems) -> Self {
@@ -269,10 +269,10 @@ macro_rules! table {
         }
     };
 }
-pub(crate) use table;
+pub(crate) use toml_table;
 
 /// Lets a type of the vocabulary be written as one of a few words.
-macro_rules! words {
+macro_rules! keyword_enum {
     ($type:ty, $what:literal { $($word:literal => $value:expr,)* }) => {
         impl $crate::profile::reader::Value for $type {
             fn read(
@@ -294,7 +294,7 @@ macro_rules! words {
         }
     };
 }
-pub(crate) use words;
+pub(crate) use keyword_enum;
 
 /// A number that must lie in a range; the usual one where it does not or is not written.
 pub(crate) fn within<T: PartialOrd + Display + Copy>(

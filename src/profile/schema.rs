@@ -12,11 +12,11 @@ pub(super) use self::device::{
 };
 use super::{
     condition::AlarmTable,
-    reader::{Choice, Raw, table, words},
+    reader::{Choice, Raw, keyword_enum, toml_table},
 };
 use crate::plant::def::{Parity, Role, Rs485};
 
-table!(
+toml_table!(
     /// A plant file.
     PlantFile, "the plant file" {
         need "title" title: String,
@@ -38,7 +38,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A `[[line]]` on a serial port.
     SerialTable, "a line on a serial port" {
         need "name" name: String,
@@ -56,7 +56,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A `[[line]]` over TCP.
     TcpTable, "a line over TCP" {
         need "name" name: String,
@@ -69,7 +69,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A `[[device]]` of a plant file.
     DeviceTable, "a device" {
         need "name" name: String,
@@ -87,7 +87,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// What holds for all alarms, `[alarms]`.
     AlarmRulesTable, "the rules for alarms" {
         opt "shelve_max" shelve_max: Duration,
@@ -95,7 +95,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// An `[[interlock]]`.
     InterlockTable, "an interlock" {
         need "tag" tag: String,
@@ -110,7 +110,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// An `[[actuator]]`.
     ActuatorTable, "an actuator" {
         need "output" output: String,
@@ -121,7 +121,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A state that another tag must be in.
     NeedTable, "a needed state" {
         need "tag" tag: String,
@@ -129,7 +129,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A `[[sequence]]`.
     SequenceTable, "a sequence" {
         need "run" run: String,
@@ -139,7 +139,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// The mimic of the process.
     MimicTable, "the mimic" {
         opt "size" size: [u16; 2],
@@ -148,7 +148,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A command on the mimic.
     CommandTable, "a mimic command" {
         need "key" key: String,
@@ -158,7 +158,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A `[[trend]]` group.
     TrendTable, "a trend" {
         need "name" name: String,
@@ -166,7 +166,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A pen of a trend.
     PenTable, "a pen" {
         need "tag" tag: String,
@@ -174,7 +174,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A `[[shift]]`.
     ShiftTable, "a shift" {
         need "name" name: String,
@@ -182,7 +182,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// The rules for logging in.
     AccessTable, "access" {
         opt "banner" banner: String,
@@ -196,7 +196,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A user of the operating system who needs no password.
     TrustedTable, "a trusted user" {
         need "user" user: String,
@@ -204,7 +204,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// What reports contain.
     ReportTable, "the report" {
         opt "folder" folder: String,
@@ -214,7 +214,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// How little of the disk may be free.
     HistoryTable, "the history" {
         opt "disk_free_percent_min" disk_free_percent_min: u8,
@@ -222,7 +222,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// The raw record of a controller.
     RecordTable, "the report's record" {
         need "device" device: String,
@@ -230,7 +230,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// How CSV is written.
     CsvTable, "the report's csv" {
         opt "separator" separator: String,
@@ -239,10 +239,10 @@ table!(
     }
 );
 
-words!(Rs485, "RS-485 direction control" { "off" => Rs485::Off, "rts-high" => Rs485::RtsHigh, "rts-low" => Rs485::RtsLow, });
+keyword_enum!(Rs485, "RS-485 direction control" { "off" => Rs485::Off, "rts-high" => Rs485::RtsHigh, "rts-low" => Rs485::RtsLow, });
 
-words!(Parity, "parity" { "N" => Parity::None, "E" => Parity::Even, "O" => Parity::Odd, });
+keyword_enum!(Parity, "parity" { "N" => Parity::None, "E" => Parity::Even, "O" => Parity::Odd, });
 
-words!(Role, "role" {
+keyword_enum!(Role, "role" {
     "viewer" => Role::Viewer, "technician" => Role::Technician, "supervisor" => Role::Supervisor,
 });

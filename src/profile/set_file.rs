@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use super::{
     diagnostic::Problems,
     names::number_of,
-    reader::{self, At, Choice, Node, Raw, Value, table, text},
+    reader::{self, At, Choice, Node, Raw, Value, text, toml_table},
 };
 use crate::plant::{
     def::PlantDef,
@@ -19,7 +19,7 @@ use crate::plant::{
     visible::acts,
 };
 
-table!(
+toml_table!(
     /// The file of a parameter set.
     SetTable, "the parameter set" {
         need "device" device: String,

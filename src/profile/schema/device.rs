@@ -10,12 +10,12 @@ use crate::{
     profile::{
         address::{Location, Modicon},
         diagnostic::{Problems, Span},
-        reader::{Choice, Node, Numbered, Raw, Value, table, words},
+        reader::{Choice, Node, Numbered, Raw, Value, keyword_enum, toml_table},
         simulate::Choices,
     },
 };
 
-table!(
+toml_table!(
     /// A device profile.
     ProfileFile, "the device profile" {
         need "vendor" vendor: String,
@@ -40,7 +40,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// What one request may hold.
     LimitsTable, "limits" {
         opt "read_registers_max" read_registers_max: u16,
@@ -54,7 +54,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A `[[tag]]` of a profile, or a `[[device.tag]]` of a plant file.
     TagTable, "a tag" {
         need "name" name: String,
@@ -105,7 +105,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// How a simulated device fills a tag.
     SimulateTable, "simulate" {
         opt "start" start: Choice,
@@ -134,7 +134,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A condition on another tag; without `is`, `above` and `below`: is it not 0?
     CheckTable, "when" {
         need "tag" tag: String,
@@ -146,7 +146,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A value for when something is so.
     CaseTable, "a case" {
         need "when" when: CheckTable,
@@ -154,7 +154,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// What must be written before a tag takes a write.
     UnlockTable, "write_unlock" {
         need "tag" tag: String,
@@ -162,7 +162,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// An `[[action]]` of a profile.
     ActionTable, "an action" {
         need "name" name: String,
@@ -175,7 +175,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// Which tags a controller is operated by.
     FaceplateTable, "the faceplate" {
         need "pv" pv: String,
@@ -190,7 +190,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// The ramp/soak program of a controller.
     ProgramTable, "the program" {
         need "position" position: String,
@@ -206,7 +206,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// A step of a program.
     StepTable, "a step of the program" {
         need "sv" sv: String,
@@ -215,23 +215,23 @@ table!(
     }
 );
 
-words!(Table, "table" {
+keyword_enum!(Table, "table" {
     "coil" => Table::Coil, "discrete" => Table::Discrete, "input" => Table::Input, "holding" => Table::Holding,
 });
 
-words!(ByteOrder, "order" {
+keyword_enum!(ByteOrder, "order" {
     "ABCD" => ByteOrder::Abcd, "CDAB" => ByteOrder::Cdab, "BADC" => ByteOrder::Badc, "DCBA" => ByteOrder::Dcba,
 });
 
-words!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" => Access::Write, });
+keyword_enum!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" => Access::Write, });
 
-words!(Confidence, "confidence" {
+keyword_enum!(Confidence, "confidence" {
     "proven" => Confidence::Proven, "high" => Confidence::High, "medium" => Confidence::Medium, "low" => Confidence::Low,
 });
 
-words!(PollClass, "poll class" { "critical" => PollClass::Critical, "normal" => PollClass::Normal, "background" => PollClass::Background, });
+keyword_enum!(PollClass, "poll class" { "critical" => PollClass::Critical, "normal" => PollClass::Normal, "background" => PollClass::Background, });
 
-words!(Reauthentication, "reauthenticate" { "password" => Reauthentication::Password, "second user" => Reauthentication::SecondUser, });
+keyword_enum!(Reauthentication, "reauthenticate" { "password" => Reauthentication::Password, "second user" => Reauthentication::SecondUser, });
 
 /// How addresses are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -242,7 +242,7 @@ pub(crate) enum Scheme {
     /// Octal `V40500`, `Y17`, `X23`, `C54` of KOYO and AutomationDirect.
     DirectLogic,
 }
-words!(Scheme, "scheme" { "modbus" => Scheme::Modbus, "directlogic" => Scheme::DirectLogic, });
+keyword_enum!(Scheme, "scheme" { "modbus" => Scheme::Modbus, "directlogic" => Scheme::DirectLogic, });
 
 /// How well a register map is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -254,7 +254,7 @@ pub(crate) enum Status {
     /// Parts are known.
     Partial,
 }
-words!(Status, "status" { "verified" => Status::Verified, "manual" => Status::Manual, "partial" => Status::Partial, });
+keyword_enum!(Status, "status" { "verified" => Status::Verified, "manual" => Status::Manual, "partial" => Status::Partial, });
 
 /// How often a tag is read; the device says what fast and slow are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -264,7 +264,7 @@ pub(crate) enum PollWord {
     Once,
     Never,
 }
-words!(PollWord, "poll" {
+keyword_enum!(PollWord, "poll" {
     "fast" => PollWord::Fast, "slow" => PollWord::Slow, "once" => PollWord::Once, "never" => PollWord::Never,
 });
 

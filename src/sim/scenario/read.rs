@@ -14,13 +14,13 @@ use crate::{
     profile::{
         self, Errors, Search,
         diagnostic::{Problems, Span},
-        reader::{self, At, Choice, Node, Value, table, text, words},
+        reader::{self, At, Choice, Node, Value, keyword_enum, text, toml_table},
         renamed,
     },
     sim::faults::{Fault, FaultTarget, why_not_applicable},
 };
 
-table!(
+toml_table!(
     /// A scenario file.
     ScenarioTable, "the scenario" {
         need "title" title: String,
@@ -36,7 +36,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// An `[[event]]`.
     EventTable, "an event" {
         need "at" at_time: Duration,
@@ -51,7 +51,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// An `[[operator]]`: what a good operator does.
     OperatorTable, "an operator action" {
         need "at" at_time: Duration,
@@ -62,7 +62,7 @@ table!(
     }
 );
 
-table!(
+toml_table!(
     /// An `[[expect]]`.
     ExpectTable, "an expectation" {
         opt "what" what: String,
@@ -87,12 +87,12 @@ table!(
     }
 );
 
-words!(Start, "start" {
+keyword_enum!(Start, "start" {
     "running" => Start::Running,
     "rest" => Start::Rest,
 });
 
-words!(AlarmEvent, "alarm event" {
+keyword_enum!(AlarmEvent, "alarm event" {
     "raised" => AlarmEvent::Raised,
     "acknowledged" => AlarmEvent::Acknowledged,
     "RTN" => AlarmEvent::ReturnedToNormal,
