@@ -224,7 +224,7 @@ impl Fault {
 
 /// Exception code of an answer (Modbus application protocol V1.1b3, section 7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error, Serialize, Deserialize)]
-#[error("exception {0:02X}, {words}", words = self.words())]
+#[error("exception {0:02X}, {words}", words = self.label())]
 pub struct ExceptionCode(pub u8);
 
 impl ExceptionCode {
@@ -240,7 +240,7 @@ impl ExceptionCode {
     }
 
     /// The meaning in the words of the standard.
-    pub fn words(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self.0 {
             0x01 => "illegal function",
             0x02 => "illegal data address",

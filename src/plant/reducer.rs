@@ -15,7 +15,7 @@ use std::sync::Arc;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_words},
+    alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_note},
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId},
     commands::CommandTracker,
     def::{LineDef, LineId, PlantDef, TagId},
@@ -210,7 +210,7 @@ impl Plant {
             | CommandKind::Restore(_)
             | CommandKind::StopRestore(_) => self.set_command(&status, at, &mut effects),
             CommandKind::HandOver | CommandKind::TakeOver => {
-                let outcome = match check_words(status.command.note.as_ref()) {
+                let outcome = match check_note(status.command.note.as_ref()) {
                     Ok(()) => Outcome::Verified,
                     Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
                 };

@@ -53,8 +53,8 @@ impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Quality::Good => f.write_str("good"),
-            Quality::Uncertain(cause) => write!(f, "uncertain: {}", cause.words()),
-            Quality::Bad(cause) => write!(f, "bad: {}", cause.words()),
+            Quality::Uncertain(cause) => write!(f, "uncertain: {}", cause.label()),
+            Quality::Bad(cause) => write!(f, "bad: {}", cause.label()),
         }
     }
 }
@@ -78,7 +78,7 @@ impl Cause {
     ];
 
     /// A few words for the operator.
-    pub fn words(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Cause::NotRead => "not read yet",
             Cause::Timeout => "no answer in time",

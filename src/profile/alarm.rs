@@ -4,7 +4,7 @@
 use std::{collections::HashMap, time::Duration};
 
 use super::{
-    condition::{self, AlarmTable, Need},
+    condition::{self, AlarmTable, Requirement},
     diagnostic::Problems,
     expr,
     names::{Defs, Unique},
@@ -32,7 +32,7 @@ const OVERLOADED: &str = "line overloaded";
 pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
     let mut alarms = Vec::new();
     for table in tables.iter().map(|table| &table.value) {
-        let found = if table.sound { condition::subject(table, defs, problems) } else { None };
+        let found = if table.valid { condition::subject(table, defs, problems) } else { None };
         let Some((subject, condition)) = found else { continue };
         let alarm = alarm(table, AlarmId(to_u16(alarms.len())), subject, condition, defs, problems);
         alarms.push(alarm);
@@ -116,7 +116,7 @@ fn alarm(
         off_delay: time(table.off_delay),
         re_alarm: table.re_alarm.map(|re_alarm| re_alarm.value),
         latch: flag(table.latch),
-        ack_comment: table.ack_comment.is_some_and(|note| note.value == Need::Required),
+        ack_comment: table.ack_comment.is_some_and(|note| note.value == Requirement::Required),
         enabled_when: table.enabled_when.as_ref().and_then(|words| expr::expr(words, defs, problems)),
         guidance: Guidance {
             cause: text(&table.cause),

@@ -45,7 +45,7 @@ toml_table!(
         opt "class" class: AlarmClass,
         opt "area" area: String,
         opt "latch" latch: bool,
-        opt "ack_comment" ack_comment: Need,
+        opt "ack_comment" ack_comment: Requirement,
         opt "re_alarm" re_alarm: Duration,
         opt "deadband" deadband: f64,
         opt "on_delay" on_delay: Duration,
@@ -61,15 +61,15 @@ toml_table!(
 
 /// Whether something must be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Need {
+pub(super) enum Requirement {
     /// It must.
     Required,
     /// It may.
     Optional,
 }
 
-keyword_enum!(Need, "need for a comment" {
-    "required" => Need::Required, "optional" => Need::Optional,
+keyword_enum!(Requirement, "need for a comment" {
+    "required" => Requirement::Required, "optional" => Requirement::Optional,
 });
 
 keyword_enum!(AlarmClass, "class of alarms" {

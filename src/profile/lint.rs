@@ -20,13 +20,13 @@ const URGENT_MAX: usize = 20;
 
 /// Looks through the alarms of a plant file; those that are wrong by themselves are passed over.
 pub(super) fn lint(tables: &[At<AlarmTable>], problems: &mut Problems) {
-    let sound: Vec<&AlarmTable> = tables.iter().map(|table| &table.value).filter(|table| table.sound).collect();
-    for table in &sound {
+    let valid: Vec<&AlarmTable> = tables.iter().map(|table| &table.value).filter(|table| table.valid).collect();
+    for table in &valid {
         incomplete(table, problems);
         delay(table, problems);
     }
-    twice(&sound, problems);
-    split(&sound, problems);
+    twice(&valid, problems);
+    split(&valid, problems);
 }
 
 /// What the operator would have to guess.

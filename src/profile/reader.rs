@@ -246,7 +246,7 @@ macro_rules! toml_table {
             /// Where the table stands.
             pub at: $crate::profile::diagnostic::Span,
             /// Nothing in it was wrong by itself. If something was, what seems missing is better not asked for.
-            pub sound: bool,
+            pub valid: bool,
             $($(#[$note])* pub $field: $crate::profile::reader::toml_table!(@type $mode $type),)*
         }
         impl $name {
@@ -254,7 +254,7 @@ macro_rules! toml_table {
                 let before = problems.count();
                 let fields = $crate::profile::reader::Fields::new(layers, $what, &[$($key),*], problems);
                 $(let $field = fields.$mode::<$type>($key, problems);)*
-                $name { at: fields.at(), sound: problems.count() == before, $($field,)* }
+                $name { at: fields.at(), valid: problems.count() == before, $($field,)* }
             }
         }
         impl $crate::profile::reader::Value for $name {

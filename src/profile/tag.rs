@@ -166,7 +166,7 @@ fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Li
 type Raws = (DataType, Option<u8>);
 
 fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Option<Point> {
-    let location = row.address.as_ref().filter(|_| row.sound)?;
+    let location = row.address.as_ref().filter(|_| row.valid)?;
     let (named, address) = locate(location, context.scheme, problems)?;
     let table = table(row, named, problems)?;
     if let Some(modicon) = &row.modicon {

@@ -34,9 +34,9 @@ pub(super) fn read(reader: &mut Reader, function: u8, direction: Direction, aske
 }
 
 fn exception(reader: &mut Reader) -> Option<String> {
-    let words = |code| format!("{code:02X} {}: {}", ExceptionCode(code).words(), names::advice(code));
+    let words = |code| format!("{code:02X} {}: {}", ExceptionCode(code).label(), names::advice(code));
     let code = reader.byte("exception", words)?;
-    Some(format!("exception {code:02X} {}", ExceptionCode(code).words()))
+    Some(format!("exception {code:02X} {}", ExceptionCode(code).label()))
 }
 
 /// A function that is not in the standard: its bytes as they are.

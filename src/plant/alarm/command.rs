@@ -12,7 +12,7 @@ use crate::plant::{
 };
 
 /// Most characters of a note or reason.
-pub const WORDS_MAX: usize = 500;
+pub const NOTE_CHARS_MAX: usize = 500;
 
 /// An alarm command. The note of its command is the note of an acknowledgement, and the reason without which
 /// nothing is shelved or put out of service.
@@ -67,8 +67,8 @@ pub enum AlarmRefusal {
     /// Shelving and taking out of service need a reason.
     #[error("a reason is required")]
     ReasonNeeded,
-    /// A note or reason is longer than [`WORDS_MAX`] characters.
-    #[error("more than {WORDS_MAX} characters")]
+    /// A note or reason is longer than [`NOTE_CHARS_MAX`] characters.
+    #[error("more than {NOTE_CHARS_MAX} characters")]
     TooLong,
     /// Not for no time, and not for longer than the plant allows.
     #[error("an alarm can be shelved for up to {} min", .max.as_secs() / 60)]
@@ -118,7 +118,7 @@ impl AlarmManager {
         if alarm.ack_comment && note.is_none() {
             return Err(AlarmRefusal::NoteNeeded);
         }
-        check_words(note)?;
+        check_note(note)?;
         let value = machine.value;
         Ok(self.record_action(&alarm, AlarmEvent::Acknowledged, at, value, by, note))
     }
@@ -245,13 +245,13 @@ impl AlarmManager {
 
 fn needed(reason: Option<&Arc<str>>) -> Result<&Arc<str>, AlarmRefusal> {
     let reason = reason.filter(|reason| !reason.trim().is_empty()).ok_or(AlarmRefusal::ReasonNeeded)?;
-    check_words(Some(reason))?;
+    check_note(Some(reason))?;
     Ok(reason)
 }
 
 /// A note that is too long is refused; `None` is none.
-pub fn check_words(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {
-    match words.is_some_and(|words| WORDS_MAX < words.chars().count()) {
+pub fn check_note(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {
+    match words.is_some_and(|words| NOTE_CHARS_MAX < words.chars().count()) {
         true => Err(AlarmRefusal::TooLong),
         false => Ok(()),
     }

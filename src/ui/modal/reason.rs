@@ -8,7 +8,7 @@ use ratatui::{Frame, layout::Rect};
 use super::{Modal, Next, line::Line, window};
 use crate::{
     plant::{
-        alarm::{AlarmCommand, command::WORDS_MAX},
+        alarm::{AlarmCommand, command::NOTE_CHARS_MAX},
         command::{Command, CommandKind},
         def::AlarmId,
         number::to_u16,
@@ -39,7 +39,7 @@ impl Reason {
     /// An action with a text, which is required if `needed`.
     pub fn new(title: &str, verb: &'static str, notes: Vec<String>, kind: CommandKind, needed: bool) -> Reason {
         let choices = vec![(String::new(), kind)];
-        let (title, line) = (title.to_owned(), Line::long("", WORDS_MAX));
+        let (title, line) = (title.to_owned(), Line::long("", NOTE_CHARS_MAX));
         Reason { title, notes, choices, chosen: 0, time: None, line, needed, verb, problem: None }
     }
 

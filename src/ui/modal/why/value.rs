@@ -41,9 +41,9 @@ pub(super) fn value_rows(
         _ if def.access == Access::Write => "write only: nobody can read it".to_owned(),
         Quality::Good => format!("good, read {} ago at {at}", age(cx.age(def.id))),
         Quality::Uncertain(cause) => {
-            format!("uncertain: {}; read {} ago at {at}", cause.words(), age(cx.age(def.id)))
+            format!("uncertain: {}; read {} ago at {at}", cause.label(), age(cx.age(def.id)))
         }
-        Quality::Bad(cause) => format!("bad: {}, since {at}", cause.words()),
+        Quality::Bad(cause) => format!("bad: {}, since {at}", cause.label()),
     };
     let mut rows = vec![row("value", format!("{}  {quality}", shown.with_unit()), shown.style)];
     let Some(cause) = sample.quality.cause().filter(|_| def.access != Access::Write) else { return rows };

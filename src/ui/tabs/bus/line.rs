@@ -171,7 +171,7 @@ fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Ve
     }
     flow.add(count(cx, "refused", counters.exceptions, ill));
     for (code, times) in &sum.exceptions {
-        flow.add(count(cx, &format!("{:02X} {}", code.0, code.words()), *times, ill));
+        flow.add(count(cx, &format!("{:02X} {}", code.0, code.label()), *times, ill));
     }
     flow.add(value(cx, "asked again", &grouped(sum.retries)));
     flow.add(count(cx, "late", counters.late, ill));
