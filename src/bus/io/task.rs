@@ -6,7 +6,7 @@ mod poll;
 mod test;
 mod write;
 
-use std::{sync::Arc, time::Duration};
+use std::{convert::Infallible, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
@@ -75,33 +75,32 @@ pub async fn run(
     let _ = task.outer().await;
 }
 
-/// The station is ending.
-struct Ended;
+/// Why a port is left.
+enum LinkExit {
+    /// An operator closed the line.
+    Closed,
+    /// The port or connection failed.
+    Lost(String),
+    /// It is opened again at once, with other settings.
+    Reopen,
+    /// A diagnostic needs the port for itself.
+    Diagnostic,
+    /// The station is ending.
+    Shutdown,
+}
 
-impl From<Closed> for Ended {
-    fn from(Closed: Closed) -> Ended {
-        Ended
+impl From<Closed> for LinkExit {
+    fn from(Closed: Closed) -> LinkExit {
+        LinkExit::Shutdown
     }
 }
 
-/// Why a port is left.
-enum Leave {
-    /// An operator closed the line.
-    Closed,
-    /// It went away.
-    Lost(String),
-    /// It is opened anew at once, with other settings.
-    Reopen,
-    /// A diagnostic needs the port for itself.
-    Test,
-}
-
-impl From<LinkError> for Leave {
-    /// LinkError of a request without a caller: only the end of the port matters.
-    fn from(error: LinkError) -> Leave {
+impl From<LinkError> for LinkExit {
+    /// Of a request without a caller only the end of the port matters.
+    fn from(error: LinkError) -> LinkExit {
         match error {
-            LinkError::Gone(why) => Leave::Lost(why),
-            LinkError::Fault(fault) => Leave::Lost(fault.to_string()),
+            LinkError::Gone(why) => LinkExit::Lost(why),
+            LinkError::Fault(fault) => LinkExit::Lost(fault.to_string()),
         }
     }
 }
@@ -137,46 +136,44 @@ struct Task<'a> {
     polls_since_test: u32,
 }
 
-/// What a turn of the loop gives: go on, leave the port, or end.
-type Turn = Result<Result<(), Leave>, Ended>;
-
 impl Task<'_> {
-    /// Opens, serves, waits, for ever.
-    async fn outer(mut self) -> Result<(), Ended> {
+    /// Opens, serves and waits until the station ends.
+    async fn outer(mut self) -> Result<(), LinkExit> {
         let mut backoff = Backoff::for_ports();
         loop {
             self.tell_state(LineState::Connecting).await?;
-            let leave = match self.connector.open().await {
+            let exit = match self.connector.open().await {
                 Ok(port) => {
                     self.memory.counters.opens += 1;
                     self.tell_state(LineState::Connected).await?;
                     tracing::info!(line = self.settings.name, transport = %self.settings.transport, "connected");
                     let answers = self.memory.counters.ok;
-                    let leave = self.serve(port).await?;
-                    // A port that opens and dies at once must not be tried in a hurry.
+                    let exit = self.serve(port).await;
+                    // A port that fails right after opening is retried with backoff.
                     if answers < self.memory.counters.ok {
                         backoff.reset();
                     }
-                    leave
+                    exit
                 }
-                Err(why) => Leave::Lost(why),
+                Err(why) => LinkExit::Lost(why),
             };
-            if !matches!(leave, Leave::Reopen) {
+            if !matches!(exit, LinkExit::Reopen | LinkExit::Shutdown) {
                 self.give_up_unconfirmed().await?;
             }
-            match leave {
-                Leave::Reopen => backoff.reset(),
-                Leave::Test => {
+            match exit {
+                LinkExit::Shutdown => return Err(exit),
+                LinkExit::Reopen => backoff.reset(),
+                LinkExit::Diagnostic => {
                     self.tell_state(LineState::Testing).await?;
                     self.test_alone().await?;
                 }
-                Leave::Closed => {
+                LinkExit::Closed => {
                     self.end_test("the line was closed").await?;
                     self.tell_state(LineState::Disconnected).await?;
                     self.tell_report(None).await?;
                     self.wait(None).await?;
                 }
-                Leave::Lost(why) => {
+                LinkExit::Lost(why) => {
                     self.end_test(&why).await?;
                     tracing::warn!(line = self.settings.name, why, "not connected");
                     let retry_at = self.clock.now() + backoff.fail();
@@ -189,7 +186,7 @@ impl Task<'_> {
     }
 
     /// Waits without a port until a moment, or until an operator opens the line; refuses writes meanwhile.
-    async fn wait(&mut self, mut until: Option<Timestamp>) -> Result<(), Ended> {
+    async fn wait(&mut self, mut until: Option<Timestamp>) -> Result<(), LinkExit> {
         loop {
             let (clock, wake) = (self.clock, until);
             let pause = async {
@@ -200,7 +197,7 @@ impl Task<'_> {
             };
             let request = tokio::select! {
                 biased;
-                _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
+                _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
                 request = self.requests.recv() => request?,
                 () = pause => return Ok(()),
             };
@@ -241,58 +238,56 @@ impl Task<'_> {
         }
     }
 
-    /// Serves an open port: operators first, then the schedule and the running diagnostic, else listens.
-    async fn serve(&mut self, opened: Opened) -> Result<Leave, Ended> {
+    /// Serves an open port until it is left.
+    async fn serve(&mut self, opened: Opened) -> LinkExit {
         let mut link = Link::new(opened, &self.settings, self.clock, self.memory.clone());
         let mut schedule = Schedule::new(&self.blocks, self.clock.now());
         self.under_way.clear();
         let on_line = self.def.devices.iter().filter(|device| device.line == self.line);
         on_line.for_each(|device| link.allow(device.unit, device.limits.in_flight_max));
-        let mut report_at = self.clock.now() + REPORT_EVERY;
         self.closed_at = self.clock.now();
+        let Err(exit) = self.take_turns(&mut link, &mut schedule).await;
+        self.close_second(&mut link);
+        self.stats.rest(&mut self.memory.counters);
+        self.refuse_waiting().await.err().unwrap_or(exit)
+    }
+
+    /// Operators first, then the schedule and the running diagnostic, else it waits.
+    async fn take_turns(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<Infallible, LinkExit> {
+        let mut report_at = self.clock.now() + REPORT_EVERY;
         // Other settings show at once.
-        self.tell_report(Some(&schedule)).await?;
-        let leave = loop {
+        self.tell_report(Some(schedule)).await?;
+        loop {
             if *self.stop.borrow() {
-                break Err(Ended);
+                return Err(LinkExit::Shutdown);
             }
             // Before the second is closed: the schedule, too, learns of answers that came late.
-            let taken = self.take_answers(&mut link, &mut schedule).await?;
-            if let Err(leave) = taken.and_then(|()| self.still_there(&link)) {
-                break Ok(leave);
-            }
+            self.take_answers(link, schedule).await?;
+            self.still_there(link)?;
             let now = self.clock.now();
             if report_at <= now {
                 report_at = now + REPORT_EVERY;
                 link.count_uart();
-                self.close_second(&mut link);
-                self.tell_report(Some(&schedule)).await?;
+                self.close_second(link);
+                self.tell_report(Some(schedule)).await?;
             }
-            self.tell_doubts(&mut link).await?;
+            self.tell_doubts(link).await?;
             let next = schedule.next(now);
             // Writes have only their share of the time while polls are due.
             let may_write = !matches!(next, Next::Run(_)) || self.budget.allows(now);
-            let Ok(request) = self.requests.next(may_write) else { break Err(Ended) };
-            let turn = match (request, next) {
-                (Some(request), _) => self.serve_request(&mut link, &mut schedule, request).await?,
-                (None, _) if self.is_turn_of_confirm(now) => self.confirm(&mut link, &mut schedule).await?,
-                (None, next) if self.is_turn_of_test(next) => self.test_step(&mut link).await?,
-                (None, Next::Run(index)) => self.poll(&mut link, &mut schedule, index).await?,
-                (None, Next::WaitUntil(at)) => self.listen(&mut link, &mut schedule, at.min(report_at)).await?,
-                (None, Next::Idle) => self.listen(&mut link, &mut schedule, report_at).await?,
-            };
-            if let Err(leave) = turn {
-                break Ok(leave);
+            match (self.requests.next(may_write)?, next) {
+                (Some(request), _) => self.serve_request(link, schedule, request).await?,
+                (None, _) if self.is_turn_of_confirm(now) => self.confirm(link, schedule).await?,
+                (None, next) if self.is_turn_of_test(next) => self.test_step(link).await?,
+                (None, Next::Run(index)) => self.poll(link, schedule, index).await?,
+                (None, Next::WaitUntil(at)) => self.listen(link, schedule, at.min(report_at)).await?,
+                (None, Next::Idle) => self.listen(link, schedule, report_at).await?,
             }
-        };
-        self.close_second(&mut link);
-        self.stats.rest(&mut self.memory.counters);
-        self.refuse_waiting().await?;
-        leave
+        }
     }
 
     /// The port is left: what still waits was never sent.
-    async fn refuse_waiting(&mut self) -> Result<(), Ended> {
+    async fn refuse_waiting(&mut self) -> Result<(), LinkExit> {
         for id in self.requests.take_waiting() {
             self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
         }
@@ -300,39 +295,44 @@ impl Task<'_> {
     }
 
     /// Nothing is due: drops unsolicited bytes until something is.
-    async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Turn {
+    async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Result<(), LinkExit> {
         let request = tokio::select! {
             // What comes at one moment is taken in this order, so that a rehearsal ends as the one before.
             biased;
-            _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
+            _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
             request = self.requests.recv() => request?,
-            ended = link.idle() => return Ok(ended.map_err(Leave::from)),
-            () = self.clock.sleep_until(until) => return Ok(Ok(())),
+            ended = link.idle() => return ended.map_err(LinkExit::from),
+            () = self.clock.sleep_until(until) => return Ok(()),
         };
         self.serve_request(link, schedule, request).await
     }
 
-    async fn serve_request(&mut self, link: &mut Link, schedule: &mut Schedule, request: BusRequest) -> Turn {
+    async fn serve_request(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        request: BusRequest,
+    ) -> Result<(), LinkExit> {
         match request {
-            BusRequest::Connect(true) => Ok(Ok(())),
-            BusRequest::Connect(false) => Ok(Err(Leave::Closed)),
+            BusRequest::Connect(true) => Ok(()),
+            BusRequest::Connect(false) => Err(LinkExit::Closed),
             BusRequest::Refresh { device, .. } => {
                 schedule.refresh(device, self.clock.now());
-                Ok(Ok(()))
+                Ok(())
             }
             BusRequest::Configure(settings) => {
                 self.configure(*settings);
-                Ok(Err(Leave::Reopen))
+                Err(LinkExit::Reopen)
             }
             BusRequest::Test { id, by, diagnostic } => {
                 self.stop_test().await?;
                 let job = self.job.insert(Job::new(id, by, diagnostic, self.clock.now()));
                 if job.is_exclusive() {
-                    return Ok(Err(Leave::Test));
+                    return Err(LinkExit::Diagnostic);
                 }
-                self.tell_test().await.map(Ok)
+                self.tell_test().await
             }
-            BusRequest::StopTest => self.stop_test().await.map(Ok),
+            BusRequest::StopTest => self.stop_test().await,
             BusRequest::Write(job) => {
                 // What was requested before a stop and still waits for this tag would undo it.
                 let overtaken = if job.urgent { self.requests.take_writes_of(job.tag) } else { Vec::new() };
@@ -340,15 +340,15 @@ impl Task<'_> {
                     self.tell_wrote(id, WriteResult::Overtaken).await?;
                 }
                 let def = self.def.clone();
-                match self.clear_way(link, schedule, def.tag(job.tag).device, job.urgent).await? {
+                match self.clear_way(link, schedule, def.tag(job.tag).device, job.urgent).await {
                     Ok(true) => {}
                     Ok(false) => {
                         self.requests.put_off(BusRequest::Write(job));
-                        return Ok(Ok(()));
+                        return Ok(());
                     }
-                    Err(leave) => {
+                    Err(exit) => {
                         self.tell_wrote(job.id, WriteResult::NotSent(Fault::NotConnected)).await?;
-                        return Ok(Err(leave));
+                        return Err(exit);
                     }
                 }
                 let started = self.clock.now();
@@ -380,7 +380,7 @@ impl Task<'_> {
     }
 
     /// What was read of a unit that sends what it was not asked for may be such a frame itself.
-    async fn tell_doubts(&mut self, link: &mut Link) -> Result<(), Ended> {
+    async fn tell_doubts(&mut self, link: &mut Link) -> Result<(), LinkExit> {
         let (def, line) = (self.def.clone(), self.line);
         for unit in link.take_unsolicited() {
             for device in def.devices.iter().filter(|device| device.line == line && device.unit == unit) {
@@ -392,7 +392,7 @@ impl Task<'_> {
         Ok(())
     }
 
-    async fn tell_report(&mut self, schedule: Option<&Schedule>) -> Result<(), Ended> {
+    async fn tell_report(&mut self, schedule: Option<&Schedule>) -> Result<(), LinkExit> {
         let mut polls: Vec<_> = schedule.map(|schedule| schedule.polls().collect()).unwrap_or_default();
         polls.iter_mut().for_each(|poll| poll.next = poll.next.map(|at| self.clock.to_utc(at)));
         let plan = Plan {
@@ -406,7 +406,7 @@ impl Task<'_> {
         self.tell(Event::Report { at: self.clock.now(), line: self.line, report }).await
     }
 
-    async fn tell_state(&mut self, state: LineState) -> Result<(), Ended> {
+    async fn tell_state(&mut self, state: LineState) -> Result<(), LinkExit> {
         self.tell(Event::Line { at: self.clock.now(), line: self.line, state }).await
     }
 
@@ -417,16 +417,16 @@ impl Task<'_> {
         tags: Vec<TagId>,
         fault: Fault,
         exchange: Option<Arc<Exchange>>,
-    ) -> Result<(), Ended> {
+    ) -> Result<(), LinkExit> {
         self.tell(Event::Failed { at, device, tags, fault, exchange }).await
     }
 
-    async fn tell_wrote(&mut self, id: WriteId, result: WriteResult) -> Result<(), Ended> {
+    async fn tell_wrote(&mut self, id: WriteId, result: WriteResult) -> Result<(), LinkExit> {
         self.requests.ended(id);
         self.tell(Event::Wrote { at: self.clock.now(), id, result }).await
     }
 
-    async fn tell(&mut self, event: Event) -> Result<(), Ended> {
-        self.events.send(event).await.map_err(|_| Ended)
+    async fn tell(&mut self, event: Event) -> Result<(), LinkExit> {
+        self.events.send(event).await.map_err(|_| LinkExit::Shutdown)
     }
 }

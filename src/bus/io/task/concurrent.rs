@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use tokio::time::Instant;
 
 use super::{
-    Ended, Leave, Task, Turn,
+    LinkExit, Task,
     poll::{Outcome, parse, span},
 };
 use crate::{
@@ -35,7 +35,12 @@ pub(super) struct UnderWay {
 
 impl Task<'_> {
     /// Sends what is due over Modbus TCP, as far as there is room. If there is none for more, waits for an answer.
-    pub(super) async fn poll_tcp(&mut self, link: &mut Link, schedule: &mut Schedule, first: usize) -> Turn {
+    pub(super) async fn poll_tcp(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        first: usize,
+    ) -> Result<(), LinkExit> {
         let now = self.clock.now();
         let mut next = Next::Run(first);
         let full = loop {
@@ -54,7 +59,7 @@ impl Task<'_> {
     }
 
     /// Sends what was submitted, and waits for an answer if there is no room for more; all of it is given up for a stop.
-    async fn send(&mut self, link: &mut Link, schedule: &mut Schedule, full: bool) -> Turn {
+    async fn send(&mut self, link: &mut Link, schedule: &mut Schedule, full: bool) -> Result<(), LinkExit> {
         let sent = async {
             link.flush().await?;
             if full { link.wait_for_answer().await } else { Ok(()) }
@@ -63,7 +68,7 @@ impl Task<'_> {
         if sent.is_none() {
             self.give_up_reads(link, schedule);
         }
-        Ok(sent.unwrap_or(Ok(())).map_err(Leave::from))
+        sent.unwrap_or(Ok(())).map_err(LinkExit::from)
     }
 
     /// What is under way is read later: a stop cannot wait for it.
@@ -93,7 +98,7 @@ impl Task<'_> {
     }
 
     /// Takes what has come of the requests under way.
-    pub(super) async fn take_answers(&mut self, link: &mut Link, schedule: &mut Schedule) -> Turn {
+    pub(super) async fn take_answers(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
         for Answered { id, answer, at, mut exchange } in link.take_ended() {
             let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
             let UnderWay { index, block, began, tries, .. } = self.under_way.swap_remove(place);
@@ -133,7 +138,7 @@ impl Task<'_> {
         schedule: &mut Schedule,
         device: DeviceId,
         urgent: bool,
-    ) -> Result<Result<bool, Leave>, Ended> {
+    ) -> Result<bool, LinkExit> {
         let (unit, until) = (self.def.device(device).unit, Instant::now() + STOP_WAIT);
         while !link.is_free(unit) {
             let answer = link.wait_for_answer();
@@ -143,16 +148,14 @@ impl Task<'_> {
             };
             let Some(waited) = waited else {
                 self.give_up_reads(link, schedule);
-                return Ok(Ok(urgent));
+                return Ok(urgent);
             };
             if let Err(error) = waited {
-                return Ok(Err(Leave::from(error)));
+                return Err(LinkExit::from(error));
             }
-            if let Err(leave) = self.take_answers(link, schedule).await? {
-                return Ok(Err(leave));
-            }
+            self.take_answers(link, schedule).await?;
         }
-        Ok(Ok(true))
+        Ok(true)
     }
 
     /// Where a block stands that stood at `planned_at`: another answer may have changed the plan meanwhile.

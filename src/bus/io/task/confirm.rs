@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{Ended, Leave, Task, Turn, poll::value_of};
+use super::{LinkExit, Task, poll::value_of};
 use crate::{
     bus::{
         backoff::Backoff,
@@ -42,7 +42,7 @@ impl Task<'_> {
         tag: TagId,
         result: WriteResult,
         fault: Fault,
-    ) -> Result<(), Ended> {
+    ) -> Result<(), LinkExit> {
         let now = self.clock.now();
         let until = now.checked_add(CONFIRM_MAX).unwrap_or(Timestamp::MAX);
         self.unconfirmed.push(Unconfirmed { id, tag, result, next: now, until, backoff: Backoff::default() });
@@ -55,15 +55,13 @@ impl Task<'_> {
     }
 
     /// Reads the tag of the first that is due, and tells how its write has ended if that is known now.
-    pub(super) async fn confirm(&mut self, link: &mut Link, schedule: &mut Schedule) -> Turn {
+    pub(super) async fn confirm(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
         let now = self.clock.now();
-        let Some(index) = self.unconfirmed.iter().position(|write| write.next <= now) else { return Ok(Ok(())) };
+        let Some(index) = self.unconfirmed.iter().position(|write| write.next <= now) else { return Ok(()) };
         let def = self.def.clone();
         let tag = def.tag(self.unconfirmed[index].tag);
-        match self.clear_way(link, schedule, tag.device, false).await? {
-            Ok(true) => {}
-            Ok(false) => return Ok(Ok(())),
-            Err(leave) => return Ok(Err(leave)),
+        if !self.clear_way(link, schedule, tag.device, false).await? {
+            return Ok(());
         }
         let block = plan::single(def.device(tag.device), tag);
         let back = self.read_unless_stopped(link, &block, None).await;
@@ -71,8 +69,8 @@ impl Task<'_> {
         let raw = match back {
             Some(Ok(values)) => value_of(tag, &block, &values),
             Some(Err(LinkError::Fault(_))) => None,
-            Some(Err(LinkError::Gone(why))) => return Ok(Err(Leave::Lost(why))),
-            None => return Ok(Ok(())),
+            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
+            None => return Ok(()),
         };
         let Some(raw) = raw else {
             let write = &mut self.unconfirmed[index];
@@ -82,7 +80,7 @@ impl Task<'_> {
                 let write = self.unconfirmed.remove(index);
                 self.tell_wrote(write.id, write.result).await?;
             }
-            return Ok(Ok(()));
+            return Ok(());
         };
         let exchange = link.last.clone();
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
@@ -94,11 +92,11 @@ impl Task<'_> {
             WriteResult::NotRead(_) => WriteResult::ReadBack(raw),
             _ => WriteResult::Held(raw),
         };
-        self.tell_wrote(write.id, result).await.map(Ok)
+        self.tell_wrote(write.id, result).await
     }
 
     /// The port is left: nothing more can be learned of them in time.
-    pub(super) async fn give_up_unconfirmed(&mut self) -> Result<(), Ended> {
+    pub(super) async fn give_up_unconfirmed(&mut self) -> Result<(), LinkExit> {
         for write in std::mem::take(&mut self.unconfirmed) {
             self.tell_wrote(write.id, write.result).await?;
         }

@@ -8,7 +8,7 @@ use tokio_modbus::{
     bytes::{Buf, Bytes},
 };
 
-use super::{Ended, Leave, Task, Turn};
+use super::{LinkExit, Task};
 use crate::{
     bus::{
         codec,
@@ -41,7 +41,12 @@ pub(super) struct Outcome {
 
 impl Task<'_> {
     /// Reads the block that is due; over Modbus TCP also others that are, and without waiting for their answers.
-    pub(super) async fn poll(&mut self, link: &mut Link, schedule: &mut Schedule, index: usize) -> Turn {
+    pub(super) async fn poll(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        index: usize,
+    ) -> Result<(), LinkExit> {
         self.polls_since_test += 1;
         if link.framing() == Framing::Mbap {
             return self.poll_tcp(link, schedule, index).await;
@@ -61,18 +66,18 @@ impl Task<'_> {
         let answer = match read {
             Some(Ok(answer)) => Ok(answer),
             Some(Err(LinkError::Fault(fault))) => Err(fault),
-            Some(Err(LinkError::Gone(why))) => return Ok(Err(Leave::Lost(why))),
+            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
             // Nothing was learned of the device.
             None => {
                 schedule.again(index, ended);
-                return Ok(Ok(()));
+                return Ok(());
             }
         };
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
         let took = span(began, ended);
         self.settle(link, schedule, Some(index), &block, Outcome { began, ended, took, answer, exchange }).await?;
-        Ok(Ok(()))
+        Ok(())
     }
 
     /// Answers that had been given up have come: their devices need more time than they used to.
@@ -86,11 +91,11 @@ impl Task<'_> {
     }
 
     /// A peer may have forgotten a connection, or hold it without ever answering: only a new one tells.
-    pub(super) fn still_there(&self, link: &Link) -> Result<(), Leave> {
+    pub(super) fn still_there(&self, link: &Link) -> Result<(), LinkExit> {
         if self.settings.transport.serial().is_some() || link.unanswered < UNANSWERED_MAX {
             return Ok(());
         }
-        Err(Leave::Lost(format!("no answer to {} requests over this connection", link.unanswered)))
+        Err(LinkExit::Lost(format!("no answer to {} requests over this connection", link.unanswered)))
     }
 
     pub(super) fn keep_gap(&self, link: &mut Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {
@@ -109,7 +114,7 @@ impl Task<'_> {
         index: Option<usize>,
         block: &Block,
         Outcome { began, ended: at, took, answer, exchange }: Outcome,
-    ) -> Result<(), Ended> {
+    ) -> Result<(), LinkExit> {
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
         if let Some(exchange) = &exchange {
             let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
@@ -218,7 +223,7 @@ impl Task<'_> {
         values: &Answer,
         reply: Duration,
         exchange: Option<Arc<Exchange>>,
-    ) -> Result<(), Ended> {
+    ) -> Result<(), LinkExit> {
         let (mut numbers, mut texts, mut corrupt) = (Vec::with_capacity(block.tags.len()), Vec::new(), Vec::new());
         for tag in block.tags.iter().map(|tag| self.def.tag(*tag)) {
             match (value_of(tag, block, values), text_of(tag, block, values)) {

@@ -2,7 +2,7 @@
 
 use std::{pin::pin, sync::Arc};
 
-use super::{Ended, Leave, Task, Turn};
+use super::{LinkExit, Task};
 use crate::{
     bus::{
         diagnostics::{Ask, Step, StepResult},
@@ -31,19 +31,19 @@ impl Task<'_> {
     }
 
     /// One step of the diagnostic, between polls.
-    pub(super) async fn test_step(&mut self, link: &mut Link) -> Turn {
+    pub(super) async fn test_step(&mut self, link: &mut Link) -> Result<(), LinkExit> {
         self.polls_since_test = 0;
-        let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) else { return Ok(Ok(())) };
-        let Some(result) = self.step_unless_cut(link, &step, false).await? else { return Ok(Ok(())) };
+        let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) else { return Ok(()) };
+        let Some(result) = self.step_unless_cut(link, &step, false).await? else { return Ok(()) };
         match (result, &mut self.job) {
             (Ok(result), Some(job)) => {
                 let in_sync = stays_in_sync(link.framing(), &step.ask, &result);
                 job.take(result);
                 self.tell_test().await?;
-                Ok(if in_sync { Ok(()) } else { Err(Leave::Reopen) })
+                if in_sync { Ok(()) } else { Err(LinkExit::Reopen) }
             }
-            (Err(LinkError::Gone(why)), _) => Ok(Err(Leave::Lost(why))),
-            (Ok(_), None) | (Err(LinkError::Fault(_)), _) => Ok(Ok(())),
+            (Err(LinkError::Gone(why)), _) => Err(LinkExit::Lost(why)),
+            (Ok(_), None) | (Err(LinkError::Fault(_)), _) => Ok(()),
         }
     }
 
@@ -54,13 +54,13 @@ impl Task<'_> {
         link: &mut Link,
         step: &Step,
         alone: bool,
-    ) -> Result<Option<Result<StepResult, LinkError>>, Ended> {
+    ) -> Result<Option<Result<StepResult, LinkError>>, LinkExit> {
         {
             let mut result = pin!(testing::step(link, step));
             loop {
                 let request = tokio::select! {
                     biased;
-                    _ = self.stop.wait_for(|stop| *stop) => return Err(Ended),
+                    _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
                     result = &mut result => return Ok(Some(result)),
                     request = self.requests.recv() => request?,
                 };
@@ -74,7 +74,7 @@ impl Task<'_> {
     }
 
     /// The diagnostic has the port for itself, opened with the serial parameters that each step wants.
-    pub(super) async fn test_alone(&mut self) -> Result<(), Ended> {
+    pub(super) async fn test_alone(&mut self) -> Result<(), LinkExit> {
         let mut open: Option<Link> = None;
         let mut settings = self.settings.clone();
         while let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) {
@@ -114,7 +114,7 @@ impl Task<'_> {
     }
 
     /// Takes a request while a test is at work, `alone` on the port or between polls; `false` when the test is ended by it.
-    async fn hear_while_testing(&mut self, request: BusRequest, alone: bool) -> Result<bool, Ended> {
+    async fn hear_while_testing(&mut self, request: BusRequest, alone: bool) -> Result<bool, LinkExit> {
         match request {
             BusRequest::Write(WriteJob { id, urgent: false, .. }) if alone => {
                 self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
@@ -143,7 +143,7 @@ impl Task<'_> {
     }
 
     /// An operator stops the running diagnostic.
-    pub(super) async fn stop_test(&mut self) -> Result<(), Ended> {
+    pub(super) async fn stop_test(&mut self) -> Result<(), LinkExit> {
         if let Some(job) = &mut self.job {
             job.stop(DiagnosticState::Cancelled);
         }
@@ -151,7 +151,7 @@ impl Task<'_> {
     }
 
     /// The line cannot go on with the running diagnostic.
-    pub(super) async fn end_test(&mut self, why: &str) -> Result<(), Ended> {
+    pub(super) async fn end_test(&mut self, why: &str) -> Result<(), LinkExit> {
         if let Some(job) = &mut self.job {
             job.stop(DiagnosticState::Failed(why.to_owned()));
         }
@@ -159,7 +159,7 @@ impl Task<'_> {
     }
 
     /// Tells how the diagnostic stands, and forgets it when it is over.
-    pub(super) async fn tell_test(&mut self) -> Result<(), Ended> {
+    pub(super) async fn tell_test(&mut self) -> Result<(), LinkExit> {
         let Some(job) = &self.job else { return Ok(()) };
         let run = Arc::new(job.run().clone());
         if job.run().state != DiagnosticState::Running {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use tokio_modbus::Request;
 
-use super::{Ended, Leave, Task, Turn, poll::value_of};
+use super::{LinkExit, Task, poll::value_of};
 use crate::{
     bus::{
         codec,
@@ -40,7 +40,12 @@ enum Unlocked {
 
 impl Task<'_> {
     /// Performs a write and reports its result.
-    pub(super) async fn write(&mut self, link: &mut Link, schedule: &mut Schedule, job: &WriteJob) -> Turn {
+    pub(super) async fn write(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        job: &WriteJob,
+    ) -> Result<(), LinkExit> {
         let def = self.def.clone();
         let (id, tag) = (job.id, def.tag(job.tag));
         if job.urgent {
@@ -58,12 +63,12 @@ impl Task<'_> {
             // It waits again, unless the stop is one of its tag.
             Written::Ended(WriteResult::Overtaken) => {
                 self.requests.put_off(BusRequest::Write(*job));
-                return Ok(Ok(()));
+                return Ok(());
             }
             Written::Ended(result) => result,
             Written::PortClosed(result, why) => {
                 self.tell_wrote(id, result).await?;
-                return Ok(Err(Leave::Lost(why)));
+                return Err(LinkExit::Lost(why));
             }
         };
         // The key is lost where its write was not sent for want of an answer.
@@ -94,7 +99,7 @@ impl Task<'_> {
         // It may still be queued here or on the way; closing the connection discards it. A waiting stop does not wait for
         // another connection and follows it on this one.
         let tcp = self.settings.transport.serial().is_none();
-        Ok(if tcp && unanswered && !self.requests.stop_waits() { Err(Leave::Reopen) } else { Ok(()) })
+        if tcp && unanswered && !self.requests.stop_waits() { Err(LinkExit::Reopen) } else { Ok(()) }
     }
 
     /// Writes the key, reports it and has it read again.
@@ -105,7 +110,7 @@ impl Task<'_> {
         key: &TagDef,
         raw: f64,
         job: &WriteJob,
-    ) -> Result<Unlocked, Ended> {
+    ) -> Result<Unlocked, LinkExit> {
         // A key of another device would be written to an address of this one.
         if key.device != self.def.tag(job.tag).device {
             return Ok(Unlocked::No(Written::Ended(WriteResult::NotSent(Fault::NotANumber))));
