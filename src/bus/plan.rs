@@ -14,7 +14,8 @@ pub mod cost;
 pub mod gaps;
 mod cheapest;
 #[cfg(test)]
-mod rivals;
+#[path = "../../tests/bench/alternatives.rs"]
+mod alternatives;
 #[cfg(test)]
 mod tests;
 

@@ -2,8 +2,7 @@
 #![allow(clippy::print_stdout, missing_docs)]
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
-#[path = "../../src/bus/plan/rivals.rs"]
-mod rivals;
+mod alternatives;
 
 use std::{
     hint::black_box,
@@ -102,21 +101,21 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
 fn compare(def: &PlantDef) {
     let unreadable = UnreadableRanges::default();
     let plan = blocks(def, LineId(0), &unreadable);
-    let ours = rivals::wire_time(def, &plan);
+    let ours = alternatives::wire_time(def, &plan);
     println!("{} tags on {} devices, {}", def.tags.len(), def.devices.len(), def.lines[0].transport);
     println!("  our plan          {:4} requests {:8.1} ms", plan.len(), ours.as_secs_f64() * 1e3);
-    let tags = rivals::sorted(def);
-    let groups = rivals::groups(def, &tags);
+    let tags = alternatives::sorted(def);
+    let groups = alternatives::groups(def, &tags);
     let all = |cut: &dyn Fn(&[TagDef], &DeviceDef) -> Vec<Block>| -> Vec<Block> {
         groups.iter().flat_map(|(group, device)| cut(group, device)).collect()
     };
     for (name, rival) in [
-        ("one a tag", all(&rivals::singles)),
-        ("fixed 10", all(&|group, device| rivals::fixed(group, device, 10))),
-        ("fixed 60", all(&|group, device| rivals::fixed(group, device, 60))),
-        ("greedy", all(&|group, device| rivals::greedy(group, device, &unreadable))),
+        ("one a tag", all(&alternatives::singles)),
+        ("fixed 10", all(&|group, device| alternatives::fixed(group, device, 10))),
+        ("fixed 60", all(&|group, device| alternatives::fixed(group, device, 60))),
+        ("greedy", all(&|group, device| alternatives::greedy(group, device, &unreadable))),
     ] {
-        let theirs = rivals::wire_time(def, &rival);
+        let theirs = alternatives::wire_time(def, &rival);
         let ratio = ours.as_secs_f64() / theirs.as_secs_f64();
         println!(
             "  {name:16}  {:4} requests {:8.1} ms   ours is {ratio:.3} of it",
@@ -131,13 +130,13 @@ fn against_the_optimum(dice: &mut Dice) {
     let (mut worst, mut cases) = (1.0f64, 0);
     for _ in 0..1000 {
         let def = plant(1, 8, 24, dice);
-        let tags = rivals::sorted(&def);
-        let groups = rivals::groups(&def, &tags);
+        let tags = alternatives::sorted(&def);
+        let groups = alternatives::groups(&def, &tags);
         let least: Duration = groups
             .iter()
-            .map(|(group, device)| rivals::best_of_all(&def, group, device, &UnreadableRanges::default()))
+            .map(|(group, device)| alternatives::best_of_all(&def, group, device, &UnreadableRanges::default()))
             .sum();
-        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
+        let ours = alternatives::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
         worst = worst.max(ours.as_secs_f64() / least.as_secs_f64());
         cases += 1;
     }

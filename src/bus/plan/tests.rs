@@ -312,11 +312,11 @@ proptest! {
         let def = plant_of(&rows, Limits { read_registers_max: words, ..limits }, transport);
         let unreadable = holes_at(&missing);
         let refused = refused(&def, LineId(0), &unreadable);
-        let mut tags = rivals::sorted(&def);
+        let mut tags = alternatives::sorted(&def);
         tags.retain(|tag| !refused.contains(&tag.id));
-        let least: Duration = rivals::groups(&def, &tags).iter()
-            .map(|(group, device)| rivals::best_of_all(&def, group, device, &unreadable)).sum();
-        prop_assert_eq!(rivals::wire_time(&def, &kept(&def, &unreadable)), least);
+        let least: Duration = alternatives::groups(&def, &tags).iter()
+            .map(|(group, device)| alternatives::best_of_all(&def, group, device, &unreadable)).sum();
+        prop_assert_eq!(alternatives::wire_time(&def, &kept(&def, &unreadable)), least);
     }
 
     #[test]
@@ -326,18 +326,18 @@ proptest! {
     ) {
         // Fixed blocks read over gaps of any length, so the limit of gaps must not stand in the way of the plan.
         let def = plant_of(&rows, Limits { gap_registers_max: 200, alignment: 1, ..limits }, transport);
-        let ours = rivals::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
-        let tags = rivals::sorted(&def);
-        let groups = rivals::groups(&def, &tags);
+        let ours = alternatives::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
+        let tags = alternatives::sorted(&def);
+        let groups = alternatives::groups(&def, &tags);
         let (mut single, mut greedy, mut short, mut long) = <(Vec<_>, Vec<_>, Vec<_>, Vec<_>)>::default();
         for (group, device) in &groups {
-            single.extend(rivals::singles(group, device));
-            greedy.extend(rivals::greedy(group, device, &UnreadableRanges::default()));
-            short.extend(rivals::fixed(group, device, 10));
-            long.extend(rivals::fixed(group, device, 60));
+            single.extend(alternatives::singles(group, device));
+            greedy.extend(alternatives::greedy(group, device, &UnreadableRanges::default()));
+            short.extend(alternatives::fixed(group, device, 10));
+            long.extend(alternatives::fixed(group, device, 60));
         }
         for (name, rival) in [("one a tag", single), ("greedy", greedy), ("10 words", short), ("60 words", long)] {
-            let theirs = rivals::wire_time(&def, &rival);
+            let theirs = alternatives::wire_time(&def, &rival);
             prop_assert!(ours <= theirs, "{}: {:?} against our {:?}", name, theirs, ours);
         }
     }

@@ -1,4 +1,4 @@
-//! Other ways to cut tags into requests, to measure the plan against. The bench of the plan includes this file too.
+//! Alternative ways to cut tags into requests: what the read plan is compared with, in its tests and its bench.
 
 use std::time::Duration;
 

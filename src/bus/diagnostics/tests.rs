@@ -1,0 +1,159 @@
+//! Diagnostics against a device that is a function from request to response.
+
+use super::*;
+use crate::plant::{def::Framing, event::ExceptionCode};
+
+/// Runs a diagnostic against a device given as a function from request to answer.
+fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
+    let id = CommandId { terminal: 1, number: 1 };
+    let mut job = Job::new(id, "anna".into(), diagnostic, Timestamp::UNIX_EPOCH);
+    for _ in 0..10_000 {
+        let Some(next) = job.next() else { return job.run().clone() };
+        let result = match next.ask.clone() {
+            Ask::Raw(bytes) => StepResult::Bytes(bytes, Some(Duration::from_millis(1))),
+            Ask::Message(request) => {
+                let answer = device(&request);
+                let exchange = Exchange {
+                    at: Timestamp::UNIX_EPOCH,
+                    framing: Framing::Mbap,
+                    outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
+                    answer: answer.clone().unwrap_or_default().into(),
+                    request: request.into(),
+                    reply: answer.is_ok().then_some(Duration::from_millis(12)),
+                    tries: 1,
+                };
+                StepResult::Answer(answer, Arc::new(exchange))
+            }
+        };
+        job.take(result);
+    }
+    panic!("it never ends")
+}
+
+fn verdict(run: &DiagnosticRun) -> &str {
+    match run.findings.last() {
+        Some(Finding::Verdict(words)) => words,
+        other => panic!("no verdict but {other:?}"),
+    }
+}
+
+#[test]
+fn a_scan_finds_who_answers_and_who_refuses() {
+    let scan = Scan { first: 1, last: 20, serials: vec![], timeout: Duration::from_millis(100) };
+    let found = run(Diagnostic::Scan(scan), |request| match request[0] {
+        3 => Ok(vec![3, 3, 2, 0, 77]),
+        17 => Err(Fault::Exception(ExceptionCode(2))),
+        18 => Err(Fault::Exception(ExceptionCode(0x0B))),
+        _ => Err(Fault::Timeout),
+    });
+    assert_eq!((found.done, found.total, &found.state), (20, 20, &DiagnosticState::Done));
+    let units: Vec<_> = found
+        .findings
+        .iter()
+        .filter_map(|finding| match finding {
+            Finding::Unit { unit, words, .. } => Some((*unit, words.as_str())),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(units, [(3, "register 0 = 77"), (17, "exception 02, illegal data address")]);
+    assert_eq!(verdict(&found), "2 answers");
+}
+
+#[test]
+fn a_scan_over_several_settings_needs_the_line_for_itself() {
+    let serials = vec![Serial::USUAL, Serial { baud: 19_200, ..Serial::USUAL }];
+    let scan = Scan { first: 1, last: 3, serials, timeout: Duration::from_millis(100) };
+    let job =
+        Job::new(CommandId { terminal: 1, number: 1 }, "anna".into(), Diagnostic::Scan(scan), Timestamp::UNIX_EPOCH);
+    assert!(job.is_exclusive());
+    assert_eq!(job.run().total, 6);
+}
+
+#[test]
+fn a_foreign_unit_that_chatters_is_not_every_unit() {
+    let scan = |last| {
+        let diagnostic =
+            Diagnostic::Scan(Scan { first: 1, last, serials: vec![], timeout: Duration::from_millis(100) });
+        run(diagnostic, |request| match request[0] {
+            2 => Ok(vec![2, 3, 2, 0, 77]),
+            asked => Err(Fault::WrongUnit { got: 99, asked }),
+        })
+    };
+    let units = |run: &DiagnosticRun| run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
+    assert_eq!(units(&scan(4)), 4, "a few may be units with other settings");
+    let many = scan(20);
+    assert_eq!((units(&many), verdict(&many)), (1, "1 answer"));
+    let told = many.findings.iter().find_map(|finding| match finding {
+        Finding::Failed { what, .. } => Some(what.as_str()),
+        _ => None,
+    });
+    assert_eq!(told, Some("19 addresses: something else talks on this line"));
+}
+
+#[test]
+fn loopbacks_are_counted() {
+    let diagnostic = Diagnostic::Loopback { unit: 1, data: 0xA537, count: 3 };
+    let all = run(diagnostic.clone(), |request| Ok(request.to_vec()));
+    assert_eq!(verdict(&all), "3 of 3 result back, 12.0 to 12.0 ms");
+    let none = run(diagnostic, |_| Err(Fault::Timeout));
+    assert_eq!(verdict(&none), "none of 3 result back");
+    let diagnostic = Diagnostic::Loopback { unit: 1, data: 0, count: 3 };
+    let without = run(diagnostic, |_| Err(Fault::Exception(ExceptionCode(1))));
+    assert!(verdict(&without).starts_with("the unit answers"), "{}", verdict(&without));
+}
+
+#[test]
+fn an_identification_in_pieces_is_asked_to_its_end() {
+    let objects = ["ACME", "PM", "1.0", "http://acme.example"];
+    let found = run(Diagnostic::Identify { unit: 1 }, |request| {
+        let (code, id) = (request[3], usize::from(request[4]));
+        let Some(text) = objects.get(id).filter(|_| code == 1 || 3 <= id) else {
+            return Err(Fault::Exception(ExceptionCode(2)));
+        };
+        let last = id == if code == 1 { 2 } else { 3 };
+        let more = if last { [0, 0] } else { [0xFF, id as u8 + 1] };
+        let head = [1, 0x2B, 0x0E, code, 0x82, more[0], more[1], 1, id as u8, text.len() as u8];
+        Ok(head.into_iter().chain(text.bytes()).collect())
+    });
+    let names: Vec<_> = found
+        .findings
+        .iter()
+        .filter_map(|finding| match finding {
+            Finding::Object { name, text } => Some(format!("{name} {text}")),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(names, ["VendorName ACME", "ProductCode PM", "MajorMinorRevision 1.0", "VendorUrl http://acme.example"]);
+}
+
+#[test]
+fn a_device_without_identification_is_asked_for_its_server_id() {
+    let found = run(Diagnostic::Identify { unit: 1 }, |request| match request[1] {
+        0x11 => Ok(vec![1, 0x11, 3, b'X', 0xFF, b'Y']),
+        _ => Err(Fault::Exception(ExceptionCode(1))),
+    });
+    let server = Finding::Object { name: "ServerId".into(), text: "X\\xFFY".into() };
+    assert!(found.findings.contains(&server), "{:?}", found.findings);
+}
+
+#[test]
+fn a_block_with_a_hole_is_read_register_by_register() {
+    let diagnostic = Diagnostic::Read { unit: 1, table: Table::Holding, address: 10, count: 3 };
+    let found = run(diagnostic, |request| {
+        let (first, count) = (u16::from(request[3]), u16::from(request[5]));
+        if (first..first + count).contains(&11) {
+            return Err(Fault::Exception(ExceptionCode(2)));
+        }
+        Ok([1, 3, 2 * count as u8].into_iter().chain((first..first + count).flat_map(u16::to_be_bytes)).collect())
+    });
+    let read: Vec<_> = found
+        .findings
+        .iter()
+        .filter_map(|finding| match finding {
+            Finding::Values { address, words, .. } => Some((*address, words.clone())),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(read, [(10, vec![10]), (12, vec![12])]);
+    assert_eq!((found.done, found.total), (4, 4));
+}

@@ -1,0 +1,203 @@
+//! Writes: sent once, read back, and stops that wait for nothing but the transaction under way.
+
+use super::*;
+
+/// Writes register 10 := 10 (so that the read-back fits the address rule) and gives result and number of writes on the wire.
+async fn write(action: SlaveAction, read_back: SlaveAction) -> (WriteResult, usize) {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    let writes = Arc::new(AtomicUsize::new(0));
+    let count = writes.clone();
+    line.plug(Mode::Rtu, move |_, message| {
+        if message[1] == 6 {
+            count.fetch_add(1, Ordering::Relaxed);
+            return action.clone();
+        }
+        if message[2..6] == [0, 10, 0, 1] { read_back.clone() } else { SlaveAction::Answer }
+    });
+    line.read(&def).await;
+    let request = BusRequest::Write(WriteJob {
+        id: WriteId(7),
+        tag: TagId(0),
+        raw: 10.0,
+        unlock: None,
+        verify: true,
+        urgent: false,
+    });
+    line.requests.send(request).await.expect("the line runs");
+    let result = line
+        .until(&def, |event| match event {
+            Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),
+            _ => None,
+        })
+        .await;
+    for _ in 0..20 {
+        line.next(&def).await;
+    }
+    (result, writes.load(Ordering::Relaxed))
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_write_is_sent_once_whatever_happens() {
+    for (action, read_back, expect) in [
+        (SlaveAction::Answer, SlaveAction::Answer, WriteResult::ReadBack(10.0)),
+        (SlaveAction::Exception(3), SlaveAction::Answer, WriteResult::Refused(ExceptionCode(3))),
+        (SlaveAction::Silent, SlaveAction::Answer, WriteResult::Held(10.0)),
+        (SlaveAction::Silent, SlaveAction::Silent, WriteResult::Lost(Fault::Timeout)),
+        (SlaveAction::Answer, SlaveAction::Silent, WriteResult::NotRead(Fault::Timeout)),
+        (SlaveAction::Instead(vec![1, 6, 0, 10, 0, 11]), SlaveAction::Answer, WriteResult::Held(10.0)),
+    ] {
+        assert_eq!(write(action.clone(), read_back).await, (expect, 1), "{action:?}");
+    }
+}
+
+/// A broadcast is sent once, nobody waits for an answer, and it is told as accepted, not as verified.
+#[tokio::test(start_paused = true)]
+async fn a_broadcast_is_sent_once_and_never_called_verified() {
+    for mode in [Mode::Rtu, Mode::Ascii] {
+        let mut def = plant(mode);
+        def.devices[0].unit = 0;
+        def.tags.retain(|tag| tag.device == DeviceId(1));
+        let everybody = TagDef { device: DeviceId(0), access: Access::Write, ..def.tags[0].clone() };
+        def.tags.insert(0, everybody);
+        for (index, tag) in def.tags.iter_mut().enumerate() {
+            tag.id = TagId(index as u16);
+        }
+        let mut line = line(def.clone());
+        let heard = Arc::new(AtomicUsize::new(0));
+        let count = heard.clone();
+        line.plug(mode, move |_, message| {
+            if message[0] != 0 {
+                return SlaveAction::Answer;
+            }
+            count.fetch_add(1, Ordering::Relaxed);
+            SlaveAction::Silent
+        });
+        line.read(&def).await;
+        let request = BusRequest::Write(WriteJob {
+            id: WriteId(1),
+            tag: TagId(0),
+            raw: 7.0,
+            unlock: None,
+            verify: false,
+            urgent: false,
+        });
+        line.requests.send(request).await.expect("the line runs");
+        let result = line
+            .until(&def, |event| match event {
+                Event::Wrote { result, .. } => Some(result.clone()),
+                _ => None,
+            })
+            .await;
+        assert_eq!((result, heard.load(Ordering::Relaxed)), (WriteResult::Accepted, 1), "{mode:?}");
+        line.read(&def).await;
+    }
+}
+
+/// The refusal of a write that was given up must not be taken for the refusal of the next: that one may take effect.
+#[tokio::test(start_paused = true)]
+async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    let mut writes = 0;
+    line.plug(Mode::Rtu, move |_, message| {
+        writes += usize::from(message[1] == 6);
+        match (message[1], writes) {
+            (6, 1) | (8, _) => SlaveAction::Silent,
+            (6, _) => SlaveAction::Exception(3),
+            _ => SlaveAction::Answer,
+        }
+    });
+    line.read(&def).await;
+    for (id, tag) in [(1, 0), (2, 1)] {
+        let request = BusRequest::Write(WriteJob {
+            id: WriteId(id),
+            tag: TagId(tag),
+            raw: 10.0,
+            unlock: None,
+            verify: true,
+            urgent: false,
+        });
+        line.requests.send(request).await.expect("the line runs");
+    }
+    for (id, expect) in
+        // Read once the unit is in sync: what the device holds, not what an answer to another write says.
+        [(1, WriteResult::Held(10.0)), (2, WriteResult::Held(11.0))]
+    {
+        let result = line
+            .until(&def, |event| match event {
+                Event::Wrote { id: done, result, .. } if *done == WriteId(id) => Some(result.clone()),
+                _ => None,
+            })
+            .await;
+        assert_eq!(result, expect);
+    }
+}
+
+/// Writes that got no answer have used up their share of a full line. A stop goes all the same, and what was requested before
+/// it and still waits does not undo it.
+#[tokio::test(start_paused = true)]
+async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    let heard = Arc::new(std::sync::Mutex::new(Vec::new()));
+    let list = heard.clone();
+    line.plug(Mode::Rtu, move |_, message| {
+        list.lock().expect("no panic").push(message[..6].to_vec());
+        let lost = message[1] == 6 && message[3] < 20;
+        if lost { SlaveAction::Silent } else { SlaveAction::Late(200 * MS) }
+    });
+    line.read(&def).await;
+    let write = |id, tag, raw, urgent| {
+        BusRequest::Write(WriteJob { id: WriteId(id), tag: TagId(tag), raw, unlock: None, verify: true, urgent })
+    };
+    for tag in 0..4u16 {
+        line.requests.send(write(u64::from(tag), tag, 1.0, false)).await.expect("the line runs");
+    }
+    line.until(&def, |event| matches!(event, Event::Wrote { id: WriteId(3), .. }).then_some(())).await;
+    line.requests.send(write(4, 4, 1.0, false)).await.expect("the line runs");
+    line.requests.send(write(5, 4, 0.0, true)).await.expect("the line runs");
+    let before = heard.lock().expect("no panic").len();
+    let mut results = Vec::new();
+    while results.len() < 2 {
+        let ended = |event: &Event| match event {
+            Event::Wrote { id, result, .. } => Some((id.0, result.clone())),
+            _ => None,
+        };
+        results.push(line.until(&def, ended).await);
+    }
+    assert_eq!(results, [(4, WriteResult::Overtaken), (5, WriteResult::ReadBack(20.0))]);
+    let heard = heard.lock().expect("no panic").clone();
+    let stop = heard.iter().position(|message| *message == [1, 6, 0, 20, 0, 0]).expect("sent");
+    assert!(stop <= before + 1, "{} requests went before the stop: {:?}", stop - before, &heard[before..]);
+    assert!(!heard.contains(&vec![1, 6, 0, 20, 0, 1]), "the start is not sent after the stop");
+}
+
+/// A key that was turned stays turned though the value is refused: that is told, and the key is read again.
+#[tokio::test(start_paused = true)]
+async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
+    let def = plant(Mode::Rtu);
+    let (value, key) = (TagId(1), TagId(9));
+    let mut line = line(def.clone());
+    line.plug(Mode::Rtu, |_, message| match message {
+        [1, 6, 0, 11, ..] => SlaveAction::Exception(3),
+        _ => SlaveAction::Answer,
+    });
+    // The key is read once at the start and then only when somebody asks for it.
+    let holds = |event: &Event| match event {
+        Event::Read { values, .. } => values.iter().any(|(tag, _)| *tag == key).then_some(()),
+        _ => None,
+    };
+    line.until(&def, holds).await;
+    let (id, unlock) = (WriteId(1), Some((key, 1.0)));
+    let request = BusRequest::Write(WriteJob { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false });
+    line.requests.send(request).await.expect("the line runs");
+    let told = |event: &Event| match event {
+        Event::Unlocked { key, result, .. } => Some((Some(*key), result.clone())),
+        Event::Wrote { result, .. } => Some((None, result.clone())),
+        _ => None,
+    };
+    assert_eq!(line.until(&def, told).await, (Some(key), WriteResult::Accepted));
+    assert_eq!(line.until(&def, told).await, (None, WriteResult::Refused(ExceptionCode(3))));
+    line.until(&def, holds).await;
+}
