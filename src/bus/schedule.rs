@@ -10,6 +10,7 @@ pub mod overload;
 mod device;
 mod poll;
 mod queue;
+mod status;
 #[cfg(test)]
 mod model;
 #[cfg(test)]
@@ -35,7 +36,7 @@ use super::plan::Block;
 use crate::plant::{
     def::{DeviceId, LineDef},
     event::ExceptionCode,
-    number::{to_f32, to_u32},
+    number::to_u32,
     tag::PollClass,
 };
 
@@ -199,24 +200,6 @@ impl Schedule {
         }
     }
 
-    /// How a poll stands.
-    fn info(&self, poll: &Pending) -> PollInfo {
-        let pace = self.pace_of(poll);
-        let factor = match (self.overload.load(), pace) {
-            (Load::Overload { factor }, Pace::Stretched(_)) => to_f32(factor),
-            (Load::Overload { .. }, Pace::Normal | Pace::Shed) | (Load::Normal, _) => 1.0,
-        };
-        PollInfo {
-            class: poll.class,
-            period: poll.period,
-            factor,
-            shed: pace == Pace::Shed,
-            next: poll.wanted(),
-            missed: poll.missed,
-            measured: poll.measured(),
-        }
-    }
-
     /// The request for this block is sent; it is not due again before [`Schedule::done`]. Needed only where others are sent
     /// before its answer comes.
     pub fn begin(&mut self, index: usize, now: Timestamp) {
@@ -375,37 +358,11 @@ impl Schedule {
         }
     }
 
-    /// Is the device given up?
-    pub fn is_down(&self, device: DeviceId) -> bool {
-        self.health(device).is_some_and(Health::is_down)
-    }
-
-    /// Must the device be left alone now (it is settling, or replies are outstanding)?
-    pub fn is_resting(&self, device: DeviceId, now: Timestamp) -> bool {
-        self.health(device).is_some_and(|health| now < health.rests_until)
-    }
-
-    /// The devices that do not answer, each with the moment when it is asked next.
-    pub fn retries(&self) -> Vec<(DeviceId, Timestamp)> {
-        let retry = |health: &Health| Some((health.device, self.probe_from(health)?));
-        self.devices.iter().filter_map(retry).collect()
-    }
-
     /// When a device that does not answer is asked next.
     fn probe_from(&self, health: &Health) -> Option<Timestamp> {
         let probe_at = health.probe_at?;
         let affordable = if health.prompt { probe_at } else { probe_at.max(self.probes.allows_from()) };
         Some(affordable.max(health.rests_until))
-    }
-
-    /// How the line copes: what is shed, and by what normal polls are stretched.
-    pub fn load(&self) -> Load {
-        self.overload.load()
-    }
-
-    /// How each poll stands, in the order of the blocks.
-    pub fn polls(&self) -> impl Iterator<Item = PollInfo> {
-        self.polls.iter().map(|poll| self.info(poll))
     }
 
     /// `None` for a device of which nothing is read.

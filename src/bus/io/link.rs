@@ -9,6 +9,7 @@
 //! PDUs are made and read by tokio-modbus, with a fresh context for every request on one end of a pipe; what travels on
 //! the port is ours.
 
+mod raw;
 mod receive;
 mod transactions;
 
@@ -26,10 +27,7 @@ use tokio_modbus::{
 };
 
 pub use self::transactions::Ended;
-use self::{
-    receive::{RECEIVE_MAX, Received},
-    transactions::Transactions,
-};
+use self::{receive::Received, transactions::Transactions};
 use super::{
     clock::Clock,
     transport::{CountUart, Opened},
@@ -37,8 +35,7 @@ use super::{
 };
 use crate::{
     bus::{
-        frame::{self, Mbap, Shape},
-        framing::{self, FrameMatch},
+        frame::{self, Shape},
         late_reply::OutstandingReplies,
         plan::Block,
     },
@@ -185,50 +182,6 @@ impl Link {
         self.keep(frame, received, sent_at).map_err(LinkError::Fault)
     }
 
-    /// Sends bytes as they are and gives everything that comes back until the line is silent: for tests of the line.
-    pub async fn send_raw(&mut self, bytes: &[u8]) -> Result<(Vec<u8>, Option<Duration>), LinkError> {
-        let framing = self.framing();
-        // What comes next would be shown as the answer.
-        self.finish_all().await?;
-        let request = frame::unwrap(framing, bytes).unwrap_or_default();
-        let sent_at = self.send(&request, bytes).await?;
-        self.note_sent(bytes.into());
-        let deadline = sent_at + self.timeout + self.wire.char_time * to_u32(frame::MESSAGE_MAX);
-        let proof = framing != Framing::Mbap && !self.wire.replies.is_ambiguous(&request);
-        let (mut buffer, mut reply) = (Vec::new(), None);
-        let mut until = deadline;
-        let answered = loop {
-            if !self.wire.receive(until, &mut buffer).await? || RECEIVE_MAX <= buffer.len() {
-                break false;
-            }
-            reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
-            // A request is answered by one frame; what follows bytes that are none only silence tells.
-            if request.is_empty() {
-                until = (Instant::now() + self.idle).min(deadline);
-                continue;
-            }
-            let whole = match framing {
-                Framing::Mbap => matches!(frame::mbap(&buffer), Mbap::Whole { .. }),
-                Framing::Rtu | Framing::Ascii => {
-                    matches!(framing::find_answer(framing, &request, &buffer), FrameMatch::Answer(_))
-                }
-            };
-            if whole {
-                break true;
-            }
-        };
-        self.asked = None;
-        if !buffer.is_empty() {
-            self.wire.record(false, buffer[..].into(), Cow::Borrowed("received"));
-        }
-        self.wire.rest(self.wire.silence);
-        // What was sent may have been a request whose answer is still to come.
-        if framing != Framing::Mbap && !request.is_empty() && !(answered && proof) {
-            self.expect_late(&request);
-        }
-        Ok((buffer, reply))
-    }
-
     /// The caller of the exchange under way has given it up, for something that cannot wait. Its answer may still come.
     pub fn abandon(&mut self) {
         self.abandon_mbap();
@@ -281,24 +234,6 @@ impl Link {
     /// Outstanding replies of a unit.
     pub fn outstanding(&self, unit: u8) -> &OutstandingReplies {
         self.wire.replies.of(unit)
-    }
-
-    /// Resynchronises a unit by a loopback, where no read can: after it nothing older can come any more.
-    pub async fn loopback(&mut self, unit: u8) -> Result<(), LinkError> {
-        let proves = self.outstanding(unit).refusal_proves();
-        let loopback = self.wire.replies.next_loopback(unit);
-        match self.exchange(&loopback).await {
-            Ok(_) => Ok(()),
-            Err(LinkError::Fault(Fault::Exception(_))) if proves => {
-                if !self.is_unsettled(unit) {
-                    self.wire.replies.clear(unit, self.wire.age());
-                }
-                Ok(())
-            }
-            // It may be the answer to an earlier loopback: the unit is alive, but not in sync.
-            Err(LinkError::Fault(Fault::Exception(_))) => Err(Fault::Timeout.into()),
-            Err(error) => Err(error),
-        }
     }
 
     /// See [`crate::bus::late_reply::LineReplies::forget`].

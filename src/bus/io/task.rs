@@ -4,6 +4,7 @@ mod concurrent;
 mod confirm;
 mod poll;
 mod test;
+mod wait;
 mod write;
 
 use std::{convert::Infallible, sync::Arc, time::Duration};
@@ -180,59 +181,6 @@ impl Task<'_> {
                     self.tell_state(LineState::Waiting { why, retry_at }).await?;
                     self.tell_report(None).await?;
                     self.wait(Some(retry_at)).await?;
-                }
-            }
-        }
-    }
-
-    /// Waits without a port until a moment, or until an operator opens the line; refuses writes meanwhile.
-    async fn wait(&mut self, mut until: Option<Timestamp>) -> Result<(), LinkExit> {
-        loop {
-            let (clock, wake) = (self.clock, until);
-            let pause = async {
-                match wake {
-                    Some(until) => clock.sleep_until(until).await,
-                    None => std::future::pending().await,
-                }
-            };
-            let request = tokio::select! {
-                biased;
-                _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
-                request = self.requests.recv() => request?,
-                () = pause => return Ok(()),
-            };
-            match request {
-                BusRequest::Write(job) => self.tell_wrote(job.id, WriteResult::NotSent(Fault::NotConnected)).await?,
-                // An operator does not wait for the next try to open the port.
-                BusRequest::Refresh { .. } if until.is_some() => return Ok(()),
-                BusRequest::Refresh { .. } | BusRequest::StopTest => {}
-                BusRequest::Connect(true) => return Ok(()),
-                BusRequest::Connect(false) => {
-                    until = None;
-                    self.tell_state(LineState::Disconnected).await?;
-                }
-                BusRequest::Configure(settings) => {
-                    self.configure(*settings);
-                    self.tell_report(None).await?;
-                    if until.is_some() {
-                        return Ok(());
-                    }
-                }
-                BusRequest::Test { id, by, diagnostic } => {
-                    let job = Job::new(id, by, diagnostic, self.clock.now());
-                    let alone = job.is_exclusive();
-                    self.job = Some(job);
-                    if alone {
-                        self.tell_state(LineState::Testing).await?;
-                        self.test_alone().await?;
-                        // A line that an operator has closed stays closed.
-                        if until.is_some() {
-                            return Ok(());
-                        }
-                        self.tell_state(LineState::Disconnected).await?;
-                        continue;
-                    }
-                    self.end_test("the line is not connected").await?;
                 }
             }
         }

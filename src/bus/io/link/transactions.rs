@@ -5,6 +5,8 @@
 //!                          └──────timeout─> given up ──late answer: dropped, its unit is noted
 //! ```
 
+mod busy;
+
 use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
 
 use tokio::time::Instant;
@@ -298,23 +300,6 @@ impl Link {
         self.close_busy(Instant::now());
     }
 
-    /// Real time in which the line was busy since this was last asked.
-    pub fn take_busy(&mut self) -> Duration {
-        if let Some(since) = &mut self.transactions.busy_since {
-            self.busy += since.elapsed();
-            *since = Instant::now();
-        }
-        std::mem::take(&mut self.busy)
-    }
-
-    fn close_busy(&mut self, now: Instant) {
-        if self.transactions.under_way.is_empty()
-            && let Some(since) = self.transactions.busy_since.take()
-        {
-            self.busy += now.saturating_duration_since(since);
-        }
-    }
-
     /// Takes what comes until `until`, or until the first time for an answer is over. May be dropped while it waits.
     async fn collect(&mut self, until: Instant) -> Result<(), LinkError> {
         let deadlines = self.transactions.under_way.iter().filter_map(Transaction::deadline);
@@ -405,20 +390,4 @@ impl Link {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_id_of_a_request_that_was_given_up_for_a_stop_names_no_later_one() {
-        let mut transactions = Transactions::new();
-        let id = transactions.begin(&[1, 3, 0, 0, 0, 1], Duration::from_secs(1));
-        transactions.under_way[0].sent_at = Some(Instant::now());
-        transactions.give_up_all();
-        for _ in 0..=u16::MAX {
-            let later = transactions.begin(&[1, 3, 0, 9, 0, 1], Duration::from_secs(1));
-            assert_ne!(later, id, "its answer is still owed");
-            transactions.under_way.clear();
-        }
-        assert!(matches!(transactions.take(id), Owner::Unknown), "it is not late: no time was given to it");
-    }
-}
+mod tests;

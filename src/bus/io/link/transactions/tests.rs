@@ -1,0 +1,17 @@
+//! Transaction ids.
+
+use super::*;
+
+#[test]
+fn the_id_of_a_request_that_was_given_up_for_a_stop_names_no_later_one() {
+    let mut transactions = Transactions::new();
+    let id = transactions.begin(&[1, 3, 0, 0, 0, 1], Duration::from_secs(1));
+    transactions.under_way[0].sent_at = Some(Instant::now());
+    transactions.give_up_all();
+    for _ in 0..=u16::MAX {
+        let later = transactions.begin(&[1, 3, 0, 9, 0, 1], Duration::from_secs(1));
+        assert_ne!(later, id, "its reply is outstanding");
+        transactions.under_way.clear();
+    }
+    assert!(matches!(transactions.take(id), Owner::Unknown), "it is not late: no time was given to it");
+}

@@ -1,0 +1,67 @@
+//! A line without a port: until it is tried again, or an operator opens it.
+
+use jiff::Timestamp;
+
+use super::{LinkExit, Task};
+use crate::{
+    bus::diagnostics::Job,
+    plant::{
+        command::BusRequest,
+        event::{Fault, LineState, WriteResult},
+    },
+};
+
+impl Task<'_> {
+    /// Waits without a port until a moment, or until an operator opens the line; refuses writes meanwhile.
+    pub(super) async fn wait(&mut self, mut until: Option<Timestamp>) -> Result<(), LinkExit> {
+        loop {
+            let (clock, wake) = (self.clock, until);
+            let pause = async {
+                match wake {
+                    Some(until) => clock.sleep_until(until).await,
+                    None => std::future::pending().await,
+                }
+            };
+            let request = tokio::select! {
+                biased;
+                _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
+                request = self.requests.recv() => request?,
+                () = pause => return Ok(()),
+            };
+            match request {
+                BusRequest::Write(job) => self.tell_wrote(job.id, WriteResult::NotSent(Fault::NotConnected)).await?,
+                // An operator does not wait for the next try to open the port.
+                BusRequest::Refresh { .. } if until.is_some() => return Ok(()),
+                BusRequest::Refresh { .. } | BusRequest::StopTest => {}
+                BusRequest::Connect(true) => return Ok(()),
+                BusRequest::Connect(false) => {
+                    until = None;
+                    self.tell_state(LineState::Disconnected).await?;
+                }
+                BusRequest::Configure(settings) => {
+                    self.configure(*settings);
+                    self.tell_report(None).await?;
+                    if until.is_some() {
+                        return Ok(());
+                    }
+                }
+                BusRequest::Test { id, by, diagnostic } => {
+                    let job = Job::new(id, by, diagnostic, self.clock.now());
+                    let alone = job.is_exclusive();
+                    self.job = Some(job);
+                    if alone {
+                        self.tell_state(LineState::Testing).await?;
+                        self.test_alone().await?;
+                        // A line that an operator has closed stays closed.
+                        if until.is_some() {
+                            return Ok(());
+                        }
+                        self.tell_state(LineState::Disconnected).await?;
+                        continue;
+                    }
+                    self.end_test("the line is not connected").await?;
+                }
+            }
+        }
+    }
+}
