@@ -89,7 +89,7 @@ pub fn interlock_words(cx: &ViewContext, lock: &InterlockDef) -> Option<(String,
             Some((format!("{mark} {}: {name} is {now}", lock.message), cx.theme.strong()))
         }
         (InterlockStatus::Unknown(cause), _) => {
-            let words = format!("? cannot be told: {name} is not good ({}): {}", cause.label(), lock.message);
+            let words = format!("? unknown: {name} is not good ({}): {}", cause.label(), lock.message);
             Some((words, cx.theme.trouble()))
         }
     }

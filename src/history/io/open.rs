@@ -37,7 +37,7 @@ pub struct Opened<T = ()> {
 pub struct Restored {
     /// The steps of alarms that the plant restores.
     pub steps: Vec<AlarmRecord>,
-    /// What the quality meter of the alarms must know of the last day.
+    /// What the alarm monitor must know of the last day.
     pub recent: Recent,
     /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
     pub chain_hashes: Option<Vec<ChainHash>>,

@@ -19,7 +19,7 @@ use crate::plant::{
     station::STATION,
 };
 
-/// A suppressed alarm whose enabling has been unknown for so long comes back: one that cannot be told any more must not keep
+/// A suppressed alarm whose enabling has been unknown for so long comes back: an unknown condition must not keep
 /// an alarm away for ever, and a lost frame or a restart must not bring all of them back at once.
 const UNKNOWN_MAX: Duration = Duration::from_secs(60);
 

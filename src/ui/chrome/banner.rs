@@ -76,9 +76,9 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     }
 }
 
-/// Why more may be wrong than can be seen: the station judges nothing, or there is a flood.
+/// Why more may be wrong than can be seen: the station evaluates nothing, or there is a flood.
 fn worry_words(model: &Model, cx: &ViewContext) -> String {
-    let blind = if silent_words(model).is_some() { "alarms not judged   " } else { "" };
+    let blind = if silent_words(model).is_some() { "alarms not evaluated   " } else { "" };
     let flood = if cx.snapshot.alarm_metrics.flood_since.is_some() { "FLOOD   " } else { "" };
     format!("{blind}{flood}")
 }
@@ -86,21 +86,21 @@ fn worry_words(model: &Model, cx: &ViewContext) -> String {
 /// `3 suppressed`: shelved or out of service. What is suppressed by design is as it should be, and stands
 /// on the alarms tab only.
 fn suppressed_words(cx: &ViewContext) -> String {
-    let by_somebody =
+    let by_operator =
         cx.snapshot.suppressed.iter().filter(|suppressed| suppressed.state != AlarmState::SuppressedByDesign);
-    match by_somebody.count() {
+    match by_operator.count() {
         0 => String::new(),
         many => format!("{many} suppressed"),
     }
 }
 
-/// Something is active and unacknowledged, and somebody has silenced it.
+/// Something is active and unacknowledged, and was silenced.
 fn is_silenced(cx: &ViewContext) -> bool {
     let sounds = |alarm: &ActiveAlarm| alarm.state == AlarmState::Unacknowledged;
     !cx.snapshot.sound && cx.snapshot.alarms.iter().any(sounds)
 }
 
-/// Why alarms may be there without being seen: `alarms not judged: L1 disconnected`.
+/// Why alarms may be there without being seen: `alarms not evaluated: L1 disconnected`.
 fn blind_words(model: &Model, cx: &ViewContext) -> Option<String> {
     let snapshot = cx.snapshot;
     let silent = silent_words(model);
@@ -125,7 +125,7 @@ fn blind_words(model: &Model, cx: &ViewContext) -> Option<String> {
 }
 
 fn not_judged(why: &str) -> String {
-    format!("alarms not judged: {why}")
+    format!("alarms not evaluated: {why}")
 }
 
 /// Why nothing is heard of the station.

@@ -54,7 +54,7 @@ pub enum Page {
     System,
     /// What was.
     Journal,
-    /// The alarm meter.
+    /// Metrics of the alarm system.
     Metrics,
     /// What the next shift must know.
     Handover,

@@ -244,7 +244,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     let mut model = faceplate(&fixture, "PLC-1.P-1");
     type_keys(&mut model, "t");
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("? cannot be told: PLC-1.TK-2 is not good"), "{shown}");
+    assert!(shown.contains("? unknown: PLC-1.TK-2 is not good"), "{shown}");
     assert!(sent_kind(&type_keys(&mut model, "⏎")).is_some());
 }
 

@@ -190,18 +190,18 @@ fn nobody_says_no_alarms_who_cannot_see_them() {
         assert_eq!(banner.trim(), expect);
     };
     check(LineState::Connected, "no alarms");
-    check(LineState::Disconnected, "alarms not judged: L1 disconnected");
-    check(LineState::Connecting, "alarms not judged: L1 not connected");
+    check(LineState::Disconnected, "alarms not evaluated: L1 disconnected");
+    check(LineState::Connecting, "alarms not evaluated: L1 not connected");
     let waiting = LineState::Waiting { why: "No such file".to_owned(), retry_at: fixture::now() };
-    check(waiting, "alarms not judged: L1 not connected");
+    check(waiting, "alarms not evaluated: L1 not connected");
     let mut model = model(&Fixture::normal(), Theme::FULL);
     update(&mut model, Msg::Tick { silent: Duration::from_secs(7) });
-    assert!(screen(&mut model, 80, 24).contains("alarms not judged: station silent"));
+    assert!(screen(&mut model, 80, 24).contains("alarms not evaluated: station silent"));
     let mut model = super::model(&Fixture::alarm(), Theme::FULL);
     update(&mut model, Msg::Tick { silent: Duration::from_secs(3) });
     let shown = screen(&mut model, 80, 24);
     let banner = shown.lines().nth(2).unwrap_or_default();
-    assert!(banner.contains("TIC-1.PV") && banner.contains("alarms not judged"), "{banner}");
+    assert!(banner.contains("TIC-1.PV") && banner.contains("alarms not evaluated"), "{banner}");
 }
 
 #[test]

@@ -453,7 +453,7 @@ fn a_station_that_has_gone_is_shown_and_takes_no_commands() {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
     }
     shows(&mut model, "STATION GONE 4 s: reconnecting");
-    shows(&mut model, "alarms not judged: station gone, the socket was closed");
+    shows(&mut model, "alarms not evaluated: station gone, the socket was closed");
     type_keys(&mut model, "0");
     assert_eq!(model.tabs.shown, Tab::Login);
     type_keys(&mut model, "4⏎u");

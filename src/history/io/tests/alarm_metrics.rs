@@ -215,8 +215,8 @@ fn an_alarm_suppressed_before_a_period_is_not_stale_in_it() {
         [(second, first), (second + 1.0, then)]
             .map(|(second, kind)| Record::Alarm(AlarmRecord { at: at(second), ..step(0, text, kind) }))
     };
-    let aside = [("shelved", Shelved), ("suppressed", SuppressedByDesign), ("out of service", OutOfService)];
-    for (text, kind) in aside {
+    let suppressed = [("shelved", Shelved), ("suppressed", SuppressedByDesign), ("out of service", OutOfService)];
+    for (text, kind) in suppressed {
         store.append(&pair(-200_000.0, text, Raised, kind)).unwrap();
     }
     store.append(&pair(-200_000.0, "quiet", SuppressedByDesign, RaisedSuppressed)).unwrap();
