@@ -53,7 +53,7 @@ fn every_spelling_of_a_step_back_is_seen() {
     check("src/plant/sample.rs", "use crate::{profile as p};");
     check("src/plant/sample.rs", "use crate::{self as root, plant::{tag::Tag}}; fn f() { root::ui::draw() }");
     check("src/plant/sample.rs", "use super::super::bus::Frame;");
-    check("src/plant/alarm/audit_log.rs", "use super::super::super::{cli};");
+    check("src/plant/alarm/manager.rs", "use super::super::super::{cli};");
     check("src/plant/mod.rs", "fn f() -> self::super::bus::Frame { panic!() }");
     check("src/bus/mod.rs", "fn f() { let x: Vec<crate::sim::World> = vec![]; }");
     check("src/bus/mod.rs", "fn f() { println!(\"{}\", crate::sim::NAME) }");

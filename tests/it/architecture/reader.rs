@@ -69,9 +69,9 @@ fn is_test_function(attr: &Attribute) -> bool {
     attr.path().segments.last().is_some_and(|last| last.ident == "test")
 }
 
-/// Names of macros, functions and methods that fail a test visibly.
+/// Names of macros, functions and methods that fail a test visibly. A wait fails at its deadline.
 fn asserts(name: &str) -> bool {
-    let starts = ["assert", "prop_assert", "check", "expect_", "refuse"];
+    let starts = ["assert", "debug_assert", "prop_assert", "check", "expect_", "refuse", "until", "wait_for"];
     starts.iter().any(|start| name.starts_with(start))
         || ["panic", "unreachable", "unwrap_err", "proptest"].contains(&name)
 }

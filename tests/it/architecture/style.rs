@@ -39,7 +39,10 @@ fn long_names(files: &[Facts]) -> Breaches {
 fn silent(files: &[Facts]) -> Breaches {
     let mut silent = Breaches::new();
     for (file, test) in tests(files).filter(|(_, test)| !test.asserts) {
-        let line = format!("  line {}: {} names no assert…, check…, refuse… or expect_…", test.line, test.name);
+        let line = format!(
+            "  line {}: {} names no assert…, check…, refuse…, expect_…, until… or wait_for",
+            test.line, test.name
+        );
         silent.entry(file.path.clone()).or_default().push(line);
     }
     silent
