@@ -31,7 +31,7 @@ const CATCH_UP_MAX: Duration = Duration::from_secs(3600);
 /// Handle of the task that owns the simulator. The task ends when the last handle is gone.
 #[derive(Debug, Clone)]
 pub struct SimulatorHandle {
-    requests: mpsc::Sender<SimRequest>,
+    requests: mpsc::Sender<Request>,
     clock: Clock,
     units: Arc<BTreeSet<(LineId, u8)>>,
 }
@@ -52,28 +52,16 @@ pub struct Report {
     pub actual: ActualValues,
 }
 
-/// What a task waits for when it asks the simulator; if the task is gone, nothing comes back.
-type Reply<T> = oneshot::Sender<T>;
+/// Work on the simulator, in its task.
+type Request = Box<dyn FnOnce(&mut Owned) + Send>;
 
-#[derive(Debug)]
-enum SimRequest {
-    Ask { line: LineId, unit: u8, pdu: Vec<u8>, reply: Reply<Option<Answer>> },
-    Change(Change, Reply<()>),
-    RigState(Reply<Option<RigState>>),
-    Value(TagId, Reply<Option<f64>>),
-    SetValue(TagId, f64, Reply<bool>),
-    Report(Reply<Report>),
-}
-
-#[derive(Debug)]
-enum Change {
-    InjectFault(FaultTarget, Fault),
-    ClearFault(FaultTarget, Fault),
-    ClearAll,
-    SensorOpen(bool),
-    Switch(u16, bool),
-    PowerCycle,
-    Corrupt(LineId),
+/// What the task owns.
+struct Owned {
+    simulator: Simulator,
+    faults: Faults,
+    ground_truth: GroundTruth,
+    /// Plant time up to which the simulator has advanced.
+    now: Timestamp,
 }
 
 impl SimulatorHandle {
@@ -90,7 +78,7 @@ impl SimulatorHandle {
     fn start(simulator: Simulator, clock: Clock, faults: Faults, ground_truth: GroundTruth) -> SimulatorHandle {
         let (requests, inbox) = mpsc::channel(REQUESTS_MAX);
         let units = Arc::new(simulator.addresses().collect());
-        tokio::spawn(run(simulator, clock, (faults, ground_truth), clock.now(), inbox));
+        tokio::spawn(run(Owned { simulator, faults, ground_truth, now: clock.now() }, clock, inbox));
         SimulatorHandle { requests, clock, units }
     }
 
@@ -112,7 +100,7 @@ impl SimulatorHandle {
     /// Puts a request to a unit of a line. `None`: nothing comes back, now or ever.
     pub async fn ask(&self, line: LineId, unit: u8, pdu: &[u8]) -> Option<Answer> {
         let pdu = pdu.to_vec();
-        self.put(|reply| SimRequest::Ask { line, unit, pdu, reply }).await.flatten()
+        self.put(move |owned| owned.faults.answer(&mut owned.simulator, line, unit, &pdu)).await.flatten()
     }
 
     /// Injects a fault into a unit of a line.
@@ -122,65 +110,67 @@ impl SimulatorHandle {
 
     /// Injects a fault; a fault that it excludes is cleared.
     pub async fn inject(&self, target: FaultTarget, fault: Fault) {
-        self.change(Change::InjectFault(target, fault)).await;
+        self.put(move |owned| owned.faults.inject(&mut owned.simulator, target, fault, owned.now)).await;
     }
 
     /// Clears a fault, whatever its parameter.
     pub async fn clear(&self, target: FaultTarget, fault: Fault) {
-        self.change(Change::ClearFault(target, fault)).await;
+        self.put(move |owned| owned.faults.clear(&mut owned.simulator, target, fault)).await;
     }
 
     /// Clears all faults.
     pub async fn clear_all(&self) {
-        self.change(Change::ClearAll).await;
+        self.put(|owned| owned.faults.clear_all(&mut owned.simulator)).await;
     }
 
     /// The active faults and the actual values now; `None` once the task has ended.
     pub async fn report(&self) -> Option<Report> {
-        self.put(SimRequest::Report).await
+        self.put(|owned| Report {
+            active: owned.faults.list().to_vec(),
+            actual: owned.ground_truth.values(&owned.simulator),
+        })
+        .await
     }
 
-    /// Breaks or repairs the wire of the temperature sensor in the tank rig.
+    /// Breaks or repairs the wire of the temperature sensor in the tank rig, if there is one.
     pub async fn set_sensor_open(&self, open: bool) {
-        self.change(Change::SensorOpen(open)).await;
+        self.put(move |owned| owned.simulator.rig_mut().map(|rig| rig.set_sensor_open(open))).await;
     }
 
-    /// Turns a panel switch X0–X3 of the rig's PLC.
+    /// Turns a panel switch X0–X3 of the rig's PLC, if there is one.
     pub async fn set_switch(&self, switch: u16, on: bool) {
-        self.change(Change::Switch(switch, on)).await;
+        self.put(move |owned| owned.simulator.rig_mut().map(|rig| rig.set_switch(switch, on))).await;
     }
 
     /// Takes the power from all devices and gives it back.
     pub async fn power_cycle(&self) {
-        self.change(Change::PowerCycle).await;
+        self.put(|owned| owned.simulator.power_cycle()).await;
     }
 
     /// The state of the tank rig now; `None` if the simulator has no rig, or once its task has ended.
     pub async fn rig_state(&self) -> Option<RigState> {
-        self.put(SimRequest::RigState).await.flatten()
+        self.put(|owned| owned.simulator.rig().map(Rig::state)).await.flatten()
     }
 
     /// What a modelled device holds for a tag now, in the tag's unit; `None` for a tag of the rig.
     pub async fn value(&self, tag: TagId) -> Option<f64> {
-        self.put(|reply| SimRequest::Value(tag, reply)).await.flatten()
+        self.put(move |owned| owned.simulator.value(tag)).await.flatten()
     }
 
     /// Puts a value into the registers of a modelled device, as if the device had found it so: a fault code, a reading.
     /// `false` if it cannot hold it.
     pub async fn set_value(&self, tag: TagId, value: f64) -> bool {
-        self.put(|reply| SimRequest::SetValue(tag, value, reply)).await.unwrap_or(false)
+        self.put(move |owned| owned.simulator.set_value(tag, value)).await.unwrap_or(false)
     }
 
-    /// Returns when it is done. The task lives as long as this handle, except while its runtime shuts down; then
-    /// nothing changes.
-    async fn change(&self, change: Change) {
-        self.put(|reply| SimRequest::Change(change, reply)).await;
-    }
-
-    async fn put<T>(&self, request: impl FnOnce(Reply<T>) -> SimRequest) -> Option<T> {
-        let (reply, answer) = oneshot::channel();
-        self.requests.send(request(reply)).await.ok()?;
-        answer.await.ok()
+    /// Does the work in the task and returns its result. The task lives as long as this handle, except while its runtime
+    /// shuts down; then there is no result.
+    async fn put<T: Send + 'static>(&self, work: impl FnOnce(&mut Owned) -> T + Send + 'static) -> Option<T> {
+        let (reply, result) = oneshot::channel();
+        // The result for a requester that has gone is dropped.
+        let request: Request = Box::new(move |owned| drop(reply.send(work(owned))));
+        self.requests.send(request).await.ok()?;
+        result.await.ok()
     }
 }
 
@@ -202,17 +192,12 @@ impl LineHandle {
 
     /// Something passed on the line that no unit could read.
     pub async fn corrupt(&self) {
-        self.simulator.change(Change::Corrupt(self.line)).await;
+        let line = self.line;
+        self.simulator.put(move |owned| owned.simulator.corrupt(line)).await;
     }
 }
 
-async fn run(
-    mut simulator: Simulator,
-    clock: Clock,
-    (mut faults, ground_truth): (Faults, GroundTruth),
-    mut reached: Timestamp,
-    mut inbox: mpsc::Receiver<SimRequest>,
-) {
+async fn run(mut owned: Owned, clock: Clock, mut inbox: mpsc::Receiver<Request>) {
     let idle = IDLE.max(IDLE_REAL_MIN.mul_f64(clock.speed()));
     loop {
         let request = tokio::select! {
@@ -225,63 +210,12 @@ async fn run(
             () = clock.sleep(idle) => None,
         };
         let now = clock.now();
-        simulator.advance(Duration::try_from(now.duration_since(reached)).unwrap_or_default().min(CATCH_UP_MAX));
-        reached = now;
+        let passed = Duration::try_from(now.duration_since(owned.now)).unwrap_or_default();
+        owned.simulator.advance(passed.min(CATCH_UP_MAX));
+        owned.now = now;
         if let Some(request) = request {
-            handle_request(&mut simulator, &mut faults, &ground_truth, now, request);
+            request(&mut owned);
         }
-    }
-}
-
-/// The reply to a requester that has gone is dropped.
-fn handle_request(
-    simulator: &mut Simulator,
-    faults: &mut Faults,
-    ground_truth: &GroundTruth,
-    now: Timestamp,
-    request: SimRequest,
-) {
-    match request {
-        SimRequest::Ask { line, unit, pdu, reply } => {
-            reply.send(faults.answer(simulator, line, unit, &pdu)).ok();
-        }
-        SimRequest::RigState(reply) => {
-            reply.send(simulator.rig().map(Rig::state)).ok();
-        }
-        SimRequest::Value(tag, reply) => {
-            reply.send(simulator.value(tag)).ok();
-        }
-        SimRequest::SetValue(tag, value, reply) => {
-            reply.send(simulator.set_value(tag, value)).ok();
-        }
-        SimRequest::Report(reply) => {
-            reply.send(Report { active: faults.list().to_vec(), actual: ground_truth.values(simulator) }).ok();
-        }
-        SimRequest::Change(change, done) => {
-            apply_change(simulator, faults, now, change);
-            done.send(()).ok();
-        }
-    }
-}
-
-/// Requests to the rig do nothing on a simulator without one.
-fn apply_change(simulator: &mut Simulator, faults: &mut Faults, now: Timestamp, change: Change) {
-    match change {
-        Change::InjectFault(target, fault) => faults.inject(simulator, target, fault, now),
-        Change::ClearFault(target, fault) => faults.clear(simulator, target, fault),
-        Change::ClearAll => faults.clear_all(simulator),
-        Change::SensorOpen(open) => {
-            if let Some(rig) = simulator.rig_mut() {
-                rig.set_sensor_open(open);
-            }
-        }
-        Change::Switch(switch, on) => {
-            if let Some(rig) = simulator.rig_mut() {
-                rig.set_switch(switch, on);
-            }
-        }
-        Change::PowerCycle => simulator.power_cycle(),
-        Change::Corrupt(line) => simulator.corrupt(line),
     }
 }
 
