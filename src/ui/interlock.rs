@@ -100,7 +100,7 @@ pub fn unmet(cx: &ViewContext, actuator: &ActuatorDef) -> Option<(TagId, f64)> {
     actuator.needs.iter().find(|(tag, state)| cx.snapshot.sample(*tag).good_value() != Some(*state)).copied()
 }
 
-/// `acts in MANUAL only, and PLC-1.AUTO is AUTO`, for the command of an actuator.
+/// `effective in MANUAL only (PLC-1.AUTO is AUTO)`, for the command of an actuator.
 pub fn unmet_words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let actuator = &cx.def().logic.actuators.iter().find(|actuator| actuator.command == tag)?;
     let (need, state) = unmet(cx, actuator)?;

@@ -175,7 +175,7 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(code(KeyCode::Esc), "", "close a window; take a failure off the screen; a page back", Global::Dismiss),
     Key::new(ctrl('k'), "", "lock this terminal; works in every window too", Global::Lock),
     Key::new(ctrl('s'), "", "silence what sounds now; nothing is acknowledged", Global::Silence),
-    Key::new(ctrl('l'), "", "draw everything anew", Global::Redraw),
+    Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
     Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),
     Key::new(char('q'), "quit", "quit (asks first, and says what stops with it)", Global::Quit),
     Key::new(char('?'), "help", "all keys", Global::Help),

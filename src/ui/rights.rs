@@ -18,8 +18,8 @@ pub fn title(role: Role) -> &'static str {
 /// What a role may, in words.
 pub fn words(role: Role) -> &'static str {
     match role {
-        Role::Viewer => "look at everything: process, curves, alarms, reports",
-        Role::Technician => "look at everything, control the process, acknowledge alarms, write reports",
+        Role::Viewer => "view everything: process, curves, alarms, reports",
+        Role::Technician => "view everything, control the process, acknowledge alarms, write reports",
         Role::Supervisor => "do everything: also users, the audit list, line settings, tests, stopping the station",
     }
 }
@@ -32,7 +32,7 @@ pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
 /// The same for a role.
 pub fn lacks(cx: &ViewContext, role: Role) -> Option<String> {
     match &cx.session.who {
-        None => Some(format!("needs {}; nobody is logged in", title(role))),
+        None => Some(format!("needs {}; no user is logged in", title(role))),
         Some(who) if who.role < role => Some(format!("needs {}; {} is {}", title(role), who.user, title(who.role))),
         Some(_) => None,
     }

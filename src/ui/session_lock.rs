@@ -22,7 +22,7 @@ const ACTIVE_TICKS: u32 = 60;
 const WARNED_TICKS: u32 = 4;
 
 /// Said of what the station has done and its disk has not taken.
-const NOT_RECORDED: &str = "Done, but NOT RECORDED: the disk of the station does not take it";
+const NOT_RECORDED: &str = "Done, but NOT RECORDED: the station cannot write to its disk";
 
 /// Times of the session and the lock, in ticks, and the number of the last request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

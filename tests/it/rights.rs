@@ -223,7 +223,7 @@ fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
     const SHORT: &str = "has 5 characters";
     match request {
         SessionRequest::Login { .. } => ("login", [DONE; 6]),
-        SessionRequest::Logout => ("logout", ["nobody is logged in here", DONE, DONE, DONE, DONE, DONE]),
+        SessionRequest::Logout => ("logout", ["no user is logged in here", DONE, DONE, DONE, DONE, DONE]),
         SessionRequest::Lock => ("lock terminal", [LOG_IN, DONE, DONE, DONE, "locked already", DONE]),
         SessionRequest::Unlock(_) => {
             ("unlock terminal", ["not locked", "not locked", "not locked", "not locked", DONE, "not locked"])

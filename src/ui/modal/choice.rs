@@ -91,6 +91,6 @@ impl Choice {
             canvas.text(2, y + 2, &row.text, style);
         }
         let last = canvas.height().saturating_sub(1);
-        canvas.text(0, last, "↑↓ select   ⏎ next   Esc leave unchanged", cx.theme.strong());
+        canvas.text(0, last, "↑↓ select   ⏎ next   Esc cancel", cx.theme.strong());
     }
 }

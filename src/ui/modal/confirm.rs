@@ -176,7 +176,7 @@ impl Confirm {
 
     /// What Esc does.
     pub fn escape(&self) -> &'static str {
-        if self.is_quit() { "stay" } else { "leave it as it is" }
+        if self.is_quit() { "stay" } else { "cancel" }
     }
 
     /// Is it certainly without effect now?

@@ -48,7 +48,7 @@ impl Entry {
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
             let checked = match self.line.missed() {
-                true => Err("not all of it was taken; Ctrl-U empties the line".to_owned()),
+                true => Err("the text was cut; Ctrl-U clears the line".to_owned()),
                 false => number::check(cx, self.tag, &self.line.text()),
             };
             match checked {
@@ -130,7 +130,7 @@ impl Entry {
         for (y, line) in problem.iter().enumerate() {
             canvas.text(0, last.saturating_sub(told) + to_u16(y), line, theme.trouble());
         }
-        canvas.text(0, last, &theme.enter("⏎ write and verify   Esc leave unchanged"), theme.strong());
+        canvas.text(0, last, &theme.enter("⏎ write and verify   Esc cancel"), theme.strong());
     }
 }
 

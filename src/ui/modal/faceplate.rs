@@ -227,7 +227,7 @@ pub fn device_words(cx: &ViewContext, device: crate::plant::def::DeviceId) -> St
     match status.state {
         DeviceState::Unknown => "not asked yet".to_owned(),
         DeviceState::Answering => match status.reply {
-            Some(reply) => format!("answering in {} ms", reply.as_millis()),
+            Some(reply) => format!("OK, {} ms", reply.as_millis()),
             None => "answering".to_owned(),
         },
         DeviceState::Failing(n) => format!("failing, {n} in a row"),

@@ -112,7 +112,7 @@ impl Form {
     pub fn lacking(&mut self) -> Option<String> {
         let lacks = |field: &Field| match &field.what {
             What::Text(line) | What::Secret(line) if line.missed() => {
-                Some("not all of it was taken; Ctrl-U empties the line".to_owned())
+                Some("the text was cut; Ctrl-U clears the line".to_owned())
             }
             What::Text(line) if line.text().trim().is_empty() => Some(type_words(field.label)),
             What::Secret(line) if line.text().is_empty() => Some(type_words(field.label)),

@@ -206,9 +206,9 @@ impl Modal {
             Modal::Help(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
             Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![hint("Esc", confirm.escape())],
             Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint("Esc", confirm.escape())],
-            Modal::Entry(_) => vec![hint("⏎", "write and verify"), hint("Esc", "leave unchanged")],
-            Modal::Choice(_) => vec![hint("↑↓", "select"), hint("⏎", "next"), hint("Esc", "leave unchanged")],
-            Modal::Prompt(_) => vec![hint("⏎", "take it"), hint("Esc", "leave")],
+            Modal::Entry(_) => vec![hint("⏎", "write and verify"), hint("Esc", "cancel")],
+            Modal::Choice(_) => vec![hint("↑↓", "select"), hint("⏎", "next"), hint("Esc", "cancel")],
+            Modal::Prompt(_) => vec![hint("⏎", "OK"), hint("Esc", "cancel")],
             Modal::Reason(reason) => reason.hints().into_iter().map(|(key, label)| hint(key, label)).collect(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![hint("Esc", "close")],
@@ -216,7 +216,7 @@ impl Modal {
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
-            Modal::UserForm(form) => form.hints().into_iter().chain([hint("Esc", "leave")]).collect(),
+            Modal::UserForm(form) => form.hints().into_iter().chain([hint("Esc", "cancel")]).collect(),
             Modal::AuditEntry(_) => vec![hint("Esc", "close")],
         };
         // A digit is typed here: the tabs are one key further away.

@@ -44,6 +44,6 @@ impl Prompt {
         canvas.text(0, 0, &self.hint, cx.theme.dim());
         self.line.view(cx.theme, &mut canvas, 0, 1);
         canvas.text(0, 3, &problem, cx.theme.trouble());
-        canvas.text(0, 4, &cx.theme.enter("⏎ take it   Esc leave"), cx.theme.strong());
+        canvas.text(0, 4, &cx.theme.enter("⏎ OK   Esc cancel"), cx.theme.strong());
     }
 }

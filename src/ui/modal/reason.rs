@@ -57,7 +57,7 @@ impl Reason {
     pub fn hints(&self) -> Vec<(&'static str, &'static str)> {
         let choose = (1 < self.choices.len()).then_some(("↑↓", "select"));
         let other = self.other().map(|time| ("Tab", if time.typing { "type the reason" } else { "type the time" }));
-        [("⏎", self.verb)].into_iter().chain(choose).chain(other).chain([("Esc", "leave it as it is")]).collect()
+        [("⏎", self.verb)].into_iter().chain(choose).chain(other).chain([("Esc", "cancel")]).collect()
     }
 
     pub(super) fn paste(&mut self, text: &str) {
@@ -129,12 +129,12 @@ impl Reason {
         }
         let words = self.line.text().trim().to_owned();
         self.problem = if self.line.missed() {
-            Some("not all of it was taken; Ctrl-U empties the line".to_owned())
+            Some("the text was cut; Ctrl-U clears the line".to_owned())
         } else if self.needed && words.is_empty() {
-            Some("say why, in some words".to_owned())
+            Some("reason required".to_owned())
         } else if self.time.as_ref().is_some_and(|time| typed_time(&words, time.max).is_ok()) {
             // Typed for the time, while another one was selected.
-            Some("a time is no reason: select \"other\" to type a time".to_owned())
+            Some("a time is not a reason: select \"other\" to type a time".to_owned())
         } else {
             rights::missing(cx, &kind)
         };

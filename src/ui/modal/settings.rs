@@ -60,9 +60,9 @@ impl Settings {
         if self.field().is_choice() {
             hints.push(hint("←→", "change"));
         }
-        hints.push(hint("⏎", "use them"));
+        hints.push(hint("⏎", "apply"));
         if !self.field().is_text() {
-            hints.extend([hint("u", "take back"), hint("S", "save")]);
+            hints.extend([hint("u", "revert"), hint("S", "save to plant file")]);
         }
         hints.push(hint("Esc", "close"));
         hints
@@ -79,14 +79,14 @@ impl Settings {
         }
         self.problem = None;
         let asked = match event.code {
-            KeyCode::Enter if enter => self.ask_use(cx),
+            KeyCode::Enter if enter => self.ask_apply(cx),
             KeyCode::Up => self.select(-1),
             KeyCode::Down | KeyCode::Tab => self.select(1),
             KeyCode::Left if self.field().is_choice() => self.draft.step(self.field(), -1),
             KeyCode::Right if self.field().is_choice() => self.draft.step(self.field(), 1),
             KeyCode::Char(' ') if self.field().is_choice() => self.draft.step(self.field(), 1),
             _ if self.draft.on_key(self.field(), event) => Ok(None),
-            KeyCode::Char('u') if keys::char('u').is(event) => self.ask_take_back(cx),
+            KeyCode::Char('u') if keys::char('u').is(event) => self.ask_revert(cx),
             KeyCode::Char('S') if keys::char('S').is(event) => self.ask_save(cx),
             KeyCode::Char('q') => return Next::Close,
             _ => Ok(None),
@@ -193,18 +193,18 @@ impl Settings {
         };
         let keys = match self.asking {
             Some(_) => "⏎ yes   n no",
-            None if self.field().is_text() => "type it   ⏎ use them   Esc close",
-            None => "⏎ use them   u take back   S save into the plant file   Esc close",
+            None if self.field().is_text() => "type it   ⏎ apply   Esc close",
+            None => "⏎ apply   u revert   S save to plant file   Esc close",
         };
         let rows = wrap(&words, room).into_iter().map(|row| (row, style));
         rows.chain([(fit_words(keys, room), theme.strong())]).collect()
     }
 
     fn query(&self, cx: &ViewContext, used: &LineDef, action: &SettingsAction) -> String {
-        let restart = "Polling starts anew; values are bad until the devices answer.";
+        let restart = "Polling restarts; values are bad until the devices answer.";
         match action {
-            SettingsAction::Use(new) => format!("Use {}? {restart}", difference(used, new)),
-            SettingsAction::TakeBack(before) => format!("Take back to {}? {restart}", difference(used, before)),
+            SettingsAction::Apply(new) => format!("Apply {}? {restart}", difference(used, new)),
+            SettingsAction::Revert(before) => format!("Revert to {}? {restart}", difference(used, before)),
             SettingsAction::Save => {
                 let (answer, well) = answers(cx, self.line);
                 let doubt = if well { String::new() } else { format!("! {answer} ") };
@@ -216,30 +216,30 @@ impl Settings {
 
     fn command_kind(&self, action: SettingsAction) -> CommandKind {
         match action {
-            SettingsAction::Use(settings) | SettingsAction::TakeBack(settings) => CommandKind::Configure(settings),
+            SettingsAction::Apply(settings) | SettingsAction::Revert(settings) => CommandKind::Configure(settings),
             SettingsAction::Save => CommandKind::SaveSettings(self.line),
         }
     }
 
-    fn ask_use(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
+    fn ask_apply(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let (used, new) = (in_use(cx, self.line), self.draft.settings()?);
         if new == *used {
-            return Err("these are the settings in use; change one first".to_owned());
+            return Err("these settings are in use; change one first".to_owned());
         }
-        Ok(Some(SettingsAction::Use(Box::new(new))))
+        Ok(Some(SettingsAction::Apply(Box::new(new))))
     }
 
-    fn ask_take_back(&mut self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
+    fn ask_revert(&mut self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let before = cx.snapshot.line(self.line).settings_before.as_ref();
-        let before = before.ok_or("nothing to take back: nobody has tried other settings")?;
+        let before = before.ok_or("nothing to revert: no other settings were applied")?;
         self.draft = Draft::of(before);
-        Ok(Some(SettingsAction::TakeBack(Box::new(LineDef::clone(before)))))
+        Ok(Some(SettingsAction::Revert(Box::new(LineDef::clone(before)))))
     }
 
     fn ask_save(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let used = in_use(cx, self.line);
         if self.draft.settings()? != *used {
-            return Err("only what is in use is saved: use these settings first (⏎)".to_owned());
+            return Err("only settings in use are saved: apply these first (⏎)".to_owned());
         }
         if cx.snapshot.line(self.line).settings_before.is_none() {
             return Err("nothing to save: these settings are in the plant file".to_owned());

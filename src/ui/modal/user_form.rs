@@ -262,7 +262,7 @@ impl UserForm {
             hints.push(hint("Ctrl-R", "show password"));
         }
         if matches!(self.purpose, Purpose::Unlock(_)) {
-            hints.push(hint("Ctrl-O", "another person"));
+            hints.push(hint("Ctrl-O", "other user"));
         }
         hints
     }
@@ -272,7 +272,7 @@ impl UserForm {
         match &self.purpose {
             Purpose::First => "the first Supervisor".to_owned(),
             Purpose::Login => "log in".to_owned(),
-            Purpose::Change(_) => "a password of your own".to_owned(),
+            Purpose::Change(_) => "choose a new password".to_owned(),
             Purpose::Unlock(user) => format!("locked by {user}"),
             Purpose::Add => "add a user".to_owned(),
             Purpose::Reset(user) => format!("new password for {user}"),
@@ -289,7 +289,7 @@ impl UserForm {
         let first = "It must be changed at the first login.".to_owned();
         let own = |user: &Arc<str>| cx.session.who.as_ref().is_some_and(|who| who.user == *user);
         let you = |user: &Arc<str>| {
-            own(user).then_some("This is you: you are out at once, and another Supervisor must help.")
+            own(user).then_some("This is your own account: you are logged out at once, and only another Supervisor can undo it.")
         };
         match &self.purpose {
             Purpose::First => vec![
@@ -299,15 +299,15 @@ impl UserForm {
             ],
             Purpose::Login => Vec::new(),
             Purpose::Change(Some(_)) => {
-                vec!["The present password was given by somebody else: choose one that only you know.".to_owned(), rule]
+                vec!["Another user set your present password: choose one that only you know.".to_owned(), rule]
             }
             Purpose::Change(None) => vec![rule],
-            Purpose::Unlock(_) => vec!["Everything stays to be seen. Your work waits as it is.".to_owned()],
+            Purpose::Unlock(_) => vec!["Process and alarms stay visible. Your open window is kept.".to_owned()],
             Purpose::Add => vec![rule, first],
             Purpose::Reset(_) => vec![rule, first],
             Purpose::Role(_) => vec![],
             Purpose::Disable(user, true) => {
-                let words = format!("{user} is logged out everywhere and cannot log in until this is taken back.");
+                let words = format!("{user} is logged out everywhere and cannot log in until enabled again.");
                 you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
             Purpose::Disable(user, false) => vec![format!("{user} may log in again; a lockout ends too.")],

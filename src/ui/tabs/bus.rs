@@ -132,9 +132,9 @@ const PLAN_KEYS: &[Key<Action>] = &[
     Key::new(char('w'), "why", "why the values of the block are what they are", Action::Why),
 ];
 const FRAMES_KEYS: &[Key<Action>] = &[
-    Key::new(char(' '), "hold", "hold the frames still, or let them run", Action::Freeze),
+    Key::new(char(' '), "pause", "pause or resume", Action::Freeze),
     Key::new(code(KeyCode::Enter), "decode", "every byte of the frame", Action::Open),
-    Key::new(char('f'), "filter", "choose which frames are shown", Action::Filter),
+    Key::new(char('f'), "filter", "filter frames", Action::Filter),
     Key::new(char('x'), "save", "write them as text and for Wireshark", Action::Save),
 ];
 const TEST_KEYS: &[Key<Action>] = &[
@@ -420,7 +420,7 @@ fn state_words(cx: &ViewContext, at: &Place) -> String {
             format!("DOWN{lost}, next try in {}s: {why}", between(cx.now, *retry_at).as_secs())
         }
         LineState::Disconnected => format!("DISCONNECTED by an operator{since}"),
-        LineState::Testing => format!("TEST{since}, nobody is polled"),
+        LineState::Testing => format!("TEST{since}, polling stopped"),
     }
 }
 

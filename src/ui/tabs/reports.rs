@@ -56,7 +56,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
     Key::new(char('e'), "export", "write the report as CSV", Action::Export).needs(Role::Technician),
     Key::new(char(';'), "format", "CSV with , and . or with ; and ,", Action::Dialect),
-    Key::new(char('u'), "", "read the figures anew", Action::Refresh),
+    Key::new(char('u'), "", "refresh the figures", Action::Refresh),
     Key::new(char('w'), "", "why its values are what they are now", Action::Why),
 ];
 

@@ -46,7 +46,7 @@ pub enum Action {
 const LIST: &[Key<Action>] = &[
     Key::new(char('n'), "new", "add a user", Action::Add),
     Key::new(char('r'), "role", "another role for the selected user", Action::Role),
-    Key::new(char('d'), "disable", "shut the selected user out, or let in again; ends a lockout too", Action::Disable),
+    Key::new(char('d'), "disable", "disable or enable the selected user (clears a lockout)", Action::Disable),
     Key::new(char('p'), "password", "a new first password for the selected user", Action::Reset),
     Key::new(char('x'), "delete", "remove the selected user (asks for the name)", Action::Delete),
     Key::new(char('j'), "audit list", "everything that was done, by whom, from where", Action::Audit),

@@ -131,10 +131,10 @@ fn a_pump_is_switched_by_its_manual_command() {
         let mut model = faceplate(&fixture, "PLC-1.P-1");
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains("t ON P-1"), "{shown}");
-        assert_eq!(shown.contains("acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
+        assert_eq!(shown.contains("effective in MANUAL only (PLC-1.AUTO is AUTO)"), told, "{shown}");
         assert_eq!(sent_kind(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
         let shown = screen(&mut model, 80, 24);
-        assert_eq!(shown.contains("! acts in MANUAL only, and PLC-1.AUTO is AUTO"), told, "{shown}");
+        assert_eq!(shown.contains("! effective in MANUAL only (PLC-1.AUTO is AUTO)"), told, "{shown}");
         let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
         assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
     }
@@ -194,7 +194,7 @@ fn a_mode_that_is_changed_under_the_question_is_told_in_it() {
     assert!(!screen(&mut model, 80, 24).contains("acts in MANUAL only"));
     fixture.set("PLC-1.AUTO", 1.0);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    assert!(screen(&mut model, 80, 24).contains("! acts in MANUAL only, and PLC-1.AUTO is AUTO"));
+    assert!(screen(&mut model, 80, 24).contains("! effective in MANUAL only (PLC-1.AUTO is AUTO)"));
 }
 
 #[test]
@@ -675,7 +675,7 @@ fn the_journal_is_asked_only_while_it_is_shown() {
 fn a_history_without_answer_is_said_so() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     let effects = type_keys(&mut model, "3j");
-    assert!(screen(&mut model, 80, 24).contains("reading …"));
+    assert!(screen(&mut model, 80, 24).contains("collecting data"));
     for effect in effects {
         if let Effect::Query(id, _) = effect {
             update(&mut model, Msg::Answer(id, Err(HistoryError::Engine("disk full".to_owned()))));

@@ -274,7 +274,7 @@ fn what_is_too_narrow_for_all_words_overlaps_none() {
 #[test]
 fn a_device_tells_its_letter_beside_its_name() {
     for (diagnosis, expect) in [
-        (None, "✓ answering in 12 ms"),
+        (None, "✓ OK, 12 ms"),
         (Some(Reason::Down), "✗F failure: not answering"),
         (Some(Reason::LineClosed), "▼C function check:"),
         (Some(Reason::Failing { failed: 9, of: 64 }), "?S out of specification:"),

@@ -105,7 +105,7 @@ fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
     update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
     assert!(!screen(&mut model, 80, 24).contains("RECORDED"));
     update(&mut model, Msg::RequestDone(id, Ok(Durability::NotRecorded)));
-    shows(&mut model, "Done, but NOT RECORDED: the disk of the station does not take it");
+    shows(&mut model, "Done, but NOT RECORDED: the station cannot write to its disk");
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn a_plant_that_lets_everybody_look_shows_the_process_and_nothing_can_be_done() 
     shows(&mut model, "Technician: s r m");
     shows(&mut model, "not logged in");
     type_keys(&mut model, "r");
-    shows(&mut model, "needs Technician; nobody is logged in");
+    shows(&mut model, "needs Technician; no user is logged in");
     type_keys(&mut model, "⎋0");
     assert_eq!(model.tabs.shown, Tab::Login);
     type_keys(&mut model, "⎋");

@@ -83,7 +83,7 @@ fn frames_run_on_after_escape() {
     type_keys(&mut model, "6F");
     for keys in [" ", "↑", "↑⏎⎋"] {
         type_keys(&mut model, keys);
-        assert!(screen(&mut model, 80, 24).contains("HELD STILL"), "{keys:?} holds");
+        assert!(screen(&mut model, 80, 24).contains("PAUSED"), "{keys:?} holds");
         type_keys(&mut model, "⎋");
         assert!(screen(&mut model, 80, 24).contains("running, newest"), "{keys:?} and Esc");
     }

@@ -73,7 +73,7 @@ fn what_cannot_be_is_told_before_anything_is_sent() {
         ("↓→", "Modbus RTU always has 8 data bits"),
         ("↑↑→→⏎", "a TCP line needs a host"),
         ("↓↓↓↓999⏎", "too long: nothing else is sent meanwhile"),
-        ("u", "nothing to take back"),
+        ("u", "nothing to revert"),
         ("S", "nothing to save"),
         ("→S", "use these settings first"),
     ] {

@@ -38,7 +38,7 @@ pub(super) fn value_rows(
     let shown = value::show(cx, def.id);
     let at = clock(sample.at, &cx.def().time_zone);
     let quality = match sample.quality {
-        _ if def.access == Access::Write => "write only: nobody can read it".to_owned(),
+        _ if def.access == Access::Write => "write only: it cannot be read".to_owned(),
         Quality::Good => format!("good, read {} ago at {at}", age(cx.age(def.id))),
         Quality::Uncertain(cause) => {
             format!("uncertain: {}; read {} ago at {at}", cause.label(), age(cx.age(def.id)))
@@ -75,7 +75,7 @@ fn because(
             }
             match (exchange.and_then(|exchange| exchange.outcome.err()), def.quality_from) {
                 (Some(Fault::NotANumber), _) => Some(words(Fault::NotANumber)),
-                (_, Some((word, mask))) => Some(format!("{} (bits 0x{mask:X} mean a fault)", words_of(word))),
+                (_, Some((word, mask))) => Some(format!("{} (bits 0x{mask:X} any bit set = fault)", words_of(word))),
                 (_, None) => None,
             }
         }

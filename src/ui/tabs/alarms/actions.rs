@@ -159,7 +159,7 @@ pub fn own_handover() -> Vec<UiAction> {
 
 /// Asks whether whoever sits here takes the plant over.
 pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
-    let who = cx.session.who.as_ref().map_or("nobody", |who| &who.user);
+    let who = cx.session.who.as_ref().map_or("–", |who| &who.user);
     let words = format!("{who} has read this page and takes the plant over.");
     open(Modal::Confirm(Confirm::command("take over", words, CommandKind::TakeOver)))
 }

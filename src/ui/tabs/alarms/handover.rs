@@ -142,7 +142,7 @@ impl Handover {
         };
         match &self.trouble {
             Some(trouble) => canvas.text(x + 2, 0, trouble, theme.trouble()),
-            None if !self.answered => canvas.text(x + 2, 0, "reading …", theme.dim()),
+            None if !self.answered => canvas.text(x + 2, 0, "collecting data", theme.dim()),
             None => x,
         };
         let lines = self.lines(cx, width);
@@ -196,7 +196,7 @@ impl Handover {
         let when = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
         let note = self.actions.iter().position(|row| &*row.action == HAND_OVER && !is_failed(row));
         let Some((n, note)) = note.and_then(|n| Some((n, self.actions.get(n)?))) else {
-            let words = if self.answered { "Nobody has handed over in this shift or the one before." } else { "" };
+            let words = if self.answered { "No handover recorded for this shift or the one before." } else { "" };
             return vec![(words.to_owned(), theme.normal())];
         };
         let mut lines = vec![(format!("handed over {} by {}", when(note), note.by), theme.strong())];

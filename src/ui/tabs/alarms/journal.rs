@@ -178,7 +178,7 @@ impl Journal {
         }
         if rows.is_empty() {
             let words = match (self.answered, self.words.is_empty()) {
-                (false, _) => "reading …",
+                (false, _) => "collecting data",
                 (true, true) => "Nothing happened.",
                 (true, false) => "Nothing found.",
             };

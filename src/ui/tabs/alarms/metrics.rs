@@ -123,7 +123,7 @@ impl Metrics {
             1 => format!(": 1 alarm{}", alarm_metrics::quiet(figures)),
             many => format!(": {many} alarms{}", alarm_metrics::quiet(figures)),
         });
-        let wait = if self.trouble.is_none() { ": reading …" } else { "" };
+        let wait = if self.trouble.is_none() { ": collecting data" } else { "" };
         let x = canvas.text(1, 1, &format!("{what}{}", count.as_deref().unwrap_or(wait)), theme.strong());
         if let Some(trouble) = &self.trouble {
             canvas.text(x + 2, 1, trouble, theme.trouble());

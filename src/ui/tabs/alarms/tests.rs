@@ -204,7 +204,7 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     let Some(Effect::Query(id, Query::AlarmMetrics { from, to })) = effects.last() else { panic!("{effects:?}") };
     let span = [from, to].map(ToString::to_string);
     assert_eq!(span, ["2026-11-20T23:00:00Z", "2026-11-21T07:00:00Z"]);
-    assert!(screen(&mut model, 80, 24).contains("reading …"));
+    assert!(screen(&mut model, 80, 24).contains("collecting data"));
     let past = PeriodMetrics { by_priority: [0, 0, 0, 7], ..figures() };
     update(&mut model, Msg::Answer(*id, Ok(Answer::AlarmMetrics(Box::new(past)))));
     assert!(
@@ -352,7 +352,7 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
     let mut model = shown(&fixture, Theme::FULL, "z");
     insta::assert_snapshot!("window_shelve", screen(&mut model, 80, 24));
     type_keys(&mut model, "⏎");
-    assert!(screen(&mut model, 80, 24).contains("say why"), "nothing is shelved without a reason");
+    assert!(screen(&mut model, 80, 24).contains("reason required"), "nothing is shelved without a reason");
     let effects = type_keys(&mut model, "↓↓sensor is cleaned⏎");
     let Some(Effect::Command(command, _)) = effects.last() else { panic!("{effects:?}") };
     let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(3_600) };

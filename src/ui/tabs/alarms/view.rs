@@ -275,7 +275,7 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
 /// disk, are never cut off.
 fn what_words(cx: &ViewContext, row: &Row, room: u16) -> String {
     let mark = match (row.first, row.under) {
-        (true, _) => "1st ",
+        (true, _) => "First-out ",
         (false, true) => cx.theme.pick("└ ", "` "),
         (false, false) => "",
     };

@@ -127,7 +127,7 @@ impl Ring {
     /// Asks for the filter.
     pub fn ask_filter(&self) -> UiAction {
         let hint = "unit 1   fc 3   tx   rx   error   03EA (bytes); all must hold; empty: all frames";
-        UiAction::Open(Modal::Prompt(Prompt::new("which frames", hint, &self.filter.to_string())))
+        UiAction::Open(Modal::Prompt(Prompt::new("filter frames", hint, &self.filter.to_string())))
     }
 
     /// Takes a filter that was typed.
@@ -210,7 +210,7 @@ impl Ring {
         let newest = self.held.iter().next_back().map_or(String::new(), |frame| clock(frame.at, zone));
         let state = match self.runs {
             true => format!("running, newest {newest} below"),
-            false => format!("HELD STILL at {newest}, Esc lets it run"),
+            false => format!("PAUSED at {newest}, Esc resumes"),
         };
         let style = if self.runs { cx.theme.dim() } else { cx.theme.strong() };
         (format!("{count} of {} frames, {state}{filter}", self.held.len().max(count)), style)

@@ -119,7 +119,7 @@ fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     let plan = Planned::of(report);
     flow.add(value(cx, "blocks", &plan.blocks.to_string()));
     let measured = plan.measured.map_or("not yet".to_owned(), ms);
-    flow.add(value(cx, "one round at worst", &format!("{}, measured {measured}", ms(plan.round))));
+    flow.add(value(cx, "worst-case scan time", &format!("{}, measured {measured}", ms(plan.round))));
     flow.add(value(cx, "load at worst", &format!("{:.0} %", plan.load * 100.0)));
     flow.add(count(cx, "missed", report.counters.missed, missed_lately(report)));
     flow.rows()
@@ -173,7 +173,7 @@ fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Ve
     for (code, times) in &sum.exceptions {
         flow.add(count(cx, &format!("{:02X} {}", code.0, code.label()), *times, ill));
     }
-    flow.add(value(cx, "asked again", &grouped(sum.retries)));
+    flow.add(value(cx, "retries", &grouped(sum.retries)));
     flow.add(count(cx, "late", counters.late, ill));
     flow.add(count(cx, "stale", counters.stale, ill));
     let mut rows = flow.rows();

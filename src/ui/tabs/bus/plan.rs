@@ -150,7 +150,7 @@ fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
 /// `1 s`, `1 s ×1.3` where it is stretched, `left out`.
 fn pace(poll: &PollReport) -> String {
     match (poll.shed, poll.factor) {
-        (true, _) => "left out".to_owned(),
+        (true, _) => "skipped".to_owned(),
         (false, factor) if factor < 1.05 => every(poll.poll),
         (false, factor) => format!("{} ×{factor:.1}", every(poll.poll)),
     }
@@ -181,7 +181,7 @@ fn summary(report: &LineReport) -> (String, bool) {
     };
     match &admission.verdict {
         Verdict::Fits => (format!("{words}: they fit{refused}"), false),
-        Verdict::TooMuch { .. } => (format!("! {words}: TOO MUCH, reads are left out{refused}"), true),
+        Verdict::TooMuch { .. } => (format!("! {words}: OVERLOADED, polls skipped{refused}"), true),
         Verdict::Blocked(overload) => {
             let blocker = &overload.blocker.name;
             (format!("! {words}: some come late behind {blocker}{refused}"), true)
@@ -200,10 +200,10 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
     let last = poll.address.saturating_add(poll.count.saturating_sub(1));
     let used: u16 = poll.tags.iter().map(|tag| cx.def().tag(*tag).point.len()).sum();
     let over = poll.count.saturating_sub(used);
-    let over = if over == 0 { String::new() } else { format!(", {over} between them read over") };
+    let over = if over == 0 { String::new() } else { format!(", {over} gap registers read") };
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
     let late =
-        stats.jitter.max().map_or("never sent late".to_owned(), |late| format!("sent late by {} at most", ms(late)));
+        stats.jitter.max().map_or("no polling delay".to_owned(), |late| format!("polling delay at most {}", ms(late)));
     let dead = report.admission.dead_cost(poll.device);
     let dead = dead.map_or(String::new(), |cost| format!("; while {} is dead a probe costs {}", device.name, ms(cost)));
     let mut lines = vec![
@@ -220,7 +220,7 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
             plural(poll.tags.len(), "tag", "tags"),
         ),
         format!(
-            "reply {} ms, p99 {}, max {}; {late}; missed {}; asked again {}{dead}",
+            "reply {} ms, p99 {}, max {}; {late}; missed {}; retries {}{dead}",
             span(stats.reply.last()),
             span(stats.reply.p99()),
             span(stats.reply.max()),

@@ -234,7 +234,7 @@ impl Form {
         let (units, settings) = (u32::from(last - first) + 1, to_u32(serials.len().max(1)));
         let longest = ms(timeout * units * settings);
         let told = vec![format!(
-            "{units} units, {settings} settings: about {longest}, if nobody answers. Any answer counts, also a refusal."
+            "{units} units, {settings} settings: about {longest}, if no unit answers. Any answer counts, also an exception."
         )];
         Ok(Built { diagnostic: Diagnostic::Scan(Scan { first, last, serials, timeout }), told })
     }

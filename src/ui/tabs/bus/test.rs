@@ -303,7 +303,7 @@ impl Send {
     fn send(&self, cx: &ViewContext) -> Result<UiAction, String> {
         let at = Place::of(cx, self.line).ok_or("this line has gone")?;
         if self.text.missed() {
-            return Err("not all of it was taken; Ctrl-U empties the line".to_owned());
+            return Err("the text was cut; Ctrl-U clears the line".to_owned());
         }
         start(&at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
     }

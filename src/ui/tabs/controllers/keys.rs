@@ -156,7 +156,7 @@ const PROGRAM: &[Key<Action>] = &[
 const SETS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "compare", "what differs between the set and the device", Action::Open),
     Key::new(char('n'), "new", "save the settings of the device as a set", Action::Save).needs(Role::Technician),
-    Key::new(char('u'), "read", "read the folder of sets anew", Action::ReadSets).needs(Role::Technician),
+    Key::new(char('u'), "read", "refresh the list of sets", Action::ReadSets).needs(Role::Technician),
     GUIDE,
 ];
 const COMPARE: &[Key<Action>] = &[

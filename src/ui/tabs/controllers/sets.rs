@@ -105,7 +105,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
         };
         canvas.text(1, y + 3, &fit(&text, end), style);
     }
-    let words = "Sets are files of the station, in the folder sets beside its history; u reads them anew.";
+    let words = "Sets are files of the station, in the folder sets beside its history; u refreshes the list.";
     canvas.text(1, bottom, &fit_words(words, end), theme.dim());
 }
 

@@ -196,7 +196,7 @@ fn a_night_without_unicode_and_colour() {
 fn the_csv_that_is_written_is_the_report_that_is_shown() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.press("e");
-    assert!(stand.screen().contains("reading the history") && stand.saved.is_empty());
+    assert!(stand.screen().contains("collecting data") && stand.saved.is_empty());
     stand.answer(true);
     stand.press("e");
     let (path, bytes) = stand.saved.pop().expect("the key writes");

@@ -53,7 +53,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         None => {
-            let words = reports.trouble.as_deref().unwrap_or("reading the history");
+            let words = reports.trouble.as_deref().unwrap_or("collecting data");
             let style = if reports.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
             canvas.text_centred(height / 2, words, style);
         }

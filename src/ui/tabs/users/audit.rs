@@ -221,7 +221,7 @@ impl Audit {
         };
         canvas.text(1, 1, &self.heading(columns), theme.dim());
         if self.rows.is_empty() {
-            let words = if self.answered { "Nothing of this is on record." } else { "reading the history" };
+            let words = if self.answered { "Nothing of this is on record." } else { "collecting data" };
             canvas.text(2, 3, words, theme.dim());
             return;
         }

@@ -60,7 +60,7 @@ fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
     let rows = usize::from(canvas.height().saturating_sub(1));
     let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
     for (y, row) in all.iter().take(shown).enumerate() {
-        let user = row.user.as_deref().unwrap_or("nobody");
+        let user = row.user.as_deref().unwrap_or("–");
         let locked = if row.locked { "  LOCKED" } else { "" };
         let text = format!(
             "{:>4}  {}since {}  {}{locked}",

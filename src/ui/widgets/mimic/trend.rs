@@ -41,7 +41,7 @@ pub fn view(
     // A good value now will be a curve soon, whatever the past lacks.
     let soon = series.is_none() || cx.snapshot.sample(tag).good_value().is_some();
     let Some((series, (low, _, high))) = series.and_then(|series| Some((series, series.summary?))) else {
-        canvas.text(0, 1, if soon { "no curve yet" } else { "no good value" }, theme.dim());
+        canvas.text(0, 1, if soon { "collecting data" } else { "no good value" }, theme.dim());
         return;
     };
     let label = |value| cx.snapshot.format(tag, value);
