@@ -289,7 +289,9 @@ impl UserForm {
         let first = "It must be changed at the first login.".to_owned();
         let own = |user: &Arc<str>| cx.session.who.as_ref().is_some_and(|who| who.user == *user);
         let you = |user: &Arc<str>| {
-            own(user).then_some("This is your own account: you are logged out at once, and only another Supervisor can undo it.")
+            own(user).then_some(
+                "This is your own account: you are logged out at once, and only another Supervisor can undo it.",
+            )
         };
         match &self.purpose {
             Purpose::First => vec![
