@@ -5,7 +5,7 @@ mod banner;
 use ratatui::{Frame, layout::Rect, style::Style};
 
 use banner::banner;
-pub use banner::{alarm_words, counts, history_words};
+pub use banner::{alarm_words, counts, history_text};
 
 use super::{
     Model, PendingCommand, SILENCE, ViewContext,
@@ -158,7 +158,7 @@ fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, Stri
     } else {
         (0, clock(cx.now, &cx.def().time_zone), theme.normal())
     };
-    let mut parts = vec![time, who_words(model, cx, role)];
+    let mut parts = vec![time, who_text(model, cx, role)];
     parts.extend(cx.extension.iter().flat_map(|extension| extension.header(cx)));
     if cx.snapshot.speed != 1.0 {
         parts.push((8, format!("speed ×{}", cx.snapshot.speed), theme.strong()));
@@ -182,20 +182,20 @@ fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, Stri
     parts
 }
 
-/// Who sits here: `tech1 TECHNICIAN`, `LOCKED by anna`, and when it will be locked.
-fn who_words(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Style) {
+/// Who sits here: `user: tech1 (Technician)`, `LOCKED by anna`, and when it will be locked.
+fn who_text(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Style) {
     let theme = cx.theme;
     let Some(who) = &model.session.who else { return (9, "not logged in".to_owned(), theme.strong()) };
     let user = fit(&who.user, 12);
     match model.locks_in() {
         _ if model.session.locked => (2, format!("LOCKED by {user}"), theme.trouble()),
         Some(left) => (1, format!("locks in {} s: press a key", left.as_secs()), theme.trouble()),
-        None if role => (9, format!("{user} {}", who.role.word().to_uppercase()), theme.dim()),
+        None if role => (9, format!("user: {user} ({})", rights::title(who.role)), theme.dim()),
         None => (9, user, theme.dim()),
     }
 }
 
-/// A line in the header: `L1 ▪ tx rx 62 %`, or why it is not connected and when it is tried again.
+/// A line in the header: `L1 load 62 %`, or why it is not connected and when it is tried again.
 fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
     let status = cx.snapshot.line(line.id);
     let counters = &status.counters;
@@ -204,13 +204,13 @@ fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
     };
     match &status.state {
         LineState::Connected => {
-            let tx = if recent(counters.last_tx) { "tx" } else { "--" };
-            let rx = if recent(counters.last_rx) { "rx" } else { "--" };
+            let replies = recent(counters.last_rx);
             let busy = counters.utilisation * 100.0;
             let overloaded = is_overloaded(status);
-            let style = if rx == "rx" && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
+            let style = if replies && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
             let overload = if overloaded { " OVERLOADED" } else { "" };
-            (format!("{} {} {tx} {rx} {busy:.0} %{overload}", line.name, cx.theme.pick("▪", "*")), style)
+            let silent = if replies { "" } else { "no reply, " };
+            (format!("{} {silent}load {busy:.0} %{overload}", line.name), style)
         }
         LineState::Connecting => (format!("{} connecting", line.name), cx.theme.trouble()),
         LineState::Waiting { retry_at, .. } => {

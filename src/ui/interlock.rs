@@ -49,22 +49,22 @@ pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, St
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (format!("! Nothing can be written now. {why}"), cx.theme.trouble()));
     let locks =
-        cx.def().logic.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_words(cx, lock));
+        cx.def().logic.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_text(cx, lock));
     let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
         rows.push(("This is not sent: it would have no effect.".to_owned(), cx.theme.strong()));
     }
-    if let Some(words) = unmet_words(cx, tag) {
+    if let Some(words) = unmet_text(cx, tag) {
         rows.push((format!("! {words}"), cx.theme.strong()));
     }
-    rows.extend(key_words(cx, tag).into_iter().map(|words| (words, cx.theme.strong())));
-    rows.extend(sequence_words(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
+    rows.extend(key_text(cx, tag).into_iter().map(|words| (words, cx.theme.strong())));
+    rows.extend(sequence_text(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows.extend(taken_over(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows
 }
 
 /// `First TIC-2.UNLOCK := ON; it stays so.`, where a write needs a key that is not certainly turned.
-pub fn key_words(cx: &ViewContext, tag: TagId) -> Option<String> {
+pub fn key_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     let (key, turned) = cx.def().tag(tag).write_unlock?;
     if cx.snapshot.sample(key).good_value() == Some(turned) {
         return None;
@@ -73,7 +73,7 @@ pub fn key_words(cx: &ViewContext, tag: TagId) -> Option<String> {
 }
 
 /// `⊘ no heating below 5 cm of water: PLC-1.LT-1 is 3.2 cm`; `None` while it does not block.
-pub fn interlock_words(cx: &ViewContext, lock: &InterlockDef) -> Option<(String, Style)> {
+pub fn interlock_text(cx: &ViewContext, lock: &InterlockDef) -> Option<(String, Style)> {
     let mark = cx.theme.pick("⊘", "(/)");
     let name = &cx.def().tag(lock.of).name;
     match (lock.status(cx.snapshot.sample(lock.of)), lock.when) {
@@ -101,7 +101,7 @@ pub fn unmet(cx: &ViewContext, actuator: &ActuatorDef) -> Option<(TagId, f64)> {
 }
 
 /// `effective in MANUAL only (PLC-1.AUTO is AUTO)`, for the command of an actuator.
-pub fn unmet_words(cx: &ViewContext, tag: TagId) -> Option<String> {
+pub fn unmet_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     let actuator = &cx.def().logic.actuators.iter().find(|actuator| actuator.command == tag)?;
     let (need, state) = unmet(cx, actuator)?;
     let now = match cx.snapshot.sample(need).good_value() {
@@ -112,7 +112,7 @@ pub fn unmet_words(cx: &ViewContext, tag: TagId) -> Option<String> {
 }
 
 /// What starting or stopping a sequence does.
-fn sequence_words(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
+fn sequence_text(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let sequences = &cx.def().logic.sequences;
     if let Some(sequence) = sequences.iter().find(|sequence| sequence.auto == Some((tag, value))) {
         return vec![match (value::is_on(cx, sequence.run), cx.snapshot.text(sequence.step)) {
@@ -270,13 +270,13 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     let mut rows = vec![("command", format!("{} {}", command.name, told.whole()), told.style)];
     let modes: Vec<String> = actuator.needs.iter().map(|(need, _)| value::show(cx, *need).whole()).collect();
     let mode = modes.join(", ");
-    match unmet_words(cx, actuator.command) {
+    match unmet_text(cx, actuator.command) {
         Some(words) => rows.push(("mode", format!("{mode}: {words}"), theme.strong())),
         None if modes.is_empty() => {}
         None => rows.push(("mode", format!("{mode}: the command acts"), theme.normal())),
     }
     let locks = logic.interlocks.iter().filter(|lock| lock.tag == actuator.command);
-    rows.extend(locks.filter_map(|lock| interlock_words(cx, lock)).map(|(words, style)| ("blocked", words, style)));
+    rows.extend(locks.filter_map(|lock| interlock_text(cx, lock)).map(|(words, style)| ("blocked", words, style)));
     if let Some(lasts) = guards_disobeyed(cx, place) {
         let (wanted, is) = (told.text, value::show(cx, actuator.output).with_unit());
         let words = format!("{} commanded {wanted}, still {is} after {}", theme.pick("≠", "!="), age(lasts));

@@ -134,7 +134,7 @@ impl Loop {
         let mut ticks = interval(TICK);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let (width, height) = self.screen.size();
-        self.take(Msg::Resize(width, height), Duration::ZERO)?;
+        self.handle(Msg::Resize(width, height), Duration::ZERO)?;
         loop {
             let due = self.redraw_at.unwrap_or_else(|| Instant::now() + FRAME);
             let leave = tokio::select! {
@@ -155,21 +155,21 @@ impl Loop {
                     changed.map_err(|_| UiError::StationGone)?;
                     self.heard_at = Instant::now();
                     let snapshot = self.session.snapshots.borrow_and_update().clone();
-                    self.take(Msg::Snapshot(snapshot), FRAME)?
+                    self.handle(Msg::Snapshot(snapshot), FRAME)?
                 }
                 Ok(()) = self.session.status.changed() => {
                     let status = self.session.status.borrow_and_update().clone();
-                    self.take(Msg::SessionStatus(status), ECHO)?
+                    self.handle(Msg::SessionStatus(status), ECHO)?
                 }
-                state = next_state(&mut self.extension) => self.take(Msg::Extension(state), FRAME)?,
+                state = next_state(&mut self.extension) => self.handle(Msg::Extension(state), FRAME)?,
                 Some((plants, msg)) = inbox.recv() => {
                     // Ids of one plant mean something else in another.
                     let fits = plants == self.model.plants || matches!(msg, Msg::RequestDone(..));
-                    if fits { self.take(msg, FRAME)? } else { false }
+                    if fits { self.handle(msg, FRAME)? } else { false }
                 }
                 _ = ticks.tick() => {
                     let silent = self.heard_at.elapsed();
-                    self.take(Msg::Tick { silent }, FRAME)?
+                    self.handle(Msg::Tick { silent }, FRAME)?
                 }
             };
             if leave {
@@ -180,19 +180,19 @@ impl Loop {
 
     fn on_event(&mut self, event: Event) -> Result<bool, UiError> {
         match event {
-            Event::Key(key) => self.take(Msg::Key(key), ECHO),
-            Event::Paste(text) => self.take(Msg::Paste(text), ECHO),
+            Event::Key(key) => self.handle(Msg::Key(key), ECHO),
+            Event::Paste(text) => self.handle(Msg::Paste(text), ECHO),
             Event::Resize(_, _) => {
                 self.screen.renew()?;
                 let (width, height) = self.screen.size();
-                self.take(Msg::Resize(width, height), ECHO)
+                self.handle(Msg::Resize(width, height), ECHO)
             }
             Event::Mouse(_) | Event::FocusGained | Event::FocusLost => Ok(false),
         }
     }
 
     /// Takes in a message; a frame follows no sooner than `pause` after the last one. `true`: leave.
-    fn take(&mut self, msg: Msg, pause: Duration) -> Result<bool, UiError> {
+    fn handle(&mut self, msg: Msg, pause: Duration) -> Result<bool, UiError> {
         let effects = own(|| update(&mut self.model, msg));
         let due = self.drawn_at.map_or_else(Instant::now, |at| at + pause);
         self.redraw_at = Some(self.redraw_at.map_or(due, |planned| planned.min(due)));

@@ -232,7 +232,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
     };
     let actions = session_lock::hold_back(model, actions);
     let effects = perform(model, actions);
-    model.settle();
+    model.close_confirmation();
     if keyed {
         model.note_keyed();
     }

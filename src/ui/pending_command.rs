@@ -68,7 +68,7 @@ impl Model {
     }
 
     /// Ends the wait of a window for the check of its credentials; refused ones are asked for again.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn close_confirmation(&mut self) {
         let Some(pending) = &self.pending_command else { return };
         let refused = match (pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
             (Some(why), _) => Some(format!("not sent: {why}")),

@@ -76,7 +76,7 @@ impl Place {
 
     fn terminal(&self) -> Terminal {
         let mut terminal = Terminal::start_in(100, 30, &[], &self.sockets);
-        terminal.wait_for("SUPERVISOR");
+        terminal.wait_for("(Supervisor)");
         terminal
     }
 

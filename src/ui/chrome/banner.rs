@@ -12,7 +12,7 @@ use crate::{
     ui::{
         modal::{
             confirm::subject,
-            faceplate::{device_words, line_state_words},
+            faceplate::{device_text, line_state_text},
         },
         rights,
         widgets::value,
@@ -24,11 +24,11 @@ use crate::{
 pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let alarms = &cx.snapshot.alarms;
     let urgent = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement());
-    let trouble = history_words(cx);
+    let trouble = history_text(cx);
     let other = alarms.first().filter(|_| trouble.is_none());
     let Some(alarm) = urgent.or(other) else {
         let seen_none = alarms.is_empty();
-        let blind = if seen_none { blind_words(model, cx) } else { silent_words(model).map(|why| not_judged(&why)) };
+        let blind = if seen_none { blind_text(model, cx) } else { silent_text(model).map(|why| not_judged(&why)) };
         let room = canvas.width().saturating_sub(1);
         match [blind, trouble].into_iter().flatten().reduce(|blind, trouble| format!("{blind}   {trouble}")) {
             Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
@@ -45,13 +45,13 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let (mark, style) =
         (cx.theme.alarm(def.priority, alarm.state, cx.flash()), cx.theme.alarm(def.priority, alarm.state, false));
     let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
-    let x = canvas.text(x, 0, &state_words(cx, alarm), style) + 2;
+    let x = canvas.text(x, 0, &state_text(cx, alarm), style) + 2;
     let room = canvas.width();
     // The key is told where it is meant for this very alarm: on the alarms tab it is for the selected one.
     let meant = model.alarm_to_acknowledge().is_some_and(|meant| meant.id == alarm.id);
     let may = rights::missing(cx, &alarm.acknowledge()).is_none();
     let ack = if waiting && meant && may { "a ack " } else { "" };
-    let worry = worry_words(model, cx);
+    let worry = worry_text(model, cx);
     let (suppressed, silenced) = (suppressed_words(cx), if is_silenced(cx) { "silenced   " } else { "" });
     let suppressed = if suppressed.is_empty() { suppressed } else { format!("{suppressed}   ") };
     let counts = counts(cx);
@@ -62,7 +62,7 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
         (14, format!("{worry}{counts}   {ack}")),
         (8, format!("{worry}{ack}")),
     ];
-    let (text, value) = what_words(cx, alarm);
+    let (text, value) = what_text(cx, alarm);
     let fits = |least: u16, tail: &str| x + width(&text).min(least) + 2 + width(tail) <= room;
     let tail = tails.iter().find(|(least, tail)| fits(*least, tail)).map_or("", |(_, tail)| tail.trim_end());
     let end = room.saturating_sub(1);
@@ -77,8 +77,8 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 }
 
 /// Why more may be wrong than can be seen: the station evaluates nothing, or there is a flood.
-fn worry_words(model: &Model, cx: &ViewContext) -> String {
-    let blind = if silent_words(model).is_some() { "alarms not evaluated   " } else { "" };
+fn worry_text(model: &Model, cx: &ViewContext) -> String {
+    let blind = if silent_text(model).is_some() { "alarms not evaluated   " } else { "" };
     let flood = if cx.snapshot.alarm_metrics.flood_since.is_some() { "FLOOD   " } else { "" };
     format!("{blind}{flood}")
 }
@@ -101,9 +101,9 @@ fn is_silenced(cx: &ViewContext) -> bool {
 }
 
 /// Why alarms may be there without being seen: `alarms not evaluated: L1 disconnected`.
-fn blind_words(model: &Model, cx: &ViewContext) -> Option<String> {
+fn blind_text(model: &Model, cx: &ViewContext) -> Option<String> {
     let snapshot = cx.snapshot;
-    let silent = silent_words(model);
+    let silent = silent_text(model);
     let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
         LineState::Connected => None,
         LineState::Disconnected => Some(format!("{} disconnected", line.name)),
@@ -129,7 +129,7 @@ fn not_judged(why: &str) -> String {
 }
 
 /// Why nothing is heard of the station.
-fn silent_words(model: &Model) -> Option<String> {
+fn silent_text(model: &Model) -> Option<String> {
     match &model.session.gone {
         Some(why) => Some(format!("station gone, {why}")),
         None => (model.clock.silent >= SILENCE).then(|| "station silent".to_owned()),
@@ -137,31 +137,31 @@ fn silent_words(model: &Model) -> Option<String> {
 }
 
 /// `history: disk full`; nothing while the history is well.
-pub fn history_words(cx: &ViewContext) -> Option<String> {
+pub fn history_text(cx: &ViewContext) -> Option<String> {
     cx.snapshot.history.words().map(|words| format!("history: {words}"))
 }
 
 /// `UNACK 00:41  TIC-1.PV temperature high  72.4 °C`.
 pub fn alarm_words(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
-    let (text, value) = what_words(cx, alarm);
-    format!("{}  {text}  {value}", state_words(cx, alarm))
+    let (text, value) = what_text(cx, alarm);
+    format!("{}  {text}  {value}", state_text(cx, alarm))
 }
 
 /// `TIC-1.PV temperature high` and `72.4 °C`.
-fn what_words(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
+fn what_text(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
     use crate::plant::def::Subject;
     let def = cx.def().alarm(alarm.id);
     let now = match def.subject {
         Subject::Tag(tag) => value::show(cx, tag).with_unit(),
-        Subject::Device(device) => device_words(cx, device),
-        Subject::Line(line) => line_state_words(cx, line),
+        Subject::Device(device) => device_text(cx, device),
+        Subject::Line(line) => line_state_text(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
     (format!("{} {}", subject(cx, alarm.id), def.message), now)
 }
 
 /// `UNACK 00:41`: the state and how long it lasts.
-fn state_words(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
+fn state_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
     let since = match alarm.state {
         AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             alarm.returned_at.unwrap_or(alarm.raised_at)

@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Confirm, Modal, Next, confirm::wire_words, window};
+use super::{Confirm, Modal, Next, confirm::wire_text, window};
 use crate::{
     plant::{
         def::{DeviceId, TagId},
@@ -83,7 +83,7 @@ impl Choice {
         let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(shown) + 4));
         if let Some(row) = self.rows.get(self.selected) {
             canvas.text(0, 0, &format!("now {}", value::show(cx, row.tag).whole()), cx.theme.normal());
-            canvas.text(0, 1, &wire_words(cx.def().tag(row.tag)), cx.theme.dim());
+            canvas.text(0, 1, &wire_text(cx.def().tag(row.tag)), cx.theme.dim());
         }
         for (y, n, row) in on_screen(&self.rows, first, shown) {
             let style = if n == self.selected { cx.theme.focus() } else { cx.theme.normal() };

@@ -7,7 +7,7 @@ use super::{
     Faceplate, Modal, Next,
     confirmed_value::ConfirmedValue,
     form::{Field, Form, Turn},
-    number::rounded_words,
+    number::rounded_text,
     window,
 };
 use crate::{
@@ -91,7 +91,7 @@ impl Confirm {
     /// what is sent.
     pub fn write(cx: &ViewContext, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
-        let rounded = rounded_words(cx, tag, value);
+        let rounded = rounded_text(cx, tag, value);
         let value = if rounded.is_some() { cx.snapshot.held(tag, value) } else { value };
         let intent = Intent::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
@@ -294,7 +294,7 @@ impl Confirm {
             let change = old_and_new(cx, *tag, *value);
             let lines = if width(&change) <= room { vec![change] } else { wrap(&change, room) };
             rows.extend(lines.into_iter().map(|line| (line, cx.theme.strong())));
-            rows.push((wire_words(cx.def().tag(*tag)), cx.theme.dim()));
+            rows.push((wire_text(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
         if let Intent::Command(CommandKind::Write { tag, value }) = &self.intent {
@@ -354,7 +354,7 @@ pub(super) fn old_and_new(cx: &ViewContext, tag: TagId, new: f64) -> String {
 }
 
 /// Where a write goes (a read, for a tag that is read-only), in both forms that manuals use: `41007 / 0x03EE, FC 06 / 0x06`.
-pub fn wire_words(def: &TagDef) -> String {
+pub fn wire_text(def: &TagDef) -> String {
     let fc = def.write_function().unwrap_or(def.point.table.read_fc());
     let address = def.point.address;
     format!("{} / 0x{address:04X}, FC {fc:02} / 0x{fc:02X}", def.point.table.modicon(address))

@@ -5,10 +5,10 @@ use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{
     Confirm, Modal, Next,
-    confirm::{wire_words, write_notes},
+    confirm::{wire_text, write_notes},
     confirmed_value::ConfirmedValue,
     line::Line,
-    number::{self, is_numeric, range_words},
+    number::{self, is_numeric, range_text},
     window,
 };
 use crate::{
@@ -96,10 +96,10 @@ impl Entry {
         let def = cx.def().tag(self.tag);
         let room = body.width.saturating_sub(8).min(64);
         let mut rows: Vec<(String, Style)> =
-            vec![(range_words(cx, self.tag), theme.normal()), (wire_words(def), theme.dim())];
+            vec![(range_text(cx, self.tag), theme.normal()), (wire_text(def), theme.dim())];
         rows.push((number::help(cx, self.tag), theme.dim()));
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
-        let notes = notes.chain(interlock::key_words(cx, self.tag));
+        let notes = notes.chain(interlock::key_text(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let missing = rights::missing(cx, &CommandKind::Write { tag: self.tag, value: 0.0 });
         let told = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);
@@ -120,7 +120,7 @@ impl Entry {
         let x = canvas.text(x, 0, "  →  new ", theme.dim());
         let x = self.line.view(theme, &mut canvas, x, 0);
         let x = canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
-        if let Some(words) = number::relative_words(cx, self.tag, &self.line.text()) {
+        if let Some(words) = number::relative_text(cx, self.tag, &self.line.text()) {
             canvas.text(x + 2, 0, &words, theme.strong());
         }
         for (y, (text, style)) in rows.iter().enumerate() {

@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Confirm, Modal, Next, Notice, Why, confirm::wire_words, number::range_words, window};
+use super::{Confirm, Modal, Next, Notice, Why, confirm::wire_text, number::range_text, window};
 use crate::{
     plant::{
         def::TagId,
@@ -183,8 +183,8 @@ fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String
     rows.extend([
         ("quality", quality, theme.quality(sample.quality)),
         ("read", format!("{read} ({poll})"), theme.normal()),
-        ("range", range_words(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
-        ("access", format!("{access}  {}  map row {}", wire_words(def), def.confidence.word()), theme.normal()),
+        ("range", range_text(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
+        ("access", format!("{access}  {}  map row {}", wire_text(def), def.confidence.word()), theme.normal()),
         (
             "device",
             format!(
@@ -193,7 +193,7 @@ fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String
                 device.model,
                 device.unit,
                 cx.def().line(device.line).name,
-                device_words(cx, def.device)
+                device_text(cx, def.device)
             ),
             theme.normal(),
         ),
@@ -222,7 +222,7 @@ fn command_of(cx: &ViewContext, tag: TagId) -> Option<TagId> {
 }
 
 /// How a device stands, in words.
-pub fn device_words(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
+pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let status = cx.snapshot.device(device);
     match status.state {
         DeviceState::Unknown => "not asked yet".to_owned(),
@@ -232,13 +232,13 @@ pub fn device_words(cx: &ViewContext, device: crate::plant::def::DeviceId) -> St
         },
         DeviceState::Failing(n) => format!("failing, {n} in a row"),
         DeviceState::Down { since } => {
-            format!("DOWN since {}{}", clock(since, &cx.def().time_zone), retry_words(cx, device))
+            format!("DOWN since {}{}", clock(since, &cx.def().time_zone), retry_text(cx, device))
         }
     }
 }
 
 /// `, retry in 12 s` for a device that does not answer.
-pub fn retry_words(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
+pub fn retry_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
     match report.and_then(|report| report.retry_at(device)) {
         Some(at) if cx.now < at => format!(", retry in {} s", between(cx.now, at).as_secs_f64().ceil()),
@@ -248,7 +248,7 @@ pub fn retry_words(cx: &ViewContext, device: crate::plant::def::DeviceId) -> Str
 }
 
 /// How a line stands, in words.
-pub fn line_state_words(cx: &ViewContext, line: crate::plant::def::LineId) -> String {
+pub fn line_state_text(cx: &ViewContext, line: crate::plant::def::LineId) -> String {
     let status = cx.snapshot.line(line);
     match &status.state {
         LineState::Connecting => "connecting".to_owned(),

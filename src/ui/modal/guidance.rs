@@ -71,7 +71,7 @@ impl Guidance {
             None => guidance::rows_of_any(cx, self.alarm, now),
         }
         .to_vec();
-        let respond = listed.and_then(|alarm| guidance::respond_words(cx, cx.def().alarm(self.alarm), alarm));
+        let respond = listed.and_then(|alarm| guidance::respond_text(cx, cx.def().alarm(self.alarm), alarm));
         rows.splice(0..0, respond.map(|(words, _)| ("time", words)));
         let lines = |(name, text): (&'static str, String)| {
             let names = std::iter::once(name).chain(std::iter::repeat(""));
@@ -85,7 +85,7 @@ impl Guidance {
         let room = room(body);
         let lines = self.lines(cx, room);
         let def = cx.def().alarm(self.alarm);
-        let condition = guidance::condition_words(cx, def.id);
+        let condition = guidance::condition_text(cx, def.id);
         let title = format!("{} {} {} {condition}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
         let mut canvas = window(cx, frame, body, title.trim_end(), (room + NAMES, lines.len() as u16 + 2));
         let rows = canvas.height().saturating_sub(2);

@@ -44,14 +44,14 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
     let inside = |value| scale::is_inside(Some(min), Some(max), value);
     let held = cx.snapshot.held(tag, value);
     match (inside(value), inside(held)) {
-        (false, _) => Err(format!("outside {}", range_words(cx, tag))),
-        (true, false) => Err(format!("the device would hold {}, outside {}", plain(held), range_words(cx, tag))),
+        (false, _) => Err(format!("outside {}", range_text(cx, tag))),
+        (true, false) => Err(format!("the device would hold {}, outside {}", plain(held), range_text(cx, tag))),
         (true, true) => Ok(value),
     }
 }
 
 /// `70.0 → 75.0`, while a number with a sign is typed.
-pub fn relative_words(cx: &ViewContext, tag: TagId, text: &str) -> Option<String> {
+pub fn relative_text(cx: &ViewContext, tag: TagId, text: &str) -> Option<String> {
     let (Number::Step(by), _) = parse(text.trim())? else { return None };
     let text = |value| cx.snapshot.format(tag, value);
     Some(format!("{} → {}", text(cx.snapshot.sample(tag).good_value()?), text(stepped(cx, tag, by)?)))
@@ -69,12 +69,12 @@ pub fn help(cx: &ViewContext, tag: TagId) -> String {
 pub fn asks(cx: &ViewContext, tag: TagId, value: f64) -> bool {
     cx.def().tag(tag).confirm.is_some()
         || reauthentication::required(cx.def(), &CommandKind::Write { tag, value }).is_some()
-        || rounded_words(cx, tag, value).is_some()
+        || rounded_text(cx, tag, value).is_some()
         || !worries(cx, tag, value).is_empty()
 }
 
 /// `72.3 → the device holds steps of 0.5: 72.5`; `None` where it holds what was typed.
-pub fn rounded_words(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> {
+pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> {
     let held = cx.snapshot.held(tag, value);
     // A single-precision register is as good as exact.
     let same = (held - value).abs() <= 1e-6 * value.abs().max(1.0);
@@ -108,7 +108,7 @@ pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
 }
 
 /// The permitted range in words.
-pub fn range_words(cx: &ViewContext, tag: TagId) -> String {
+pub fn range_text(cx: &ViewContext, tag: TagId) -> String {
     let labels = &cx.def().tag(tag).labels;
     if !labels.is_empty() {
         return format!("range one of {}", labels.len());
@@ -208,8 +208,8 @@ mod tests {
         assert_eq!(checked(&fixture, "=-5"), Err("outside range 0.0 … 120.0 °C".to_owned()), "an absolute number");
         let sv = fixture.tag("TIC-1.SV");
         with_cx(&fixture.snapshot(), |cx| {
-            assert_eq!(relative_words(cx, sv, "+5").as_deref(), Some("70.0 → 75.0"));
-            assert_eq!((relative_words(cx, sv, "5"), relative_words(cx, sv, "+")), (None, None));
+            assert_eq!(relative_text(cx, sv, "+5").as_deref(), Some("70.0 → 75.0"));
+            assert_eq!((relative_text(cx, sv, "5"), relative_text(cx, sv, "+")), (None, None));
         });
         fixture.samples[sv.index()] = Sample::bad(Cause::Timeout, now());
         assert_eq!(

@@ -7,7 +7,7 @@ mod tests;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Modal, Next, faceplate::device_words, window};
+use super::{Modal, Next, faceplate::device_text, window};
 use crate::{
     plant::{
         command::{CommandKind, Outcome},
@@ -302,7 +302,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
             let well = |state| matches!(state, DeviceState::Answering | DeviceState::Unknown);
             let all_well = devices.clone().all(|device| well(cx.snapshot.device(device.id).state));
             let words: Vec<String> =
-                devices.map(|device| format!("{} {}", device.name, device_words(cx, device.id))).collect();
+                devices.map(|device| format!("{} {}", device.name, device_text(cx, device.id))).collect();
             (format!("{name} connected: {}", words.join("; ")), all_well)
         }
     }

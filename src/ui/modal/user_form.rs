@@ -327,7 +327,7 @@ impl UserForm {
         told.map_or(0, |(wait, at)| wait.saturating_sub(cx.phase.wrapping_sub(at) / 2))
     }
 
-    fn problem_words(&self, cx: &ViewContext) -> Option<String> {
+    fn problem_text(&self, cx: &ViewContext) -> Option<String> {
         if self.waiting {
             return Some("asking the station …".to_owned());
         }
@@ -367,7 +367,7 @@ impl UserForm {
         y += self.form.rows();
         let style = if self.waiting { cx.theme.dim() } else { cx.theme.trouble() };
         let room = canvas.width();
-        for words in self.problem_words(cx).iter().flat_map(|words| wrap(words, room)) {
+        for words in self.problem_text(cx).iter().flat_map(|words| wrap(words, room)) {
             canvas.text(0, y, &words, style);
             y += 1;
         }
@@ -378,7 +378,7 @@ impl UserForm {
         let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
         let keys = cx.theme.enter(&format!("{}   Esc leave", keys.join("   ")));
         let inner = self.form.width().max(width(&keys)).clamp(40, body.width.saturating_sub(8).clamp(40, 72));
-        let problem = self.problem_words(cx).map_or(1, |words| to_u16(wrap(&words, inner).len()));
+        let problem = self.problem_text(cx).map_or(1, |words| to_u16(wrap(&words, inner).len()));
         let height = to_u16(self.rows(cx, inner).len()) + self.form.rows() + problem + 2;
         let mut canvas = window(cx, frame, body, &self.title(), (inner, height));
         self.draw(cx, &mut canvas);

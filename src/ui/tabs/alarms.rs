@@ -31,7 +31,7 @@ use crate::{
         UiAction, ViewContext,
         keys::{Hint, find},
         last_frame::Rows,
-        modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_words},
+        modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_text},
         widgets::list::{Motion, Selected, first},
     },
 };
@@ -112,7 +112,7 @@ impl TabView for Alarms {
             Action::Priority => self.filter.next_priority(),
             Action::State => self.filter.next_state(),
             Action::Area => self.filter.next_area(cx.def()),
-            Action::Words => return self.ask_words(),
+            Action::Words => return self.ask_text(),
             Action::Shift(by) => self.shift(cx, by),
             Action::Now => self.shift(cx, 0),
             Action::Journal => self.turn_to_journal(cx),
@@ -152,7 +152,7 @@ impl TabView for Alarms {
                 .is_some_and(|suppressed| matches!(suppressed.state, AlarmState::Shelved | AlarmState::OutOfService)),
             _ => true,
         };
-        let mut hints = keys::told(self.page);
+        let mut hints = keys::page_hints(self.page);
         hints.iter_mut().filter(|hint| !can(&hint.label)).for_each(|hint| hint.label.clear());
         // The first of these must not fall off a narrow footer.
         hints.sort_by_key(|hint| match hint.label.as_str() {
@@ -348,11 +348,11 @@ impl Alarms {
             return;
         }
         let of = self.target(cx).map(|alarm| guidance::journal_of(cx, cx.def().alarm(alarm).subject));
-        self.journal.look_for(of.unwrap_or_default());
+        self.journal.search_for(of.unwrap_or_default());
         self.page = Page::Journal;
     }
 
-    fn ask_words(&self) -> Vec<UiAction> {
+    fn ask_text(&self) -> Vec<UiAction> {
         let prompt = match self.page {
             Page::Journal => Prompt::new("search the journal", journal::FORMS, &self.journal.typed()),
             Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
@@ -402,7 +402,7 @@ fn faceplate(cx: &ViewContext, subject: Subject) -> Option<Faceplate> {
         Subject::Tag(tag) => Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]),
         Subject::Device(device) => {
             let tags = cx.def().tags_of(device).take(8).map(|tag| tag.id).collect();
-            Faceplate::new(format!("{} {}", cx.def().device(device).name, device_words(cx, device)), tags)
+            Faceplate::new(format!("{} {}", cx.def().device(device).name, device_text(cx, device)), tags)
         }
         Subject::Line(_) | Subject::Station => None,
     }

@@ -362,7 +362,7 @@ impl Bus {
             count => format!(" {}/{count}", at.id.0 + 1),
         };
         let words =
-            fit_words(&format!("{}{place}  {}", at.settings.name, state_words(cx, at)), end.saturating_sub(x + 2));
+            fit_words(&format!("{}{place}  {}", at.settings.name, state_text(cx, at)), end.saturating_sub(x + 2));
         let style = if at.status.state == LineState::Connected { cx.theme.normal() } else { cx.theme.trouble() };
         canvas.text(end.saturating_sub(width(&words)), 0, &words, style);
     }
@@ -405,7 +405,7 @@ pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
-fn state_words(cx: &ViewContext, at: &Place) -> String {
+fn state_text(cx: &ViewContext, at: &Place) -> String {
     let zone = &cx.def().time_zone;
     let since = at
         .status

@@ -297,7 +297,7 @@ impl TabView for Controllers {
                 let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
                 let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
                 let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
-                let words = sets::replace_words(cx, there);
+                let words = sets::replace_text(cx, there);
                 Ok(vec![UiAction::Open(Modal::Confirm(Confirm::command(format!("save set {text}"), words, kind)))])
             }
         }

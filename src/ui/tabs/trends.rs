@@ -148,7 +148,7 @@ impl TabView for Trends {
                 if let Some(asked) = curves {
                     self.data.trouble = None;
                     // Asked at a steady time, about times in UTC.
-                    self.take_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
+                    self.accept_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
                 } else if hours.is_some() {
                     self.data.trouble = None;
                     self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
@@ -382,7 +382,7 @@ impl Trends {
 
     /// Takes curves of the history in. Figures, and where the day's data begin, are taken only from an answer for what
     /// is shown now; a curve carries its own times and is right in any view.
-    fn take_curves(&mut self, cx: &ViewContext, series: Vec<Series>, asked: Timestamp) {
+    fn accept_curves(&mut self, cx: &ViewContext, series: Vec<Series>, asked: Timestamp) {
         if !self.periodics.curves.is_wanted() {
             self.data.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
             if self.accumulate && self.end.is_none() {

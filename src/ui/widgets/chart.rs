@@ -321,7 +321,7 @@ impl Chart<'_> {
         while x < past && !plan.columns.is_empty() {
             let end = (x..past).find(known).unwrap_or(past);
             let (first, last) = (to_u16(x.div_ceil(across)), to_u16(end / across));
-            let length = span_words(span.mul_f64((end - x) as f64 / count as f64));
+            let length = span_text(span.mul_f64((end - x) as f64 / count as f64));
             let texts = [format!("no data {length}"), format!("gap {length}"), length];
             let fits = |text: &String| first + to_u16(text.width()) + 2 <= last;
             if let Some(text) = texts.into_iter().find(fits).filter(|_| was_read(x + (end - x) / 2)) {
@@ -436,7 +436,7 @@ fn widen(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
 }
 
 /// A length of time in a few letters: `40 s`, `12 min`, `3.5 h`, `2.0 d`.
-pub fn span_words(span: Duration) -> String {
+pub fn span_text(span: Duration) -> String {
     let seconds = span.as_secs();
     match seconds {
         0..=99 => format!("{seconds} s"),

@@ -17,7 +17,7 @@ use crate::{
     },
     ui::{
         ViewContext,
-        modal::faceplate::device_words,
+        modal::faceplate::device_text,
         widgets::text::{age, between, running},
     },
 };
@@ -28,7 +28,7 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     let status = cx.snapshot.device(device.id);
     let line = cx.snapshot.line(device.line);
     let stats = line.report.as_ref().and_then(|report| report.device(device.id));
-    let mut text = device_words(cx, device.id);
+    let mut text = device_text(cx, device.id);
     if let Some(p99) = stats.and_then(|stats| stats.reply.p99()) {
         text += &format!(", 99 % within {}", span(p99));
     }

@@ -14,7 +14,7 @@ use crate::{
         ViewContext,
         modal::{
             confirm::subject,
-            faceplate::{device_words, line_state_words},
+            faceplate::{device_text, line_state_text},
         },
         rights,
         widgets::{
@@ -29,7 +29,7 @@ const NAMES: u16 = 10;
 
 /// All there is to say about a listed alarm.
 pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
-    rows_of_any(cx, alarm.id, now_words(cx, cx.def().alarm(alarm.id), alarm))
+    rows_of_any(cx, alarm.id, now_text(cx, cx.def().alarm(alarm.id), alarm))
 }
 
 /// The same for one that is not in a list.
@@ -52,9 +52,9 @@ pub fn height(rows: &[(&str, String)], width: u16) -> u16 {
 /// Draws it for a listed alarm.
 pub fn view(cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Canvas) {
     let def = cx.def().alarm(alarm.id);
-    let go = go_words(cx, def, Some(alarm));
+    let go = go_text(cx, def, Some(alarm));
     let rows = rows(cx, alarm);
-    let respond = respond_words(cx, def, alarm)
+    let respond = respond_text(cx, def, alarm)
         .map(|(words, overdue)| (format!(" {words} "), if overdue { cx.theme.trouble() } else { cx.theme.strong() }));
     let cut = title(cx, def, Some(alarm), respond, canvas);
     draw(cx, cut.as_deref(), &rows, &go, canvas);
@@ -65,7 +65,7 @@ pub fn view_any(cx: &ViewContext, alarm: AlarmId, now: String, canvas: &mut Canv
     let def = cx.def().alarm(alarm);
     let rows = rows_of_any(cx, alarm, now);
     let cut = title(cx, def, None, None, canvas);
-    draw(cx, cut.as_deref(), &rows, &go_words(cx, def, None), canvas);
+    draw(cx, cut.as_deref(), &rows, &go_text(cx, def, None), canvas);
 }
 
 /// Which alarm it is about; at the right how long there is to respond. Its whole name, where there was no room for that.
@@ -87,7 +87,7 @@ fn title(
     });
     let ack = if mine { "a ack " } else { "" };
     let name = format!(" {ack}{} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
-    let whole = format!("{name} {}", condition_words(cx, def.id));
+    let whole = format!("{name} {}", condition_text(cx, def.id));
     let room = end.saturating_sub(text::width(&words) + 3);
     let shown =
         if text::width(whole.trim_end()) <= room { whole.trim_end().to_owned() } else { fit_words(&name, room) };
@@ -139,15 +139,15 @@ fn or_dash(text: &str) -> &str {
 }
 
 /// The value now and when it was raised, how often, and who acknowledged it.
-fn now_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
+fn now_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
     let zone = &cx.def().time_zone;
     let mut words = match def.subject {
         Subject::Tag(tag) => {
             let raised = alarm.value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
             format!("{}, raised at {raised}", value::show(cx, tag).whole())
         }
-        Subject::Device(device) => device_words(cx, device),
-        Subject::Line(line) => line_state_words(cx, line),
+        Subject::Device(device) => device_text(cx, device),
+        Subject::Line(line) => line_state_text(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
     if 1 < alarm.times {
@@ -167,7 +167,7 @@ fn now_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
 }
 
 /// `respond within 10 min, 09:19 left`, and whether that time is over; nothing where the plant file gives no time.
-pub fn respond_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
+pub fn respond_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
     let respond = def.guidance.response_time?;
     let within = format!("respond within {} min", respond.as_secs().div_ceil(60));
     let gone = between(alarm.raised_at, cx.now);
@@ -187,7 +187,7 @@ pub fn respond_words(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> O
 }
 
 /// The keys that lead from an alarm to what it watches.
-pub fn go_words(cx: &ViewContext, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
+pub fn go_text(cx: &ViewContext, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
     let at = alarm.map(|alarm| format!(" at {}", clock(alarm.raised_at, &cx.def().time_zone))).unwrap_or_default();
     let journal = format!("j journal of {}", journal_of(cx, def.subject));
     match def.subject {
@@ -209,7 +209,7 @@ pub fn journal_of<'a>(cx: &ViewContext<'a>, subject: Subject) -> &'a str {
 }
 
 /// The limit of an alarm: `> 72.0`; empty where there is none.
-pub fn condition_words(cx: &ViewContext, alarm: AlarmId) -> String {
+pub fn condition_text(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
     let number = |value| match def.subject {
         Subject::Tag(tag) => cx.snapshot.format(tag, value),

@@ -5,7 +5,7 @@ use ratatui::style::Style;
 
 use super::{
     super::{Tab, periodic_query::PeriodicQuery, reports::period},
-    journal::action_words,
+    journal::action_text,
     span,
 };
 use crate::{
@@ -22,7 +22,7 @@ use crate::{
     report::Period,
     ui::{
         UiAction, ViewContext,
-        modal::{confirm::subject, faceplate::device_words},
+        modal::{confirm::subject, faceplate::device_text},
         widgets::{
             list::{Motion, Scroll},
             text::{Canvas, between, clock, fit_words, moment, running, wrap},
@@ -179,7 +179,7 @@ impl Handover {
             let from = self.period(cx).map_or(Timestamp::MIN, |shown| shown.from);
             let of = |keep: fn(&ActionRecord) -> bool| {
                 let rows = self.actions.iter().filter(|row| from <= row.at && keep(row));
-                folded(cx, rows.map(|row| (row.at, action_words(cx, row).trim_start().to_owned())))
+                folded(cx, rows.map(|row| (row.at, action_text(cx, row).trim_start().to_owned())))
             };
             section("failed in this shift", of(|row| is_failed(row) && is_change(row)), true);
             section("changed in this shift", of(|row| !is_failed(row) && is_change(row)), false);
@@ -273,7 +273,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
     let devices = def.devices.iter().filter_map(|device| {
         let status = snapshot.device(device.id);
         let words = match (status.state, status.diagnosis) {
-            (DeviceState::Down { .. }, _) => device_words(cx, device.id),
+            (DeviceState::Down { .. }, _) => device_text(cx, device.id),
             (DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_), reason) => {
                 let signal = reason?.signal();
                 format!("{} {}", signal.letter(), signal.word())

@@ -52,7 +52,7 @@ pub struct Journal {
 
 impl Journal {
     /// Searches for these words in the last 24 hours.
-    pub fn look_for(&mut self, words: &str) {
+    pub fn search_for(&mut self, words: &str) {
         self.words = Words::parse(words);
         self.show(None);
     }
@@ -197,7 +197,7 @@ impl Journal {
     /// Alarms and operator actions in one list, newest first.
     fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
         let alarms = self.alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
-        let actions = self.actions.iter().map(|row| (row.at, action_words(cx, row), cx.theme.strong()));
+        let actions = self.actions.iter().map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
         let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.words.fit(text)).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.0));
         rows
@@ -223,7 +223,7 @@ fn alarm_words(cx: &ViewContext, row: &AlarmRecord) -> String {
 }
 
 /// An action in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.
-pub fn action_words(cx: &ViewContext, row: &ActionRecord) -> String {
+pub fn action_text(cx: &ViewContext, row: &ActionRecord) -> String {
     let change = match (&row.old, &row.new) {
         (Some(old), Some(new)) => format!("{old} → {new}  "),
         (None, Some(new)) => format!("? → {new}  "),

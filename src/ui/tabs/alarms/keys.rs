@@ -145,7 +145,7 @@ pub fn table(page: Page) -> Vec<Row> {
 }
 
 /// The same for footer and help.
-pub fn told(page: Page) -> Vec<Hint> {
+pub fn page_hints(page: Page) -> Vec<Hint> {
     let everywhere = match page {
         // Keys of every tab, but here is where they are looked for.
         Page::Active | Page::System => vec![

@@ -113,7 +113,7 @@ impl Metrics {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
         let x = canvas.text(1, 0, "Now  ", theme.strong());
-        let (words, flood) = now_words(cx);
+        let (words, flood) = now_text(cx);
         canvas.text(x, 0, &words, if flood { theme.trouble() } else { theme.normal() });
         let what = match &self.period {
             None => "last 24 hours".to_owned(),
@@ -209,7 +209,7 @@ impl Metrics {
 }
 
 /// The rates of this moment, and whether there is a flood.
-fn now_words(cx: &ViewContext) -> (String, bool) {
+fn now_text(cx: &ViewContext) -> (String, bool) {
     let metrics = &cx.snapshot.alarm_metrics;
     let flood = match metrics.flood_since {
         Some(since) => format!("FLOOD since {}", clock(since, &cx.def().time_zone)),

@@ -10,7 +10,7 @@ use crate::{
     },
     ui::{
         ViewContext,
-        chrome::history_words,
+        chrome::history_text,
         modal::confirm::subject,
         widgets::{
             list::{first, on_screen},
@@ -50,7 +50,7 @@ fn history_trouble(cx: &ViewContext, canvas: &mut Canvas) -> u16 {
 }
 
 fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<String> {
-    let Some(trouble) = history_words(cx) else { return Vec::new() };
+    let Some(trouble) = history_text(cx) else { return Vec::new() };
     let mut lines = wrap(&trouble, width.saturating_sub(2));
     lines.truncate(usize::from(height / 3).max(1));
     lines
@@ -260,7 +260,7 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
         cx.theme.state_mark(alarm.state).to_owned(),
         moment(alarm.raised_at, cx.now, &cx.def().time_zone),
         subject(cx, alarm.id),
-        what_words(cx, row, what),
+        what_text(cx, row, what),
         match def.subject {
             Subject::Tag(tag) => value::show(cx, tag).within(10),
             Subject::Device(_) | Subject::Line(_) | Subject::Station => "–".to_owned(),
@@ -273,7 +273,7 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
 
 /// `1st temperature high > 72.0 +14 more, 3 unack`: how many are folded under it, and an acknowledgement that is not on
 /// disk, are never cut off.
-fn what_words(cx: &ViewContext, row: &Row, room: u16) -> String {
+fn what_text(cx: &ViewContext, row: &Row, room: u16) -> String {
     let mark = match (row.first, row.under) {
         (true, _) => "First-out ",
         (false, true) => cx.theme.pick("└ ", "` "),
@@ -288,7 +288,7 @@ fn what_words(cx: &ViewContext, row: &Row, room: u16) -> String {
     let unrecorded = if unrecorded { " NOT RECORDED" } else { "" };
     let (long, short) = (long + unrecorded, short + unrecorded);
     let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).message);
-    let text = format!("{name} {}", guidance::condition_words(cx, row.alarm.id));
+    let text = format!("{name} {}", guidance::condition_text(cx, row.alarm.id));
     let text = text.trim_end();
     let choices = [(text, &long), (text, &short), (&name, &short)];
     let whole = choices.iter().find(|(text, more)| width(text) + width(more) <= room);

@@ -35,7 +35,7 @@ pub struct Ring {
     runs: bool,
     held: Frames,
     /// Tick at which they were taken in; `None` before the first time.
-    taken: Option<u32>,
+    read_at: Option<u32>,
     /// Number of the selected frame; `None`: the newest.
     selected: Option<u64>,
     filter: Filter,
@@ -49,7 +49,7 @@ impl Default for Ring {
         Ring {
             runs: true,
             held: Frames::default(),
-            taken: None,
+            read_at: None,
             selected: None,
             filter: Filter::default(),
             saved: Vec::new(),
@@ -67,16 +67,16 @@ impl Ring {
 
     /// Takes in what is new, if it runs and it is time.
     pub fn follow(&mut self, cx: &ViewContext, at: &Place) {
-        let due = self.taken.is_none_or(|taken| EVERY <= cx.phase.wrapping_sub(taken));
-        if (self.runs || self.taken.is_none()) && due {
-            self.take(cx, at);
+        let due = self.read_at.is_none_or(|taken| EVERY <= cx.phase.wrapping_sub(taken));
+        if (self.runs || self.read_at.is_none()) && due {
+            self.read_frames(cx, at);
         }
     }
 
-    fn take(&mut self, cx: &ViewContext, at: &Place) {
+    fn read_frames(&mut self, cx: &ViewContext, at: &Place) {
         if let Some(report) = at.report {
             self.held = report.frames.clone();
-            self.taken = Some(cx.phase);
+            self.read_at = Some(cx.phase);
         }
     }
 
@@ -85,7 +85,7 @@ impl Ring {
         self.runs = !self.runs;
         self.selected = None;
         if self.runs {
-            self.take(cx, at);
+            self.read_frames(cx, at);
         }
     }
 
@@ -105,8 +105,8 @@ impl Ring {
 
     /// Moves the selection; looking back holds still.
     pub fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion, room: usize) {
-        if self.taken.is_none() {
-            self.take(cx, at);
+        if self.read_at.is_none() {
+            self.read_frames(cx, at);
         }
         self.runs = false;
         let shown = self.shown();
@@ -141,8 +141,8 @@ impl Ring {
         if !self.outgoing.is_empty() {
             return Vec::new();
         }
-        if self.taken.is_none() {
-            self.take(cx, at);
+        if self.read_at.is_none() {
+            self.read_frames(cx, at);
         }
         let frames: Vec<Frame> = self.shown().into_iter().cloned().collect();
         self.saved.clear();
@@ -181,7 +181,7 @@ impl Ring {
         // Before the first message has come the page is drawn from the report itself.
         let held = at.report.map(|report| report.frames.clone()).unwrap_or_default();
         let now = Ring { held, filter: self.filter.clone(), ..Ring::default() };
-        let ring = if self.taken.is_some() { self } else { &now };
+        let ring = if self.read_at.is_some() { self } else { &now };
         let shown = ring.shown();
         let (width, height) = (canvas.width(), canvas.height());
         let (words, style) = self.heading(cx, shown.len());

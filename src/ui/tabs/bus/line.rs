@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     Place,
     rows::{self, Flow, Row, bar, number, plain, words},
-    state_words,
+    state_text,
 };
 use crate::{
     bus::names,
@@ -19,7 +19,7 @@ use crate::{
     },
     ui::{
         ViewContext,
-        modal::faceplate::retry_words,
+        modal::faceplate::retry_text,
         tabs::controllers::signal_mark,
         widgets::{
             spark,
@@ -59,7 +59,7 @@ fn lines(cx: &ViewContext, at: &Place) -> Vec<Row> {
         let chosen = line.id == at.id;
         let place = Place::of(cx, line.id)?;
         let busy = f64::from(place.status.counters.utilisation) * 100.0;
-        let words = format!("{:8} {}  {busy:.0} %  {}", line.name, place.settings.transport, state_words(cx, &place));
+        let words = format!("{:8} {}  {busy:.0} %  {}", line.name, place.settings.transport, state_text(cx, &place));
         let style = match (chosen, place.status.state == LineState::Connected) {
             (true, _) => cx.theme.focus(),
             (false, true) => cx.theme.normal(),
@@ -282,7 +282,7 @@ fn state(cx: &ViewContext, device: &DeviceDef) -> String {
         DeviceState::Answering => "answering".to_owned(),
         DeviceState::Failing(times) => format!("failing {times}×"),
         DeviceState::Down { since } => {
-            format!("DOWN {}{}", running(between(since, cx.now)), retry_words(cx, device.id))
+            format!("DOWN {}{}", running(between(since, cx.now)), retry_text(cx, device.id))
         }
     }
 }

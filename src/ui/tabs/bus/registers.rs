@@ -181,7 +181,7 @@ impl Registers {
         let (from, to) = (self.table.modicon(first), self.table.modicon(second));
         canvas.text(0, 1, &format!("  {:18} unsigned 32    signed 32  float", format!("{from}+{to}")), theme.dim());
         for (y, (name, order)) in ORDERS.into_iter().enumerate() {
-            canvas.text(0, to_u16(y) + 2, &format!("  {name:18} {}", pair_words([*a, *b], order)), theme.normal());
+            canvas.text(0, to_u16(y) + 2, &format!("  {name:18} {}", pair_text([*a, *b], order)), theme.normal());
         }
     }
 }
@@ -195,7 +195,7 @@ const ORDERS: [(&str, ByteOrder); 4] =
     [("ABCD", ByteOrder::Abcd), ("CDAB", ByteOrder::Cdab), ("BADC", ByteOrder::Badc), ("DCBA", ByteOrder::Dcba)];
 
 /// `  4294901760       -65536  -1.5`.
-fn pair_words(words: [u16; 2], order: ByteOrder) -> String {
+fn pair_text(words: [u16; 2], order: ByteOrder) -> String {
     let point = |kind| Point { table: Table::Holding, address: 0, kind, order, field: None };
     let number = |kind| codec::decode(point(kind), &words);
     let whole = |kind| number(kind).map_or("–".to_owned(), |value| format!("{value:.0}"));
@@ -213,11 +213,11 @@ mod tests {
 
     #[test]
     fn a_pair_is_read_in_all_four_orders() {
-        let check = |order, expect: &str| assert_eq!(pair_words([0x42C8, 0x0000], order).trim_start(), expect);
+        let check = |order, expect: &str| assert_eq!(pair_text([0x42C8, 0x0000], order).trim_start(), expect);
         check(ByteOrder::Abcd, "1120403456   1120403456  100");
         check(ByteOrder::Cdab, "17096        17096  2.3957e-41");
         check(ByteOrder::Badc, "3359768576   -935198720  -198656");
         check(ByteOrder::Dcba, "51266        51266  7.1839e-41");
-        assert!(pair_words([0x7FC0, 0], ByteOrder::Abcd).ends_with("no number"));
+        assert!(pair_text([0x7FC0, 0], ByteOrder::Abcd).ends_with("no number"));
     }
 }

@@ -201,14 +201,14 @@ impl Form {
         match self.tried {
             Tried::Bytes | Tried::Request => {
                 let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
-                let told = request_words(&message, framing)?;
+                let told = request_text(&message, framing)?;
                 Ok(Built { diagnostic: Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), told })
             }
             Tried::Registers => {
                 let (unit, table) = (unit(0)?, TABLES[self.chosen(1)]);
                 let address = address(&self.text(2), table)?;
                 let count = to_u16(number(&self.text(3), "count", 1..=if table.is_bits() { 2_000 } else { 125 })?);
-                let told = request_words(&read(unit, table, address, count), framing)?;
+                let told = request_text(&read(unit, table, address, count), framing)?;
                 Ok(Built { diagnostic: Diagnostic::Read { unit, table, address, count }, told })
             }
             Tried::Loopback => {
@@ -317,7 +317,7 @@ fn read(unit: u8, table: Table, address: u16, count: u16) -> Vec<u8> {
 }
 
 /// The request in words, and its bytes; `Err` with what no device can take.
-fn request_words(message: &[u8], framing: Framing) -> Result<Vec<String>, String> {
+fn request_text(message: &[u8], framing: Framing) -> Result<Vec<String>, String> {
     if let Some(error) = request_lint::check_request(message, framing).first() {
         return Err(error.to_string());
     }

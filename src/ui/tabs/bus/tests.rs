@@ -373,7 +373,7 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
 }
 
 #[test]
-fn what_came_back_is_told_in_words() {
+fn what_came_back_is_described() {
     let mut fixture = Fixture::traffic();
     let sent = with_crc(&[1, 3, 3, 0xEA, 0, 1]);
     let bytes = with_crc(&[1, 3, 2, 0, 0xC8]);
@@ -394,7 +394,7 @@ fn what_came_back_is_told_in_words() {
 }
 
 #[test]
-fn loopback_and_identification_are_told_in_words() {
+fn loopback_and_identification_are_described() {
     let mut fixture = Fixture::traffic();
     let exchange = |outcome: Result<(), Fault>| {
         let request = with_crc(&[1, 8, 0, 0, 0xA5, 0x37]);

@@ -37,7 +37,7 @@ pub fn query(
         format!("Write {count} to {}, one after the other, each read back? The first failure stops it.", device.name);
     let warnings = warnings(cx.def(), &changes);
     let shown = if warnings.len() <= 2 { 6 } else { 4 };
-    let mut notes: Vec<String> = changes.iter().take(shown).map(|change| change_words(cx, change)).collect();
+    let mut notes: Vec<String> = changes.iter().take(shown).map(|change| change_text(cx, change)).collect();
     if changes.len() > shown {
         notes.push(format!("… and {} more, as listed", changes.len() - shown));
     }
@@ -50,7 +50,7 @@ pub fn query(
     Confirm::command(title, query, CommandKind::Restore(Box::new(request))).with_notes(notes).with_reauthentication(cx)
 }
 
-fn change_words(cx: &ViewContext, change: &Change) -> String {
+fn change_text(cx: &ViewContext, change: &Change) -> String {
     let text = |value| cx.snapshot.format(change.tag, value);
     let (short, unit) = (&cx.def().tag(change.tag).short, cx.snapshot.unit(change.tag));
     format!("{short}  {} → {} {unit}", text(change.old), text(change.new)).trim_end().to_owned()

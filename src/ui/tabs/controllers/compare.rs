@@ -133,7 +133,7 @@ impl Compare {
             canvas.text_right(end, bottom.saturating_sub(1), &format!("{below} more ▼"), theme.normal());
         }
         if let Some(run) = self.run(cx, device) {
-            let (words, trouble) = run_words(cx, device, run);
+            let (words, trouble) = run_text(cx, device, run);
             canvas.text(1, bottom, &fit_words(&words, end), if trouble { theme.trouble() } else { theme.strong() });
         }
     }
@@ -187,7 +187,7 @@ fn columns([short, label, set, device, note]: [&str; 5], end: u16) -> String {
 }
 
 /// How a restore goes, or how it ended.
-fn run_words(cx: &ViewContext, device: &DeviceDef, run: &Restore) -> (String, bool) {
+fn run_text(cx: &ViewContext, device: &DeviceDef, run: &Restore) -> (String, bool) {
     let (done, all) = (run.done(), run.steps.len());
     let (at, by) = (moment(run.at, cx.now, &cx.def().time_zone), &run.by);
     match run.state {

@@ -4,7 +4,7 @@ use ratatui::style::Style;
 
 use super::{
     faceplate,
-    table::{Table, default_words, differs},
+    table::{Table, default_text, differs},
 };
 use crate::{
     history::Series,
@@ -17,7 +17,7 @@ use crate::{
     ui::{
         ViewContext,
         chrome::{command_label, outcome_words},
-        modal::faceplate::{device_words, retry_words},
+        modal::faceplate::{device_text, retry_text},
         widgets::text::{Canvas, clock, fit_words, width, wrap},
     },
 };
@@ -53,7 +53,7 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Tabl
         let y = bottom.saturating_sub(words);
         let meaning = if tag.meaning.is_empty() { &tag.label } else { &tag.meaning };
         // The default first: it must not be what a narrow screen cuts off.
-        let default = default_words(cx, tag).map_or(String::new(), |default| format!("default {default}; "));
+        let default = default_text(cx, tag).map_or(String::new(), |default| format!("default {default}; "));
         let x = canvas.text(1, y, &tag.name, cx.theme.strong()) + 2;
         let text = format!("{default}{meaning}");
         let lines = wrap(&text, end.saturating_sub(x));
@@ -94,7 +94,7 @@ fn heading(cx: &ViewContext, device: &DeviceDef, canvas: &mut Canvas) {
     let title = if canvas.width() < least { String::new() } else { format!("{}  ", device.title) };
     let words = format!("{}  {title}unit {}  {line}", device.model, device.unit);
     let x = canvas.text(x + 2, 0, &words, theme.normal());
-    let (words, style) = status_words(cx, device.id);
+    let (words, style) = status_text(cx, device.id);
     let (end, place) = (canvas.width().saturating_sub(1), format!("{}/{count}", device.id.0 + 1));
     let room = end.saturating_sub(x + 2 + width(&place) + 1);
     canvas.text(x + 2, 0, &fit_words(&words, room), style);
@@ -102,18 +102,18 @@ fn heading(cx: &ViewContext, device: &DeviceDef, canvas: &mut Canvas) {
 }
 
 /// How a device stands: mark of NE 107, its word and its reason.
-pub fn status_words(cx: &ViewContext, device: DeviceId) -> (String, Style) {
+pub fn status_text(cx: &ViewContext, device: DeviceId) -> (String, Style) {
     let (theme, status) = (cx.theme, cx.snapshot.device(device));
     match (status.diagnosis, status.state) {
         (Some(reason), _) => {
             let signal = reason.signal();
-            let retry = if reason == Reason::Down { retry_words(cx, device) } else { String::new() };
+            let retry = if reason == Reason::Down { retry_text(cx, device) } else { String::new() };
             (format!("{} {}: {reason}{retry}", signal_mark(signal), signal.word()), theme.trouble())
         }
-        (None, DeviceState::Answering) => (format!("✓ {}", device_words(cx, device)), theme.normal()),
-        (None, DeviceState::Unknown) => (format!("? {}", device_words(cx, device)), theme.dim()),
+        (None, DeviceState::Answering) => (format!("✓ {}", device_text(cx, device)), theme.normal()),
+        (None, DeviceState::Unknown) => (format!("? {}", device_text(cx, device)), theme.dim()),
         (None, DeviceState::Failing(_) | DeviceState::Down { .. }) => {
-            (format!("✗ {}", device_words(cx, device)), theme.trouble())
+            (format!("✗ {}", device_text(cx, device)), theme.trouble())
         }
     }
 }

@@ -68,7 +68,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     }
     y += 1;
     if let Some(tuning) = tuning_of(cx, device) {
-        for (n, words) in tuning_words(cx, faceplate, tuning).into_iter().enumerate() {
+        for (n, words) in tuning_text(cx, faceplate, tuning).into_iter().enumerate() {
             let style = if n == 0 { cx.theme.strong() } else { cx.theme.normal() };
             for line in crate::ui::widgets::text::wrap(&words, wide) {
                 canvas.text(0, y, &line, style);
@@ -200,14 +200,14 @@ fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, faceplate: 
 }
 
 fn tuning_row(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tuning: &Tuning) {
-    let words = tuning_words(cx, faceplate, tuning).join("  ");
+    let words = tuning_text(cx, faceplate, tuning).join("  ");
     let room = canvas.width().saturating_sub(2);
     let style = if tuning.ended.is_none() { cx.theme.strong() } else { cx.theme.normal() };
     canvas.text(1, 0, &pad(&fit_words(&words, room), room), style);
 }
 
 /// How a tuning goes, or what it has found.
-pub fn tuning_words(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) -> Vec<String> {
+pub fn tuning_text(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) -> Vec<String> {
     let elapsed = running(tuning.elapsed(cx.now));
     let least = if tuning.seen { "" } else { "more than " };
     let number = |value: f64| cx.snapshot.format(faceplate.pv, value);

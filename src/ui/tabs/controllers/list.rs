@@ -2,7 +2,7 @@
 
 use ratatui::style::Style;
 
-use super::device::{signal_mark, status_words};
+use super::device::{signal_mark, status_text};
 use crate::{
     plant::{
         def::{DeviceDef, DeviceId, Subject},
@@ -70,7 +70,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
     }
     if let Some(device) = devices.get(selected) {
         let x = canvas.text(1, bottom, &device.name, theme.strong());
-        let (words, style) = status_words(cx, device.id);
+        let (words, style) = status_text(cx, device.id);
         let title = if device.title.is_empty() { String::new() } else { format!("{}  ", device.title) };
         let x = canvas.text(x + 2, bottom, &fit_words(&title, end.saturating_sub(x + 4)), theme.normal());
         canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);

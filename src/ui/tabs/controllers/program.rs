@@ -58,13 +58,13 @@ fn heading(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &
     let x = canvas.text(x + 2, 0, "ramp/soak program", theme.normal());
     let (words, style) = match cx.snapshot.device(device.id).diagnosis {
         Some(reason) => (format!("{} {reason}", signal_mark(reason.signal())), theme.trouble()),
-        None => (now_words(cx, device, program), theme.strong()),
+        None => (now_text(cx, device, program), theme.strong()),
     };
     canvas.text(x + 3, 0, &fit_words(&words, canvas.width().saturating_sub(x + 4)), style);
 }
 
 /// `RUN, ramp 2, 03:12 of 10 min`.
-fn now_words(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> String {
+fn now_text(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> String {
     let command = value::show(cx, program.command).text;
     let Some(place) = place(cx, program) else { return format!("{command}, position not known") };
     let (what, length) = match place {

@@ -166,7 +166,7 @@ pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
 }
 
 /// The query before a set is written over: whose it is, for it may be of another kind of device.
-pub fn replace_words(cx: &ViewContext, there: &StoredSet) -> String {
+pub fn replace_text(cx: &ViewContext, there: &StoredSet) -> String {
     let name = &there.name;
     match &there.set {
         Ok(set) => {

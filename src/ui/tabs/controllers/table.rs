@@ -7,7 +7,7 @@ use crate::{
     },
     ui::{
         ViewContext,
-        modal::number::range_words,
+        modal::number::range_text,
         widgets::{
             list::{Words, first, on_screen},
             text::{Canvas, age, pad, pad_left, whole, width},
@@ -109,7 +109,7 @@ impl Table {
             && cx.age(tag.id).as_secs() < 60
             && cx.snapshot.sample(tag.id).quality.is_good();
         let read = if now || tag.access == Access::Write { String::new() } else { age(cx.age(tag.id)) };
-        let range = range_words(cx, tag.id);
+        let range = range_text(cx, tag.id);
         // What is only read needs no range; what can be written says that its range is not known.
         let none = !tag.writable() && tag.labels.is_empty() && cx.snapshot.range(tag.id).is_none();
         let range = if none { "–".to_owned() } else { range };
@@ -122,7 +122,7 @@ impl Table {
         let known = shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some();
         let meaning = if known { &tag.meaning } else { &shown.note };
         let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
-        let default = default_words(cx, tag).unwrap_or_default();
+        let default = default_text(cx, tag).unwrap_or_default();
         let range = whole(&range, Columns::RANGE);
         let row = columns.row([pen, &name, &text, &shown.unit, &range, &default, &read, meaning]);
         canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
@@ -141,7 +141,7 @@ pub fn differs(cx: &ViewContext, tag: &TagDef) -> bool {
 }
 
 /// The default as the value is written.
-pub fn default_words(cx: &ViewContext, tag: &TagDef) -> Option<String> {
+pub fn default_text(cx: &ViewContext, tag: &TagDef) -> Option<String> {
     tag.default.map(|default| cx.snapshot.format(tag.id, default))
 }
 

@@ -75,12 +75,12 @@ pub fn midnight(now: Timestamp, zone: &TimeZone) -> Timestamp {
 }
 
 /// A window as it is written: `10 min`, `1 h`.
-pub fn window_words(seconds: i64) -> String {
+pub fn window_text(seconds: i64) -> String {
     if seconds < 3_600 { format!("{} min", seconds / 60) } else { format!("{} h", seconds / 3_600) }
 }
 
 /// A rate as it is written: `0.5 s`, `10 s`.
-pub fn rate_words(millis: u64) -> String {
+pub fn rate_text(millis: u64) -> String {
     format!("{} s", Duration::from_millis(millis).as_secs_f64())
 }
 
@@ -141,9 +141,9 @@ mod tests {
 
     #[test]
     fn windows_and_rates_read_well() {
-        let words: Vec<String> = WINDOWS.into_iter().map(window_words).collect();
+        let words: Vec<String> = WINDOWS.into_iter().map(window_text).collect();
         assert_eq!(words.join(", "), "1 min, 2 min, 5 min, 10 min, 15 min, 30 min, 1 h, 2 h, 4 h, 8 h, 12 h, 24 h");
-        let words: Vec<String> = RATES.into_iter().map(rate_words).collect();
+        let words: Vec<String> = RATES.into_iter().map(rate_text).collect();
         assert_eq!(words.join(", "), "0.5 s, 1 s, 2 s, 5 s, 10 s");
         for (seconds, expect) in [(10, 60), (60, 60), (61, 120), (90_000, 86_400)] {
             assert_eq!(WINDOWS[nearest(SignedDuration::from_secs(seconds))], expect);

@@ -10,7 +10,7 @@ use ratatui::{
 
 use super::{
     Trends,
-    span::{RATES, WINDOWS, midnight, rate_words, window_words},
+    span::{RATES, WINDOWS, midnight, rate_text, window_text},
     stored,
 };
 use crate::{
@@ -86,7 +86,7 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         (true, None) => "all since midnight".to_owned(),
         (true, Some(since)) if brief => format!("all since {}", since.strftime("%H:%M")),
         (true, Some(since)) => format!("all since {}, the first value today", since.strftime("%H:%M")),
-        (false, _) => format!("window {}", window_words(WINDOWS[trends.window])),
+        (false, _) => format!("window {}", window_text(WINDOWS[trends.window])),
     };
     x = canvas.text(x + 3, 0, &window, theme.normal());
     if trends.end.is_some() {
@@ -94,7 +94,7 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     } else {
         x = canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal());
         if !brief {
-            x = canvas.text(x + 3, 0, &format!("update {}", rate_words(RATES[trends.rate])), theme.normal());
+            x = canvas.text(x + 3, 0, &format!("update {}", rate_text(RATES[trends.rate])), theme.normal());
         }
     }
     if let Some(trouble) = trouble {

@@ -99,11 +99,11 @@ fn a_third_unit_gets_a_scale_of_its_own() {
 }
 
 #[test]
-fn lengths_of_time_are_short_words() {
+fn lengths_of_time_are_short() {
     for (seconds, expect) in
         [(0, "0 s"), (99, "99 s"), (100, "2 min"), (3_600, "60 min"), (9_000, "2.5 h"), (259_200, "3.0 d")]
     {
-        assert_eq!(span_words(Duration::from_secs(seconds)), expect);
+        assert_eq!(span_text(Duration::from_secs(seconds)), expect);
     }
 }
 
