@@ -39,8 +39,8 @@ pub struct Settings {
 /// What can be done here.
 #[derive(Debug, Clone, PartialEq)]
 enum SettingsAction {
-    Use(Box<LineDef>),
-    TakeBack(Box<LineDef>),
+    Apply(Box<LineDef>),
+    Revert(Box<LineDef>),
     Save,
 }
 
