@@ -19,7 +19,7 @@ pub fn rings(before: &Snapshot, now: &Snapshot) -> bool {
     sounding(&now.alarms).any(|alarm| !known.contains(&alarm))
 }
 
-/// Activations that are active and that nobody has acknowledged.
+/// Active, unacknowledged alarm activations.
 fn sounding(alarms: &[ActiveAlarm]) -> impl Iterator<Item = (AlarmId, Timestamp)> {
     let sounds = |alarm: &&ActiveAlarm| alarm.state == AlarmState::Unacknowledged;
     alarms.iter().filter(sounds).map(|alarm| (alarm.id, alarm.raised_at))

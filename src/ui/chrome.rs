@@ -1,7 +1,9 @@
 //! What every tab shares: header, tab bar, alarm banner, the last command's outcome, and the keys of the moment.
 
+mod header;
 mod banner;
 
+use header::header;
 use ratatui::{Frame, layout::Rect, style::Style};
 
 use banner::banner;
@@ -125,105 +127,6 @@ fn too_small(model: &Model, cx: &ViewContext, frame: &mut Frame) {
             canvas.text(0, 2, "q quit", cx.theme.dim());
         }
     }
-}
-
-fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
-    let theme = cx.theme;
-    let x = canvas.text(1, 0, "sightglass", theme.dim());
-    let start = canvas.text(x + 2, 0, &fit(&cx.def().title, canvas.width() / 3), theme.strong()) + 2;
-    let mut end = canvas.width().saturating_sub(1);
-    let fits = |parts: &[(usize, String, Style)]| {
-        parts.iter().map(|(_, text, _)| width(text) + 2).sum::<u16>() <= end.saturating_sub(start) + 2
-    };
-    let full = header_parts(model, cx, true);
-    let mut parts = if fits(&full) { full } else { header_parts(model, cx, false) };
-    while !fits(&parts) {
-        let Some(least) = parts.iter().map(|(need, _, _)| *need).max() else { break };
-        parts.retain(|(need, _, _)| *need != least);
-    }
-    for (_, text, style) in parts {
-        canvas.text_right(end, 0, &text, style);
-        end = end.saturating_sub(width(&text) + 2);
-    }
-}
-
-/// What the header tells, from the right, each with its need: the greatest number is the first to be left out.
-/// The role of who sits here is told where there is room for everything.
-fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, String, Style)> {
-    let theme = cx.theme;
-    let time = if let Some(gone) = model.gone() {
-        (0, format!("STATION GONE {} s: reconnecting", gone.as_secs()), theme.trouble())
-    } else if model.clock.silent >= SILENCE {
-        (0, format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble())
-    } else {
-        (0, clock(cx.now, &cx.def().time_zone), theme.normal())
-    };
-    let mut parts = vec![time, who_text(model, cx, role)];
-    parts.extend(cx.extension.iter().flat_map(|extension| extension.header(cx)));
-    if cx.snapshot.speed != 1.0 {
-        parts.push((8, format!("speed ×{}", cx.snapshot.speed), theme.strong()));
-    }
-    let history = &cx.snapshot.history;
-    if history.lost > 0 {
-        parts.push((1, format!("{} records lost", history.lost), theme.trouble()));
-    }
-    if history.failing.is_some() {
-        let share = history.waiting * 100 / history.waiting_max.max(1);
-        parts.push((2, format!("not recording, buffer {share} %"), theme.trouble()));
-    } else if history.trouble.is_some() {
-        parts.push((2, "history: see 3".to_owned(), theme.trouble()));
-    }
-    for line in cx.def().lines.iter().rev() {
-        let (text, style) = line_words(cx, line);
-        let status = cx.snapshot.line(line.id);
-        let well = status.state == LineState::Connected && !is_overloaded(status);
-        parts.push((if well { 10 + line.id.index() } else { 3 }, text, style));
-    }
-    parts
-}
-
-/// Who sits here: `user: tech1 (Technician)`, `LOCKED by anna`, and when it will be locked.
-fn who_text(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Style) {
-    let theme = cx.theme;
-    let Some(who) = &model.session.who else { return (9, "not logged in".to_owned(), theme.strong()) };
-    let user = fit(&who.user, 12);
-    match model.locks_in() {
-        _ if model.session.locked => (2, format!("LOCKED by {user}"), theme.trouble()),
-        Some(left) => (1, format!("locks in {} s: press a key", left.as_secs()), theme.trouble()),
-        None if role => (9, format!("user: {user} ({})", rights::title(who.role)), theme.dim()),
-        None => (9, user, theme.dim()),
-    }
-}
-
-/// A line in the header: `L1 load 62 %`, or why it is not connected and when it is tried again.
-fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
-    let status = cx.snapshot.line(line.id);
-    let counters = &status.counters;
-    let recent = |at: Option<jiff::Timestamp>| {
-        at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
-    };
-    match &status.state {
-        LineState::Connected => {
-            let replies = recent(counters.last_rx);
-            let busy = counters.utilisation * 100.0;
-            let overloaded = is_overloaded(status);
-            let style = if replies && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
-            let overload = if overloaded { " OVERLOADED" } else { "" };
-            let silent = if replies { "" } else { "no reply, " };
-            (format!("{} {silent}load {busy:.0} %{overload}", line.name), style)
-        }
-        LineState::Connecting => (format!("{} connecting", line.name), cx.theme.trouble()),
-        LineState::Waiting { retry_at, .. } => {
-            let left = between(cx.now, *retry_at).as_secs();
-            (format!("{} DOWN retry {left}s", line.name), cx.theme.trouble())
-        }
-        LineState::Disconnected => (format!("{} DISCONNECTED", line.name), cx.theme.trouble()),
-        LineState::Testing => (format!("{} TEST", line.name), cx.theme.trouble()),
-    }
-}
-
-fn is_overloaded(line: &LineStatus) -> bool {
-    line.report.as_ref().is_some_and(|report| report.strain.is_some())
 }
 
 fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
@@ -371,7 +274,7 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> 
 }
 
 /// As many keys as fit; those of every tab stand at the right end.
-/// What whoever sits here may not do stands behind the role that it needs, all of it dim.
+/// Keys that the user may not press stand dimmed behind the role that they need.
 fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option<(Role, Vec<Hint>)>, global: bool) {
     let tail: Vec<Hint> = if global {
         keys::hints(&keys::global()).into_iter().filter(|hint| !hint.label.is_empty()).collect()

@@ -108,7 +108,7 @@ pub fn unmet_text(cx: &ViewContext, tag: TagId) -> Option<String> {
         Some(now) => format!("is {}", cx.snapshot.format(need, now)),
         None => "is not known".to_owned(),
     };
-    Some(format!("acts in {} only, and {} {now}", cx.snapshot.format(need, state), cx.def().tag(need).name))
+    Some(format!("effective in {} only ({} {now})", cx.snapshot.format(need, state), cx.def().tag(need).name))
 }
 
 /// What starting or stopping a sequence does.

@@ -150,7 +150,7 @@ pub enum Global {
     AcknowledgeAll,
     /// End the sound of the alarms that sound now.
     Silence,
-    /// Draw everything anew.
+    /// Redraw the screen.
     Redraw,
     /// Take the outcome of the last command off the screen.
     Dismiss,

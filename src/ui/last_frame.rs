@@ -14,7 +14,7 @@ use super::{
 };
 use crate::plant::{def::AlarmId, snapshot::ActiveAlarm};
 
-/// Shown where a key was not taken.
+/// Shown where a key was ignored.
 const CHANGED: &str = "The list has changed, press again";
 
 /// The rows of a list that keys act on, each with its state, and the selected one.
@@ -60,7 +60,7 @@ impl Model {
         self.last_frame = Some(self.as_drawn());
     }
 
-    /// Something has come from the station that no frame has shown.
+    /// The station has sent something that no frame has shown.
     pub(super) fn note_news(&mut self) {
         if let Some(last_frame) = &mut self.last_frame {
             last_frame.news = true;

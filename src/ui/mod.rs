@@ -1,27 +1,29 @@
 //! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
 
-pub mod bell;
-pub mod chrome;
-pub mod last_frame;
-pub mod extension;
-pub mod glyph_filter;
-pub mod io;
-pub mod interlock;
-pub mod keys;
-pub mod modal;
-pub mod msg;
-pub mod session_lock;
-pub mod rights;
-pub mod tabs;
-pub mod theme;
-pub mod pending_command;
-pub mod widgets;
+mod effects;
+pub(crate) mod bell;
+pub(crate) mod chrome;
+pub(crate) mod last_frame;
+pub(crate) mod extension;
+pub(crate) mod glyph_filter;
+pub(crate) mod io;
+pub(crate) mod interlock;
+pub(crate) mod keys;
+pub(crate) mod modal;
+pub(crate) mod msg;
+pub(crate) mod session_lock;
+pub(crate) mod rights;
+pub(crate) mod tabs;
+pub(crate) mod theme;
+pub(crate) mod pending_command;
+pub(crate) mod widgets;
 
 #[cfg(test)]
-pub mod fixture;
+pub(crate) mod fixture;
 #[cfg(test)]
 mod tests;
 
+use effects::perform;
 use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyEvent, KeyEventKind};
@@ -64,7 +66,7 @@ pub struct Model {
     pub pending_command: Option<PendingCommand>,
     /// Number of this terminal.
     pub terminal: u32,
-    /// Who sits here and what he may.
+    /// The session: user, role and lock.
     pub session: Arc<SessionStatus>,
     /// The lock, its warning, and requests on their way.
     pub session_lock: SessionLock,
@@ -108,7 +110,7 @@ pub struct ViewContext<'a> {
     pub area: Rect,
     /// State that the embedding command adds.
     pub extension: Option<&'a dyn Extension>,
-    /// Who sits here and what he may.
+    /// The session: user, role and lock.
     pub session: &'a SessionStatus,
 }
 
@@ -302,7 +304,7 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     }
     match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
-        // Nobody gives commands to what cannot be seen.
+        // No command goes to what is not visible.
         Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
         None if !model.may_act(event) => Vec::new(),
@@ -377,73 +379,4 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
         model.doubt();
     }
     with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))
-}
-
-fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
-    let mut effects = Vec::new();
-    for action in actions {
-        match action {
-            UiAction::Open(modal) => model.modal = Some(modal),
-            UiAction::Show(tab) => effects.extend(show(model, tab)),
-            UiAction::ShowDevice(device) => {
-                model.tabs.controllers.show(device);
-                effects.extend(show(model, Tab::Controllers));
-            }
-            UiAction::ShowParameter(tag) => {
-                with_tabs(model, |tabs, cx| {
-                    tabs.controllers.show_parameter(cx, tag);
-                    Vec::new()
-                });
-                effects.extend(show(model, Tab::Controllers));
-            }
-            UiAction::ShowOnMimic(tags) => {
-                with_tabs(model, |tabs, cx| {
-                    tabs.mimic.select(cx, &tags);
-                    Vec::new()
-                });
-                effects.extend(show(model, Tab::Mimic));
-            }
-            UiAction::ShowOnTrends(tag, at) => {
-                with_tabs(model, |tabs, cx| {
-                    tabs.trends.show(cx, tag, at);
-                    Vec::new()
-                });
-                effects.extend(show(model, Tab::Trends));
-            }
-            UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
-            UiAction::Confirmed(command, credentials) => effects.extend(model.send_command(command, credentials)),
-            UiAction::SessionRequest(tab, request) => {
-                // Nought is nobody's: whoever waits has a number.
-                model.session_lock.last_request = model.session_lock.last_request.checked_add(1).unwrap_or(1);
-                let number = model.session_lock.last_request;
-                if let Some(Modal::UserForm(form)) = &mut model.modal {
-                    form.sent(number);
-                }
-                effects.push(Effect::SessionRequest(QueryId { tab, number }, request));
-            }
-            UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
-            UiAction::Do(effect) => effects.push(effect),
-        }
-    }
-    effects
-}
-
-/// Shows a tab; it asks at once for what it needs.
-fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
-    model.tabs.shown = tab;
-    let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
-    let effects = asked.into_iter().filter_map(|action| match action {
-        UiAction::Do(effect) => Some(effect),
-        UiAction::Open(_)
-        | UiAction::Leave
-        | UiAction::Show(_)
-        | UiAction::ShowDevice(_)
-        | UiAction::ShowParameter(_)
-        | UiAction::ShowOnMimic(_)
-        | UiAction::ShowOnTrends(..)
-        | UiAction::Command(_)
-        | UiAction::Confirmed(..)
-        | UiAction::SessionRequest(..) => None,
-    });
-    effects.collect()
 }

@@ -31,7 +31,7 @@ pub enum Msg {
     Resize(u16, u16),
     /// News of the plant.
     Snapshot(Arc<Snapshot>),
-    /// News of who sits here.
+    /// The session has changed.
     SessionStatus(Arc<SessionStatus>),
     /// The reply to a request, or why it failed.
     RequestDone(QueryId, Result<Durability, String>),

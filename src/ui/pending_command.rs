@@ -55,7 +55,7 @@ impl Model {
         undelivered.is_none().then_some(Effect::Command(command, credentials))
     }
 
-    /// Takes the outcome of the watched command from the snapshot that has come.
+    /// Reads the outcome of the pending command from the new snapshot.
     pub(super) fn follow(&mut self) {
         if let Some(pending) = &mut self.pending_command
             && let Some(status) = self.snapshot.commands.iter().find(|status| status.command.id == pending.command.id)

@@ -1,4 +1,4 @@
-//! Rights as courtesy: what the one who sits here may not do is said before it is tried. The station decides.
+//! Rights in the terminal: a missing right is shown before a command is tried. The station decides.
 
 use super::ViewContext;
 use crate::{
@@ -24,7 +24,7 @@ pub fn words(role: Role) -> &'static str {
     }
 }
 
-/// Why whoever sits here may not give this command: `needs Technician, tom is Viewer`.
+/// Why the user may not give this command: `needs Technician, tom is Viewer`.
 pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
     lacks(cx, right::needs(kind))
 }

@@ -69,7 +69,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
         (_, None) => model.session_lock.gone_at = None,
         (Some(_), Some(_)) => {}
     }
-    // Nobody inherits the window of somebody else. Whoever is only locked out for a while finds his own again.
+    // A window closes when the user changes. A user who only unlocks finds the open window again.
     let user = |session: &SessionStatus| session.who.as_ref().map(|who| who.user.clone());
     if user(&before) != user(&now) || is_closed(&now) {
         model.modal.take_if(|modal| !modal.is_quit());
@@ -135,7 +135,7 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     }
 }
 
-/// Locks at once, if there is somebody to lock it.
+/// Locks at once if a user is logged in.
 pub(super) fn lock(model: &Model) -> Vec<UiAction> {
     let may = model.session.who.is_some() && !model.session.locked;
     if may { vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)] } else { Vec::new() }
@@ -191,7 +191,7 @@ fn unlock(model: &Model, below: Option<Modal>) -> Option<Modal> {
     Some(Modal::UserForm(Box::new(UserForm::unlock(who.user.clone(), below))))
 }
 
-/// Word to the station that somebody is there; twice a minute at most, but at once when it is about to lock.
+/// The activity message to the station: at most twice a minute, at once when the lock is near.
 pub(super) fn active(model: &mut Model) -> Option<Effect> {
     let session = &model.session;
     if session.who.is_none() || session.locked || session.gone.is_some() {

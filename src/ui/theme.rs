@@ -185,7 +185,7 @@ impl Theme {
             (Priority::Low, _) => " 4  ",
         }
     }
-    /// The mark of a state: filled while nobody has acknowledged it, a letter for what is not plain.
+    /// The mark of a state: filled while unacknowledged, a letter for what is not plain.
     pub fn state_mark(&self, state: AlarmState) -> &'static str {
         match state {
             AlarmState::Normal => " ",

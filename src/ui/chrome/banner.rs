@@ -55,7 +55,7 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let (suppressed, silenced) = (suppressed_words(cx), if is_silenced(cx) { "silenced   " } else { "" });
     let suppressed = if suppressed.is_empty() { suppressed } else { format!("{suppressed}   ") };
     let counts = counts(cx);
-    // How many there are, that one waits for somebody, and why to doubt all this must not be what a long text pushes out.
+    // A long text must not push out the counts, the mark of an unacknowledged alarm and the reason for doubt.
     let tails = [
         (25, format!("{worry}{counts}   {suppressed}{silenced}{ack}")),
         (25, format!("{worry}{counts}   {suppressed}{ack}")),

@@ -234,7 +234,7 @@ impl Confirm {
             }
         };
         if self.reauthentication.is_some() {
-            // A password that is typed anew after a refusal must find its line, not the keys of the tab below.
+            // After a refusal the password line stays open: the next keys must not reach the tab below.
             (self.waiting, self.problem) = (true, None);
             return Next::Both(Modal::Confirm(self), vec![act]);
         }

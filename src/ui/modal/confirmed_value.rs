@@ -1,4 +1,4 @@
-//! The value that an operator saw when a window opened: should somebody else change it meanwhile, he is asked again.
+//! The value displayed when a window opened. If it changes before the write, the window asks again.
 
 use crate::{
     plant::{command::Outcome, def::TagId},
@@ -43,7 +43,7 @@ impl ConfirmedValue {
         if self.asked < ASKED_MAX { self.value.or(now) } else { now.or(self.value) }
     }
 
-    /// What the window says of a change that its reader may not have noticed; `None` while it is as he saw it.
+    /// The note about a change since the window opened; `None` while the value is unchanged.
     pub fn news(&self, cx: &ViewContext) -> Option<String> {
         let now = cx.snapshot.sample(self.tag).good_value();
         let other = now.is_some() && now != self.value && self.asked < ASKED_MAX;

@@ -96,7 +96,7 @@ impl Faceplate {
         let Some((command, value)) = self.toggle(cx) else { return Modal::write(cx, actuator.command) };
         let refused = interlock::is_refused(cx, command, value);
         let missing = interlock::unmet(cx, actuator).filter(|(need, _)| {
-            // A state that nobody knows is no reason to change it.
+            // An unknown state is no reason to write.
             cx.def().tag(*need).writable() && cx.snapshot.sample(*need).good_value().is_some() && !refused
         });
         let confirm = match missing {

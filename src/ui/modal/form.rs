@@ -269,7 +269,7 @@ mod tests {
         form.paste("  correct horse \n");
         assert_eq!((form.secret(2).0.as_str(), form.lacking()), ("  correct horse ", None));
         form.paste("two\nlines");
-        assert!(form.lacking().is_some_and(|why| why.contains("not all of it")));
+        assert!(form.lacking().is_some_and(|why| why.contains("the text was cut")));
         form.forget();
         assert_eq!(form.lacking().as_deref(), Some("type the password"));
         assert_eq!(form.name(0), "anna");

@@ -17,7 +17,7 @@ pub struct Line {
     cursor: usize,
     /// Most characters that it takes.
     room: usize,
-    /// Something that was typed or pasted is not in the text; until the text is empty again nobody may trust it.
+    /// Something that was typed or pasted is not in the text; the text is incomplete until it is cleared.
     missed: bool,
 }
 
@@ -48,7 +48,7 @@ impl Line {
     /// An editing key; `false` if it is none.
     pub fn on_key(&mut self, event: KeyEvent) -> bool {
         let known = self.edit(event);
-        // Taking everything away starts anew; a key that was not taken does not.
+        // Clearing the text resets the mark; a rejected key does not.
         let typed = matches!(event.code, KeyCode::Char(_)) && !event.modifiers.contains(KeyModifiers::CONTROL);
         self.missed &= typed || !self.text.is_empty();
         known

@@ -1,22 +1,22 @@
 //! Windows on top of a tab: they get every key until they close, and carry the finished intent.
 
-pub mod choice;
-pub mod confirm;
-pub mod audit_entry;
-pub mod entry;
-pub mod faceplate;
-pub mod form;
-pub mod guidance;
-pub mod help;
-pub mod line;
-pub mod notice;
-pub mod number;
-pub mod prompt;
-pub mod reason;
-pub mod confirmed_value;
-pub mod settings;
-pub mod user_form;
-pub mod why;
+pub(crate) mod choice;
+pub(crate) mod confirm;
+pub(crate) mod audit_entry;
+pub(crate) mod entry;
+pub(crate) mod faceplate;
+pub(crate) mod form;
+pub(crate) mod guidance;
+pub(crate) mod help;
+pub(crate) mod line;
+pub(crate) mod notice;
+pub(crate) mod number;
+pub(crate) mod prompt;
+pub(crate) mod reason;
+pub(crate) mod confirmed_value;
+pub(crate) mod settings;
+pub(crate) mod user_form;
+pub(crate) mod why;
 
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};

@@ -1,9 +1,10 @@
 //! Tab 3: what is wrong, how urgent and what to do about it; what is suppressed; what was; how good the alarm system is;
 //! and what the next shift must know.
 
-pub mod actions;
+mod go;
+pub(crate) mod actions;
 mod filter;
-pub mod guidance;
+pub(crate) mod guidance;
 mod handover;
 mod journal;
 mod keys;
@@ -351,37 +352,6 @@ impl Alarms {
         self.journal.search_for(of.unwrap_or_default());
         self.page = Page::Journal;
     }
-
-    fn ask_text(&self) -> Vec<UiAction> {
-        let prompt = match self.page {
-            Page::Journal => Prompt::new("search the journal", journal::FORMS, &self.journal.typed()),
-            Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
-                Prompt::new("show only alarms with", filter::FORMS, &self.filter.typed())
-            }
-        };
-        vec![UiAction::Open(Modal::Prompt(prompt))]
-    }
-
-    /// Leads to what the alarm watches.
-    fn go(&self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let Some(id) = self.target(cx) else { return Vec::new() };
-        let raised = self.selected(cx).map_or(cx.now, |alarm| alarm.raised_at);
-        match (cx.def().alarm(id).subject, action) {
-            (Subject::Tag(tag), Action::Mimic) => vec![UiAction::ShowOnMimic(vec![tag])],
-            (Subject::Device(device), Action::Mimic) => {
-                vec![UiAction::ShowOnMimic(cx.def().tags_of(device).map(|tag| tag.id).collect())]
-            }
-            (Subject::Tag(tag), Action::Trend) => vec![UiAction::ShowOnTrends(tag, raised)],
-            (Subject::Tag(tag), Action::Controller) => vec![UiAction::ShowParameter(tag)],
-            (Subject::Device(device), Action::Controller) => vec![UiAction::ShowDevice(device)],
-            (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),
-            (Subject::Device(device), Action::Why) => Why::open(Why::of_device(cx, device)),
-            (subject, Action::Open) => {
-                vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate(cx, subject)))))]
-            }
-            (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => Vec::new(),
-        }
-    }
 }
 
 /// Does an alarm stand on this page? Urgent trouble of the system is not kept from whoever looks at the process.
@@ -394,16 +364,5 @@ fn is_on(page: Page, def: &crate::plant::def::AlarmDef) -> bool {
         Page::Active => def.class == AlarmClass::Process || urgent,
         Page::System => def.class == AlarmClass::System,
         Page::Suppressed | Page::Journal | Page::Metrics | Page::Handover => false,
-    }
-}
-
-fn faceplate(cx: &ViewContext, subject: Subject) -> Option<Faceplate> {
-    match subject {
-        Subject::Tag(tag) => Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]),
-        Subject::Device(device) => {
-            let tags = cx.def().tags_of(device).take(8).map(|tag| tag.id).collect();
-            Faceplate::new(format!("{} {}", cx.def().device(device).name, device_text(cx, device)), tags)
-        }
-        Subject::Line(_) | Subject::Station => None,
     }
 }

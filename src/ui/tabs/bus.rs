@@ -1,6 +1,7 @@
 //! Tab 6: the line explains itself: how it does, its read plan, its frames, and tests of it. Four pages.
 
 mod frames;
+mod keys;
 mod line;
 mod plan;
 mod registers;
@@ -21,6 +22,7 @@ use ratatui::{Frame, layout::Rect};
 
 pub use window::Window;
 
+use self::keys::{Action, table};
 use super::{Tab, TabView, periodic_query::PeriodicQuery};
 use crate::{
     history::{Answer, HistoryError},
@@ -35,7 +37,7 @@ use crate::{
     },
     ui::{
         UiAction, ViewContext,
-        keys::{self, Hint, Key, char, code},
+        keys::{Hint, Key, char, code, find, hints},
         last_frame::Rows,
         modal::{Modal, Notice, Settings},
         widgets::{
@@ -79,76 +81,6 @@ impl Page {
     }
 }
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// So many pages on.
-    Turn(isize),
-    /// This page.
-    Show(Page),
-    /// The next line of the plant.
-    NextLine,
-    /// Another row.
-    Move(Motion),
-    /// Opens what is selected.
-    Open,
-    /// Why the values of the selected block are what they are.
-    Why,
-    /// Holds the frames still, or lets them run.
-    Freeze,
-    /// Asks which frames are shown.
-    Filter,
-    /// Writes the frames to files.
-    Save,
-    /// Prepares a test.
-    Try(Tried),
-    /// The last test once more.
-    Again,
-    /// Stops the test at work.
-    Stop,
-    /// The communication settings of the line.
-    Settings,
-    /// Asks the devices that do not answer at once.
-    Retry,
-}
-
-/// Keys of every page.
-const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "the page before", Action::Turn(-1)),
-    Key::new(code(KeyCode::Right), "page", "the next page", Action::Turn(1)),
-    Key::new(char('L'), "", "page Line", Action::Show(Page::Line)),
-    Key::new(char('P'), "", "page Plan", Action::Show(Page::Plan)),
-    Key::new(char('F'), "", "page Frames", Action::Show(Page::Frames)),
-    Key::new(char('T'), "", "page Test", Action::Show(Page::Test)),
-    Key::new(char('n'), "", "the next line of the plant", Action::NextLine),
-];
-/// Keys of the first page.
-const LINE_KEYS: &[Key<Action>] = &[
-    Key::new(char('r'), "retry", "ask devices that do not answer now", Action::Retry).needs(Role::Technician),
-    Key::new(char('c'), "settings", "communication settings of the line", Action::Settings),
-];
-const PLAN_KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "tags", "the tags of the block", Action::Open),
-    Key::new(char('w'), "why", "why the values of the block are what they are", Action::Why),
-];
-const FRAMES_KEYS: &[Key<Action>] = &[
-    Key::new(char(' '), "pause", "pause or resume", Action::Freeze),
-    Key::new(code(KeyCode::Enter), "decode", "every byte of the frame", Action::Open),
-    Key::new(char('f'), "filter", "filter frames", Action::Filter),
-    Key::new(char('x'), "save", "write them as text and for Wireshark", Action::Save),
-];
-const TEST_KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "start", "start the selected test", Action::Open).needs(Role::Technician),
-    Key::new(char('t'), "", "type bytes and send them", Action::Try(Tried::Bytes)),
-    Key::new(char('f'), "", "a request by its fields", Action::Try(Tried::Request)),
-    Key::new(char('b'), "", "browse registers", Action::Try(Tried::Registers)),
-    Key::new(char('l'), "", "loopback", Action::Try(Tried::Loopback)),
-    Key::new(char('i'), "", "identify a device", Action::Try(Tried::Identify)),
-    Key::new(char('s'), "", "scan for units", Action::Try(Tried::Scan)),
-    Key::new(char('r'), "again", "the last test once more", Action::Again).needs(Role::Technician),
-    Key::new(char('x'), "stop", "stop the test at work", Action::Stop).needs(Role::Technician),
-];
-
 /// State of this tab.
 #[derive(Debug)]
 pub struct Bus {
@@ -182,7 +114,7 @@ impl TabView for Bus {
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let action = keys::find(&table(self.page), event);
+        let action = find(&table(self.page), event);
         let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
         self.frames.dismiss();
         match action {
@@ -212,7 +144,7 @@ impl TabView for Bus {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut hints = keys::hints(&table(self.page));
+        let mut hints = hints(&table(self.page));
         if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
             for hint in hints.iter_mut().filter(|hint| hint.label == "stop") {
                 hint.label.clear();
@@ -295,8 +227,8 @@ impl TabView for Bus {
     }
 
     #[cfg(test)]
-    fn chords() -> keys::PageChords {
-        Page::ALL.iter().map(|page| (page.title(), keys::chords_of(&table(*page)))).collect()
+    fn chords() -> crate::ui::keys::PageChords {
+        Page::ALL.iter().map(|page| (page.title(), crate::ui::keys::chords_of(&table(*page)))).collect()
     }
 }
 
@@ -422,15 +354,4 @@ fn state_text(cx: &ViewContext, at: &Place) -> String {
         LineState::Disconnected => format!("DISCONNECTED by an operator{since}"),
         LineState::Testing => format!("TEST{since}, polling stopped"),
     }
-}
-
-/// The keys of a page: those of every page first.
-fn table(page: Page) -> Vec<Key<Action>> {
-    let (moves, own) = match page {
-        Page::Line => (motions!("scroll", Action::Move), LINE_KEYS),
-        Page::Plan => (motions!("select", Action::Move), PLAN_KEYS),
-        Page::Frames => (motions!("select", Action::Move), FRAMES_KEYS),
-        Page::Test => (motions!("select", Action::Move), TEST_KEYS),
-    };
-    [KEYS, &moves, own].concat()
 }

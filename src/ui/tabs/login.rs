@@ -1,4 +1,4 @@
-//! Tab 0: who sits here. Logging in, the first Supervisor, a password of one's own; and what the one who is in may do.
+//! Tab 0: log in, create the first Supervisor, change the password; shows the user and its rights.
 
 mod view;
 
@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-/// What a key means here while somebody is logged in.
+/// What a key means while a user is logged in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// Another password for oneself.
@@ -30,7 +30,7 @@ pub enum Action {
     Leave,
 }
 
-/// Keys of this tab while somebody is logged in; in a form every letter is a letter.
+/// Keys of this tab while a user is logged in; a form takes every letter.
 const KEYS: &[Key<Action>] = &[
     Key::new(char('p'), "password", "choose another password for yourself", Action::Password),
     Key::new(char('k'), "lock", "lock this terminal, as Ctrl-K does on every tab", Action::Lock),
@@ -42,7 +42,7 @@ const KEYS: &[Key<Action>] = &[
 pub struct Login {
     /// The form that is filled in.
     form: Option<UserForm>,
-    /// The password with which somebody has just logged in, as long as he may have to change it.
+    /// The password of the last login, kept while it may have to be changed.
     given: Option<Secret>,
     /// The password is being changed.
     changing: bool,
@@ -145,7 +145,7 @@ impl Login {
         typing
     }
 
-    /// Somebody came, went, or has something else to do here.
+    /// The session has changed.
     pub fn on_session_status(&mut self, cx: &ViewContext) {
         let session = cx.session;
         let user = session.who.as_ref().map(|who| &who.user);

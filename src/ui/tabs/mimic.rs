@@ -265,7 +265,7 @@ pub fn command_of(cx: &ViewContext, event: KeyEvent) -> Option<Modal> {
 }
 
 /// The window of a plant command, or why it cannot be given: a fixed value or the other of two states is asked at once; a toggle of a state that
-/// nobody knows becomes a list, and anything else is entered.
+/// unknown value becomes a list, and anything else is entered.
 fn intent(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     let tag = command.tag;
     let def = cx.def().tag(tag);
@@ -278,7 +278,7 @@ fn intent(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     if let Some(new) = interlock::other_state(cx, tag) {
         return Some(Modal::Confirm(Confirm::write(cx, tag, new)));
     }
-    // Nobody knows whether it runs: what is asked is the stop, which never takes more than two keys.
+    // Unknown whether it runs: offer the stop, which never takes more than two keys.
     if cx.def().logic.sequences.iter().any(|sequence| sequence.run == tag) {
         return Some(Modal::Confirm(Confirm::write(cx, tag, 0.0)));
     }

@@ -1,15 +1,15 @@
 //! The tabs: the table of them, and the trait that each of them implements.
 
-pub mod alarms;
-pub mod bus;
-pub mod controllers;
+pub(crate) mod alarms;
+pub(crate) mod bus;
+pub(crate) mod controllers;
 mod periodic_query;
-pub mod faults;
-pub mod login;
-pub mod mimic;
-pub mod reports;
-pub mod trends;
-pub mod users;
+pub(crate) mod faults;
+pub(crate) mod login;
+pub(crate) mod mimic;
+pub(crate) mod reports;
+pub(crate) mod trends;
+pub(crate) mod users;
 
 use std::path::PathBuf;
 

@@ -64,7 +64,7 @@ fn table() -> Vec<Key<Action>> {
     [KEYS, &motions!("", Action::Move)].concat()
 }
 
-/// How often the figures of a running shift are read anew, and when an answer counts as lost (real time).
+/// How often the figures of a running shift are refreshed, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 30.0;
 /// A report over weeks may take its time.
 const PATIENCE_S: f64 = 60.0;
@@ -74,7 +74,7 @@ const PATIENCE_S: f64 = 60.0;
 pub struct Reports {
     /// The period shown; `None` only at the very ends of the calendar.
     period: Option<Period>,
-    /// Nobody has chosen a period: the running shift is shown, whichever that is.
+    /// No period is chosen: the running shift is shown.
     follow: bool,
     /// The report of that very period.
     report: Option<Box<ShiftReport>>,
@@ -220,7 +220,7 @@ impl Reports {
         self.ask(cx)
     }
 
-    /// What became of a file has been read.
+    /// Clears the note about the last file.
     fn dismiss(&mut self) {
         if matches!(self.export, Export::Done(_) | Export::Failed(_)) {
             self.export = Export::Not;

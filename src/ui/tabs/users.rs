@@ -28,11 +28,11 @@ use crate::{
 pub enum Action {
     /// Select another row.
     Move(Motion),
-    /// Add somebody.
+    /// Add a user.
     Add,
     /// Another role.
     Role,
-    /// Shut out, or let in again.
+    /// Disable, or enable.
     Disable,
     /// A new first password.
     Reset,

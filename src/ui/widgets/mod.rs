@@ -1,9 +1,9 @@
 //! Small drawings that tabs are made of.
 
-pub mod chart;
-pub mod line_trend;
-pub mod list;
-pub mod mimic;
-pub mod spark;
-pub mod text;
-pub mod value;
+pub(crate) mod chart;
+pub(crate) mod line_trend;
+pub(crate) mod list;
+pub(crate) mod mimic;
+pub(crate) mod spark;
+pub(crate) mod text;
+pub(crate) mod value;

@@ -94,7 +94,7 @@ impl Shown {
     }
 }
 
-/// `on` for a good value that is not zero; `None` when nobody can say.
+/// `on` for a good value that is not zero; `None` when unknown.
 pub fn is_on(cx: &ViewContext, tag: TagId) -> Option<bool> {
     cx.snapshot.sample(tag).good_value().map(|value| value != 0.0)
 }

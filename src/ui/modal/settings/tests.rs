@@ -69,13 +69,13 @@ fn what_is_chosen_is_what_is_sent() {
 #[test]
 fn what_cannot_be_is_told_before_anything_is_sent() {
     for (keys, expect) in [
-        ("⏎", "these are the settings in use"),
+        ("⏎", "these settings are in use"),
         ("↓→", "Modbus RTU always has 8 data bits"),
         ("↑↑→→⏎", "a TCP line needs a host"),
         ("↓↓↓↓999⏎", "too long: nothing else is sent meanwhile"),
         ("u", "nothing to revert"),
         ("S", "nothing to save"),
-        ("→S", "use these settings first"),
+        ("→S", "apply these first"),
     ] {
         let mut model = open(&Fixture::normal());
         let effects = type_keys(&mut model, keys);
@@ -94,7 +94,7 @@ fn nothing_is_done_that_was_not_asked_twice() {
     assert!(model.modal.is_none());
 }
 
-/// Somebody has tried 19200 baud, and nobody answers.
+/// 19200 baud was applied, and no device answers.
 fn tried_out() -> Fixture {
     let mut fixture = Fixture::normal();
     let before = line();
@@ -123,10 +123,10 @@ fn what_is_asked_can_be_read_on_the_smallest_screen() {
         let mut model = open(&fixture);
         type_keys(&mut model, "↓↓↓↓↓");
         let shown = screen(&mut model, width, height);
-        assert!(shown.contains("gap") && shown.contains("⏎ use them"), "{shown}");
+        assert!(shown.contains("gap") && shown.contains("⏎ apply"), "{shown}");
         type_keys(&mut model, "u");
         let shown = screen(&mut model, width, height);
-        for words in ["Take back to RTU /dev/ttyUSB0 9600 8N1?", "⏎ yes   n no"] {
+        for words in ["Revert to RTU /dev/ttyUSB0 9600 8N1?", "⏎ yes   n no"] {
             assert!(shown.contains(words), "no `{words}` in\n{shown}");
         }
     }

@@ -157,7 +157,7 @@ pub fn own_handover() -> Vec<UiAction> {
     open(Modal::Notice(Notice::new("take over", words.map(str::to_owned).to_vec())))
 }
 
-/// Asks whether whoever sits here takes the plant over.
+/// Asks whether the user takes the plant over.
 pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     let who = cx.session.who.as_ref().map_or("–", |who| &who.user);
     let words = format!("{who} has read this page and takes the plant over.");

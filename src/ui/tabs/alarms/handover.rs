@@ -33,7 +33,7 @@ use crate::{
 
 /// Most actions that are read; the list says when there are more.
 const ROWS: usize = 500;
-/// How often they are asked anew, real time.
+/// How often they are queried again, real time.
 const EVERY_S: f64 = 2.0;
 /// Bad or uncertain values that are named at most.
 const NAMED: usize = 8;
@@ -211,7 +211,7 @@ impl Handover {
         lines
     }
 
-    /// Was it whoever sits here that handed over, and has nobody taken over since?
+    /// Did the current user hand over, with no take-over since?
     pub fn is_own(&self, cx: &ViewContext) -> bool {
         let last = |row: &&ActionRecord| [HAND_OVER, TAKE_OVER].contains(&&*row.action) && !is_failed(row);
         self.actions.iter().find(last).is_some_and(|row| &*row.action == HAND_OVER && is_own(cx, row))
@@ -253,7 +253,7 @@ pub fn suppressed_words(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Strin
     format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", suppressed.state.word(), def.message)
 }
 
-/// Lines and devices that somebody has taken away, sequences in manual, actuators that do not obey.
+/// Disconnected lines and devices, sequences in manual, actuators that do not follow their command.
 fn unusual(cx: &ViewContext) -> Vec<String> {
     let (def, snapshot) = (cx.def(), cx.snapshot);
     let zone = &def.time_zone;

@@ -29,7 +29,7 @@ const SPAN: SignedDuration = SignedDuration::from_hours(24);
 const ROWS: usize = 500;
 /// The same while something is searched for.
 const SEARCHED_ROWS: usize = 2_000;
-/// How often it is asked anew, real time.
+/// How often it is queried again, real time.
 const EVERY_S: f64 = 5.0;
 /// What may be typed, for the entry window.
 pub const FORMS: &str = "words of tag, text, user; a time or a day:  TIC-1 anna   06:00-14:00   2026-11-20";

@@ -29,7 +29,7 @@ use crate::{
     },
 };
 
-/// How often the figures of a running shift are asked anew, real time.
+/// How often the figures of a running shift are queried again, real time.
 const EVERY_S: f64 = 30.0;
 /// An alarm that has been active for longer is stale.
 const STALE: Duration = Duration::from_secs(24 * 3_600);

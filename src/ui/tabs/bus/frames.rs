@@ -98,7 +98,7 @@ impl Ring {
         held
     }
 
-    /// What became of files has been read.
+    /// Clears the note about the last files.
     pub fn dismiss(&mut self) {
         self.saved.clear();
     }

@@ -1,5 +1,9 @@
 //! Tests by their fields: a request, a loopback, an identification, a scan, registers. What is typed is told at once.
 
+mod fields;
+
+pub use fields::address;
+use fields::{all_settings, bit, number, register};
 use std::{ops::RangeInclusive, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -168,7 +172,7 @@ impl Form {
         let at = Place::of(cx, self.line).ok_or("this line has gone")?;
         let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
         if self.fields.iter().any(missed) {
-            return Err("not all of it was taken; Ctrl-U empties a field".to_owned());
+            return Err("the text was cut; Ctrl-U clears a field".to_owned());
         }
         let diagnostic = self.build(at.settings)?.diagnostic;
         let mut acts = vec![test::start(&at, diagnostic.clone())?];
@@ -351,49 +355,6 @@ fn message(unit: u8, function: u8, place: &str, rest: &str) -> Result<Vec<u8>, S
         }
     }
     Ok(message)
-}
-
-/// `123`, `-5`, `0x3EA`.
-fn number(text: &str, what: &str, range: RangeInclusive<i64>) -> Result<i64, String> {
-    let text = text.trim();
-    let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
-    let value = digits.map_or_else(|| text.parse(), |digits| i64::from_str_radix(digits, 16));
-    let expected = || format!("{what}: found `{text}`, expected {} to {}", range.start(), range.end());
-    value.ok().filter(|value| range.contains(value)).ok_or_else(expected)
-}
-
-fn register(text: &str) -> Result<u16, String> {
-    number(text, "value", -32_768..=65_535).map(|value| to_u16(value.rem_euclid(0x1_0000)))
-}
-
-fn bit(text: &str) -> Result<bool, String> {
-    match text.trim().to_ascii_lowercase().as_str() {
-        "1" | "on" => Ok(true),
-        "0" | "off" => Ok(false),
-        other => Err(format!("value: found `{other}`, expected 1 or 0")),
-    }
-}
-
-/// The wire address: `41003` is a Modicon number of its table, `1002` and `0x03EA` are as sent. Five digits or more that
-/// begin with the digit of a table are a Modicon number; a wire address as great as that is written in hexadecimal.
-pub fn address(text: &str, table: Table) -> Result<u16, String> {
-    let digits = text.trim();
-    let modicon = matches!(digits.len(), 5 | 6) && digits.bytes().all(|byte| byte.is_ascii_digit());
-    let named =
-        TABLES.into_iter().find(|table| digits.starts_with(char::from(b'0' + table.digit()))).filter(|_| modicon);
-    let Some(named) = named else { return number(digits, "address", 0..=65_535).map(|address| to_u16(address)) };
-    if named != table {
-        return Err(format!("address: {digits} is of the table {}, this is {}", named.word(), table.word()));
-    }
-    let place = digits[1..].parse::<u32>().ok().and_then(|number| u16::try_from(number.checked_sub(1)?).ok());
-    place.ok_or_else(|| format!("address: {digits} does not exist, the first is {}", table.modicon(0)))
-}
-
-/// All settings that devices are found with; RTU needs eight data bits.
-fn all_settings(line: &LineDef) -> Vec<Serial> {
-    let data_bits = if line.transport.framing() == Framing::Ascii { 7 } else { 8 };
-    let of = |baud| CHARACTERS.map(|(parity, stop_bits)| Serial { baud, data_bits, parity, stop_bits });
-    BAUDS.into_iter().flat_map(of).collect()
 }
 
 #[cfg(test)]

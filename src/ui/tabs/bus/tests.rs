@@ -1,5 +1,7 @@
 //! The bus tab in the whole terminal: what a technician sees and what the keys do.
 
+mod pages;
+
 use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
@@ -78,129 +80,6 @@ fn every_page_well_and_in_trouble() {
             }
         }
     }
-}
-
-#[test]
-fn a_silent_device_shows_when_it_is_asked_next_and_r_asks_it_now() {
-    let mut fixture = Fixture::traffic();
-    let device = fixture.def.devices[0].id;
-    fixture.devices[0].state = DeviceState::Down { since: now() - jiff::SignedDuration::from_secs(75) };
-    fixture.devices[0].diagnosis = Some(Reason::Down);
-    let mut report = fixture.line.report.as_deref().cloned().expect("the line has reported");
-    report.retries = vec![(device, now() + jiff::SignedDuration::from_secs(12))];
-    fixture.line.report = Some(Arc::new(report));
-    for (width, height) in [(80, 24), (120, 40)] {
-        let mut model = bus(&fixture, Theme::FULL, "L");
-        let shown = screen(&mut model, width, height);
-        assert!(shown.contains("retry in 12 s"), "{shown}");
-        assert_eq!(sent_kind(&type_keys(&mut model, "r")), Some(&CommandKind::Refresh(device)));
-        type_keys(&mut model, "4⏎");
-        let shown = screen(&mut model, width, height);
-        assert!(shown.contains("not answering, retry in 12 s"), "{shown}");
-    }
-}
-
-#[test]
-fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "F");
-    let newer = |model: &mut Model| {
-        let mut fixture = Fixture::traffic();
-        crate::ui::fixture::more_frames(&mut fixture);
-        update(model, Msg::Snapshot(fixture.snapshot()));
-        // The page takes new frames in every other second.
-        (0..4).for_each(|_| drop(update(model, Msg::Tick { silent: Duration::ZERO })));
-    };
-    assert_acts_only_on_what_was_drawn(&mut model, newer, "⏎");
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "P");
-    let other_plan = |model: &mut Model| {
-        let mut fixture = Fixture::traffic();
-        let mut report = fixture.line.report.as_deref().cloned().expect("the line has reported");
-        report.polls.reverse();
-        fixture.line.report = Some(Arc::new(report));
-        update(model, Msg::Snapshot(fixture.snapshot()));
-    };
-    assert_acts_only_on_what_was_drawn(&mut model, other_plan, "⏎");
-}
-
-#[test]
-fn every_page_in_seven_bits_tells_what_is_wrong() {
-    for (page, keys, words) in [
-        ("line", "L", "! PLC-1: no answer in time at 14:01:50"),
-        ("plan", "P", "! TIC-1"),
-        ("frames", "F", "x CRC error: got 3C51"),
-        ("test", "T", "scan for units"),
-    ] {
-        let mut model = bus(&Fixture::traffic_trouble(), Theme::PLAIN, keys);
-        let shown = screen(&mut model, 80, 24);
-        assert!(shown.is_ascii() && shown.contains(words), "{page}:\n{shown}");
-    }
-}
-
-#[test]
-fn pages_are_turned_by_arrows_and_letters() {
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
-    for (keys, page) in
-        [("", "‹Line›"), ("→", "‹Plan›"), ("→→", "‹Test›"), ("→", "‹Line›"), ("←", "‹Test›"), ("F", "‹Frames›")]
-    {
-        type_keys(&mut model, keys);
-        let shown = screen(&mut model, 80, 24);
-        assert!(shown.contains(page), "{keys}: {page}\n{shown}");
-    }
-    let before = screen(&mut model, 80, 24);
-    for key in ["w", "z"] {
-        assert_eq!(type_keys(&mut model, key), []);
-    }
-    assert_eq!(screen(&mut model, 80, 24), before);
-    type_keys(&mut model, "Lc");
-    assert!(matches!(model.modal, Some(Modal::Settings(_))));
-}
-
-#[test]
-fn a_quiet_line_has_no_warnings_and_a_bad_one_says_what_to_do() {
-    let quiet = screen(&mut bus(&Fixture::traffic(), Theme::FULL, ""), 80, 24);
-    assert!(!quiet.contains('!') && !quiet.contains('✗'), "{quiet}");
-    let bad = screen(&mut bus(&Fixture::traffic_trouble(), Theme::FULL, ""), 120, 40);
-    for words in [
-        "replies take 288 of 300 ms: raise the timeout",
-        "look at its power, wiring and unit number; every probe costs the line 312 ms",
-        "look at baud rate, parity, termination and shield",
-        "!corrupt 6",
-        "02 illegal data address 2",
-        "the line is full: 41 reads were skipped",
-    ] {
-        assert!(bad.contains(words), "{words} is missing:\n{bad}");
-    }
-}
-
-#[test]
-fn frames_are_held_still_while_they_are_read() {
-    let mut fixture = Fixture::traffic();
-    let mut model = bus(&fixture, Theme::FULL, "F↑↑");
-    let held = screen(&mut model, 80, 24);
-    assert!(held.contains("HELD STILL"), "{held}");
-    crate::ui::fixture::more_frames(&mut fixture);
-    for _ in 0..6 {
-        update(&mut model, Msg::Tick { silent: Duration::ZERO });
-        update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    }
-    let body = |shown: &str| shown.lines().skip(4).take(18).map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(body(&screen(&mut model, 80, 24)), body(&held));
-    type_keys(&mut model, " ");
-    let running = screen(&mut model, 80, 24);
-    assert!(running.contains("running, newest") && running.contains("07 D0 00 01"), "{running}");
-}
-
-#[test]
-fn running_frames_are_taken_in_every_two_seconds() {
-    let mut fixture = Fixture::traffic();
-    let mut model = bus(&fixture, Theme::FULL, "F");
-    crate::ui::fixture::more_frames(&mut fixture);
-    update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    assert!(!screen(&mut model, 80, 24).contains("07 D0 00 01"), "slow lines have few bytes");
-    for _ in 0..4 {
-        update(&mut model, Msg::Tick { silent: Duration::ZERO });
-    }
-    assert!(screen(&mut model, 80, 24).contains("07 D0 00 01"));
 }
 
 #[test]

@@ -105,7 +105,7 @@ impl Window {
 /// No text has more rows; the view stops at its last one.
 const ROWS_MAX: usize = 400;
 
-/// Rows to read, drawn anew with every snapshot.
+/// Rows to read, redrawn with every snapshot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TextWindow {
     shown: Shown,

@@ -56,7 +56,7 @@ pub enum Action {
     Pattern,
     /// Save the settings as a set.
     Save,
-    /// Read the folder of sets anew.
+    /// Refresh the list of sets.
     ReadSets,
     /// Show what is the same too, or hide it.
     All,

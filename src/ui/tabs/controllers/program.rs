@@ -144,7 +144,7 @@ fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pr
     canvas.text(0, 6, "r run   p hold   o off", cx.theme.strong());
 }
 
-/// One straight piece of the curve: how long, from where (`None`: nobody remembers), to where, and which place it is.
+/// One straight piece of the curve: how long, from where (`None`: unknown), to where, and which place it is.
 struct Segment {
     minutes: f64,
     from: Option<f64>,

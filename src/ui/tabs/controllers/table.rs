@@ -174,7 +174,7 @@ impl Columns {
         2 + self.name + 1
     }
     fn row(&self, [pen, name, value, unit, range, default, age, meaning]: [&str; 8]) -> String {
-        // The line below the table has the selected meaning in full: a stump of it in the table helps nobody.
+        // The line below the table has the selected meaning in full: a stump in the table does not help.
         let meaning = if self.meaning < 12 { "" } else { meaning };
         let default = if self.default == 0 { String::new() } else { format!("{} ", pad_left(default, self.default)) };
         format!(

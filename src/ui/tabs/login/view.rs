@@ -50,7 +50,7 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
     alarms(cx, &mut canvas.part(0, top, width, height - top));
 }
 
-/// The title of the plant stands where somebody has yet to learn where he is.
+/// The heading of the form; on a locked terminal it names the user who locked it.
 fn heading(cx: &ViewContext, title: &str) -> String {
     match &cx.session.who {
         Some(who) if cx.session.locked => format!("{title} as another person than {}", who.user),
@@ -74,7 +74,7 @@ fn banner(cx: &ViewContext, canvas: &mut Canvas, most: u16) -> u16 {
     to_u16(lines.len()) + 1
 }
 
-/// Who is in, since when, and what he may; returns the row after it.
+/// The user, since when, and its rights; returns the row after it.
 fn who(login: &Login, cx: &ViewContext, canvas: &mut Canvas, y: u16) -> u16 {
     let theme = cx.theme;
     let Some(who) = &cx.session.who else { return y };

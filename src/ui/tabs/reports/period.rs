@@ -1,4 +1,4 @@
-//! Which period a report is of: the shifts of the plant, days where it has none, or what somebody typed; pure.
+//! Which period a report is of: the shifts of the plant, days where it has none, or a typed period; pure.
 
 use jiff::{SignedDuration, Timestamp, ToSpan, civil};
 

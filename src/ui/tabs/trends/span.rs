@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 
 /// The windows that zooming steps through, seconds: 1 min to 24 h.
 pub const WINDOWS: [i64; 12] = [60, 120, 300, 600, 900, 1_800, 3_600, 7_200, 14_400, 28_800, 43_200, 86_400];
-/// How often the history may be asked anew, milliseconds.
+/// How often the history may be queried, milliseconds.
 pub const RATES: [u64; 5] = [500, 1_000, 2_000, 5_000, 10_000];
 
 /// A stretch of time cut into columns of equal width, on a grid that does not move with the clock: so a curve travels

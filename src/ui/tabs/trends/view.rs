@@ -312,7 +312,7 @@ fn resolution(cx: &ViewContext, tag: TagId) -> f64 {
     10f64.powi(-i32::from(cx.snapshot.decimals[tag.index()]))
 }
 
-/// Is it set by somebody rather than measured? Such pens are drawn as broken lines.
+/// Is it a written value rather than a measured one? Such pens are drawn as broken lines.
 fn is_set_value(cx: &ViewContext, tag: TagId) -> bool {
     let faceplates = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref());
     let def = cx.def().tag(tag);

@@ -69,7 +69,7 @@ pub fn keys() -> Vec<Key<Action>> {
 const ROWS: usize = 1_000;
 /// By default the list reaches back so far.
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 7);
-/// How often the list is read anew, and when an answer counts as lost (real time).
+/// How often the list is refreshed, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 10.0;
 const PATIENCE_S: f64 = 20.0;
 
@@ -133,7 +133,7 @@ impl Audit {
                     part.clear();
                 }
                 self.period = None;
-                self.anew();
+                self.restart();
             }
             Action::Back => {}
         }
@@ -152,12 +152,12 @@ impl Audit {
             None => return Ok(()),
         }
         self.asking = None;
-        self.anew();
+        self.restart();
         Ok(())
     }
 
     /// Rows of another search must not stand under this one.
-    fn anew(&mut self) {
+    fn restart(&mut self) {
         (self.rows, self.answered, self.selected) = (Vec::new(), false, 0);
         self.periodic.want();
     }

@@ -1,11 +1,11 @@
 //! The parts of the mimic, on a canvas of nominal cells that is stretched to the screen.
 
-pub mod list;
-pub mod panel;
-pub mod pipe;
-pub mod tank;
-pub mod trend;
-pub mod unit;
+pub(crate) mod list;
+pub(crate) mod panel;
+pub(crate) mod pipe;
+pub(crate) mod tank;
+pub(crate) mod trend;
+pub(crate) mod unit;
 
 use ratatui::style::Style;
 

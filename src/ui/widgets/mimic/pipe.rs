@@ -137,7 +137,7 @@ fn bend(from: Way, to: Way, heavy: bool) -> char {
     if heavy { strong } else { light }
 }
 
-/// Nobody knows whether it flows.
+/// Unknown whether it flows.
 fn unknown(from: Way, to: Way) -> char {
     match bend(from, to, false) {
         '─' => '╌',

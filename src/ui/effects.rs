@@ -1,0 +1,72 @@
+//! What the actions of tabs and windows become: changes of the model, and effects.
+
+use super::*;
+
+pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
+    let mut effects = Vec::new();
+    for action in actions {
+        match action {
+            UiAction::Open(modal) => model.modal = Some(modal),
+            UiAction::Show(tab) => effects.extend(show(model, tab)),
+            UiAction::ShowDevice(device) => {
+                model.tabs.controllers.show(device);
+                effects.extend(show(model, Tab::Controllers));
+            }
+            UiAction::ShowParameter(tag) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.controllers.show_parameter(cx, tag);
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Controllers));
+            }
+            UiAction::ShowOnMimic(tags) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.mimic.select(cx, &tags);
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Mimic));
+            }
+            UiAction::ShowOnTrends(tag, at) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.trends.show(cx, tag, at);
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Trends));
+            }
+            UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
+            UiAction::Confirmed(command, credentials) => effects.extend(model.send_command(command, credentials)),
+            UiAction::SessionRequest(tab, request) => {
+                // 0 means no request: numbers start at 1.
+                model.session_lock.last_request = model.session_lock.last_request.checked_add(1).unwrap_or(1);
+                let number = model.session_lock.last_request;
+                if let Some(Modal::UserForm(form)) = &mut model.modal {
+                    form.sent(number);
+                }
+                effects.push(Effect::SessionRequest(QueryId { tab, number }, request));
+            }
+            UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
+            UiAction::Do(effect) => effects.push(effect),
+        }
+    }
+    effects
+}
+
+/// Shows a tab; it asks at once for what it needs.
+pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
+    model.tabs.shown = tab;
+    let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
+    let effects = asked.into_iter().filter_map(|action| match action {
+        UiAction::Do(effect) => Some(effect),
+        UiAction::Open(_)
+        | UiAction::Leave
+        | UiAction::Show(_)
+        | UiAction::ShowDevice(_)
+        | UiAction::ShowParameter(_)
+        | UiAction::ShowOnMimic(_)
+        | UiAction::ShowOnTrends(..)
+        | UiAction::Command(_)
+        | UiAction::Confirmed(..)
+        | UiAction::SessionRequest(..) => None,
+    });
+    effects.collect()
+}

@@ -1,0 +1,173 @@
+//! The window that sends bytes as they are typed.
+
+use super::*;
+
+/// Bytes on their way onto a line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Send {
+    pub(super) line: LineId,
+    pub(super) text: Line,
+    /// As typed, without a check.
+    pub(super) bare: bool,
+    pub(super) problem: Option<String>,
+}
+
+/// What was typed, as it would go over the line.
+#[derive(Debug)]
+struct Ready {
+    frame: Vec<u8>,
+    /// What was added to what was typed.
+    added: String,
+    dissection: Dissection,
+    errors: Vec<String>,
+}
+
+impl Send {
+    /// A key; what is typed is kept for the next time.
+    pub fn on_key(mut self, cx: &ViewContext, bench: &mut Bench, event: KeyEvent) -> Next {
+        if keys::code(KeyCode::Tab).is(event) {
+            self.bare = !self.bare;
+            self.problem = None;
+        } else if keys::code(KeyCode::Enter).is(event) {
+            match self.send(cx) {
+                Ok(UiAction::Command(kind)) => {
+                    bench.first = None;
+                    return Next::Do(vec![
+                        UiAction::Command(kind),
+                        UiAction::Open(Modal::Bus(Box::new(Window::Send(self)))),
+                    ]);
+                }
+                Ok(act) => return Next::Do(vec![act]),
+                Err(problem) => self.problem = Some(problem),
+            }
+        } else if self.text.on_key(event) {
+            self.problem = None;
+        }
+        (bench.text, bench.bare) = (self.text.text(), self.bare);
+        Window::Send(self).stay()
+    }
+
+    /// Pasted text.
+    pub fn on_paste(&mut self, text: &str) {
+        self.text.paste(text);
+    }
+
+    fn send(&self, cx: &ViewContext) -> Result<UiAction, String> {
+        let at = Place::of(cx, self.line).ok_or("this line has gone")?;
+        if self.text.missed() {
+            return Err("the text was cut; Ctrl-U clears the line".to_owned());
+        }
+        start(&at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
+    }
+
+    fn ready(&self, framing: Framing) -> Result<Ready, String> {
+        let typed = hex_input::parse(&self.text.text(), Some(framing)).map_err(|error| error.to_string())?;
+        let (frame, added) = if self.bare { (typed.bytes.clone(), String::new()) } else { dress(&typed, framing) };
+        let dissection = dissect::dissect(&frame, Some(framing), Some(Direction::Request), None);
+        let mut errors: Vec<String> =
+            request_lint::check_request(&dissection.message, framing).iter().map(ToString::to_string).collect();
+        if dissection.verdict != "ok" && errors.is_empty() {
+            errors.push(dissection.verdict.clone());
+        }
+        Ok(Ready { frame, added, dissection, errors })
+    }
+
+    /// Draws it over the tests, so that what comes back is seen below.
+    pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
+        let Some(at) = Place::of(cx, self.line) else { return };
+        let theme = cx.theme;
+        let area = Rect { height: (TOP + 1).min(body.height), ..body };
+        let mut outer = Canvas::new(screen.buffer_mut(), area);
+        outer.clear();
+        outer.frame(&format!("send on {}, {}", at.settings.name, at.settings.transport), theme.strong());
+        let (width, height) = (area.width.saturating_sub(4), area.height.saturating_sub(2));
+        let mut canvas = outer.part(2, 1, width, height);
+        let x = canvas.text(0, 0, "bytes ", theme.dim());
+        self.text.view(theme, &mut canvas, x, 0);
+        let framing = at.settings.transport.framing();
+        let rows = if self.text.text().trim().is_empty() {
+            vec![
+                plain("such as 01 03 03 EA 00 01: unit, function, address, count; or a line of a log", theme.dim()),
+                plain("the check that the line needs is added", theme.dim()),
+            ]
+        } else {
+            match self.ready(framing) {
+                Ok(ready) => ready.rows(cx, self.bare, width),
+                Err(why) => wrap(&why, width).into_iter().map(|line| plain(line, theme.trouble())).collect(),
+            }
+        };
+        let problem = self.problem.clone().or_else(|| closed(&at));
+        let room = height.saturating_sub(2 + u16::from(problem.is_some()));
+        if usize::from(room) < rows.len() {
+            canvas.text_right(
+                width,
+                0,
+                &format!(" {} more lines: enlarge", rows.len() - usize::from(room)),
+                theme.strong(),
+            );
+        }
+        for (y, row) in rows.iter().take(usize::from(room)).enumerate() {
+            let mut x = 0;
+            for (text, style) in row {
+                x = canvas.text(x, to_u16(y) + 1, &fit_words(text, width.saturating_sub(x)), *style);
+            }
+        }
+        let last = height.saturating_sub(1);
+        if let Some(problem) = problem {
+            canvas.text(0, last.saturating_sub(1), &fit(&format!("! {problem}"), width), theme.trouble());
+        }
+        let check = if self.bare { "with its check" } else { "as typed, without check" };
+        canvas.text(0, last, &format!("⏎ send   Tab {check}   Esc close"), theme.strong());
+    }
+}
+
+impl Ready {
+    fn rows(&self, cx: &ViewContext, bare: bool, width: u16) -> Vec<Row> {
+        let theme = cx.theme;
+        let added = match (bare, self.added.is_empty()) {
+            (true, _) => "as typed, nothing added".to_owned(),
+            (false, true) => "it has its check".to_owned(),
+            (false, false) => self.added.clone(),
+        };
+        let mut rows = vec![plain(fit_words(&added, width), theme.normal())];
+        let lines = wrap(&self.dissection.summary, width);
+        rows.extend(lines.into_iter().map(|line| plain(line, theme.strong())));
+        for error in &self.errors {
+            rows.extend(wrap(&format!("! {error}"), width).into_iter().map(|line| plain(line, theme.trouble())));
+        }
+        if rows.len() < 4 {
+            let bytes = broken(
+                &format!(
+                    "sent as {}",
+                    super::super::frames::bytes_text(self.dissection.framing.unwrap_or(Framing::Rtu), &self.frame)
+                ),
+                width,
+            );
+            rows.extend(bytes.into_iter().map(|line| plain(line, theme.dim())));
+        }
+        rows
+    }
+}
+
+/// The frame of what was typed, and what was added to it, if it is not a frame already.
+fn dress(typed: &hex_input::ParsedInput, framing: Framing) -> (Vec<u8>, String) {
+    let bytes = &typed.bytes;
+    match framing {
+        Framing::Rtu if 4 <= bytes.len() && frame::without_crc(bytes).is_ok() => (bytes.clone(), String::new()),
+        Framing::Rtu => {
+            let whole = frame::with_crc(bytes);
+            let crc = hex(&whole[bytes.len()..]);
+            (whole, format!("+ CRC {crc}"))
+        }
+        Framing::Ascii if typed.framing == Some(Framing::Ascii) => (bytes.clone(), String::new()),
+        Framing::Ascii => (ascii::encode(bytes), format!("+ LRC {:02X}, as : hex CR LF", ascii::lrc(bytes))),
+        Framing::Mbap if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) => {
+            (bytes.clone(), String::new())
+        }
+        Framing::Mbap => {
+            let whole = frame::with_mbap(TRANSACTION, bytes);
+            let header = hex(&whole[..6]);
+            (whole, format!("+ header {header}"))
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Moving between the pages and rows of the controllers tab.
+
+use super::*;
+
+impl Controllers {
+    pub(super) fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
+        let count = cx.def().devices.len() as isize;
+        let next = DeviceId(to_u16((self.device.0 as isize + by).rem_euclid(count)));
+        self.show(next);
+        self.on_snapshot(cx)
+    }
+
+    pub(super) fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion) -> Vec<UiAction> {
+        let room = usize::from(cx.area.height.saturating_sub(4)).max(1);
+        let to = |at: usize, count: usize| motion.to(at, count, room);
+        match &mut self.page {
+            Page::List => self.device = DeviceId(to_u16(to(usize::from(self.device.0), cx.def().devices.len()))),
+            Page::Device => self.table.selected = to(self.table.selected, self.table.rows(cx, device.id).len()),
+            Page::Program => {
+                let steps = device.program.as_ref().map_or(0, |program| program.steps.len());
+                self.cell.row = to(self.cell.row, steps);
+            }
+            Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
+            Page::Compare(compare) => compare.scroll(cx, device, motion, room),
+            Page::Guide(..) => {}
+        }
+        Vec::new()
+    }
+
+    /// Enter: what is selected is opened, edited or written.
+    pub(super) fn open(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
+        match &self.page {
+            Page::List => {
+                self.show(device.id);
+                self.on_snapshot(cx)
+            }
+            Page::Device => match self.table.tag(cx, device.id) {
+                Some(tag) if tag.writable() => write(cx, Some(tag.id)),
+                Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id])
+                    .map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate)))
+                    .into_iter()
+                    .collect(),
+                None => Vec::new(),
+            },
+            Page::Program => write(cx, device.program.as_ref().and_then(|program| self.cell.tag(program))),
+            Page::Sets => {
+                let Some(source) = sets::sources(cx, device).into_iter().nth(self.set) else { return Vec::new() };
+                if let Some(notice) = sets::problems(cx, &source) {
+                    return vec![UiAction::Open(Modal::Notice(notice))];
+                }
+                self.page = Page::Compare(Compare::new(source));
+                Vec::new()
+            }
+            Page::Compare(compare) => {
+                let window = compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm);
+                vec![UiAction::Open(window)]
+            }
+            Page::Guide(..) => Vec::new(),
+        }
+    }
+
+    pub(super) fn in_compare(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+        let Page::Compare(compare) = &mut self.page else { return Vec::new() };
+        match (action, &compare.source) {
+            (Action::All, _) => compare.all = !compare.all,
+            // A copy the other way round: the target is chosen by opening its page.
+            (_, Source::Device(other)) => {
+                let (other, here) = (*other, self.device);
+                self.show(other);
+                self.page = Page::Compare(Compare::new(Source::Device(here)));
+            }
+            (_, Source::Set(_)) => {
+                let device = cx.def().device(self.device);
+                return notice(device, "only a copy between two controllers can be turned around");
+            }
+        }
+        Vec::new()
+    }
+}

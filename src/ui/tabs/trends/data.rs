@@ -1,0 +1,93 @@
+//! What the trends hold: live values, curves of the history, and the queries for them.
+
+use super::*;
+
+impl Trends {
+    /// Appends what the snapshot knows to the curves of the shown group.
+    pub(super) fn push_live(&mut self, cx: &ViewContext) {
+        for pen in self.pens(cx) {
+            let sample = cx.snapshot.sample(pen.tag);
+            let value = sample.good_value();
+            let at = if value.is_some() { sample.at } else { cx.now };
+            self.data.traces.entry(pen.tag).or_default().push(at, value);
+        }
+    }
+
+    /// Takes curves of the history in. Figures, and where the day's data begin, are taken only from an answer for what
+    /// is shown now; a curve carries its own times and is right in any view.
+    pub(super) fn accept_curves(&mut self, cx: &ViewContext, series: Vec<Series>, asked: Timestamp) {
+        if !self.periodics.curves.is_wanted() {
+            self.data.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
+            if self.accumulate && self.end.is_none() {
+                self.begin_with(self.span(cx), series.iter().filter_map(first_value).min());
+            }
+        }
+        let sure = asked.checked_sub(real(cx, COMMIT_LAG_S)).unwrap_or(asked);
+        let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
+        for series in series.into_iter().filter(|series| tags.contains(&series.tag)) {
+            self.data.traces.entry(series.tag).or_default().set_past(series, sure);
+        }
+    }
+
+    /// Lets the view of the day begin with its first value, and asks again where that makes the columns much finer.
+    pub(super) fn begin_with(&mut self, view: View, first: Option<Timestamp>) {
+        if let Some(first) = first.filter(|first| *first > view.from) {
+            self.since = Some(first);
+            if first.duration_since(view.from) > view.width() / 20 {
+                self.moved();
+            }
+        }
+    }
+
+    /// Asks what is due.
+    pub(super) fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let (now, patience, view) = (cx.now, real(cx, PATIENCE_S), self.span(cx));
+        let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
+        let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);
+        // A curve of wide columns does not change its shape at every update; its newest values come live.
+        let often = match view.holds(now) {
+            true => rate.max((view.step() / 2).min(real(cx, 30.0))),
+            false => real(cx, 60.0),
+        };
+        let to = view.to.min(now);
+        let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
+        let mut acts = Vec::new();
+        let PeriodicQueries { curves, hours, raised, number } = &mut self.periodics;
+        let steady = cx.steady();
+        let mut due = |periodic: &mut PeriodicQuery, every, query: Query| {
+            if periodic.due(steady, every, patience) {
+                *number = number.wrapping_add(1);
+                periodic.asked(*number, steady);
+                acts.push(UiAction::query(Tab::Trends, *number, query));
+            }
+        };
+        if self.values.is_none() && !group.is_empty() {
+            due(curves, often, series(&group, view.from, view.to, view.columns));
+            due(raised, often.max(real(cx, 10.0)), Query::Journal { from: view.from, to, limit: MARKS_MAX });
+        }
+        let tags = match self.values {
+            Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
+            None => group,
+        };
+        let hour = View::ending(now, 3_600, HOUR_COLUMNS);
+        if !tags.is_empty() {
+            due(hours, real(cx, 20.0), series(&tags, hour.from, hour.to, HOUR_COLUMNS));
+        }
+        acts
+    }
+}
+
+/// Start of the first column that has a value.
+pub(super) fn first_value(series: &Series) -> Option<Timestamp> {
+    let first = series.buckets.iter().position(Option::is_some)?;
+    series.from.checked_add(series.step * u32::try_from(first).ok()?).ok()
+}
+
+/// The figures of a curve up to when it was asked for: what lies after that is neither good nor bad.
+pub(super) fn figures(series: &Series, asked: Timestamp) -> Figures {
+    let width = series.step.as_secs_f64() * series.buckets.len() as f64;
+    let past = asked.duration_since(series.from).as_secs_f64().clamp(0.0, width);
+    // The millionth makes up for the rounding of the column's width, lest a whole record reads 99.9 %.
+    let good = if past > 0.0 { (series.good * width / past + 1e-6).min(1.0) } else { series.good };
+    (series.summary, good)
+}

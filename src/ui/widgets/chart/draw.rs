@@ -1,0 +1,199 @@
+//! Drawing of a chart: grid, curves, marks, gaps, axes and cursor.
+
+use super::*;
+
+impl Chart<'_> {
+    /// Faint points where round values meet round times, to lead the eye; not in ASCII, where a point is a value.
+    pub(super) fn draw_grid(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
+        let Some((_, scale)) = plan.scales.iter().find(|(axis, _)| *axis == Axis::Left) else { return };
+        if self.theme.glyphs == Glyphs::Ascii || plan.plot.height == area.height {
+            return;
+        }
+        for (at, _) in self.time_labels(plan) {
+            let Some(x) = self.cell(at, plan.plot.width) else { continue };
+            for tick in scale.ticks() {
+                let y = self.row(*scale, tick, plan.plot.height);
+                buf[(plan.plot.x + x, plan.plot.y + y)].set_symbol("·").set_style(self.theme.dim());
+            }
+        }
+    }
+
+    pub(super) fn draw_curves(&self, plan: &Plan, buf: &mut Buffer) {
+        let plot = plan.plot;
+        let mut canvas = Canvas::new(raster(self.theme), plot.width.into(), plot.height.into());
+        let (_, height) = canvas.size();
+        for (n, curve) in self.curves.iter().enumerate().rev() {
+            let scale = plan.scales[n].1;
+            let row = |value: f64| dot_of(scale, value, height);
+            let mut before: Option<Span> = None;
+            for (x, span) in plan.columns[n].iter().enumerate() {
+                if let Some(span) = span {
+                    let from = before.map_or(span.last, |before| before.last);
+                    let (low, high) = (span.min.min(from), span.max.max(from));
+                    if !curve.dashed || row(low) != row(high) || x % 4 < 2 {
+                        canvas.bar(x, row(high), row(low), n);
+                    }
+                }
+                before = *span;
+            }
+        }
+        for (x, y, glyph, owner) in canvas.glyphs() {
+            let cell = &mut buf[(plot.x + to_u16(x), plot.y + to_u16(y))];
+            cell.set_char(glyph).set_style(self.theme.pen(self.curves[owner].pen));
+        }
+    }
+
+    /// The mark of each pen: at the end of its curve, and at regular times so that it travels with the curve.
+    pub(super) fn draw_marks(&self, plan: &Plan, buf: &mut Buffer) {
+        let (plot, dots) = (plan.plot, raster(self.theme).dots().0);
+        let mut taken: Vec<(u16, u16)> = Vec::new();
+        let count = self.curves.len() as i64;
+        let cell_width = (self.to.as_microsecond() - self.from.as_microsecond()) / i64::from(plot.width.max(1));
+        let first = self.from.as_microsecond().div_euclid(cell_width.max(1));
+        for (n, curve) in self.curves.iter().enumerate() {
+            let place = |x: u16| {
+                let cell = &plan.columns[n][usize::from(x) * dots..(usize::from(x) + 1) * dots];
+                let last = cell.iter().rev().flatten().next()?.last;
+                Some((x, self.row(plan.scales[n].1, last, plot.height)))
+            };
+            let mut put = |(x, y): (u16, u16)| {
+                let free = !taken.contains(&(x, y));
+                if free {
+                    taken.push((x, y));
+                    let cell = &mut buf[(plot.x + x, plot.y + y)];
+                    cell.set_symbol(mark(self.theme, curve.pen)).set_style(self.theme.pen(curve.pen));
+                }
+                free
+            };
+            // Where two curves end in one place, the second mark stands a little before.
+            (0..plot.width).rev().filter_map(place).take(8).any(&mut put);
+            let phase = MARK_CELLS * n as i64 / count;
+            let due = |x: &u16| count > 1 && (first + i64::from(*x)).rem_euclid(MARK_CELLS) == phase;
+            (0..plot.width.saturating_sub(8)).filter(due).filter_map(place).for_each(|at| {
+                put(at);
+            });
+        }
+    }
+
+    /// Says how long there is no value of any pen, where there is room to say it. Time that was not read yet is left
+    /// blank: nothing is known of it.
+    pub(super) fn draw_gaps(&self, plan: &Plan, buf: &mut Buffer) {
+        let (plot, across) = (plan.plot, raster(self.theme).dots().0);
+        let count = usize::from(plot.width) * across;
+        let past = self.cell(self.now, plot.width).map_or(count, |x| usize::from(x) * across);
+        let known = |x: &usize| plan.columns.iter().any(|columns| columns[*x].is_some());
+        let span = Duration::try_from(self.to.duration_since(self.from)).unwrap_or_default();
+        let was_read = |x: usize| {
+            let at = self
+                .from
+                .checked_add(SignedDuration::try_from(span.mul_f64(x as f64 / count as f64)).unwrap_or_default());
+            at.is_ok_and(|at| self.curves.iter().any(|curve| curve.trace.covers(at)))
+        };
+        let mut x = 0;
+        while x < past && !plan.columns.is_empty() {
+            let end = (x..past).find(known).unwrap_or(past);
+            let (first, last) = (to_u16(x.div_ceil(across)), to_u16(end / across));
+            let length = span_text(span.mul_f64((end - x) as f64 / count as f64));
+            let texts = [format!("no data {length}"), format!("gap {length}"), length];
+            let fits = |text: &String| first + to_u16(text.width()) + 2 <= last;
+            if let Some(text) = texts.into_iter().find(fits).filter(|_| was_read(x + (end - x) / 2)) {
+                let start = plot.x + first + (last - first - to_u16(text.width())) / 2;
+                buf.set_string(start, plot.y + plot.height / 2, text, self.theme.dim());
+            }
+            x = end + 1;
+        }
+    }
+
+    pub(super) fn draw_axes(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
+        let (plot, style) = (plan.plot, self.theme.dim());
+        if plot.height == area.height {
+            return;
+        }
+        let (right, below) = (plot.right(), plot.bottom());
+        let line = |unicode, ascii| self.theme.pick(unicode, ascii);
+        let own = |wanted: Axis| self.curves.iter().zip(&plan.scales).find(move |(_, (axis, _))| *axis == wanted);
+        if plot.x > area.x {
+            for y in plot.y..below {
+                buf[(plot.x - 1, y)].set_symbol(line("│", "|")).set_style(style);
+            }
+            buf[(plot.x - 1, below)].set_symbol(line("└", "+")).set_style(style);
+        }
+        if let Some((curve, (_, scale))) = own(Axis::Left).filter(|_| plot.x > area.x) {
+            let width = usize::from(plot.x - area.x - 1);
+            buf.set_stringn(area.x, area.y, format!("{:>width$}", curve.unit), plot.width.into(), style);
+            for tick in scale.ticks() {
+                let y = plot.y + self.row(*scale, tick, plot.height);
+                buf.set_string(area.x, y, format!("{:>width$}{}", scale.label(tick), line("┤", "+")), style);
+            }
+        }
+        if let Some((curve, (_, scale))) = own(Axis::Right).filter(|_| area.right() > right) {
+            for y in plot.y..below {
+                buf[(right, y)].set_symbol(line("│", "|")).set_style(style);
+            }
+            buf.set_stringn(right + 1, area.y, curve.unit, usize::from(area.right() - right - 1), style);
+            buf[(right, below)].set_symbol(line("┘", "+")).set_style(style);
+            for tick in scale.ticks() {
+                let y = plot.y + self.row(*scale, tick, plot.height);
+                buf.set_string(right, y, format!("{}{}", line("├", "+"), scale.label(tick)), style);
+            }
+        }
+        for x in plot.x..right {
+            buf[(x, below)].set_symbol(line("─", "-")).set_style(style);
+        }
+        self.draw_time(plan, area, buf);
+    }
+
+    /// Ticks, labels and events of the time axis. A label is drawn whole or not at all.
+    pub(super) fn draw_time(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
+        let (plot, style) = (plan.plot, self.theme.dim());
+        let mut free = area.x;
+        for (at, label) in self.time_labels(plan) {
+            let Some(x) = self.cell(at, plot.width) else { continue };
+            buf[(plot.x + x, plot.bottom())].set_symbol(self.theme.pick("┴", "+"));
+            let width = to_u16(label.width());
+            let start = (plot.x + x).saturating_sub(width / 2).min(area.right().saturating_sub(width)).max(area.x);
+            if start >= free && start + width <= area.right() {
+                buf.set_string(start, plot.bottom() + 1, &label, style);
+                free = start + width + 1;
+            }
+        }
+        for (at, style) in &self.marks {
+            if let Some(x) = self.cell(*at, plot.width) {
+                buf[(plot.x + x, plot.bottom())].set_symbol("!").set_style(*style);
+            }
+        }
+    }
+
+    pub(super) fn time_labels(&self, plan: &Plan) -> Vec<(Timestamp, String)> {
+        let seconds = self.to.as_second() - self.from.as_second();
+        let cells_min = if seconds < 8 * 60 { 12 } else { 8 };
+        time_ticks(self.from, self.to, self.zone, plan.plot.width.into(), cells_min)
+    }
+
+    /// A line through the empty cells of its column, and the words above it, on whichever side there is room.
+    pub(super) fn draw_cursor(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
+        let plot = plan.plot;
+        let Some((at, words)) = &self.cursor else { return };
+        let Some(x) = self.cell(*at, plot.width).map(|x| plot.x + x) else { return };
+        let (line, foot) = match self.theme.glyphs {
+            Glyphs::Braille => ("┊", "┷"),
+            Glyphs::Block => ("│", "┴"),
+            Glyphs::Ascii => (":", "^"),
+        };
+        for y in plot.y..plot.bottom() {
+            let cell = &mut buf[(x, y)];
+            if matches!(cell.symbol(), " " | "·") {
+                cell.set_symbol(line).set_style(self.theme.normal());
+            } else {
+                cell.set_style(self.theme.focus());
+            }
+        }
+        if plot.y > area.y {
+            buf[(x, plot.bottom())].set_symbol(foot).set_style(self.theme.normal());
+            let width = to_u16(words.width()).min(plot.width);
+            let end = plot.right().saturating_sub(2).max(plot.x + width);
+            let start = x.saturating_sub(width / 2).clamp(plot.x, end - width);
+            buf.set_line(start, area.y, words, width);
+        }
+    }
+}
