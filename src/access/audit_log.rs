@@ -49,7 +49,7 @@ pub struct Entry {
     pub who: Arc<str>,
     /// From where.
     pub from: Arc<str>,
-    /// What he did.
+    /// The action.
     pub action: Arc<str>,
     /// To what or whom.
     pub target: Arc<str>,
@@ -206,9 +206,9 @@ impl Check {
     fn look_at(&mut self, bytes: &[u8]) -> Result<(Entry, ChainHash), String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "this is no text".to_owned())?;
         let (body, hash) =
-            split(text).ok_or("this does not end with a hash: it was cut or is no line of the audit log")?;
+            split(text).ok_or("the line has no hash at its end: it was cut or is no line of an audit log")?;
         let entry: Entry =
-            serde_json::from_str(&format!("{body}}}")).map_err(|_| "this is no line of the audit log".to_owned())?;
+            serde_json::from_str(&format!("{body}}}")).map_err(|_| "this is no line of an audit log".to_owned())?;
         let expected = self.last.number + 1;
         if entry.n < expected {
             return Err(format!("found entry {}, expected {expected}: it was moved or doubled", entry.n));
@@ -223,7 +223,7 @@ impl Check {
             return Err("the hash does not fit: this line was changed or put in".to_owned());
         }
         if self.head.is_some_and(|head| head.number == entry.n && head.hash != hash) {
-            return Err("the station has noted another hash for this entry: the audit log was written anew".to_owned());
+            return Err("the station has noted another hash for this entry: the audit log was rewritten".to_owned());
         }
         match self.rows.remove(&entry.n) {
             Some(row) if row != hash => return Err("the history holds another hash for this entry".to_owned()),

@@ -49,7 +49,7 @@ pub struct Peer {
     pub from: Arc<str>,
     /// The user of the operating system, as the system says.
     pub unix_user: Option<Arc<str>>,
-    /// It belongs to the station's own process: whoever has started the station sits there.
+    /// It belongs to the process of the station.
     pub own: bool,
 }
 
@@ -70,7 +70,7 @@ pub enum Effect {
     Save(Users),
     /// End the station.
     Stop,
-    /// Take up the plant file anew; the request is answered when that is done.
+    /// Reload the plant file; the reply is sent when that is done.
     Reload(u64),
     /// This terminal may not stay.
     HangUp(u32, String),
@@ -100,7 +100,7 @@ pub struct AccessControl {
     saving: Option<Saving>,
     /// A change that waits until last logins are written: the terminal, its ticket, what.
     next: Option<(u32, u64, Change)>,
-    /// Somebody's last login is not written down yet.
+    /// A last login is not saved yet.
     unsaved: bool,
 }
 
@@ -198,7 +198,7 @@ impl AccessControl {
 
     /// A terminal has gone.
     pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
-        let mut effects = self.sent_out(terminal, "done: the terminal has gone", at);
+        let mut effects = self.log_out(terminal, "done: the terminal has gone", at);
         let Some(session) = self.sessions.remove(&terminal) else { return effects };
         if !session.peer.own && self.may_record(&session.origin, at) {
             effects.push(audit(&session, "detach", "", "done", at));
@@ -216,7 +216,7 @@ impl AccessControl {
         let may =
             if needed == Role::Viewer { self.may_look(terminal) } else { self.may(terminal, Some(needed)).map(drop) };
         let Err(why) = may else { return Ok(()) };
-        // Who may not look is told so; who wants to know what others did is put on record.
+        // Only a refused read of the audit log is recorded.
         let mut effects = Vec::new();
         if needed != Role::Viewer
             && let Some(session) = self.sessions.remove(&terminal)
@@ -353,7 +353,7 @@ impl AccessControl {
         at.checked_add(self.behind_utc).unwrap_or(at)
     }
 
-    /// Who sits here, if he may do what needs this role. `Err` says in words for him why not.
+    /// The user, if the role is sufficient. `Err` is the reply to the user.
     fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&Who, String> {
         let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
         let who = session.who.as_ref().ok_or(LOG_IN_FIRST)?;
@@ -369,7 +369,7 @@ impl AccessControl {
 }
 
 const LOG_IN_FIRST: &str = "log in first";
-const CHANGE_FIRST: &str = "choose a password of your own first";
+const CHANGE_FIRST: &str = "choose a new password first";
 
 fn enough(role: Role, needed: Role) -> Result<(), String> {
     if needed <= role {

@@ -62,7 +62,7 @@ impl Count {
 }
 
 impl LoginAttempts {
-    /// How long the next password for this key must wait; `None` if it can be looked at now.
+    /// How long the next password for this key must wait; `None` if it can be checked now.
     pub fn wait(&self, key: &Key, rules: &AccessDef, at: Timestamp) -> Option<Duration> {
         let own = self.counts.get(key).map(|count| count.wait_until(key, rules));
         let until = own.max(self.origin_locked_until(key, rules, at))?;
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn one_waits_longer_after_each_wrong_password_and_is_locked_out_at_last() {
+    fn each_failure_delays_longer_and_the_last_locks_out() {
         let (rules, anna) = (AccessDef::default(), key("panel", "anna"));
         let mut attempts = LoginAttempts::default();
         let mut now = 0;
@@ -182,7 +182,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_origin_has_more_attempts_than_permitted_in_a_lockout(
+        fn no_origin_exceeds_the_attempts_during_a_lockout(
             login_attempts_max in 1u16..8, steps in prop::collection::vec((0usize..2, 0usize..20, 0i64..40), 1..400)
         ) {
             let rules = AccessDef { login_attempts_max, ..AccessDef::default() };

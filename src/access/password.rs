@@ -11,15 +11,15 @@ use argon2::{
 };
 use unicode_normalization::UnicodeNormalization;
 
-/// Most characters of a password: a passphrase has room, a hostile terminal keeps nobody busy.
+/// Most characters of a password: enough for a passphrase, too few to load the station.
 pub const CHARS_MAX: usize = 128;
 /// Bytes of a salt.
 pub const SALT_BYTES: usize = 16;
 /// 19 MiB, twice, one lane: what OWASP recommends for Argon2id.
 const COST: (u32, u32, u32) = (19 * 1024, 2, 1);
-/// What a hash in a file may cost at the most, so that nobody stalls the station through it: KiB and rounds.
+/// Most costly hash accepted from a file, so that it cannot stall the station: KiB and rounds.
 const COST_MAX: (u32, u32) = (64 * 1024, 10);
-/// What everybody tries first. Compared without case, without what is no letter or digit, and as a repetition.
+/// Common passwords. Compared without case and punctuation, and as a repetition.
 const COMMON: [&str; 16] = [
     "password",
     "passphrase",
@@ -72,7 +72,7 @@ pub fn check(password: &str, user: &str, chars_min: u16) -> Result<(), String> {
     let letters: Vec<char> = plain.chars().collect();
     let short = |count: usize| letters.chunks(count).all(|part| letters.starts_with(part));
     if letters.is_empty() || (1..=3).any(short) || COMMON.iter().any(|common| made_of(&plain, common)) {
-        return Err("this password is among the first that everybody attempts".to_owned());
+        return Err("this password is too common".to_owned());
     }
     Ok(())
 }
@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_passphrase_in_any_language_is_welcome_and_what_everybody_tries_is_not() {
+    fn any_language_is_accepted_and_common_passwords_are_not() {
         let good =
             ["four wet horses in a tank", "ปั๊มน้ำเสียทุกวันจันทร์", "grüße aus dem kesselhaus", "passwordless entry is fine"];
         for password in good {

@@ -71,7 +71,7 @@ fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
     match diagnostic {
         // Raw bytes may be a write.
         Diagnostic::Send(_) => Right::Engineer,
-        // While other settings are tried the line polls nobody.
+        // While other settings are tried the line is not polled.
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
         Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
             Right::Operate

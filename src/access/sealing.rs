@@ -93,7 +93,7 @@ impl Key {
     }
 }
 
-/// The first key and when it was made. Whoever has it can compute all others: it is kept off the machine.
+/// The first key and when it was made. It gives all later keys: keep it off the machine.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct VerificationKey {
     /// The first key.
@@ -137,7 +137,7 @@ pub struct Sealed {
 pub struct SealCheck {
     first: Key,
     next: Key,
-    /// The last entry that was looked at.
+    /// The last entry that was checked.
     entry: ChainHash,
     last: Option<(u64, Timestamp)>,
     bad: Option<FirstBad>,

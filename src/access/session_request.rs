@@ -26,64 +26,64 @@ impl From<&str> for Secret {
 /// A request that is not about the plant. Each gets a reply: done, or the reason for the operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum SessionRequest {
-    /// Somebody sits down here.
+    /// Log in.
     Login {
-        /// His name.
+        /// The user name.
         user: String,
-        /// His password.
+        /// The password.
         password: Secret,
     },
-    /// He leaves.
+    /// Log out.
     Logout,
-    /// He goes away for a while; alarms stay to be seen.
+    /// Lock the terminal; alarms stay visible.
     Lock,
-    /// He is back.
+    /// Unlock the terminal.
     Unlock(Secret),
     /// A key was pressed: the terminal is not idle. Sent twice a minute at most.
     Active,
-    /// There are no users yet: this is the first.
+    /// Create the first Supervisor while no users exist.
     FirstSupervisor {
-        /// His name.
+        /// The user name.
         user: String,
-        /// His password.
+        /// The password.
         password: Secret,
     },
-    /// Another password for oneself.
+    /// Change the own password.
     ChangePassword {
         /// The present one.
         old: Secret,
         /// The new one.
         new: Secret,
     },
-    /// Somebody new. He must change the password when he first logs in.
+    /// Add a user, who must change the password at the first login.
     AddUser {
-        /// His name.
+        /// The user name.
         user: String,
-        /// His role.
+        /// The role.
         role: Role,
-        /// His first password.
+        /// The first password.
         password: Secret,
     },
-    /// Another role.
+    /// Change the role of a user.
     SetRole {
         /// Whose.
         user: String,
         /// Which.
         role: Role,
     },
-    /// Shut somebody out, or let him in again; also ends a lockout.
+    /// Disable a user, or enable one, which also clears a lockout.
     Disable {
         /// Whom.
         user: String,
         /// Out or in.
         disabled: bool,
     },
-    /// Remove somebody. What he did stays in the audit log.
+    /// Delete a user. Past actions stay in the audit log.
     DeleteUser {
         /// Whom.
         user: String,
     },
-    /// A new first password for somebody.
+    /// Give a user a new first password.
     ResetPassword {
         /// Whose.
         user: String,
@@ -99,7 +99,7 @@ pub enum SessionRequest {
     },
     /// End the station.
     Stop,
-    /// Take up the plant file anew.
+    /// Reload the plant file; on error keep the running configuration.
     Reload,
 }
 
@@ -121,21 +121,21 @@ pub struct Credentials {
     pub password: Secret,
 }
 
-/// Somebody who is logged in.
+/// A logged-in user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Who {
-    /// His name.
+    /// The user name.
     pub user: Arc<str>,
-    /// What he may.
+    /// The role.
     pub role: Role,
-    /// He must choose a password of his own before anything else.
+    /// A new password must be chosen before anything else.
     pub must_change: bool,
 }
 
 /// The session of a terminal as the station publishes it: all that the login and users pages draw.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SessionStatus {
-    /// Who sits here; `None` before a login.
+    /// The logged-in user; `None` before a login.
     pub who: Option<Who>,
     /// Locked: only looking, until the password is given.
     pub locked: bool,
@@ -151,11 +151,11 @@ pub struct SessionStatus {
     pub idle_lock: Option<Duration>,
     /// When it will be, if that is near; plant time is not real time, so this is what is left.
     pub locks_in: Option<Duration>,
-    /// Everybody; only for a Supervisor.
+    /// All users; only for a Supervisor.
     pub users: Arc<Vec<UserRow>>,
     /// Who is attached; only for a Supervisor.
     pub sessions: Arc<Vec<SessionRow>>,
-    /// Its latest commands that the plant never saw, and why: no snapshot tells their outcome. The latest stands last.
+    /// The latest commands that did not reach the plant, and why; the latest last.
     pub undelivered: Vec<(CommandId, Arc<str>)>,
     /// The station has gone, and why; set by the terminal's own end of the socket.
     pub gone: Option<Arc<str>>,
@@ -164,17 +164,17 @@ pub struct SessionStatus {
 /// A row of the list of users.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UserRow {
-    /// His name.
+    /// The user name.
     pub user: Arc<str>,
-    /// What he may.
+    /// The role.
     pub role: Role,
-    /// Shut out by a Supervisor.
+    /// Disabled by a Supervisor.
     pub disabled: bool,
-    /// Shut out by wrong passwords until then.
+    /// Locked out after failed logins until then.
     pub locked_until: Option<Timestamp>,
-    /// He must change his password.
+    /// The password must be changed.
     pub must_change: bool,
-    /// When he last logged in.
+    /// The last login.
     pub last_login: Option<Timestamp>,
 }
 
@@ -183,7 +183,7 @@ pub struct UserRow {
 pub struct SessionRow {
     /// Its number.
     pub terminal: u32,
-    /// Who sits there.
+    /// The logged-in user.
     pub user: Option<Arc<str>>,
     /// `pts/3 from 10.0.0.5, user panel`.
     pub from: Arc<str>,

@@ -12,24 +12,24 @@ pub const USERS_MAX: usize = 200;
 /// Most characters of a name.
 pub const NAME_MAX: usize = 32;
 
-/// Somebody who can log in.
+/// A user who can log in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct User {
-    /// His name.
+    /// The user name.
     pub name: Arc<str>,
-    /// What he may.
+    /// The role.
     pub role: Role,
     /// Argon2id, as [`super::password::hash`] makes it.
     pub hash: Arc<str>,
-    /// Shut out by a Supervisor.
+    /// Disabled by a Supervisor.
     pub disabled: bool,
-    /// He must choose a password of his own before anything else.
+    /// A new password must be chosen before anything else.
     pub must_change: bool,
-    /// When he last logged in.
+    /// The last login.
     pub last_login: Option<Timestamp>,
 }
 
-/// Everybody, in the order they came.
+/// All users, in the order of creation.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Users {
     list: Vec<User>,
@@ -38,23 +38,23 @@ pub struct Users {
 /// A change of who may what.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Change {
-    /// The very first: a Supervisor, only while there is nobody.
+    /// The first Supervisor, only while no users exist.
     First {
         /// Name.
         user: Arc<str>,
-        /// Of his password.
+        /// The hash of the password.
         hash: Arc<str>,
     },
-    /// Somebody new, who must change his password.
+    /// A new user, who must change the password.
     Add {
         /// Name.
         user: Arc<str>,
-        /// What he may.
+        /// The role.
         role: Role,
-        /// Of his first password.
+        /// The hash of the first password.
         hash: Arc<str>,
     },
-    /// Another role.
+    /// Change the role of a user.
     Role(Arc<str>, Role),
     /// Shut out, or let in again.
     Disable(Arc<str>, bool),
@@ -86,7 +86,7 @@ impl Change {
 }
 
 impl Users {
-    /// The SHA-256 of all that says who may what, as text: the same until somebody changes that. A login changes nothing.
+    /// The SHA-256 of names, roles and hashes, as text. A login does not change it.
     pub fn digest(&self) -> String {
         let row = |User { name, role, hash, disabled, must_change, last_login: _ }: &User| {
             // None of these holds an end of line.
@@ -108,30 +108,30 @@ impl Users {
         Ok(users)
     }
 
-    /// Nobody yet.
+    /// No users.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// Everybody.
+    /// All users.
     pub fn iter(&self) -> impl Iterator<Item = &User> {
         self.list.iter()
     }
 
-    /// Somebody by name, however its letters are written.
+    /// A user by name, in any spelling of its letters.
     pub fn get(&self, name: &str) -> Option<&User> {
         let key = key(name);
         self.list.iter().find(|user| self::key(&user.name) == key)
     }
 
-    /// Somebody has logged in.
+    /// Notes a login.
     pub fn logged_in(&mut self, name: &str, at: Timestamp) {
         if let Some(user) = self.place(name).map(|place| &mut self.list[place]) {
             user.last_login = Some(at);
         }
     }
 
-    /// Everybody as it will be after a change. `Err` says in words for the operator why it may not be.
+    /// The users after a change. `Err`: why the change is not permitted, for the operator.
     pub fn with(&self, change: &Change) -> Result<Users, String> {
         let mut users = self.clone();
         users.change(change)?;
@@ -153,7 +153,7 @@ impl Users {
         let place = self.place(change.user());
         let place = place.ok_or_else(|| format!("there is no user {}", change.user()));
         match change {
-            Change::First { .. } if !self.list.is_empty() => return Err("there are users already".to_owned()),
+            Change::First { .. } if !self.list.is_empty() => return Err("users exist already".to_owned()),
             Change::First { user, hash } => self.list.push(new(user, Role::Supervisor, hash, false)),
             Change::Add { user, role, hash } => self.list.push(new(user, *role, hash, true)),
             Change::Role(_, role) => self.list[place?].role = *role,
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_supervisor_can_be_neither_deleted_disabled_nor_lowered() {
+    fn the_last_supervisor_always_remains() {
         let anna: Arc<str> = "anna".into();
         for change in
             [Change::Delete(anna.clone()), Change::Disable(anna.clone(), true), Change::Role(anna, Role::Technician)]

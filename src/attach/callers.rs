@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn strangers_of_one_user_push_out_only_their_own() {
+    fn pending_connections_push_out_only_the_same_user() {
         let mut strangers = vec![PANEL; 3];
         for _ in 0..1_000 {
             if let Some(place) = makes_room(&strangers, EVE) {
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_user_who_attaches_without_end_neither_takes_all_places_nor_keeps_others_out() {
+    fn endless_attaches_of_one_user_keep_out_nobody_else() {
         let mut callers = Callers::new(500);
         let attached = (0..10_000).filter(|_| callers.attach(EVE, seconds(1)).is_ok()).count();
         assert_eq!(attached, TERMINALS_OF_USER_MAX);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_about_one_user_are_bounded_in_rate_and_the_rest_is_counted() {
+    fn log_lines_of_one_user_are_limited_and_the_rest_counted() {
         let mut callers = Callers::new(500);
         let mut logged = 0;
         for second in 0..600 {
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn users_without_end_cost_no_memory_without_end() {
+    fn the_memory_for_users_is_bounded() {
         let mut callers = Callers::new(500);
         for user in 1_000..10_000 {
             callers.may_log(user, seconds(1));

@@ -28,7 +28,7 @@ pub struct CommandIdMap {
     numbers: VecDeque<u32>,
     /// Sent, and their end not seen in a snapshot yet.
     sent: VecDeque<CommandStatus>,
-    /// Commands that no snapshot of the station will ever tell the end of.
+    /// Commands without a final status in any snapshot.
     lost: VecDeque<CommandStatus>,
     /// The station is there: what its snapshots say of a command under way is still true.
     connected: bool,
@@ -96,18 +96,18 @@ impl CommandIdMap {
 
     /// A snapshot of the station as this terminal is to see it: own commands under the own number, lost ones among them.
     pub fn see(&mut self, snapshot: &Arc<Snapshot>) -> Arc<Snapshot> {
-        let told = |number: u32| {
+        let has_ended = |number: u32| {
             let own = |status: &&CommandStatus| {
                 status.command.id.number == number && self.numbers.contains(&status.command.id.terminal)
             };
             snapshot.commands.iter().find(own).map(|status| !status.is_pending())
         };
-        self.sent.retain(|status| told(status.command.id.number) != Some(true));
+        self.sent.retain(|status| has_ended(status.command.id.number) != Some(true));
         if self.connected {
             // The station remembers it after all: what it says counts again.
-            let (known, lost) = self.lost.drain(..).partition(|status| told(status.command.id.number).is_some());
+            let (known, lost) = self.lost.drain(..).partition(|status| has_ended(status.command.id.number).is_some());
             let known: VecDeque<CommandStatus> = known;
-            let under_way = known.into_iter().filter(|status| told(status.command.id.number) == Some(false));
+            let under_way = known.into_iter().filter(|status| has_ended(status.command.id.number) == Some(false));
             self.sent.extend(under_way.map(|status| CommandStatus { outcome: Outcome::Pending, ..status }));
             self.lost = lost;
         }
@@ -131,7 +131,7 @@ impl CommandIdMap {
                     Some(Arc::new(DiagnosticRun { id: self.renumbered(test.id), ..DiagnosticRun::clone(test) }));
             }
         }
-        // The last snapshot of a station that has gone shows as under way what nobody will hear the end of.
+        // The last snapshot before a disconnect shows lost commands as pending.
         let is_lost = |id: CommandId| {
             id.terminal == self.terminal && self.lost.iter().any(|lost| lost.command.id.number == id.number)
         };
@@ -141,7 +141,7 @@ impl CommandIdMap {
         Arc::new(seen)
     }
 
-    /// All own numbers become the own one; whoever has the own one by chance gets one that is nobody's.
+    /// Maps all own terminal numbers to one; another terminal with that number gets an unused one.
     fn renumbered(&self, id: CommandId) -> CommandId {
         let terminal = if self.numbers.contains(&id.terminal) {
             self.terminal

@@ -1,7 +1,7 @@
 //! What terminal and station say to each other, as bytes: a u32 little-endian length, then a message in postcard.
 //!
 //! Both begin with a [`Handshake`], which never changes its shape, so that a terminal and a station of different versions
-//! can still tell each other so.
+//! can still report it.
 
 use std::sync::Arc;
 
@@ -58,7 +58,7 @@ pub struct Place {
     pub term: Option<String>,
 }
 
-/// What the station tells a terminal that may stay; it follows the handshake of the station.
+/// Follows the handshake of a station that accepts the terminal.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct HandshakeReply {
     /// Which run of the station this is, see [`Snapshot::run`](crate::plant::Snapshot::run): another one counts terminals
@@ -145,7 +145,7 @@ pub enum ProtocolError {
         /// What was expected.
         expected: &'static str,
     },
-    /// Whoever is at the other end is of another version.
+    /// The other end has another version.
     #[error("{0}")]
     OtherVersion(String),
 }

@@ -132,7 +132,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn of_each_alarm_the_last_step_of_every_kind_comes_back_as_it_was(
+        fn the_last_step_of_each_kind_is_read_back(
             journal in proptest::collection::vec(step(), 0..80),
             cut in 0usize..400,
         ) {
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_a_later_version_and_no_file_at_all_are_not_read_as_no_alarms() {
+    fn a_newer_or_missing_file_is_not_read_as_no_alarms() {
         assert!(parse(b"").is_err_and(|why| why.contains("line 1")));
         assert!(parse(b"sightglass alarm state 3\n").is_err_and(|why| why.contains("line 1")));
         assert!(parse(HEADER.as_bytes()).unwrap().is_empty());

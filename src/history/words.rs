@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_operator_reads_names_the_cause_and_nothing_of_the_engine() {
+    fn messages_name_the_cause_without_engine_details() {
         for (message, words) in [
             (
                 "TransactionContext Error: Failed to commit: Could not write file \"/x/tank.duckdb.wal\": No space left on device",
@@ -62,7 +62,7 @@ mod tests {
                 "The file \"x\" exists, but it is not a valid DuckDB database file!",
             ),
             ("File exists (os error 17)", "File exists"),
-            ("too busy, ask again", "too busy, ask again"),
+            ("too busy, try again", "too busy, try again"),
             ("line L1: a name with a colon", "line L1: a name with a colon"),
             ("", ""),
         ] {

@@ -30,7 +30,7 @@ pub struct BlockingJobs {
     path: Option<PathBuf>,
     waiting: VecDeque<(JobId, PasswordJob)>,
     working: JoinSet<(JobId, Outcome)>,
-    /// The jobs that are being worked on: one that panics must be told as well.
+    /// The jobs that are running, to report one that panics.
     jobs: Vec<(tokio::task::Id, JobId)>,
     saving: Option<JoinHandle<Result<(), String>>>,
 }
@@ -52,7 +52,7 @@ impl BlockingJobs {
         let path = self.path.clone();
         self.saving = Some(tokio::task::spawn_blocking(move || match path {
             Some(path) => users::write(&path, &list),
-            None => Err("this station keeps no users".to_owned()),
+            None => Err("this station has no users".to_owned()),
         }));
     }
 

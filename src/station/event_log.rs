@@ -36,7 +36,7 @@ fn line_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
             LineState::Connecting => return None,
             LineState::Connected => "connected".into(),
             LineState::Disconnected => "closed by an operator".into(),
-            LineState::Testing => "nobody is polled while a test has it".into(),
+            LineState::Testing => "not polled: used by a test".into(),
             // Every failed try would be a line; the first says it all.
             LineState::Waiting { .. } if before.lines[index].lost_since.is_some() => return None,
             LineState::Waiting { why, .. } => format!("not connected: {why}"),
@@ -52,7 +52,7 @@ fn device_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
         let (old, new) = (before.device(device.id).state, after.device(device.id).state);
         let was_down = matches!(old, DeviceState::Down { .. } | DeviceState::Unknown);
         match new {
-            // A line that is gone has been told; its devices go with it.
+            // A lost line has been logged; its devices go with it.
             DeviceState::Down { .. } if after.line(device.line).state != LineState::Connected => {}
             DeviceState::Down { .. } if !matches!(old, DeviceState::Down { .. }) => {
                 let why = after.device(device.id).last_fault.map(|(_, fault)| format!(": {fault}")).unwrap_or_default();
@@ -156,15 +156,15 @@ mod tests {
         let at = |second| Timestamp::from_second(second).expect("a small number");
         let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
         let mut before = plant.snapshot();
-        let mut tell = |plant: &Plant| {
+        let mut log = |plant: &Plant| {
             let after = plant.snapshot();
             let lines = changes(&before, &after);
             before = after;
             lines
         };
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
-        assert_eq!(tell(&plant), ["line L1: connected"]);
-        assert!(tell(&plant).is_empty());
+        assert_eq!(log(&plant), ["line L1: connected"]);
+        assert!(log(&plant).is_empty());
         plant.on_event(Event::Failed { at: at(1), device: TIC, tags: vec![PV], fault: Fault::Timeout, exchange: None });
         plant.on_event(Event::Failed {
             at: at(3),
@@ -174,13 +174,13 @@ mod tests {
             exchange: None,
         });
         assert_eq!(
-            tell(&plant),
+            log(&plant),
             ["device TIC-1 (unit 1): not answering: no answer in time", "alarm 2 RAISED: TIC-1 alarm 1"]
         );
         for (second, why) in [(4, "gone"), (6, "still gone")] {
             let state = LineState::Waiting { why: why.into(), retry_at: at(second + 1) };
             plant.on_event(Event::Line { at: at(second), line: LineId(0), state });
         }
-        assert_eq!(tell(&plant), ["line L1: not connected: still gone"]);
+        assert_eq!(log(&plant), ["line L1: not connected: still gone"]);
     }
 }

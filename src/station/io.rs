@@ -69,7 +69,7 @@ pub struct Station {
     history: Option<history::Handle>,
     /// The thread of the audit log, which ends before the history.
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
-    /// Nobody is asked who he is.
+    /// Login is not required.
     open: bool,
     stop: watch::Sender<bool>,
     tasks: Vec<JoinHandle<()>>,
@@ -142,10 +142,10 @@ fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
     if let Some(why) = access.is_closed() {
         return Some(FaultState::Active(why.clone()));
     }
-    let nobody = Users::default().digest();
-    let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *nobody);
-    let words = "the users file is missing although there were users: bring it back from a copy";
-    (had_users && access.users_digest() == Some(nobody)).then(|| FaultState::Occurred(words.into()))
+    let no_users = Users::default().digest();
+    let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *no_users);
+    let words = "the users file is missing although users existed: restore it from a backup";
+    (had_users && access.users_digest() == Some(no_users)).then(|| FaultState::Occurred(words.into()))
 }
 
 /// A station that keeps nothing, for virtual time, where no other thread may take part. Queries to the history
@@ -226,7 +226,7 @@ impl Station {
 
     /// Attaches a terminal of this very process.
     pub fn session(&self, operator: &str) -> Session {
-        // What somebody calls himself counts only where nobody is asked.
+        // The given name counts only without login.
         let user = if self.open { operator.to_owned() } else { own_user() };
         self.acceptor.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), own: true })
     }
@@ -234,7 +234,7 @@ impl Station {
     /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
     pub async fn stop(self) -> Option<ChainHash> {
         let Station { acceptor, commands, lifecycle, history, audit_writer, open: _, stop, tasks } = self;
-        // Links may have ended already; then nobody listens, which is fine.
+        // The links may have ended already.
         let _ = stop.send(true);
         drop((acceptor, commands, lifecycle));
         for task in tasks {

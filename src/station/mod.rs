@@ -1,7 +1,7 @@
-//! The station: links, plant, history, wired together. Polls whether or not anybody looks.
+//! The station: links, plant, history, wired together. Polls with or without terminals.
 //!
 //! There is exactly one awaited send (link → plant). Everything else is `try_send` or `watch`, so the plant task never
-//! blocks. Shutdown runs downstream: the links stop, the plant ends because nobody can send any more, the history
+//! blocks. Shutdown runs downstream: the links stop, the plant ends when all senders are dropped, the history
 //! thread drains, flushes and ends.
 //!
 //! # When a resource fails

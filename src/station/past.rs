@@ -1,4 +1,4 @@
-//! What a station takes up from its history, which may open long after the lines are polled.
+//! What a station restores from its history, which may open long after polling has started.
 
 use std::{collections::HashSet, time::Duration};
 
@@ -6,7 +6,7 @@ use tokio::sync::oneshot;
 
 use crate::{history::io::open::Restored, plant::record::AlarmRecord};
 
-/// Where the journal alone knows the state of the alarms, the plant waits so long for it before it judges any.
+/// Where the journal alone knows the state of the alarms, the plant waits this long before it evaluates any.
 pub const WAIT_MAX: Duration = Duration::from_millis(500);
 /// Steps of alarms that are kept for the figures of the last day until the history is open.
 const EARLY_MAX: usize = 10_000;
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn a_past_that_comes_late_changes_no_alarm_that_has_moved_since() {
+    fn a_late_restore_changes_no_newer_alarm() {
         let before = vec![step(1, "high", AlarmEvent::Raised), step(2, "low", AlarmEvent::Raised)];
         let recent = Recent { steps: before.clone(), ..Recent::default() };
         let restored = Restored { steps: before.clone(), recent, chain_hashes: None };

@@ -108,7 +108,7 @@ impl PlantTask {
         if self.persistence.past.as_ref().is_some_and(|past| past.from_journal) {
             // Events wait in their queue; the lines are polled meanwhile.
             let known = tokio::time::timeout(past::WAIT_MAX, Past::known(&mut self.persistence.past)).await;
-            known.into_iter().for_each(|restored| self.take_up(restored));
+            known.into_iter().for_each(|restored| self.restore_history(restored));
         }
         loop {
             // What a snapshot shows as done is on disk, or marked.
@@ -122,44 +122,44 @@ impl PlantTask {
                 Some(mut status) = commands.recv() => {
                     status.command.kind.unshift(self.clock.behind_utc());
                     let effects = self.plant.on_command(status, self.clock.now());
-                    self.carry_out(effects);
+                    self.apply_effects(effects);
                     (changed, next) = (true, Instant::now());
                 }
                 Some(message) = messages.recv() => self.handle_audit_message(message),
                 saved = saved(&mut self.saving) => {
-                    self.take_saved(saved);
+                    self.on_saved(saved);
                     changed = true;
                 }
                 done = filed(&mut self.filing) => {
-                    self.take_filed(done);
+                    self.on_filed(done);
                     changed = true;
                 }
                 restored = Past::known(&mut self.persistence.past) => {
-                    self.take_up(restored);
+                    self.restore_history(restored);
                     changed = true;
                 }
                 Ok(()) = self.persistence.store.changed() => {
-                    self.hear_store();
+                    self.update_history_status();
                     changed = true;
                 }
                 () = AuditQueue::changed(&mut self.persistence.audit) => {
-                    self.tell_answers();
-                    self.hear_store();
+                    self.send_due_replies();
+                    self.update_history_status();
                     changed = true;
                 }
                 // Before the events: however many there are, values age and commands expire.
                 _ = tick.tick() => {
                     let effects = self.plant.on_tick(self.clock.now());
-                    self.carry_out(effects);
-                    self.look_at_clock();
-                    self.tell_answers();
+                    self.apply_effects(effects);
+                    self.check_clock();
+                    self.send_due_replies();
                     changed = true;
                 }
                 event = events.recv() => {
                     // The links have stopped: nothing can become true any more.
                     let Some(event) = event else { break };
                     let effects = self.plant.on_event(event);
-                    self.carry_out(effects);
+                    self.apply_effects(effects);
                     changed = true;
                 }
             }
@@ -168,7 +168,7 @@ impl PlantTask {
             && let Ok(restored) = tokio::time::timeout(HISTORY_MAX, Past::known(&mut self.persistence.past)).await
         {
             // A station that ends as soon as it has started completes its history all the same.
-            self.take_up(restored);
+            self.restore_history(restored);
         }
         // What the session server had begun is on record as well; it ends soon after the links.
         while let Ok(Some(message)) = tokio::time::timeout(MESSAGES_WAIT_MAX, messages.recv()).await {
@@ -177,13 +177,13 @@ impl PlantTask {
         // What was begun is ended, but a disk that hangs does not keep the station from ending.
         if self.saving.is_some() {
             match tokio::time::timeout(FILES_MAX, saved(&mut self.saving)).await {
-                Ok(saved) => self.take_saved(saved),
+                Ok(saved) => self.on_saved(saved),
                 Err(_) => tracing::error!("the disk of the plant file does not answer: left behind"),
             }
         }
         if self.filing.is_some() {
             match tokio::time::timeout(FILES_MAX, filed(&mut self.filing)).await {
-                Ok(done) => self.take_filed(done),
+                Ok(done) => self.on_filed(done),
                 Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
             }
         }
@@ -192,7 +192,7 @@ impl PlantTask {
         let stopped = entries::stopped(&self.plant.def().name, self.clock.utc());
         if let Some(audit) = &mut self.persistence.audit {
             audit.send_all();
-            self.write_down(vec![stopped], Vec::new());
+            self.record(vec![stopped], Vec::new());
         }
         self.publish();
     }
@@ -206,8 +206,8 @@ impl PlantTask {
         self.publish.send_replace(Arc::new(snapshot));
     }
 
-    /// Takes up what the history knows of the time before the start.
-    fn take_up(&mut self, restored: Restored) {
+    /// Restores alarm states and metrics from the history.
+    fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
         let Restored { steps, recent, chain_hashes } = past.join(restored);
         if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
@@ -216,7 +216,7 @@ impl PlantTask {
         if !steps.is_empty() {
             tracing::info!(steps = steps.len(), "the state of the alarms is taken from the journal");
             self.plant.restore(&steps);
-            self.write_down(Vec::new(), steps);
+            self.record(Vec::new(), steps);
         }
         self.plant.remeasure(&recent.active, &recent.steps, &recent.watched, self.clock.now());
     }
@@ -232,13 +232,13 @@ impl PlantTask {
         }
     }
 
-    fn tell_answers(&mut self) {
+    fn send_due_replies(&mut self) {
         let left = self.persistence.audit.as_mut().map(AuditQueue::send_due).unwrap_or_default();
         self.store(left.into_iter().map(Record::Action).collect());
     }
 
     /// A step of the system clock is followed at once, recorded and alarmed.
-    fn look_at_clock(&mut self) {
+    fn check_clock(&mut self) {
         let before = self.clock.utc();
         let Some(step) = self.clock.follow() else { return };
         self.clock_stepped(before, before.checked_add(step).unwrap_or(before));
@@ -246,15 +246,15 @@ impl PlantTask {
 
     fn clock_stepped(&mut self, old: Timestamp, new: Timestamp) {
         self.store(vec![Record::ClockSet]);
-        self.write_down(vec![entries::clock_step(old, new)], Vec::new());
+        self.record(vec![entries::clock_step(old, new)], Vec::new());
         let words = format!("the clock was set from {old:.0} to {new:.0}; times follow it from here on");
         tracing::warn!("{words}");
         let state = FaultState::Occurred(words.into());
         let effects = self.plant.on_event(Event::Station { at: self.clock.now(), fault: StationFault::Clock, state });
-        self.carry_out(effects);
+        self.apply_effects(effects);
     }
 
-    fn carry_out(&mut self, effects: Effects) {
+    fn apply_effects(&mut self, effects: Effects) {
         // Written down before it is sent: a station that is killed in between leaves a trace.
         let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request));
         self.keep(intents.map(Record::Action).collect());
@@ -307,12 +307,12 @@ impl PlantTask {
                 Record::Sample(..) | Record::Line(_) | Record::ClockSet => others.push(record),
             }
         }
-        self.write_down(actions, steps);
+        self.record(actions, steps);
         self.store(others);
     }
 
     /// To the disk, and actions from there to the history; straight there where there is no room.
-    fn write_down(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
+    fn record(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
         if actions.is_empty() && steps.is_empty() {
             return;
         }
@@ -328,11 +328,11 @@ impl PlantTask {
         let lost = offer(store, records);
         if lost > 0 {
             self.lost += lost;
-            self.hear_store();
+            self.update_history_status();
         }
     }
 
-    fn hear_store(&mut self) {
+    fn update_history_status(&mut self) {
         let mut status = self.persistence.store.borrow_and_update().clone();
         status.lost += self.lost;
         let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));

@@ -15,13 +15,13 @@ use crate::{
 
 /// One attached terminal. Dropping it stops nothing.
 ///
-/// The station publishes a snapshot at least every two seconds of real time, changed or not: a terminal that hears
-/// nothing for longer calls the station silent and doubts every value.
+/// The station publishes a snapshot at least every two seconds of real time, changed or not: a terminal that receives
+/// nothing for longer shows the station as silent and all values as uncertain.
 #[derive(Debug, Clone)]
 pub struct Session {
     /// The latest snapshot only.
     pub snapshots: watch::Receiver<Arc<Snapshot>>,
-    /// Who sits here and what he may.
+    /// The status of this session.
     pub status: watch::Receiver<Arc<SessionStatus>>,
     /// Requests; a full queue is a refusal.
     pub requests: mpsc::Sender<(u32, Request)>,

@@ -34,7 +34,7 @@ const REQUESTS: usize = 256;
 const ATTACH_QUEUE_MAX: usize = 16;
 /// Requests for the station as a whole that may wait.
 pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
-/// Real time between two looks at the clock: idle terminals, ends of lockouts, terminals that have gone.
+/// How often timeouts are checked: idle terminals, ends of lockouts, closed terminals.
 const TICK: Duration = Duration::from_millis(500);
 
 /// A terminal asks to attach.
@@ -53,7 +53,7 @@ pub struct AttachRequest {
 pub enum LifecycleRequest {
     /// To end.
     Stop,
-    /// To take up the plant file anew, and where the outcome is told.
+    /// Reload the plant file; the result goes to the sender.
     Reload(oneshot::Sender<Result<(), String>>),
 }
 
@@ -66,7 +66,7 @@ pub struct Outputs {
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// To the audit log.
     pub audit: mpsc::Sender<AuditMessage>,
-    /// To whoever has started the station.
+    /// To the owner of the station.
     pub lifecycle: mpsc::Sender<LifecycleRequest>,
 }
 
@@ -160,24 +160,24 @@ impl SessionServer {
                 Some(request) = attach_requests.recv() => {
                     self.terminals.insert(request.terminal, request.status);
                     let effects = self.access.open(request.terminal, request.peer, self.clock.now());
-                    self.carry_out(effects);
+                    self.apply_effects(effects);
                 }
                 done = self.jobs.next() => {
                     let effects = match done {
                         Done::Job(job, outcome) => self.access.on_job_done(job, outcome, self.clock.now()),
                         Done::Saved(result) => self.access.on_saved(result, self.clock.now()),
                     };
-                    self.carry_out(effects);
+                    self.apply_effects(effects);
                 }
                 Some(Ok((ticket, answer))) = self.reloads.join_next() => self.reply(ticket, answer, Record::Sent),
-                Some((terminal, request)) = requests.recv() => self.take(terminal, request),
+                Some((terminal, request)) = requests.recv() => self.on_session_message(terminal, request),
                 _ = tick.tick() => {
                     let gone: Vec<u32> =
                         self.terminals.iter().filter(|(_, end)| end.is_closed()).map(|(id, _)| *id).collect();
                     for terminal in gone {
                         self.terminals.remove(&terminal);
                         let effects = self.access.close(terminal, self.clock.now());
-                        self.carry_out(effects);
+                        self.apply_effects(effects);
                     }
                     if self.lost > 0 && self.outputs.audit.try_send(AuditMessage::Lost(self.lost)).is_ok() {
                         self.lost = 0;
@@ -186,7 +186,7 @@ impl SessionServer {
                     self.tickets.retain(|_, reply| !reply.is_closed());
                     let mut effects = self.access.follow_clock(self.clock.behind_utc());
                     effects.extend(self.access.tick(self.clock.now()));
-                    self.carry_out(effects);
+                    self.apply_effects(effects);
                 }
             }
         }
@@ -194,26 +194,26 @@ impl SessionServer {
         if let Some(result) = self.jobs.end().await {
             let mut effects = self.access.on_saved(result, self.clock.now());
             effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));
-            self.carry_out(effects);
+            self.apply_effects(effects);
         }
     }
 
-    fn take(&mut self, terminal: u32, request: Request) {
+    fn on_session_message(&mut self, terminal: u32, request: Request) {
         let now = self.clock.now();
         match request {
             Request::Command(command, credentials) => {
                 let effects = self.access.on_command(terminal, command, credentials, now);
-                self.carry_out(effects);
+                self.apply_effects(effects);
             }
             Request::Ask(query) => match self.access.may_ask(terminal, &query.query, now) {
                 Ok(()) => {
                     if let Err(error) = self.outputs.queries.try_send((terminal, query)) {
                         let (_, query) = error.into_inner();
-                        let _ = query.reply.send(Err(HistoryError::Engine("too busy, ask again".to_owned())));
+                        let _ = query.reply.send(Err(HistoryError::Engine("too busy, try again".to_owned())));
                     }
                 }
                 Err((why, effects)) => {
-                    self.carry_out(effects);
+                    self.apply_effects(effects);
                     // A terminal that has left needs no answer.
                     let _ = query.reply.send(Err(HistoryError::Engine(why)));
                 }
@@ -222,12 +222,12 @@ impl SessionServer {
                 self.last_ticket += 1;
                 self.tickets.insert(self.last_ticket, reply);
                 let effects = self.access.on_request(terminal, self.last_ticket, request, now);
-                self.carry_out(effects);
+                self.apply_effects(effects);
             }
         }
     }
 
-    fn carry_out(&mut self, effects: Vec<Effect>) {
+    fn apply_effects(&mut self, effects: Vec<Effect>) {
         // An answer follows its record on the way to the log.
         let mut record = Record::None;
         let mut answers = Vec::new();
@@ -238,8 +238,8 @@ impl SessionServer {
                         tracing::error!(%error, "a command did not reach the plant");
                         let (mpsc::error::TrySendError::Full(status) | mpsc::error::TrySendError::Closed(status)) =
                             error;
-                        let told = self.access.undelivered(status.command.id, "station too busy");
-                        self.carry_out(told);
+                        let effects = self.access.undelivered(status.command.id, "station too busy");
+                        self.apply_effects(effects);
                     }
                 }
                 Effect::Record(action) => {
@@ -261,7 +261,7 @@ impl SessionServer {
                 Effect::Stop => self.send_lifecycle(LifecycleRequest::Stop),
                 Effect::Reload(ticket) => {
                     let (reply, answer) = oneshot::channel();
-                    let ended = || Err("not reloaded: the station ends, or is too busy".to_owned());
+                    let ended = || Err("not reloaded: the station is stopping or too busy".to_owned());
                     self.reloads.spawn(async move { (ticket, answer.await.unwrap_or_else(|_| ended())) });
                     self.send_lifecycle(LifecycleRequest::Reload(reply));
                 }

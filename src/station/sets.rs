@@ -56,23 +56,23 @@ fn write(folder: &Path, def: &PlantDef, set: &ParameterSet, replace: bool) -> Re
     }
 }
 
-/// Every set of the folder, by name; a file that is no set is told with what is wrong with it, and so is a folder that
-/// cannot be read, and how many sets are left out.
+/// Every set of the folder, by name; a file that is no set is listed with its problems, as is a folder that
+/// cannot be read and the number of sets left out.
 fn read_all(folder: &Path, def: &PlantDef) -> Vec<StoredSet> {
     let mut names = match names(folder) {
         Ok(names) => names,
-        Err(error) => return vec![untold("the folder", format!("{} cannot be read: {error}", folder.display()))],
+        Err(error) => return vec![unreadable("the folder", format!("{} cannot be read: {error}", folder.display()))],
     };
     names.sort();
     let more = names.len().saturating_sub(SETS_MAX);
     names.truncate(SETS_MAX);
     let read = names.into_iter().map(|(name, path)| StoredSet { set: read(&name, &path, def).map(Arc::new), name });
     let left_out = format!("at most {SETS_MAX} sets are read, by name: move old ones out of {}", folder.display());
-    read.chain((more > 0).then(|| untold(&format!("… {more} more not read"), left_out))).collect()
+    read.chain((more > 0).then(|| unreadable(&format!("… {more} more not read"), left_out))).collect()
 }
 
 /// A row in the list that is no set, and why it is there.
-fn untold(name: &str, why: String) -> StoredSet {
+fn unreadable(name: &str, why: String) -> StoredSet {
     StoredSet { name: name.to_owned(), set: Err(vec![why]) }
 }
 
@@ -98,7 +98,7 @@ fn names(folder: &Path) -> std::io::Result<Vec<(String, PathBuf)>> {
 fn read(name: &str, path: &Path, def: &PlantDef) -> Result<ParameterSet, Vec<String>> {
     let file = format!("{name}.toml");
     let unreadable = |error: std::io::Error| vec![format!("{file} cannot be read: {error}")];
-    // Opening a pipe would wait for somebody to write into it.
+    // Opening a pipe would wait for a writer.
     if !fs::metadata(path).map_err(unreadable)?.is_file() {
         return Err(vec![format!("{file} is no file, expected a parameter set")]);
     }
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_set_outlives_the_station_and_is_not_written_over_by_chance() {
+    fn a_set_survives_a_restart_and_accidental_saves() {
         let def = load(Path::new("tank"), &Search::shipped()).unwrap();
         let home = tempfile::tempdir().unwrap();
         let folder = folder(&home.path().join("tank.duckdb"), "tank");
@@ -153,17 +153,17 @@ mod tests {
     }
 
     #[test]
-    fn a_pipe_in_the_folder_holds_nobody_up() {
+    fn a_pipe_in_the_folder_does_not_block() {
         let def = load(Path::new("tank"), &Search::shipped()).unwrap();
         let home = tempfile::tempdir().unwrap();
         let pipe = home.path().join("pipe.toml");
         rustix::fs::mkfifoat(rustix::fs::CWD, pipe, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
         let (_, sets) = work(home.path(), &def, SetWork::Read);
-        assert_eq!(sets, [untold("pipe", "pipe.toml is no file, expected a parameter set".into())]);
+        assert_eq!(sets, [unreadable("pipe", "pipe.toml is no file, expected a parameter set".into())]);
     }
 
     #[test]
-    fn what_cannot_be_read_is_told() {
+    fn unreadable_sets_are_reported() {
         let def = load(Path::new("tank"), &Search::shipped()).unwrap();
         let home = tempfile::tempdir().unwrap();
         let file = home.path().join("sets");
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_set_is_told_and_hides_no_other() {
+    fn a_file_that_is_no_set_is_reported() {
         let def = load(Path::new("tank"), &Search::shipped()).unwrap();
         let home = tempfile::tempdir().unwrap();
         fs::write(home.path().join("a.toml"), "SV = 70").unwrap();

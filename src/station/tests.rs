@@ -39,7 +39,7 @@ async fn actions_of(session: &super::Session, action: &str) -> Vec<ActionRecord>
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn from_the_first_supervisor_to_the_stop_everything_is_in_the_book_and_in_the_history() {
+async fn every_action_is_in_the_audit_log_and_in_the_history() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
     let mut station = start_guarded(options(&history)).unwrap();
@@ -108,7 +108,7 @@ async fn without_users(history: &Path) -> (bool, Result<(), String>, Result<(), 
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_damaged_users_file_closes_the_login_and_nothing_else_and_a_missing_one_is_alarmed() {
+async fn a_damaged_users_file_closes_only_the_login() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
     let users = users_beside(&history);
@@ -128,7 +128,7 @@ async fn a_damaged_users_file_closes_the_login_and_nothing_else_and_a_missing_on
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_recorded_after_the_clock_was_set_is_of_the_next_epoch() {
+async fn records_after_a_clock_step_are_of_the_next_epoch() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(&folder.path().join("fixture.duckdb"));
     // Two years ahead of the system clock, which is as if that was set back as soon as the station runs.

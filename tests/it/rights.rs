@@ -34,7 +34,7 @@ const WHY: [&str; 6] = [
     "this is for a {}, you are technician",
     "",
     "this terminal is locked",
-    "choose a password of your own first",
+    "choose a new password first",
 ];
 
 /// What is called so in the audit log may be done by whom: nobody, Viewer, Technician, Supervisor, Supervisor at a locked
@@ -210,7 +210,7 @@ type Answers = [&'static str; 6];
 const DONE: &str = "";
 const LOG_IN: &str = "log in first";
 const LOCKED: &str = "this terminal is locked";
-const CHANGE: &str = "choose a password of your own first";
+const CHANGE: &str = "choose a new password first";
 const NOT_VIEWER: &str = "you are viewer";
 const NOT_TECHNICIAN: &str = "you are technician";
 const SUPERVISOR: Answers = [LOG_IN, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, CHANGE];
@@ -229,7 +229,7 @@ fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
             ("unlock terminal", ["not locked", "not locked", "not locked", "not locked", DONE, "not locked"])
         }
         SessionRequest::Active => ("", [DONE; 6]),
-        SessionRequest::FirstSupervisor { .. } => ("add user", ["there are users already"; 6]),
+        SessionRequest::FirstSupervisor { .. } => ("add user", ["users exist already"; 6]),
         SessionRequest::ChangePassword { .. } => ("change password", ["log in", SHORT, SHORT, SHORT, "unlock", SHORT]),
         SessionRequest::AddUser { .. } => ("add user", SUPERVISOR),
         SessionRequest::SetRole { .. } => ("set role", SUPERVISOR),

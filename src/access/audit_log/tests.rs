@@ -40,7 +40,7 @@ fn verify(lines: &[String], head: Option<ChainHash>, rows: &[ChainHash]) -> Resu
 }
 
 #[test]
-fn a_book_as_it_was_written_is_whole_and_its_lines_can_be_read() {
+fn an_unchanged_log_is_whole_and_readable() {
     let (lines, chain_hashes) = audit_log(5);
     let summary = verify(&lines, chain_hashes.last().copied(), &chain_hashes).unwrap();
     assert_eq!((summary.entries, summary.compared, summary.last), (5, 5, chain_hashes[4]));
@@ -52,7 +52,7 @@ fn a_book_as_it_was_written_is_whole_and_its_lines_can_be_read() {
 }
 
 #[test]
-fn a_book_that_was_written_anew_is_found_by_the_note_and_by_the_history() {
+fn a_rewritten_log_is_found_by_the_note_and_by_the_history() {
     let (lines, chain_hashes) = audit_log(5);
     let forged = ChainHash { number: 3, hash: [1; 32] };
     assert_eq!(verify(&lines, Some(forged), &[]).unwrap_err().line, 3);
@@ -66,7 +66,7 @@ fn a_book_that_was_written_anew_is_found_by_the_note_and_by_the_history() {
 }
 
 #[test]
-fn what_the_history_lacks_of_the_log_is_found_and_so_is_what_differs() {
+fn entries_missing_or_different_in_the_history_are_found() {
     let (lines, chain_hashes) = audit_log(6);
     let mut check = Check::new(None, &[]);
     let entry = |line: &String| check.line(line.as_bytes()).map(|entry| entry.chained(check.last()));
@@ -79,13 +79,13 @@ fn what_the_history_lacks_of_the_log_is_found_and_so_is_what_differs() {
     assert_eq!(found.missing[0].new.as_deref(), Some("1 \"°C\" "), "as it is in the log");
     assert_eq!(compare(&tail, chain_hashes[5], &chain_hashes, 100), Comparison::default());
     let found = compare(&tail, chain_hashes[5], &[chain_hashes[5], chain_hashes[3]], 2);
-    assert_eq!(found.missing.len(), 1, "nobody knows what else the history holds before the rows that were read");
+    assert_eq!(found.missing.len(), 1, "rows before those that were read are unknown");
     assert_eq!(compare(&tail, chain_hashes[5], &[], 100).missing.len(), 6, "a new history is completed from the log");
 }
 
 proptest! {
     #[test]
-    fn whatever_somebody_puts_on_record_the_book_stays_whole_and_says_where_it_was_cut(
+    fn any_text_keeps_the_chain_whole_and_a_cut_is_found(
         texts in prop::collection::vec(("[\\PC\\x00-\\x1f\"\\\\\u{202e}]{1,40}", 1usize..4_000), 8)
     ) {
         let texts: Vec<Arc<str>> = texts.iter().map(|(text, times)| text.repeat(*times).into()).collect();

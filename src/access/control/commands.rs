@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Said of a command that was made before the station was started again, with the same plant file or with another.
-const OTHER_RUN: &str = "the station was started again since this was shown: check and confirm again";
+const OTHER_RUN: &str = "the station was restarted since this was shown: check and confirm again";
 
 impl AccessControl {
     /// Checks a command of a terminal and passes it on to the plant, permitted or refused.
@@ -75,15 +75,15 @@ impl AccessControl {
         vec![Effect::Command(status)]
     }
 
-    /// A command did not reach the plant: no snapshot tells its outcome, so its terminal is told with how it stands.
+    /// A command did not reach the plant: the session status reports it, as no snapshot will.
     pub fn undelivered(&mut self, id: CommandId, why: &str) -> Vec<Effect> {
         let Some(session) = self.sessions.get_mut(&id.terminal) else { return Vec::new() };
         session.undelivered(id, why);
         vec![Effect::SessionStatus(id.terminal)]
     }
 
-    /// The plant puts it on record and into the snapshot, so that whoever gave the command sees what became of it. Too many of
-    /// them are only told.
+    /// Sends a refused command to the plant, which records and shows it. Above the rate limit only the session status reports
+    /// it.
     pub(super) fn refuse_command(
         &mut self,
         terminal: u32,

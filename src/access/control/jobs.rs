@@ -75,13 +75,13 @@ pub(super) struct PendingJob {
 
 #[derive(Debug)]
 pub(super) enum JobPurpose {
-    /// The password of `user`, `None` for a name that nobody has.
+    /// The password of `user`; `None` for an unknown name.
     Login { ticket: u64, user: Option<Arc<str>> },
-    /// Of who sits there.
+    /// The password of the logged-in user.
     Unlock { ticket: u64, user: Arc<str> },
-    /// Of who sits there, before he may have a new one.
+    /// The present password of the user, before it is changed.
     Change { ticket: u64, user: Arc<str>, new: Secret },
-    /// Of who signs a command.
+    /// The password of the approver.
     Reauthenticate { by: Arc<str>, approver: Option<Arc<str>>, command: Box<Command> },
     /// A new one is hashed.
     Hash { ticket: u64, hashing: Hashing },
@@ -242,7 +242,7 @@ impl AccessControl {
         effects
     }
 
-    /// What speaks against this attempt, in words for the audit log; the operator is told less.
+    /// Why this attempt fails, for the audit log; the operator gets less.
     fn failure_reason(&self, what: &JobPurpose, right: bool) -> Option<&'static str> {
         let user = what.whose().and_then(|user| self.users.as_ref()?.get(user));
         match (user, right) {
@@ -310,7 +310,7 @@ impl JobPurpose {
         }
     }
 
-    /// Does somebody who is not in yet want to be? A logged-in user has attempts of their own, so that others at
+    /// Whether the attempt comes from a user without a session. A logged-in user has attempts of their own, so that others at
     /// the same place cannot block them.
     fn comes_from_outside(&self) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! Sitting down at a terminal, leaving it, and locking it for a while. Alarms stay to be seen through all of it.
+//! Login, logout and lock of a terminal. Alarms stay visible throughout.
 
 use std::{sync::Arc, time::Duration};
 
@@ -13,9 +13,7 @@ use super::{
 };
 use crate::access::{Secret, Who, user};
 
-/// Said where nobody is asked who he is.
-const NOBODY_ASKED: &str = "this station asks nobody for a password";
-/// Said where one is known without a password.
+const NO_LOGIN: &str = "this station does not require login";
 const NO_PASSWORD: &str = "the operating system says who you are here, there is no password to ask for";
 
 impl AccessControl {
@@ -27,12 +25,12 @@ impl AccessControl {
         password: Secret,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let Some(users) = &self.users else { return reply(ticket, NOBODY_ASKED) };
+        let Some(users) = &self.users else { return reply(ticket, NO_LOGIN) };
         if let Some(why) = &self.closed {
             return reply(ticket, why);
         }
         if users.is_empty() {
-            return reply(ticket, "there are no users yet: whoever has started the station makes the first supervisor");
+            return reply(ticket, "no users exist: the user who started the station creates the first Supervisor");
         }
         let (name, user) = (user.to_owned(), users.get(user).map(|user| user.name.clone()));
         let looked_at = self.verify_password(terminal, &name, password, JobPurpose::Login { ticket, user }, at);
@@ -54,15 +52,15 @@ impl AccessControl {
         if !self.sessions.contains_key(&terminal) {
             return Vec::new();
         }
-        let mut effects = self.sent_out(terminal, "done: somebody else logs in", at);
+        let mut effects = self.log_out(terminal, "done: another user logs in", at);
         let who = Who { user: user.name.clone(), role: user.role, must_change: user.must_change };
-        effects.extend(self.sit_down(terminal, who, at));
+        effects.extend(self.log_in(terminal, who, at));
         effects.push(Effect::Reply(ticket, Ok(())));
         effects
     }
 
-    /// Somebody sits down here.
-    pub(super) fn sit_down(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
+    /// Starts a login session.
+    pub(super) fn log_in(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let name = who.user.clone();
         let utc = at.checked_add(self.behind_utc).unwrap_or(at);
@@ -76,7 +74,7 @@ impl AccessControl {
         effects
     }
 
-    /// A wrong attempt: on record with what was wrong, answered without it.
+    /// Records why an attempt failed, and replies without the reason.
     pub(super) fn failed(
         &mut self,
         terminal: u32,
@@ -95,17 +93,17 @@ impl AccessControl {
     }
 
     pub(super) fn logout(&mut self, terminal: u32, ticket: u64, at: Timestamp) -> Vec<Effect> {
-        let mut effects = self.sent_out(terminal, "done", at);
+        let mut effects = self.log_out(terminal, "done", at);
         if effects.is_empty() {
-            return reply(ticket, "nobody is logged in here");
+            return reply(ticket, "no user is logged in here");
         }
         effects.push(Effect::Reply(ticket, Ok(())));
         self.publish_status(terminal, &mut effects);
         effects
     }
 
-    /// Whoever sits there leaves; nothing where nobody does.
-    pub(super) fn sent_out(&mut self, terminal: u32, outcome: &str, at: Timestamp) -> Vec<Effect> {
+    /// Ends the login of this terminal, if there is one.
+    pub(super) fn log_out(&mut self, terminal: u32, outcome: &str, at: Timestamp) -> Vec<Effect> {
         let asked = self.users.is_some();
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let Some(who) = &session.who else { return Vec::new() };
@@ -158,13 +156,13 @@ impl AccessControl {
         effects
     }
 
-    /// After how long without a key this terminal is locked; never where there is no password to unlock it with.
+    /// The idle time after which this terminal is locked; `None` without a password to unlock it.
     pub(super) fn idle_lock(&self, session: &SessionState) -> Option<Duration> {
         let span = self.def.access.idle_lock;
         (!span.is_zero() && self.users.is_some() && !session.trusted).then_some(span)
     }
 
-    /// Locks terminals that nobody has touched for long, and tells those of which this is near.
+    /// Locks idle terminals, and publishes the status of those that will be locked soon.
     pub(super) fn lock_idle(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
         let idle = |access: &AccessControl, session: &SessionState| {
@@ -176,7 +174,7 @@ impl AccessControl {
             if let Some(session) = self.sessions.get_mut(&terminal).filter(|_| left.is_zero()) {
                 session.locked = true;
                 let name = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                effects.push(audit(session, "lock terminal", &name, "done: nobody has touched it", at));
+                effects.push(audit(session, "lock terminal", &name, "done: idle", at));
                 self.publish_status(terminal, &mut effects);
             } else {
                 effects.push(Effect::SessionStatus(terminal));
@@ -185,8 +183,8 @@ impl AccessControl {
         effects
     }
 
-    /// Everybody of this name is sent out, except from one terminal.
-    pub(super) fn send_out_everywhere(
+    /// Logs a user out of all terminals but one.
+    pub(super) fn log_out_everywhere(
         &mut self,
         name: &str,
         except: Option<u32>,
@@ -200,7 +198,7 @@ impl AccessControl {
         let sessions: Vec<u32> = self.sessions.iter().filter(|(_, session)| here(session)).map(|(id, _)| *id).collect();
         let mut effects = Vec::new();
         for terminal in sessions.into_iter().filter(|terminal| Some(*terminal) != except) {
-            effects.extend(self.sent_out(terminal, why, at));
+            effects.extend(self.log_out(terminal, why, at));
             effects.push(Effect::SessionStatus(terminal));
         }
         effects

@@ -27,13 +27,13 @@ pub struct SessionState {
     pub origin: Arc<str>,
     /// Since when.
     pub since: Timestamp,
-    /// Who sits there.
+    /// The logged-in user.
     pub who: Option<Who>,
     /// Goes up with each login and logout here.
     pub login_number: u64,
-    /// He is known without a password, so none can be asked of him.
+    /// Known by the operating system, without a password.
     pub trusted: bool,
-    /// Only looking until the password is given.
+    /// Locked until the password is entered.
     pub locked: bool,
     /// When a key was last pressed.
     pub active: Timestamp,
@@ -87,7 +87,7 @@ impl SessionState {
         self.login_number += 1;
     }
 
-    /// Nobody sits there any more.
+    /// The user has logged out.
     pub fn leave(&mut self) {
         (self.who, self.locked, self.trusted) = (None, false, false);
         self.login_number += 1;

@@ -149,7 +149,7 @@ const RUN: CommandKind = CommandKind::Write { tag: fixture::RUN, value: 1.0 };
 const SV: CommandKind = CommandKind::Write { tag: fixture::SV, value: 50.0 };
 
 #[test]
-fn wrong_user_wrong_password_and_locked_out_look_the_same_and_the_book_knows_which() {
+fn failed_logins_look_alike_and_the_log_has_the_reason() {
     let mut bench = Bench::new(AccessDef::default());
     for (terminal, (user, password)) in [("nobody", BOSS), ("boss", "guess"), ("tech", "guess")].into_iter().enumerate()
     {
@@ -173,7 +173,7 @@ fn wrong_user_wrong_password_and_locked_out_look_the_same_and_the_book_knows_whi
 }
 
 #[test]
-fn five_wrong_passwords_lock_the_name_out_for_that_system_user_and_who_is_in_stays_in() {
+fn five_failures_lock_out_one_system_user_of_one_account() {
     let mut bench = Bench::new(AccessDef { anonymous_view: true, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
     bench.open(2, "10.0.0.2");
@@ -219,7 +219,7 @@ fn refused_commands_reach_the_plant_as_refused() {
 }
 
 #[test]
-fn without_a_login_the_history_is_answered_only_where_the_plant_may_be_seen() {
+fn anonymous_queries_need_anonymous_view() {
     let query = Query::Journal { from: Timestamp::MIN, to: Timestamp::MAX, limit: 1 };
     for view in [false, true] {
         let mut bench = Bench::new(AccessDef { anonymous_view: view, ..AccessDef::default() });
@@ -231,7 +231,7 @@ fn without_a_login_the_history_is_answered_only_where_the_plant_may_be_seen() {
 }
 
 #[test]
-fn the_audit_trail_is_for_a_supervisor_at_an_unlocked_terminal_and_who_else_asks_is_on_record() {
+fn the_audit_trail_is_for_supervisors_and_refusals_are_recorded() {
     let (words, by, action) = (String::new(), String::new(), String::new());
     let query = Query::Audit { from: Timestamp::MIN, to: Timestamp::MAX, words, by, action, limit: 1 };
     let mut bench = Bench::new(AccessDef::default());
@@ -247,7 +247,7 @@ fn the_audit_trail_is_for_a_supervisor_at_an_unlocked_terminal_and_who_else_asks
 }
 
 #[test]
-fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password_is_given() {
+fn an_idle_terminal_is_locked_until_the_password_is_entered() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "here");
     bench.login(1, "tech", TECH).unwrap();
@@ -271,7 +271,7 @@ fn an_untouched_terminal_is_locked_shows_it_and_may_only_look_until_the_password
 }
 
 #[test]
-fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
+fn a_trusted_system_user_needs_no_password() {
     let trusted = vec![("panel".to_owned(), Role::Technician)];
     let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
@@ -283,7 +283,7 @@ fn a_user_whom_the_operating_system_knows_is_in_without_a_password() {
 }
 
 #[test]
-fn the_stations_own_user_stops_it_also_where_a_lesser_role_is_given_without_a_password() {
+fn the_station_user_can_stop_it_with_a_lesser_trusted_role() {
     let trusted = vec![("panel".to_owned(), Role::Technician), ("sight".to_owned(), Role::Technician)];
     let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
@@ -294,7 +294,7 @@ fn the_stations_own_user_stops_it_also_where_a_lesser_role_is_given_without_a_pa
 }
 
 #[test]
-fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
+fn the_session_limit_exempts_the_stations_own_terminal() {
     let mut bench = Bench::new(AccessDef { sessions_max: 4, ..AccessDef::default() });
     bench.open(1, "a");
     bench.open(2, "b");
@@ -307,7 +307,7 @@ fn no_more_terminals_come_in_than_permitted_but_the_stations_own_always_does() {
 }
 
 #[test]
-fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
+fn a_hostile_terminal_floods_neither_plant_nor_audit_log() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "evil");
     let mut commands = 0;
@@ -334,7 +334,7 @@ fn a_hostile_terminal_can_neither_flood_the_plant_nor_fill_the_book() {
 }
 
 #[test]
-fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
+fn a_terminal_that_hangs_up_early_has_used_its_attempt() {
     let mut bench = Bench::new(AccessDef { login_attempts_max: 2, ..AccessDef::default() });
     for terminal in 1..=2 {
         bench.open(terminal, "evil");
@@ -349,7 +349,7 @@ fn a_terminal_that_hangs_up_before_the_answer_has_had_its_try() {
 }
 
 #[test]
-fn a_demonstration_asks_nobody() {
+fn a_demonstration_needs_no_login() {
     let mut bench = Bench::of(AccessControl::new(Arc::new(fixture::plant()), Some("sight".into())));
     let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };
     bench.access.open(1, own, bench.now);
@@ -369,7 +369,7 @@ mod room;
 
 proptest! {
     #[test]
-    fn nobody_comes_in_while_he_is_locked_out(
+    fn no_login_succeeds_during_a_lockout(
         steps in prop::collection::vec((0u32..4, any::<bool>(), 0i64..60), 1..80), login_attempts_max in 1u16..4
     ) {
         let mut bench = Bench::new(AccessDef { login_attempts_max, ..AccessDef::default() });

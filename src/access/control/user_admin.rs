@@ -31,7 +31,7 @@ pub(super) enum Hashing {
     Reset(Arc<str>),
 }
 
-/// A change on its way to the disk.
+/// A change that is being saved.
 #[derive(Debug)]
 pub(super) struct Saving {
     terminal: u32,
@@ -48,11 +48,11 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         if self.users.is_none() {
-            return reply(ticket, "this station keeps no users");
+            return reply(ticket, "this station has no users");
         }
         let (action, target) = words(&request);
         if let Some(why) = self.closed.clone() {
-            // What is in the damaged file is not to be written over.
+            // The damaged file is not overwritten.
             return self.not_changed(terminal, ticket, action, &target, &why, at);
         }
         let result = match request {
@@ -104,7 +104,7 @@ impl AccessControl {
         effects
     }
 
-    /// Has he started the station, or could he? Only he makes the first Supervisor.
+    /// Whether this is root, the user of the station, or its own process.
     pub(super) fn is_host(&self, peer: &Peer) -> bool {
         let user = peer.unix_user.as_deref();
         peer.own || user == Some("root") || (user.is_some() && user == self.host.as_deref())
@@ -113,10 +113,10 @@ impl AccessControl {
     fn first(&mut self, terminal: u32, ticket: u64, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
         let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
         if !self.is_host(&session.peer) {
-            return Err("only whoever has started the station makes the first supervisor".to_owned());
+            return Err("only the user who started the station creates the first Supervisor".to_owned());
         }
         if self.users.as_ref().is_none_or(|users| !users.is_empty()) {
-            return Err("there are users already".to_owned());
+            return Err("users exist already".to_owned());
         }
         self.new_password(terminal, ticket, password, Hashing::First(user))
     }
@@ -164,14 +164,14 @@ impl AccessControl {
         password: Secret,
         hashing: Hashing,
     ) -> Result<Vec<Effect>, String> {
-        // What can be refused is refused before the work; it is looked at again when the work is done.
+        // Checked before the hash and again after it.
         self.check_change(&hashing.change("".into()))?;
         password::check(&password.0, hashing.user(), self.def.access.password_chars_min)?;
         self.hash(terminal, ticket, password, hashing)
     }
 
     fn check_change(&self, change: &Change) -> Result<crate::access::Users, String> {
-        let users = self.users.as_ref().ok_or("this station keeps no users")?;
+        let users = self.users.as_ref().ok_or("this station has no users")?;
         let name = user::key(change.user());
         if let Change::Add { .. } | Change::First { .. } = change
             && self.def.access.trusted.iter().any(|(trusted, _)| user::key(trusted) == name)
@@ -194,7 +194,7 @@ impl AccessControl {
         result.unwrap_or_else(|why| self.not_changed(terminal, ticket, hashing.action(), &name, &why, at))
     }
 
-    /// Begins a change: it is true when it is on disk. Rights are looked at once more, as a hash has taken its time.
+    /// Starts a change, which takes effect when it is on disk. Checks the rights again, because hashing takes time.
     fn change(&mut self, terminal: u32, ticket: u64, change: Change, at: Timestamp) -> Result<Vec<Effect>, String> {
         let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
         match &change {
@@ -213,11 +213,11 @@ impl AccessControl {
                 self.next = Some((terminal, ticket, change));
                 return Ok(Vec::new());
             }
-            Some(_) => return Err("another change is just being written down, try again".to_owned()),
+            Some(_) => return Err("another change is being saved, try again".to_owned()),
             None => {}
         }
         let after = self.check_change(&change)?;
-        let (action, old, new) = self.told(&change);
+        let (action, old, new) = self.audit_texts(&change);
         let name = self.users.as_ref().and_then(|users| users.get(change.user())).map(|user| user.name.clone());
         let target = name.unwrap_or_else(|| change.user().clone());
         let record = ActionRecord { old, new, ..record(session, action, &target, "done", at) };
@@ -225,8 +225,8 @@ impl AccessControl {
         Ok(vec![Effect::Save(after)])
     }
 
-    /// What a change is called on record, and what it changes from and to.
-    fn told(&self, change: &Change) -> (&'static str, Option<Arc<str>>, Option<Arc<str>>) {
+    /// Action, old value and new value of the entry of a change.
+    fn audit_texts(&self, change: &Change) -> (&'static str, Option<Arc<str>>, Option<Arc<str>>) {
         let before = self.users.as_ref().and_then(|users| users.get(change.user()));
         let role = before.map(|user| user.role.word().into());
         let can = |disabled| if disabled { "disabled" } else { "enabled" };
@@ -244,7 +244,7 @@ impl AccessControl {
         }
     }
 
-    /// Writes down who has logged in when.
+    /// Saves the last logins.
     pub(super) fn save_logins(&mut self) -> Option<Effect> {
         self.unsaved = false;
         let users = self.users.clone()?;
@@ -255,7 +255,7 @@ impl AccessControl {
     /// The users were saved, or not: `Err` says why.
     pub fn on_saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
         let Some(Saving { terminal, request: Some((ticket, change, record)) }) = self.saving.take() else {
-            return self.go_on(at);
+            return self.start_next(at);
         };
         let after = result.and_then(|()| self.check_change(&change));
         let users = match after {
@@ -277,28 +277,28 @@ impl AccessControl {
             ..by_station
         };
         let mut effects = vec![Effect::Record(*record), Effect::Record(file), Effect::Reply(ticket, Ok(()))];
-        effects.extend(self.followed(terminal, &change, at));
+        effects.extend(self.apply_to_sessions(terminal, &change, at));
         self.publish_status(terminal, &mut effects);
         effects
     }
 
-    /// Begins the change that waited while last logins were written.
-    fn go_on(&mut self, at: Timestamp) -> Vec<Effect> {
+    /// Starts the change that waited while last logins were saved.
+    fn start_next(&mut self, at: Timestamp) -> Vec<Effect> {
         let Some((terminal, ticket, change)) = self.next.take() else { return Vec::new() };
-        let (action, _, _) = self.told(&change);
+        let (action, _, _) = self.audit_texts(&change);
         let target = change.user().clone();
         let begun = self.change(terminal, ticket, change, at);
         begun.unwrap_or_else(|why| self.not_changed(terminal, ticket, action, &target, &why, at))
     }
 
-    /// What a change means for those who are in.
-    fn followed(&mut self, terminal: u32, change: &Change, at: Timestamp) -> Vec<Effect> {
+    /// Applies a change to the sessions.
+    fn apply_to_sessions(&mut self, terminal: u32, change: &Change, at: Timestamp) -> Vec<Effect> {
         let name = change.user().clone();
-        let mut out = |why: &str, except| self.send_out_everywhere(&name, except, why, at);
+        let mut out = |why: &str, except| self.log_out_everywhere(&name, except, why, at);
         match change {
             Change::First { user, .. } => {
                 let who = Who { user: user.clone(), role: Role::Supervisor, must_change: false };
-                self.sit_down(terminal, who, at)
+                self.log_in(terminal, who, at)
             }
             Change::Add { .. } => Vec::new(),
             Change::Role(..) => out("done: has another role now", None),

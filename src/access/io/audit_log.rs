@@ -236,7 +236,7 @@ impl AuditLog {
         }
         let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data());
         if let Err(error) = written {
-            // Half a line helps nobody; if it cannot be taken back it is put beside when the audit log is opened again.
+            // Removes a partial line; if that fails, it is set aside when the audit log is opened again.
             let _ = self.file.set_len(self.bytes);
             return Err(error);
         }

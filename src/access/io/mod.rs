@@ -23,7 +23,7 @@ pub fn random<const BYTES: usize>() -> Result<[u8; BYTES], String> {
     }
 }
 
-/// The user of the operating system that this process runs as; his number where he has no name. May ask another machine.
+/// The user of the operating system that this process runs as, or the uid without a name. May query another machine.
 pub fn own_user() -> String {
     let name = uzers::get_effective_username().map(|name| name.to_string_lossy().into_owned());
     name.unwrap_or_else(|| uzers::get_effective_uid().to_string())

@@ -38,11 +38,11 @@ const BATCHES_MAX: usize = 256;
 const GROUP_MAX: usize = 64;
 /// Actions that wait for a log that cannot be written; one more, and the oldest is in the history only.
 const PENDING_MAX: usize = 10_000;
-/// What could not be written is tried again so often.
+/// Pause before a failed write is retried.
 const AGAIN: Duration = Duration::from_secs(1);
-/// So long the thread waits for something to write before it looks whether a seal is due.
-const LOOK: Duration = Duration::from_secs(60);
-/// A log that cannot be opened is tried again so often: it is read from its beginning.
+/// How often the thread checks whether a seal is due.
+const CHECK_EVERY: Duration = Duration::from_secs(60);
+/// Pause before a failed open is retried: it reads the whole log.
 const REOPEN: Duration = Duration::from_secs(10);
 
 /// What belongs together: actions, and the steps of alarms that they made.
@@ -175,7 +175,7 @@ impl Recorder {
 
     fn run(mut self, queue: &queue::Receiver<Message>, status: &watch::Sender<Recorded>) -> Option<ChainHash> {
         loop {
-            let wait = if self.is_written() { LOOK } else { AGAIN };
+            let wait = if self.is_written() { CHECK_EVERY } else { AGAIN };
             match queue.recv_timeout(wait) {
                 Ok(message) => {
                     let more = queue.try_iter().take(GROUP_MAX - 1);

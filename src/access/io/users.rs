@@ -19,7 +19,7 @@ const BYTES_MAX: u64 = 256 << 10;
 /// The first words of the file.
 const HEAD: &str = "# The users of this plant. Written by the station: change it there, in the tab Users.\n";
 
-/// Why the users are not known. Nobody can log in then: a damaged file must not be taken for nobody.
+/// Why the users file cannot be read. Login is closed then: a damaged file must not be read as no users.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UsersError {
     /// It is there, and cannot be read.
@@ -31,7 +31,7 @@ pub enum UsersError {
         why: String,
     },
     /// It says something that cannot be.
-    #[error("{path}:{line}:{column}: {why}; nobody can log in until the file is mended or brought back from a copy")]
+    #[error("{path}:{line}:{column}: {why}; login is closed until the file is repaired or restored from a backup")]
     Wrong {
         /// The file.
         path: String,
@@ -44,7 +44,7 @@ pub enum UsersError {
     },
 }
 
-/// Reads the users; where there is no file there is nobody yet.
+/// Reads the users; a missing file means no users.
 pub fn read(path: &Path) -> Result<Users, UsersError> {
     let unreadable = |why: String| UsersError::Unreadable { path: path.display().to_string(), why };
     let file = match File::open(path) {
@@ -158,10 +158,10 @@ mod tests {
     }
 
     #[test]
-    fn users_come_back_as_they_were_and_nobody_else_can_read_the_file() {
+    fn users_are_read_back_and_the_file_is_private() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.users.toml");
-        assert!(read(&path).unwrap().is_empty(), "nobody yet");
+        assert!(read(&path).unwrap().is_empty(), "no users yet");
         write(&path, &two()).unwrap();
         write(&path, &two()).unwrap();
         assert_eq!(read(&path).unwrap(), two());
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_file_is_never_taken_for_nobody() {
+    fn a_damaged_file_is_never_read_as_no_users() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.users.toml");
         let good = text(&two());

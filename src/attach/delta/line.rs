@@ -88,7 +88,7 @@ impl LineDelta {
     }
 }
 
-/// A line without test and report, which are told by themselves.
+/// A line without test and report, which travel separately.
 fn bare(line: &LineStatus) -> LineStatus {
     LineStatus { test: None, report: None, ..line.clone() }
 }
@@ -130,7 +130,7 @@ impl ReportDelta {
 }
 
 impl NewFrames {
-    /// Numbers tell which are new; `None` if none came or went.
+    /// The new elements, by number; `None` without a change.
     fn between(old: &Frames, new: &Frames) -> Option<NewFrames> {
         let first = new.iter().next().map(|frame| frame.number);
         let last = old.iter().next_back();

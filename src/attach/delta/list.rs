@@ -1,11 +1,11 @@
-//! A list told by what is new in it: the rest is taken from the list before.
+//! The delta of a list: new elements, and ranges kept from the list before.
 
 use serde::{Deserialize, Serialize};
 
 use super::DeltaMismatch;
 use crate::plant::number::to_u32;
 
-/// So far on an element is looked for where some were taken away before it.
+/// How far ahead a kept element is searched for.
 const LOOK_AHEAD: usize = 32;
 
 /// A list, as pieces of the list before and new elements; `None`: nothing has changed.

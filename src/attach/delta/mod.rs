@@ -70,7 +70,7 @@ pub struct DeltaMismatch;
 impl Delta {
     /// What makes `new` of `old`, which has the same definition.
     pub fn between(old: &Snapshot, new: &Snapshot) -> Delta {
-        // Taken apart, so that nobody adds a field and forgets it here.
+        // Destructured, so that a new field cannot be forgotten here.
         let Snapshot {
             at,
             run,

@@ -1,4 +1,4 @@
-//! Samples and source frames as they change: by the answer that many tags share, so that its time is told once.
+//! Changed samples and source frames, grouped by response so that a shared time is sent once.
 
 use std::{
     collections::{BTreeMap, HashMap},

@@ -178,7 +178,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn a_terminal_sees_what_the_station_has_whatever_happened_in_between(
+    fn deltas_reproduce_every_snapshot(
         (from, to) in (0usize..6, 0usize..6),
         changes in prop::collection::vec((0u8..19, any::<u16>(), 0u32..1_000), 0..24),
         more in prop::collection::vec((0u8..19, any::<u16>(), 0u32..1_000), 0..24),

@@ -39,7 +39,7 @@ enum Waiting {
 }
 
 impl Waiting {
-    /// It will not be answered any more. Whoever has left needs no answer.
+    /// Replies that there will be no answer.
     fn refuse(self, why: &str) {
         match self {
             Waiting::Ask(reply) => drop(reply.send(Err(HistoryError::Engine(why.to_owned())))),
@@ -63,7 +63,7 @@ pub struct ClientTask {
 
 /// Why a connection ended.
 enum Disconnected {
-    /// Nobody holds the session any more.
+    /// All handles of the session were dropped.
     Left,
     /// The station has gone, in words.
     Gone(String),
@@ -82,7 +82,7 @@ impl ClientTask {
         ClientTask { path, place, id_map, latest, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
     }
 
-    /// Runs for as long as somebody holds the session.
+    /// Runs until all handles of the session are dropped.
     pub async fn run(mut self, line: Line, mut requests: mpsc::Receiver<(u32, Request)>) {
         let mut line = Some(line);
         loop {
@@ -150,13 +150,13 @@ impl ClientTask {
             }
             ServerMessage::Answer { ticket, answer } => {
                 if let Some(Waiting::Ask(reply)) = self.waiting.remove(&ticket) {
-                    // Whoever has left needs no answer.
+                    // The receiver may have gone.
                     let _ = reply.send(answer);
                 }
             }
             ServerMessage::RequestDone { ticket, answer } => {
                 if let Some(Waiting::SessionRequest(reply)) = self.waiting.remove(&ticket) {
-                    // Whoever has left needs no answer.
+                    // The receiver may have gone.
                     let _ = reply.send(answer);
                 }
             }
@@ -227,7 +227,7 @@ impl ClientTask {
         self.status_sender.borrow().who.as_ref().map_or_else(|| "".into(), |who| who.user.clone())
     }
 
-    /// Seeks the station until it is there again; `None` when nobody holds the session any more.
+    /// Reconnects to the station; `None` when all handles of the session are dropped.
     async fn seek(&mut self, requests: &mut mpsc::Receiver<(u32, Request)>) -> Option<Line> {
         let mut pause = PAUSE_MIN;
         loop {
@@ -325,7 +325,7 @@ mod tests {
     use crate::{history::Query, plant::fixture};
 
     #[tokio::test]
-    async fn a_question_whose_answer_is_not_waited_for_is_cancelled_at_the_station() {
+    async fn an_abandoned_query_is_cancelled_at_the_station() {
         let (publish, _snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
         let (status_sender, _standing) = watch::channel(Arc::new(SessionStatus::default()));
         let mut task =

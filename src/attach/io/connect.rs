@@ -39,7 +39,7 @@ pub const REQUESTS: usize = 32;
 /// Why there is no session.
 #[derive(Debug, thiserror::Error)]
 pub enum AttachError {
-    /// Nobody listens there.
+    /// No process listens there.
     #[error("no station at {}: {error}", .path.display())]
     NoStation {
         /// Where.

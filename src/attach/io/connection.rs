@@ -41,7 +41,7 @@ pub const ANSWER_STUCK_MAX: Duration = Duration::from_secs(30);
 const IN_FLIGHT_MAX: usize = 16;
 /// Queries of one terminal that are before the history, or answered and not taken yet.
 const ANSWERS_MAX: usize = 4;
-/// So long a newcomer may wait to hear how it stands.
+/// How long a new terminal waits for its first status.
 const STATUS_WAIT_MAX: Duration = Duration::from_secs(2);
 
 /// An answer on its way to the terminal. It gives its places in flight back only when it has left.
@@ -83,7 +83,7 @@ pub enum ConnectionEnd {
     #[error("the station has ended")]
     StationGone,
     /// The station has another plant now.
-    #[error("the plant file was taken up anew")]
+    #[error("the plant file was reloaded")]
     OtherPlant,
 }
 
@@ -126,7 +126,7 @@ impl Inbound {
         };
         let sent = sent.and_then(|()| self.session.send(Request::Command(command, credentials)).map_err(str::to_owned));
         if let Err(why) = sent {
-            // Only a terminal that has ended does not hear it.
+            // The terminal may have gone.
             let _ = self.replies.send((ServerMessage::Undelivered { id, why }, Vec::new())).await;
         }
     }
@@ -143,13 +143,13 @@ impl Inbound {
             // A query waits here for those before it, so that what comes behind it, a command perhaps, does not.
             let Ok(turn) = asked.acquire_owned().await else { return };
             let sent = sent.and_then(|()| session.ask(query).map_err(str::to_owned));
-            // The station takes a terminal for gone when nobody holds its session any more.
+            // The station closes a terminal when all handles of its session are dropped.
             drop(session);
             let answer = match sent {
                 Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
                 Err(why) => Err(HistoryError::Engine(why)),
             };
-            // Only a terminal that has ended does not hear it.
+            // The terminal may have gone.
             let _ = replies.send((ServerMessage::Answer { ticket, answer }, vec![place, turn])).await;
         });
         self.tickets.insert(ticket, query);
@@ -172,7 +172,7 @@ impl Inbound {
                 Ok(()) => answer.await.unwrap_or_else(|_| Err("the station has ended".to_owned())),
                 Err(why) => Err(why),
             };
-            // Only a terminal that has ended does not hear it.
+            // The terminal may have gone.
             let _ = replies.send((ServerMessage::RequestDone { ticket, answer }, vec![place])).await;
         });
     }
@@ -195,7 +195,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         match timeout(STATUS_WAIT_MAX, self.session.status.changed()).await {
             Ok(Ok(())) => {}
             Ok(Err(_)) => return Err(ConnectionEnd::SentAway),
-            Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal does not hear how it stands"),
+            Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal got no session status"),
         }
         let welcome = HandshakeReply { run, terminal: self.session.terminal, def: self.def.clone() };
         let welcome = protocol::encode_first(&Handshake::current(), Some(&welcome), NEWS_BYTES_MAX);
@@ -225,7 +225,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         }
     }
 
-    /// What the terminal has requested itself is told at once.
+    /// Whether the status of an own command has changed, which is sent at once.
     fn has_news_of_own(&self, sent: &Snapshot, snapshot: &Snapshot) -> bool {
         let terminal = self.session.terminal;
         let own = |snapshot: &'_ Snapshot| -> Vec<(u32, Outcome)> {

@@ -16,7 +16,7 @@ const SOCKETS_MAX: usize = 64;
 /// A living station takes a connection within this time.
 const TRY_MAX: Duration = Duration::from_millis(500);
 
-/// The folders in which sockets may be, as the environment tells.
+/// The folders that may hold sockets, from the environment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Places {
     /// `$RUNTIME_DIRECTORY`: the service manager has made it for this very process.
@@ -73,7 +73,7 @@ impl Places {
         Ok(folder.join(name))
     }
 
-    /// A folder of sockets that is there, and that this user may not look into.
+    /// A folder of sockets that this user may not read.
     pub fn closed(&self) -> Option<PathBuf> {
         let folders = self.given.iter().chain([&self.service]).chain(&self.login).chain([&self.last]);
         let closed = |folder: &&PathBuf| {
@@ -101,7 +101,7 @@ impl Places {
     }
 }
 
-/// Whoever else could write there could put himself in the place of the station and be told passwords.
+/// Another user who could write there could impersonate the station and receive passwords.
 fn require_own(folder: &Path) -> io::Result<()> {
     let about = fs::symlink_metadata(folder).map_err(|error| named(folder, error))?;
     let is_own = about.is_dir() && about.uid() == rustix::process::getuid().as_raw() && about.mode() & 0o022 == 0;

@@ -46,7 +46,7 @@ pub enum ListenError {
     /// Another station of this plant is there.
     #[error("the station is already running{}", .process.map(|n| format!(", process {n}")).unwrap_or_default())]
     Running {
-        /// Its process, if the system tells.
+        /// Its process, if known.
         process: Option<i32>,
     },
     /// The system says no.
@@ -213,8 +213,8 @@ impl Listener {
     /// Lets terminals in until the station behind this acceptor has ended. Can be called again with another station.
     pub async fn serve(&mut self, acceptor: &SessionAcceptor) {
         let mut snapshots = acceptor.snapshots.clone();
-        let mut look = interval(CHECK_EVERY);
-        look.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        let mut check = interval(CHECK_EVERY);
+        check.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let mut connections = Connections {
             acceptor,
             run: snapshots.borrow().run,
@@ -230,7 +230,7 @@ impl Listener {
                 ended = snapshots.changed() => if ended.is_err() { break },
                 Some(parse_handshake) = connections.strangers.join_next() => if let Ok(parse_handshake) = parse_handshake { connections.on_greeted(parse_handshake) },
                 Some(left) = connections.serving.join_next() => if let Ok(left) = left { connections.on_left(left) },
-                _ = look.tick() => {
+                _ = check.tick() => {
                     self.keep();
                     connections.log_left_out();
                 }

@@ -39,7 +39,7 @@ fn a_terminal_says_where_it_is_and_is_told_the_plant() {
 }
 
 #[test]
-fn a_terminal_and_a_station_of_two_versions_say_so_and_what_to_do() {
+fn different_versions_are_refused_with_what_to_do() {
     let old = Handshake { protocol: PROTOCOL + 1, version: "9.9".into(), ..Handshake::current() };
     // Whatever else that version says is never looked at.
     let bytes = body(encode_first(&old, Some(&vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
@@ -61,7 +61,7 @@ fn a_terminal_and_a_station_of_two_versions_say_so_and_what_to_do() {
 }
 
 #[test]
-fn what_a_terminal_says_of_itself_cannot_disturb_a_screen_or_say_who_it_is() {
+fn the_place_of_a_terminal_is_one_harmless_line() {
     let rows: [(&str, &str, &str); 5] = [
         ("pts/3", "10.0.0.5", "pts/3 from 10.0.0.5, user panel, process 123"),
         ("", "", "no terminal, user panel, process 123"),

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_found_by_the_next_station_and_the_file_stays_small() {
+    fn alarm_states_are_read_back_and_the_file_stays_small() {
         let folder = tempfile::tempdir().unwrap();
         let path = beside(&folder.path().join("tank.duckdb"));
         assert_eq!(found(&path), Found::default(), "no file yet");

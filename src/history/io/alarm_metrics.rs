@@ -26,7 +26,7 @@ use crate::{
 const CHUNK: Duration = Duration::from_secs(86_400);
 /// A window of the monitor, in microseconds.
 const WINDOW: i64 = 600_000_000;
-/// Windows that are looked into one by one: two days.
+/// Windows that are read one by one: two days.
 const LOOKED_INTO_MAX: i64 = 288;
 /// Steps of alarms behind the figures of one answer: years of a plant that is run well.
 const STEPS_MAX: u64 = 2_000_000;
@@ -81,7 +81,7 @@ impl Store {
     }
 
     /// The windows in which anything was stored. Lines have a row every minute; where there is none, single windows are
-    /// looked into for samples, and many are read at once.
+    /// read for samples, and many are read at once.
     fn watched(&self, from: Timestamp, to: Timestamp) -> Result<BTreeSet<i64>, HistoryError> {
         let span = params![utc(from), utc(to), ROWS_MAX + 1];
         let list = |sql| self.whole_list(sql, span, |row| row.get::<_, i64>(0));

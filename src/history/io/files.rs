@@ -25,7 +25,7 @@ pub struct Opening {
     pub failed: u32,
 }
 
-/// Refuses a file that is certainly no history, so that nobody's other file is ever set aside as a damaged one. Reads it
+/// Refuses a file that is certainly no history, so that no other file is ever set aside as a damaged one. Reads it
 /// only if its name is not that of a history, and before DuckDB has it.
 pub fn refuse_foreign(db: &Path) -> Result<(), HistoryError> {
     if db.extension().is_some_and(|ending| ending == "duckdb") || size(db) == 0 {
@@ -226,7 +226,7 @@ mod tests {
     use crate::report::testing::at;
 
     #[test]
-    fn a_disk_is_nearly_full_when_little_is_free_in_bytes_and_in_percent() {
+    fn a_disk_is_nearly_full_by_bytes_and_by_percent() {
         const GIB: u64 = 1 << 30;
         for (free, all, expect) in [
             (50 * GIB, 1000 * GIB, None),
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn files_set_aside_within_one_second_do_not_overwrite_each_other() {
+    fn files_set_aside_in_one_second_are_all_kept() {
         let folder = tempfile::tempdir().unwrap();
         let db = folder.path().join("x.duckdb");
         let mut targets = Vec::new();

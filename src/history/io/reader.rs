@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn one_terminal_never_has_all_places_and_those_that_wait_take_turns() {
+    fn one_terminal_never_takes_all_query_slots() {
         for (waiting, answered, expect) in [
             (&[][..], &[][..], None),
             (&[7, 7], &[], Some(0)),

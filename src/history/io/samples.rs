@@ -27,7 +27,7 @@ use crate::{
 
 /// Rows of a piece that are aimed at; twice as many are held at most.
 pub(super) const PIECE: usize = 1 << 17;
-/// Rows that one statement looks at, about, however few of them are asked for: a checkpoint waits for it.
+/// Rows that one statement reads, about, however few of them are asked for: a checkpoint waits for it.
 const LOOKED_AT: f64 = 3e6;
 /// Of a period with unreadable blocks at most this share, in parts, is given up with each of them; and this long at the
 /// least, in microseconds.

@@ -44,7 +44,7 @@ pub struct Store {
     file: Option<(u64, u64)>,
     /// The stored number of each tag, by `TagId`; `None` for a tag that the file does not know (only when read-only).
     pub(super) ids: Vec<Option<u16>>,
-    /// Where the records end, if nobody is writing any more.
+    /// Where the records end, if no station is writing.
     pub(super) ended: Option<Timestamp>,
     /// Rows that are read at a time.
     pub(super) piece: usize,

@@ -48,8 +48,8 @@ impl PlantTask {
                 self.filing = Some(tokio::task::spawn_blocking(move || sets::work(&folder, &def, work)));
                 return;
             }
-            (Some(_), Some(_)) => "another set is just being saved, try again",
-            (None, _) => "this station keeps nothing",
+            (Some(_), Some(_)) => "another set is being saved, try again",
+            (None, _) => "this station stores nothing",
         };
         // What is being done ends with the folder read, so a request to read is granted already.
         if let SetWork::Write { command, .. } = work {
@@ -58,10 +58,10 @@ impl PlantTask {
         }
     }
 
-    pub(super) fn take_filed(&mut self, done: Result<sets::Done, tokio::task::JoinError>) {
+    pub(super) fn on_filed(&mut self, done: Result<sets::Done, tokio::task::JoinError>) {
         let (written, sets) = match done {
             Ok(done) => done,
-            // Whoever has requested it hears of it when his command is given up.
+            // The command times out, which its operator sees.
             Err(error) => return tracing::error!(%error, "the work with the sets ended badly"),
         };
         self.plant.on_sets(sets);
@@ -71,7 +71,7 @@ impl PlantTask {
         }
     }
 
-    /// Has the plant file written beside the loop; the outcome comes to [`PlantTask::take_saved`].
+    /// Has the plant file written beside the loop; the outcome comes to [`PlantTask::on_saved`].
     pub(super) fn save(&mut self, command: CommandId, settings: LineDef) {
         match (self.file.take(), &self.saving) {
             (Some(mut file), _) => {
@@ -82,17 +82,17 @@ impl PlantTask {
                 });
                 self.saving = Some(Saving { command, settings: saved, work });
             }
-            (None, Some(_)) => self.tell_saved(command, &settings, Err("other settings are just being saved".into())),
-            (None, None) => self.tell_saved(command, &settings, Err(NO_FILE.into())),
+            (None, Some(_)) => self.report_saved(command, &settings, Err("other settings are being saved".into())),
+            (None, None) => self.report_saved(command, &settings, Err(NO_FILE.into())),
         }
     }
 
-    pub(super) fn take_saved(&mut self, (command, settings, done): Saved) {
+    pub(super) fn on_saved(&mut self, (command, settings, done): Saved) {
         let result = match done {
             Ok((file, result)) => {
                 let now = self.clock.utc();
                 let changed = self.persistence.audit.as_mut().and_then(|audit| audit.plant_file(&file, now));
-                self.write_down(changed.into_iter().collect(), Vec::new());
+                self.record(changed.into_iter().collect(), Vec::new());
                 self.file = Some(file);
                 result
             }
@@ -101,10 +101,10 @@ impl PlantTask {
                 Err("internal error, see the log".to_owned())
             }
         };
-        self.tell_saved(command, &settings, result);
+        self.report_saved(command, &settings, result);
     }
 
-    fn tell_saved(&mut self, command: CommandId, settings: &LineDef, result: Result<(), String>) {
+    fn report_saved(&mut self, command: CommandId, settings: &LineDef, result: Result<(), String>) {
         let effects = self.plant.on_saved(command, settings, result);
         self.keep(effects.records);
     }

@@ -100,7 +100,7 @@ fn steps(history: &Path) -> Vec<AlarmEvent> {
 }
 
 #[tokio::test]
-async fn an_acknowledgement_that_is_shown_is_on_disk_also_while_the_history_takes_nothing() {
+async fn a_shown_acknowledgement_is_on_disk_without_a_history() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
     let mut station = Station::start(&history).await;
@@ -115,7 +115,7 @@ async fn an_acknowledgement_that_is_shown_is_on_disk_also_while_the_history_take
 }
 
 #[tokio::test]
-async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_is() {
+async fn unwritten_actions_are_shown_as_not_recorded() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
     // A folder where the file should be: nothing can be written over it.
@@ -140,7 +140,7 @@ async fn what_the_disk_does_not_take_is_done_and_shown_as_not_recorded_until_it_
 }
 
 #[tokio::test]
-async fn a_login_is_reported_as_not_recorded_while_the_disk_takes_nothing() {
+async fn a_login_is_reported_as_not_recorded_without_a_disk() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
     let obstacle = alarm_file::beside(&history);
@@ -166,7 +166,7 @@ async fn a_login_is_reported_as_not_recorded_while_the_disk_takes_nothing() {
 }
 
 #[tokio::test]
-async fn a_clock_that_is_set_while_the_station_runs_is_followed_recorded_and_alarmed() {
+async fn a_clock_step_is_followed_recorded_and_alarmed() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
     // The station begins two years ahead of the system clock, which is as if it was set back then.

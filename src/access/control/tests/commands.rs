@@ -68,7 +68,7 @@ fn a_stop_is_never_one_request_too_many() {
 }
 
 #[test]
-fn a_tag_that_asks_for_a_second_person_is_written_only_with_one() {
+fn a_tag_with_second_user_is_written_only_with_one() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");
     bench.login(1, "tech", TECH).unwrap();

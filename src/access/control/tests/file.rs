@@ -4,7 +4,7 @@ use super::*;
 use crate::access::audit_log::USERS_FILE;
 
 #[test]
-fn each_change_of_the_users_is_tied_to_the_one_before_and_a_login_changes_nothing() {
+fn user_changes_are_chained_and_a_login_changes_nothing() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "a");
     let start = bench.access.users_digest().unwrap();

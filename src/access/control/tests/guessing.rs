@@ -45,7 +45,7 @@ fn wrong_passwords_of_one_system_user_lock_no_other_out() {
 }
 
 #[test]
-fn root_and_the_stations_own_user_are_delayed_and_never_locked_out() {
+fn root_and_the_station_user_are_delayed_never_locked_out() {
     for user in ["root", "sight"] {
         let mut bench = Bench::new(AccessDef { login_attempts_max: 2, ..AccessDef::default() });
         bench.open_as(1, user);

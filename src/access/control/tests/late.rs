@@ -56,7 +56,7 @@ fn a_new_password_being_hashed_does_not_undo_a_reset() {
 }
 
 #[test]
-fn a_login_with_a_password_changed_meanwhile_fails_and_is_no_guess() {
+fn a_login_during_a_password_change_fails_without_counting() {
     let mut bench = two_at_work();
     bench.open(3, "10.0.0.3");
     let login = SessionRequest::Login { user: "tech".into(), password: TECH.into() };

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn wrong_names_at_a_place_do_not_keep_those_who_are_in_from_their_work() {
+fn failures_of_others_do_not_block_a_logged_in_user() {
     let mut bench = Bench::new(AccessDef::default());
     for terminal in 1..=3 {
         bench.open(terminal, "10.0.0.5");
@@ -23,7 +23,7 @@ fn wrong_names_at_a_place_do_not_keep_those_who_are_in_from_their_work() {
 }
 
 #[test]
-fn who_guesses_at_a_locked_terminal_waits_as_long_as_anywhere_else() {
+fn guesses_at_a_locked_terminal_are_delayed_as_usual() {
     let mut bench = Bench::new(AccessDef { login_attempts_max: 3, ..AccessDef::default() });
     bench.open(1, "10.0.0.5");
     bench.open(2, "10.0.0.5");
@@ -41,7 +41,7 @@ fn who_guesses_at_a_locked_terminal_waits_as_long_as_anywhere_else() {
 }
 
 #[test]
-fn after_the_clock_was_set_the_lists_of_a_supervisor_are_in_utc_and_lock_outs_go_on() {
+fn a_clock_step_moves_lists_and_keeps_lockouts() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.5");
     bench.open(2, "10.0.0.6");

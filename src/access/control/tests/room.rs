@@ -27,7 +27,7 @@ fn one_user_of_the_operating_system_cannot_take_all_seats() {
 }
 
 #[test]
-fn a_terminal_where_nobody_is_logged_in_makes_room_when_it_was_idle_for_long() {
+fn a_long_idle_anonymous_session_makes_room() {
     let mut bench = Bench::new(AccessDef { sessions_max: 4, idle_lock: Duration::ZERO, ..AccessDef::default() });
     bench.comes(1, "panel");
     bench.comes(2, "panel");

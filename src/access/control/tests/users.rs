@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_supervisor_ends_a_lock_out() {
+fn a_supervisor_clears_a_lockout() {
     let mut bench = Bench::new(AccessDef { login_attempts_max: 1, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
     bench.open(2, "10.0.0.2");
@@ -17,7 +17,7 @@ fn a_supervisor_ends_a_lock_out() {
 }
 
 #[test]
-fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station() {
+fn only_the_host_creates_the_first_supervisor_and_only_once() {
     let mut bench =
         Bench::of(AccessControl::with_users(Arc::new(fixture::plant()), Users::default(), Some("sight".into())));
     let first =
@@ -46,7 +46,7 @@ fn the_first_supervisor_is_made_once_and_only_by_whoever_could_start_the_station
 }
 
 #[test]
-fn whoever_got_a_password_from_somebody_must_first_choose_his_own() {
+fn a_user_with_a_given_password_must_choose_a_new_one() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");
     bench.open(2, "10.0.0.2");
@@ -65,7 +65,7 @@ fn whoever_got_a_password_from_somebody_must_first_choose_his_own() {
 }
 
 #[test]
-fn a_change_acts_on_those_who_are_in_at_once_and_one_that_was_not_saved_is_none() {
+fn a_saved_change_acts_at_once_and_an_unsaved_one_never() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");
     bench.login(1, "boss", BOSS).unwrap();
@@ -98,7 +98,7 @@ fn a_change_acts_on_those_who_are_in_at_once_and_one_that_was_not_saved_is_none(
 }
 
 #[test]
-fn a_change_that_comes_while_last_logins_are_written_waits_for_them() {
+fn a_change_waits_while_last_logins_are_saved() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "10.0.0.1");
     bench.login(1, "boss", BOSS).unwrap();

@@ -75,7 +75,7 @@ fn chain_hashes(rows: &[ActionRecord]) -> Vec<ChainHash> {
 }
 
 #[test]
-fn deeds_of_several_lives_are_one_chain_and_only_the_station_can_read_it() {
+fn several_runs_make_one_chain_in_a_private_file() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("tank.duckdb");
     let path = beside(&history);
@@ -93,7 +93,7 @@ fn deeds_of_several_lives_are_one_chain_and_only_the_station_can_read_it() {
 }
 
 #[test]
-fn a_torn_last_line_is_put_beside_and_said_and_the_chain_goes_on() {
+fn a_torn_last_line_is_set_aside_and_reported() {
     let folder = tempfile::tempdir().unwrap();
     let (history, path) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
     life(&history, &["start", "write"]);
@@ -110,7 +110,7 @@ fn a_torn_last_line_is_put_beside_and_said_and_the_chain_goes_on() {
 }
 
 #[test]
-fn a_book_that_was_tampered_with_is_said_stays_as_it_is_and_goes_on() {
+fn a_tampered_log_is_reported_kept_and_continued() {
     for (what, line) in [("changed", 2), ("cut in the middle", 2), ("cut at the end", 3), ("removed", 1)] {
         let folder = tempfile::tempdir().unwrap();
         let (history, path) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
@@ -138,7 +138,7 @@ fn a_book_that_was_tampered_with_is_said_stays_as_it_is_and_goes_on() {
 }
 
 #[test]
-fn without_a_disk_deeds_go_to_the_history_without_a_seal_and_it_is_said() {
+fn without_a_disk_actions_go_to_the_history_only() {
     let folder = tempfile::tempdir().unwrap();
     let (rows, status, _) = life(&folder.path().join("gone").join("tank.duckdb"), &["start", "write"]);
     assert!(rows.len() == 2 && rows.iter().all(|row| row.chain_hash.is_none()), "each once");
@@ -149,7 +149,7 @@ fn without_a_disk_deeds_go_to_the_history_without_a_seal_and_it_is_said() {
 }
 
 #[test]
-fn a_book_that_is_taken_away_while_it_is_written_is_noticed() {
+fn a_log_removed_while_open_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tank.audit.jsonl");
     let (mut audit_log, _) = AuditLog::open(&path).unwrap();
@@ -161,7 +161,7 @@ fn a_book_that_is_taken_away_while_it_is_written_is_noticed() {
 }
 
 #[test]
-fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing_is_missing() {
+fn refused_writes_are_unrecorded_until_the_disk_is_back() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("later").join("tank.duckdb");
     let (history, mut rows) = mpsc::channel(64);
@@ -197,7 +197,7 @@ fn what_a_disk_did_not_take_is_not_recorded_until_it_comes_back_and_then_nothing
 }
 
 #[test]
-fn a_log_that_cannot_be_written_for_long_keeps_the_latest_actions_and_says_how_many_it_lacks() {
+fn a_long_fault_keeps_the_latest_actions_and_counts_the_rest() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("later").join("tank.duckdb");
     let (history, _rows) = mpsc::channel(64);
@@ -216,7 +216,7 @@ fn a_log_that_cannot_be_written_for_long_keeps_the_latest_actions_and_says_how_m
 }
 
 #[test]
-fn a_full_disk_that_outlasts_the_waiting_actions_leaves_a_trace_in_the_log() {
+fn a_long_full_disk_leaves_a_trace_in_the_log() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
     let path = beside(&history_file);
@@ -236,7 +236,7 @@ fn a_full_disk_that_outlasts_the_waiting_actions_leaves_a_trace_in_the_log() {
 }
 
 #[test]
-fn what_is_said_of_the_log_itself_waits_for_the_disk_like_every_action() {
+fn entries_about_the_log_itself_wait_for_the_disk_too() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
     life(&history_file, &["start"]);
@@ -251,7 +251,7 @@ fn what_is_said_of_the_log_itself_waits_for_the_disk_like_every_action() {
 }
 
 #[test]
-fn what_was_acknowledged_is_found_by_the_next_station_without_any_history() {
+fn acknowledgements_survive_without_a_history() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
     let (history, rows) = mpsc::channel(1);
@@ -270,7 +270,7 @@ fn what_was_acknowledged_is_found_by_the_next_station_without_any_history() {
 
 /// What a station that was killed had written into the log and not into the history.
 #[test]
-fn a_history_that_lacks_entries_of_the_log_is_completed_and_one_that_differs_is_said() {
+fn the_history_is_completed_and_differences_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
     let (rows, ..) = life(&history_file, &["start", "write", "acknowledge"]);
@@ -297,7 +297,7 @@ fn a_history_that_lacks_entries_of_the_log_is_completed_and_one_that_differs_is_
 }
 
 #[test]
-fn files_that_another_process_writes_are_left_alone_until_it_ends() {
+fn files_in_use_by_another_process_are_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
     life(&history_file, &["start"]);

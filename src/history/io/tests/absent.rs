@@ -78,7 +78,7 @@ fn whatever_stands_in_the_way_records_wait_and_are_caught_up() {
 }
 
 #[test]
-fn what_exceeds_the_buffer_is_counted_and_alarms_outlive_samples() {
+fn a_full_buffer_drops_samples_first_and_counts_them() {
     let (folder, db) = folder();
     fs::create_dir(&db).unwrap();
     let mut writer = without_store(&db, "Is a directory");
@@ -97,7 +97,7 @@ fn what_exceeds_the_buffer_is_counted_and_alarms_outlive_samples() {
 }
 
 #[test]
-fn a_file_removed_or_replaced_under_the_station_is_noticed_and_recording_goes_on() {
+fn a_removed_or_replaced_file_is_noticed() {
     for replaced in [false, true] {
         let (folder, db) = folder();
         let mut writer = Writer::open(db.clone(), def(), sec(0)).unwrap();

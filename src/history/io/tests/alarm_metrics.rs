@@ -152,7 +152,7 @@ fn instant(journal: &[AlarmRecord], share: f64, on_a_step: bool) -> Timestamp {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn the_figures_of_any_period_are_those_that_sql_counts_in_the_journal(
+    fn metrics_of_any_period_equal_those_counted_by_sql(
         journal in journal(),
         (a, b) in (0.0..0.7, 0.1..1.0f64),
         (from_step, until_step) in any::<(bool, bool)>(),
@@ -169,7 +169,7 @@ proptest! {
 }
 
 #[test]
-fn a_storm_an_alarm_from_the_day_before_and_an_empty_night_are_counted_as_sql_counts_them() {
+fn metrics_of_special_days_equal_those_counted_by_sql() {
     use AlarmEvent::{Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, START);

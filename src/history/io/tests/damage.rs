@@ -32,7 +32,7 @@ fn a_report_without_the_station_reads_but_never_creates() {
 }
 
 #[test]
-fn a_file_that_is_not_a_database_is_set_aside_and_recording_begins_anew() {
+fn a_file_that_is_no_database_is_set_aside() {
     for damage in [b"not a database".to_vec(), vec![0; 20_000], vec![0xA5; 20_000]] {
         let (_folder, db) = folder();
         fs::write(&db, &damage).unwrap();
@@ -93,7 +93,7 @@ fn a_log_torn_at_any_length_never_keeps_the_station_down() {
 }
 
 #[test]
-fn files_whose_opening_never_ended_twice_are_set_aside_before_the_third() {
+fn files_that_twice_never_opened_are_set_aside() {
     let (_folder, db) = folder();
     open(&db, 0).append(&[good(PV, 0, 27.0)]).unwrap();
     fs::write(with_suffix(&db, ".opening"), "1").unwrap();

@@ -21,7 +21,7 @@ fn what_a_line_counted_comes_back_minute_by_minute() {
 }
 
 #[test]
-fn a_history_of_an_older_program_gets_the_new_table_and_keeps_its_rows() {
+fn an_older_history_is_migrated_and_keeps_its_rows() {
     let (_folder, db) = folder();
     let old = duckdb::Connection::open(&db).unwrap();
     old.execute_batch(sql::CREATE_VERSION).unwrap();
@@ -95,7 +95,7 @@ fn a_step_of_the_clock_is_not_counted_as_a_row() {
 }
 
 #[test]
-fn a_clock_that_went_back_is_reported_and_the_old_curve_still_ends() {
+fn a_clock_set_back_is_reported_and_the_old_curve_ends() {
     let (_folder, db) = folder();
     open(&db, 0).append(&[good(PV, 1000, 27.0)]).unwrap();
     let writer = Writer::open(db, def(), sec(500)).unwrap();

@@ -72,7 +72,7 @@ fn damage(files: &mut Files, kind: usize, numbers: &mut Numbers) -> String {
 }
 
 #[test]
-fn whatever_is_flipped_or_cut_the_station_starts_and_nothing_is_silently_wrong() {
+fn a_station_starts_with_any_damage_and_reports_it() {
     let cases = std::env::var("SIGHTGLASS_DAMAGE").map_or(CASES, |cases| cases.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let whole = folder.path().join("whole.duckdb");

@@ -105,7 +105,7 @@ fn a_report_has_the_last_entry_of_the_audit_log_before_its_end() {
 }
 
 #[test]
-fn a_period_of_a_century_is_answered_at_once_and_a_record_of_millions_of_rows_refused() {
+fn a_century_is_answered_and_millions_of_rows_are_refused() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     store.append(&[good(PV, 0, 27.0), good(PV, 100_000, 28.0)]).unwrap();
@@ -127,7 +127,7 @@ fn a_period_before_the_samples_of_a_start_is_answered_at_once() {
 }
 
 #[test]
-fn a_question_behind_which_too_much_lies_is_refused_before_anything_is_read() {
+fn a_query_of_too_many_rows_is_refused_before_reading() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     store.append(&[good(PV, 1, 27.0), good(PV, 2, 28.0), good(PV, 3, 28.0)]).unwrap();
@@ -142,7 +142,7 @@ fn a_question_behind_which_too_much_lies_is_refused_before_anything_is_read() {
 }
 
 #[test]
-fn an_action_that_was_stored_without_its_seal_is_there_once_when_it_comes_with_it() {
+fn an_action_stored_before_its_chain_hash_is_kept_once() {
     use crate::plant::record::{ActionRecord, ChainHash};
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(&folder.path().join("h.duckdb"), &def(), sec(0)).unwrap().store;

@@ -166,7 +166,7 @@ fn a_restart_continues_and_the_time_in_between_is_a_gap() {
 }
 
 #[test]
-fn a_value_is_stored_to_its_last_digit_and_every_quality_comes_back() {
+fn values_and_qualities_are_stored_exactly() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     store.append(&[good(PV, 0, 123_456.7), Record::Sample(PV, Sample::bad(Cause::SensorFault, sec(10)))]).unwrap();
@@ -181,7 +181,7 @@ fn a_value_is_stored_to_its_last_digit_and_every_quality_comes_back() {
 }
 
 #[test]
-fn a_tag_keeps_its_curve_when_the_plant_file_is_reordered_and_loses_it_with_its_unit() {
+fn a_tag_keeps_its_curve_unless_its_unit_changes() {
     let (_folder, db) = folder();
     open(&db, 0).append(&[good(PV, 0, 27.0), good(SV, 0, 70.0)]).unwrap();
     let mut other = plant("Asia/Bangkok", &THREE);
@@ -238,7 +238,7 @@ fn epochs(store: &Store, table: &str) -> Vec<u16> {
 }
 
 #[test]
-fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
+fn alarms_and_acknowledgements_survive_a_restart() {
     use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
     let (_folder, db) = folder();
     let store = open(&db, 0);
@@ -262,7 +262,7 @@ fn the_alarms_of_before_the_restart_are_restored_with_their_acknowledgements() {
 }
 
 #[test]
-fn records_wait_while_the_store_fails_and_nothing_is_lost_when_it_recovers() {
+fn no_record_is_lost_when_a_failed_store_recovers() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
     let sql = |writer: &Writer, sql: &str| writer.store().unwrap().db.execute_batch(sql).unwrap();
@@ -287,7 +287,7 @@ fn records_wait_while_the_store_fails_and_nothing_is_lost_when_it_recovers() {
 }
 
 #[test]
-fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
+fn a_stop_ends_every_curve_and_a_run_answers_queries() {
     let (_folder, db) = folder();
     let clock = Clock::starting_at(sec(10), 1.0);
     let mut handle = thread::start(&db, def(), clock).unwrap();
@@ -314,7 +314,7 @@ fn a_stopped_station_leaves_every_curve_ended_and_a_running_one_answers() {
 }
 
 #[test]
-fn what_an_operator_does_with_an_alarm_is_committed_at_once() {
+fn operator_steps_of_alarms_are_committed_at_once() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
     assert!(!writer.accept(vec![Record::Alarm(AlarmRecord { by: None, ..step(6, "high", AlarmEvent::Raised) })]));

@@ -95,7 +95,7 @@ fn a_station_that_stops_ends_the_questions_and_closes_the_file() {
 }
 
 #[test]
-fn alarms_and_actions_have_room_when_samples_have_filled_the_queue() {
+fn alarms_and_actions_fit_when_samples_fill_the_queue() {
     let (queue, mut waiting) = mpsc::channel(thread::RECORDS_MAX);
     let mut lost = 0;
     let mut sent = 0;
@@ -187,7 +187,7 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
 }
 
 #[test]
-fn a_store_is_opened_anew_only_when_the_last_question_to_the_old_one_has_ended() {
+fn a_store_reopens_after_the_last_query_to_the_old_one() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
     let mut stores = writer.stores();
@@ -209,7 +209,7 @@ fn a_store_is_opened_anew_only_when_the_last_question_to_the_old_one_has_ended()
 }
 
 #[test]
-fn a_checkpoint_finds_its_moment_between_questions_without_pause() {
+fn a_checkpoint_runs_between_endless_queries() {
     use std::sync::atomic::{AtomicUsize, Ordering};
     let (_folder, db) = folder();
     let mut writer = Writer::open(db.clone(), def(), sec(0)).unwrap();
@@ -281,7 +281,7 @@ fn a_transaction_that_was_left_open_does_not_stop_the_recording() {
 }
 
 #[test]
-fn the_longest_lists_that_are_answered_fit_in_the_memory_of_the_engine() {
+fn the_longest_lists_fit_in_the_engines_memory() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let rows = format!(

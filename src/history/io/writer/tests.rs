@@ -38,7 +38,7 @@ fn check(mut pending: Vec<Record>, expect: Vec<Record>) {
 }
 
 #[test]
-fn when_too_much_waits_the_oldest_samples_go_and_the_alarms_stay() {
+fn the_oldest_samples_are_dropped_before_alarms() {
     check(vec![], vec![]);
     check((0..4).map(sample).collect(), (0..4).map(sample).collect());
     check((0..5).map(sample).collect(), (2..5).map(sample).collect());

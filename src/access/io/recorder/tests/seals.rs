@@ -14,7 +14,7 @@ fn sealed(log: &Path, key: &VerificationKey) -> (u64, u64) {
 }
 
 #[test]
-fn a_log_with_a_key_is_sealed_at_the_start_each_hour_and_at_the_end() {
+fn a_log_is_sealed_at_start_hourly_and_at_the_end() {
     let folder = tempfile::tempdir().unwrap();
     let (history_file, log) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
     life(&history_file, &["start"]);
@@ -53,7 +53,7 @@ fn a_log_with_a_key_is_sealed_at_the_start_each_hour_and_at_the_end() {
 }
 
 #[test]
-fn a_process_killed_at_any_step_of_a_seal_leaves_no_gap_and_uses_no_key_twice() {
+fn a_kill_during_a_seal_leaves_no_gap_and_reuses_no_key() {
     for (step, seals) in
         [("before the entry", 2), ("within the entry", 2), ("before the key", 3), ("within the key", 3)]
     {
@@ -86,7 +86,7 @@ fn a_process_killed_at_any_step_of_a_seal_leaves_no_gap_and_uses_no_key_twice() 
 }
 
 #[test]
-fn a_log_that_can_no_longer_be_sealed_is_said_and_goes_on() {
+fn a_log_that_cannot_be_sealed_is_reported_and_continued() {
     let folder = tempfile::tempdir().unwrap();
     let (history_file, log) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
     let (path, verification) = (sealing::beside(&log), sealing::make(&log, at(0)).unwrap());
@@ -110,7 +110,7 @@ fn a_log_that_can_no_longer_be_sealed_is_said_and_goes_on() {
 }
 
 #[test]
-fn a_key_that_cannot_be_replaced_is_said_and_makes_no_other_seal() {
+fn a_key_that_cannot_be_replaced_makes_one_seal_only() {
     let folder = tempfile::tempdir().unwrap();
     let (history_file, log) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
     let verification = sealing::make(&log, at(0)).unwrap();
@@ -139,7 +139,7 @@ fn a_key_that_cannot_be_replaced_is_said_and_makes_no_other_seal() {
 }
 
 #[test]
-fn a_seal_that_cannot_be_written_leaves_its_key_for_the_next_one() {
+fn an_unwritten_seal_leaves_its_key_for_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let (history_file, log) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
     let verification = sealing::make(&log, at(0)).unwrap();
