@@ -3,7 +3,7 @@
 //! ```text
 //! Event ───┐                       ┌──> Effects { bus requests, records }
 //! Command ─┼──> Plant (reducer) ───┤
-//! tick  ───┘    image alarms desk  └──> Snapshot
+//! tick  ───┘    image alarms       └──> Snapshot
 //!               values alarms commands
 //! ```
 
