@@ -44,7 +44,7 @@ fn every_condition_says_what_it_lacks() {
         ("rate = 0.5\nover = \"1min\"", "the alarm would never return"),
         ("changes = 10", "`changes` needs `within`"),
         ("changes = 1\nwithin = \"1min\"", "not a count of changes"),
-        ("no_change = \"1ms\"", "nothing can be told in so short a time"),
+        ("no_change = \"1ms\"", "this time is too short"),
         ("no_update = \"30s\"\nover = \"1min\"", "`over` belongs to `rate`"),
         ("bit = 3", "D1.T has no bit 3"),
         ("high = 80.0\nclass = \"proces\"", "did you mean `process`?"),

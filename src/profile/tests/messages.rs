@@ -53,7 +53,7 @@ fn all_problems_come_at_once_and_in_file_order() {
     insta::assert_snapshot!(lines.join("\n"), @"
     small.toml:2:13: unknown time zone `Mars/Base`
     small.toml:8:8: 9601 is not a usual baud rate
-    small.toml:22:8: unit 0 is a broadcast, which nobody answers: PLC.STEP can never be read
+    small.toml:22:8: unit 0 is a broadcast, which no unit answers: PLC.STEP can never be read
     small.toml:27:1: unknown key `deadbnd` in an alarm
     meter.toml:16:8: unknown unit `C`
     plc.toml:9:16: `V2008` does not exist: DirectLOGIC counts in octal
