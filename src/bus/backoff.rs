@@ -19,7 +19,7 @@ impl Default for Backoff {
 }
 
 impl Backoff {
-    /// For ports and connections: looking costs nobody anything, and somebody waits for the cable to work again.
+    /// For ports and connections: trying is cheap, and an operator waits for the cable.
     pub fn for_ports() -> Backoff {
         Backoff { failures: 0, cap: Duration::from_secs(5) }
     }

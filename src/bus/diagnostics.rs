@@ -1,4 +1,4 @@
-//! Diagnostics of a line as pure step machines: which request is next, and what its answer tells.
+//! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
@@ -196,7 +196,7 @@ impl Job {
     fn take_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
         let Ask::Message(request) = &step.ask else { return };
         let words = match answer {
-            // A broadcast is answered by nobody.
+            // A broadcast has no response.
             Ok(answer) if answer.is_empty() => return,
             Ok(answer) => match answer.get(3..5) {
                 Some([high, low]) => format!("register 0 = {}", u16::from_be_bytes([*high, *low])),
@@ -210,7 +210,7 @@ impl Job {
         self.found(Finding::Unit { unit: request[0], serial: step.serial, words });
     }
 
-    /// Few corrupt answers are told as what may be units; more with the same settings come from something else that talks.
+    /// A few corrupt responses may be units; more of them with the same settings come from another sender.
     fn conclude_traces(&mut self) {
         let traces = std::mem::take(&mut self.traces);
         for same in traces.chunk_by(|one, other| one.1 == other.1) {

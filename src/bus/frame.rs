@@ -162,8 +162,8 @@ pub(crate) fn unsolicited(framing: Framing, bytes: &[u8]) -> Vec<Unsolicited> {
     }
 }
 
-/// What an answer looks like from outside. RTU answers carry no transaction id: two answers of one shape cannot be told
-/// apart.
+/// What an answer looks like from outside. RTU answers carry no transaction id: two answers of one shape look
+/// the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Shape {
     function: u8,

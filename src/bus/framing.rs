@@ -1,5 +1,5 @@
-//! What the bytes that have come over a line are: the answer, somebody else's frame, noise, or the beginning of one.
-//! For lines without transaction ids; Modbus TCP tells by its header.
+//! What the bytes that have come over a line are: the response, another frame, noise, or the beginning of a frame.
+//! For lines without transaction ids; Modbus TCP has its header.
 
 use super::{ascii, frame, pdu};
 use crate::plant::{def::Framing, event::Fault, number::to_u16};

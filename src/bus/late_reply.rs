@@ -25,7 +25,7 @@ const OUTSTANDING_MAX: usize = 16;
 /// Usual shapes that are remembered of a unit; one with more is resynchronised by a loopback.
 const USUAL_MAX: usize = 64;
 
-/// A unit rests no longer than this, however late it seems to have been.
+/// A unit is left alone no longer than this, however late it seems to have been.
 const REST_MAX: Duration = Duration::from_secs(600);
 
 /// Outstanding replies of one unit.
@@ -187,7 +187,7 @@ impl Unit {
         true
     }
 
-    /// It rests so long for each outstanding reply, where nothing can prove that it is in sync.
+    /// It is left alone so long for each outstanding reply, where nothing can prove that it is in sync.
     fn patience(&self, timeout: Duration) -> Duration {
         (2 * self.late_max).max(10 * timeout)
     }
@@ -330,7 +330,7 @@ impl LineReplies {
         !unit.reorders && !is_repeated && unit.detect_reordering(message, unit.patience(timeout), now)
     }
 
-    /// Can only time, or the owed answer, make sure that the answer to this message is no older one?
+    /// Can only time, or the outstanding reply, make sure that the answer to this message is no older one?
     pub fn must_wait(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first().map(|unit| &self.units[usize::from(*unit)]) else { return false };
         unit.reorders && shape_of(message).is_some_and(|shape| unit.outstanding.contains(shape))
@@ -343,7 +343,7 @@ impl LineReplies {
     }
 
     /// For a unit that no probe can resynchronise: how much longer it must rest before its outstanding replies may be forgotten,
-    /// `None` once it is forgotten. For each outstanding reply it rests twice as long as it has ever been late, ten
+    /// `None` once it is forgotten. For each outstanding reply it is left alone twice as long as it has ever been late, ten
     /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let timeout = self.timeout;

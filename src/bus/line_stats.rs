@@ -71,7 +71,7 @@ impl LineStats {
         }
     }
 
-    /// The plan has changed: blocks that stay keep their stats, others begin anew.
+    /// The plan has changed: blocks that stay keep their stats, others start at zero.
     pub fn replan(&mut self, old: &[Block], new: &[Block]) {
         let kept = |block: &Block| {
             let place = old.iter().position(|old| old.request() == block.request() && old.poll == block.poll)?;

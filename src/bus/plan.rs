@@ -96,7 +96,7 @@ fn asked_again(device: &DeviceDef, tag: &TagDef) -> Block {
     Block { poll: Poll::Every(period), class: PollClass::Background, ..single(device, tag) }
 }
 
-/// The tags of a line that its devices do not have, as their refusals told.
+/// The tags of a line that its devices have refused.
 pub fn refused(def: &PlantDef, line: LineId, unreadable: &UnreadableRanges) -> Vec<TagId> {
     let on_line = def.devices.iter().filter(|device| device.line == line);
     let refused = on_line.flat_map(|device| readable(def, device).filter(|tag| is_refused(device, tag, unreadable)));

@@ -46,8 +46,8 @@ const STARVED_AFTER: Duration = Duration::from_secs(60);
 
 /// Tier of what has waited so long.
 const STARVED: u8 = 0;
-/// The demand is looked at so often.
-const JUDGE_EVERY: Duration = Duration::from_secs(1);
+/// The demand is evaluated this often.
+const EVALUATE_EVERY: Duration = Duration::from_secs(1);
 
 /// What to do now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -230,14 +230,14 @@ impl Schedule {
         self.devices[self.polls[index].place].tried(now);
         self.requeue(index);
         let urgent = self.late && self.overload.load() == Load::Normal;
-        if urgent || self.judged_at + JUDGE_EVERY <= now {
-            self.judge(now);
+        if urgent || self.judged_at + EVALUATE_EVERY <= now {
+            self.evaluate_load(now);
         }
         served
     }
 
     /// Looks at every poll, so not at every read.
-    fn judge(&mut self, now: Timestamp) {
+    fn evaluate_load(&mut self, now: Timestamp) {
         let mut demand = Demand::default();
         for poll in self.polls.iter().filter(|poll| self.devices[poll.place].probe_at.is_none()) {
             let share = match poll.class {

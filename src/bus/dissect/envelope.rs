@@ -1,4 +1,4 @@
-//! What stands around a message: CRC, LRC, MBAP header; which of them it is, when nobody said so.
+//! The envelope of a message: CRC, LRC or MBAP header, and how to recognise it.
 
 use super::Field;
 use crate::{
@@ -25,7 +25,7 @@ pub(super) struct Envelope {
     pub fault: Option<String>,
 }
 
-/// The framing of bytes that nobody has named: `:` and text is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
+/// The framing of bytes, recognised: `:` and text is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
 pub fn recognise(bytes: &[u8]) -> Option<Framing> {
     // Unit 58 of a binary frame is a `:` too, but what follows it is no text.
     let text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();

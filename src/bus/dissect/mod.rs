@@ -74,7 +74,7 @@ impl Dissection {
     }
 }
 
-/// Tells a frame in words. What is not told – framing, direction – is recognised. `asked` is the request message (unit
+/// Decodes a frame. Framing and direction are recognised if they are not given. `asked` is the request message (unit
 /// and PDU) that the frame answers: it gives the values their addresses, and the answer is checked against it.
 pub fn dissect(
     bytes: &[u8],
@@ -96,7 +96,7 @@ pub fn dissect(
         }
     }
     let (direction, reading, also) = read.choose(direction);
-    // Bytes without unit and function come from nobody.
+    // Bytes without unit and function have no direction.
     let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
         let fault = frame::check_answer(asked, &envelope.message).err()?;
@@ -121,7 +121,7 @@ pub fn dissect(
     }
 }
 
-/// Tells a frame of a line in words; `before` are the earlier frames of the line, the latest first: one of them is the
+/// Decodes a frame of a line; `before` are the earlier frames of the line, the latest first: one of them is the
 /// request of an answer.
 pub fn in_traffic<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) -> Dissection {
     let framing = Some(frame.framing);
@@ -158,7 +158,7 @@ struct Reading {
 struct Readings {
     request: Reading,
     answer: Reading,
-    /// Why both readings are the same, if they are: the answer repeats the request, or nobody knows the function.
+    /// Why both readings are the same, if they are: the answer repeats the request, or the function is unknown.
     same: Option<&'static str>,
 }
 
@@ -170,7 +170,7 @@ impl Readings {
             Some(code @ 0..=0x7F) => match pdu::function(*code) {
                 Some(function) if function.echoes => Some("the answer repeats the request: these bytes may be either"),
                 Some(_) => None,
-                None => Some("the standard has no such function: request and answer cannot be told apart"),
+                None => Some("the standard has no such function: request and answer look the same"),
             },
             Some(_) | None => None,
         };

@@ -113,7 +113,7 @@ impl<'a> Reader<'a> {
         if left == 0 {
             return;
         }
-        let words = if self.trouble.is_none() { "does not belong to this message" } else { "cannot be told" };
+        let words = if self.trouble.is_none() { "does not belong to this message" } else { "unknown" };
         self.wrong(format!("{} too many", names::counted(left, "byte")));
         self.name(self.at..self.message.len(), "rest".into(), words.into());
     }

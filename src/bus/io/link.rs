@@ -114,10 +114,10 @@ impl Link {
     pub async fn call(&mut self, unit: u8, request: Request<'_>) -> Result<Response, LinkError> {
         let (ours, theirs) = tokio::io::duplex(2 * frame::MESSAGE_MAX);
         let mut context = rtu::attach_slave(theirs, Slave(unit));
-        let (answer, done) = tokio::join!(context.call(request), self.carry(ours));
+        let (answer, done) = tokio::join!(context.call(request), self.relay(ours));
         done?;
         if unit == 0 && self.framing() != Framing::Mbap {
-            // A broadcast: nobody answers, so there is nothing to read.
+            // A broadcast has no response to read.
             return Ok(Response::Custom(0, Bytes::new()));
         }
         match answer {
@@ -133,7 +133,7 @@ impl Link {
 
     /// Takes one frame from the pipe, exchanges its message over the port, hands the answer back. On an error the pipe is
     /// dropped, which ends the waiting on its other end.
-    async fn carry(&mut self, mut pipe: DuplexStream) -> Result<(), LinkError> {
+    async fn relay(&mut self, mut pipe: DuplexStream) -> Result<(), LinkError> {
         let mut frame = vec![0; 2 * frame::MESSAGE_MAX];
         let count = pipe.read(&mut frame).await.unwrap_or(0);
         let message = frame::without_crc(&frame[..count])?.to_vec();
@@ -371,7 +371,7 @@ impl Link {
         }
     }
 
-    /// The answer to this message may still come: it is remembered, and the line rests until it would have passed.
+    /// The answer to this message may still come: it is remembered, and the line stays silent until it would have passed.
     fn expect_late(&mut self, message: &[u8]) {
         self.wire.replies.failed(message, self.wire.age());
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);

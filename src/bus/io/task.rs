@@ -1,4 +1,4 @@
-//! The task of one line: opens the port, keeps the schedule, serves operators and diagnostics, and tells the plant what came of it.
+//! The task of one line: opens the port, keeps the schedule, serves operators and diagnostics, and sends events to the plant.
 
 mod concurrent;
 mod confirm;
@@ -39,7 +39,7 @@ use crate::{
 /// A line report is sent this often, in plant time.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// Runs a line until `stop` turns true or nobody can send requests any more.
+/// Runs a line until `stop` turns true or the request channel closes.
 pub async fn run(
     def: Arc<PlantDef>,
     line: LineId,
@@ -68,11 +68,11 @@ pub async fn run(
         blocks,
         closed_at: clock.now(),
         job: None,
-        polls_since_test: 0,
+        polls_since_step: 0,
         line,
         def,
     };
-    // The only way out is the end of the station; there is nobody left to tell.
+    // It returns only when the station ends, and then no receiver is left.
     let _ = task.outer().await;
 }
 
@@ -134,7 +134,7 @@ struct Task<'a> {
     stats: LineStats,
     /// The running diagnostic.
     job: Option<Job>,
-    polls_since_test: u32,
+    polls_since_step: u32,
 }
 
 impl Task<'_> {
@@ -142,11 +142,11 @@ impl Task<'_> {
     async fn outer(mut self) -> Result<(), LinkExit> {
         let mut backoff = Backoff::for_ports();
         loop {
-            self.tell_state(LineState::Connecting).await?;
+            self.publish_state(LineState::Connecting).await?;
             let exit = match self.connector.open().await {
                 Ok(port) => {
                     self.memory.counters.opens += 1;
-                    self.tell_state(LineState::Connected).await?;
+                    self.publish_state(LineState::Connected).await?;
                     tracing::info!(line = self.settings.name, transport = %self.settings.transport, "connected");
                     let answers = self.memory.counters.ok;
                     let exit = self.serve(port).await;
@@ -165,21 +165,21 @@ impl Task<'_> {
                 LinkExit::Shutdown => return Err(exit),
                 LinkExit::Reopen => backoff.reset(),
                 LinkExit::Diagnostic => {
-                    self.tell_state(LineState::Testing).await?;
-                    self.test_alone().await?;
+                    self.publish_state(LineState::Testing).await?;
+                    self.run_diagnostic_alone().await?;
                 }
                 LinkExit::Closed => {
-                    self.end_test("the line was closed").await?;
-                    self.tell_state(LineState::Disconnected).await?;
-                    self.tell_report(None).await?;
+                    self.end_diagnostic("the line was closed").await?;
+                    self.publish_state(LineState::Disconnected).await?;
+                    self.publish_report(None).await?;
                     self.wait(None).await?;
                 }
                 LinkExit::Lost(why) => {
-                    self.end_test(&why).await?;
+                    self.end_diagnostic(&why).await?;
                     tracing::warn!(line = self.settings.name, why, "not connected");
                     let retry_at = self.clock.now() + backoff.fail();
-                    self.tell_state(LineState::Waiting { why, retry_at }).await?;
-                    self.tell_report(None).await?;
+                    self.publish_state(LineState::Waiting { why, retry_at }).await?;
+                    self.publish_report(None).await?;
                     self.wait(Some(retry_at)).await?;
                 }
             }
@@ -204,29 +204,29 @@ impl Task<'_> {
     async fn take_turns(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<Infallible, LinkExit> {
         let mut report_at = self.clock.now() + REPORT_EVERY;
         // Other settings show at once.
-        self.tell_report(Some(schedule)).await?;
+        self.publish_report(Some(schedule)).await?;
         loop {
             if *self.stop.borrow() {
                 return Err(LinkExit::Shutdown);
             }
             // Before the second is closed: the schedule, too, learns of answers that came late.
             self.take_answers(link, schedule).await?;
-            self.still_there(link)?;
+            self.check_connection(link)?;
             let now = self.clock.now();
             if report_at <= now {
                 report_at = now + REPORT_EVERY;
                 link.count_uart();
                 self.close_second(link);
-                self.tell_report(Some(schedule)).await?;
+                self.publish_report(Some(schedule)).await?;
             }
-            self.tell_doubts(link).await?;
+            self.publish_unsolicited(link).await?;
             let next = schedule.next(now);
             // Writes have only their share of the time while polls are due.
             let may_write = !matches!(next, Next::Run(_)) || self.budget.allows(now);
             match (self.requests.next(may_write)?, next) {
                 (Some(request), _) => self.serve_request(link, schedule, request).await?,
                 (None, _) if self.is_turn_of_confirm(now) => self.confirm(link, schedule).await?,
-                (None, next) if self.is_turn_of_test(next) => self.test_step(link).await?,
+                (None, next) if self.is_turn_of_diagnostic(next) => self.diagnostic_step(link).await?,
                 (None, Next::Run(index)) => self.poll(link, schedule, index).await?,
                 (None, Next::WaitUntil(at)) => self.listen(link, schedule, at.min(report_at)).await?,
                 (None, Next::Idle) => self.listen(link, schedule, report_at).await?,
@@ -237,7 +237,7 @@ impl Task<'_> {
     /// The port is left: what still waits was never sent.
     async fn refuse_waiting(&mut self) -> Result<(), LinkExit> {
         for id in self.requests.take_waiting() {
-            self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+            self.publish_write_result(id, WriteResult::NotSent(Fault::NotConnected)).await?;
         }
         Ok(())
     }
@@ -273,19 +273,19 @@ impl Task<'_> {
                 Err(LinkExit::Reopen)
             }
             BusRequest::Test { id, by, diagnostic } => {
-                self.stop_test().await?;
+                self.stop_diagnostic().await?;
                 let job = self.job.insert(Job::new(id, by, diagnostic, self.clock.now()));
                 if job.is_exclusive() {
                     return Err(LinkExit::Diagnostic);
                 }
-                self.tell_test().await
+                self.publish_diagnostic().await
             }
-            BusRequest::StopTest => self.stop_test().await,
+            BusRequest::StopTest => self.stop_diagnostic().await,
             BusRequest::Write(job) => {
                 // What was requested before a stop and still waits for this tag would undo it.
                 let overtaken = if job.urgent { self.requests.take_writes_of(job.tag) } else { Vec::new() };
                 for id in overtaken {
-                    self.tell_wrote(id, WriteResult::Overtaken).await?;
+                    self.publish_write_result(id, WriteResult::Overtaken).await?;
                 }
                 let def = self.def.clone();
                 match self.clear_way(link, schedule, def.tag(job.tag).device, job.urgent).await {
@@ -295,7 +295,7 @@ impl Task<'_> {
                         return Ok(());
                     }
                     Err(exit) => {
-                        self.tell_wrote(job.id, WriteResult::NotSent(Fault::NotConnected)).await?;
+                        self.publish_write_result(job.id, WriteResult::NotSent(Fault::NotConnected)).await?;
                         return Err(exit);
                     }
                 }
@@ -328,19 +328,19 @@ impl Task<'_> {
     }
 
     /// What was read of a unit that sends what it was not asked for may be such a frame itself.
-    async fn tell_doubts(&mut self, link: &mut Link) -> Result<(), LinkExit> {
+    async fn publish_unsolicited(&mut self, link: &mut Link) -> Result<(), LinkExit> {
         let (def, line) = (self.def.clone(), self.line);
         for unit in link.take_unsolicited() {
             for device in def.devices.iter().filter(|device| device.line == line && device.unit == unit) {
                 tracing::warn!(device = device.name, "unsolicited frames: its values are in doubt");
                 let tags = def.tags_of(device.id).map(|tag| tag.id).collect();
-                self.tell_failed(self.clock.now(), device.id, tags, Fault::OutOfSync, None).await?;
+                self.publish_failure(self.clock.now(), device.id, tags, Fault::OutOfSync, None).await?;
             }
         }
         Ok(())
     }
 
-    async fn tell_report(&mut self, schedule: Option<&Schedule>) -> Result<(), LinkExit> {
+    async fn publish_report(&mut self, schedule: Option<&Schedule>) -> Result<(), LinkExit> {
         let mut polls: Vec<_> = schedule.map(|schedule| schedule.polls().collect()).unwrap_or_default();
         polls.iter_mut().for_each(|poll| poll.next = poll.next.map(|at| self.clock.to_utc(at)));
         let plan = Plan {
@@ -351,14 +351,14 @@ impl Task<'_> {
             load: schedule.map_or(Load::Normal, Schedule::load),
         };
         let report = self.stats.report(&self.def, &self.settings, plan, self.memory.counters);
-        self.tell(Event::Report { at: self.clock.now(), line: self.line, report }).await
+        self.publish(Event::Report { at: self.clock.now(), line: self.line, report }).await
     }
 
-    async fn tell_state(&mut self, state: LineState) -> Result<(), LinkExit> {
-        self.tell(Event::Line { at: self.clock.now(), line: self.line, state }).await
+    async fn publish_state(&mut self, state: LineState) -> Result<(), LinkExit> {
+        self.publish(Event::Line { at: self.clock.now(), line: self.line, state }).await
     }
 
-    async fn tell_failed(
+    async fn publish_failure(
         &mut self,
         at: Timestamp,
         device: DeviceId,
@@ -366,15 +366,15 @@ impl Task<'_> {
         fault: Fault,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), LinkExit> {
-        self.tell(Event::Failed { at, device, tags, fault, exchange }).await
+        self.publish(Event::Failed { at, device, tags, fault, exchange }).await
     }
 
-    async fn tell_wrote(&mut self, id: WriteId, result: WriteResult) -> Result<(), LinkExit> {
+    async fn publish_write_result(&mut self, id: WriteId, result: WriteResult) -> Result<(), LinkExit> {
         self.requests.ended(id);
-        self.tell(Event::Wrote { at: self.clock.now(), id, result }).await
+        self.publish(Event::Wrote { at: self.clock.now(), id, result }).await
     }
 
-    async fn tell(&mut self, event: Event) -> Result<(), LinkExit> {
+    async fn publish(&mut self, event: Event) -> Result<(), LinkExit> {
         self.events.send(event).await.map_err(|_| LinkExit::Shutdown)
     }
 }

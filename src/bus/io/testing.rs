@@ -58,7 +58,7 @@ pub fn settings_for(line: &LineDef, step: &Step) -> LineDef {
     settings
 }
 
-/// Runs a diagnostic to its end on a line that nobody polls; `progress` sees every step and may stop it by `false`.
+/// Runs a diagnostic to its end on a line that is not polled; `progress` sees every step and may stop it by `false`.
 pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&DiagnosticRun) -> bool) -> DiagnosticRun {
     let mut connector = Connector::Real(line.transport.clone());
     let mut memory = Memory::new(line, Clock::real());

@@ -1,4 +1,4 @@
-//! The bytes of one open port: silences are kept, every byte is counted and goes on record, what nobody waits for is dropped.
+//! The bytes of one open port: silent intervals are kept, every byte is counted and recorded, unexpected bytes are dropped.
 
 use std::{borrow::Cow, sync::Arc, time::Duration};
 
@@ -169,7 +169,7 @@ impl Wire {
     pub async fn send(&mut self, bytes: &[u8]) -> Result<Instant, LinkError> {
         self.wait_for_silence().await;
         if self.framing != Framing::Mbap {
-            // What is just coming in is heard to its end: it may be an outstanding reply.
+            // What is just coming in is received to its end: it may be an outstanding reply.
             self.drain()?;
             if self.has_begun() {
                 self.rest(self.idle);
@@ -227,7 +227,7 @@ impl Wire {
         }
     }
 
-    /// Reads and drops what comes while nobody has asked; returns only when the port is gone.
+    /// Reads and drops unsolicited bytes; returns only when the port is gone.
     pub async fn idle(&mut self) -> LinkError {
         loop {
             let pause = if self.stray.is_empty() { Duration::from_secs(3_600) } else { self.idle };
@@ -264,7 +264,7 @@ impl Wire {
         self.drop_stale(&bytes);
     }
 
-    /// Bytes that nobody waits for, or not any more: on record, and counted for their unit.
+    /// Records unexpected or late bytes, and counts them for their unit.
     pub fn drop_stale(&mut self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -272,7 +272,7 @@ impl Wire {
         self.counters.stale += 1;
         tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
         let mut late = false;
-        // Only a whole good frame tells who was late: chance bytes name anybody.
+        // Only a whole good frame names the unit: chance bytes may name any.
         for frame in frame::unsolicited(self.framing, bytes) {
             let age = self.age();
             let (Unsolicited::Response(message) | Unsolicited::Request(message)) = &frame;

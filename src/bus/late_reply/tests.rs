@@ -13,7 +13,7 @@ fn a_probe_is_never_of_an_owed_shape() {
     let mut outstanding = OutstandingReplies::default();
     assert!(outstanding.is_clear());
     let mut asked = Vec::new();
-    // Every probe in vain is owed too; each next one differs until the block has no more shapes to offer.
+    // Every probe in vain is outstanding too; each next one differs until the block has no more shapes to offer.
     outstanding.add(shape_of(&inputs.request()).unwrap());
     assert!(outstanding.is_ambiguous(shape_of(&inputs.request()).unwrap()));
     while let Some(probe) = outstanding.probe([inputs].into_iter()) {
@@ -86,7 +86,7 @@ fn a_unit_whose_answers_overtake_each_other_proves_nothing_by_a_later_one() {
     replies.answered(&probe, &probed, true, s(201));
     assert!(replies.is_ambiguous(&request) && replies.must_wait(&request) && !replies.must_wait(&probe));
     assert!(replies.on_late_reply(1, &answer, s(202)));
-    assert!(!replies.is_ambiguous(&request), "what was owed has come");
+    assert!(!replies.is_ambiguous(&request), "the outstanding reply has come");
     replies.failed(&request, s(300));
     assert_eq!((replies.forget(1, s(305)), replies.forget(1, s(310))), (Some(s(5)), None), "or it never comes");
 }

@@ -79,7 +79,7 @@ pub fn split(def: &PlantDef, block: &Block) -> Option<([Block; 2], (u32, u32))> 
     Some(([part(&tags[..before]), part(&tags[before..])], (from, to)))
 }
 
-/// The search for what is wrong with a refused block: its parts are polled in its place, and what they answer tells. What
+/// The search for what is wrong with a refused block: its parts are polled in its place, and their responses narrow it down. What
 /// was found must be confirmed by one more refusal, so that a device that stumbled once loses nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RangeBisection {
@@ -148,7 +148,7 @@ impl RangeBisection {
     }
 
     /// When every part has answered, or is a gap itself: adds what was confirmed to `unreadable`. `true` if the plan must be
-    /// made anew. Where both parts of a refused block are sound, the culprit lies between them.
+    /// made again. Where both parts of a refused block can be read, the gap between them cannot.
     pub fn conclude(&mut self, unreadable: &mut UnreadableRanges) -> bool {
         if !self.open.is_empty() || (self.cuts.is_empty() && self.found.is_empty()) {
             return false;
@@ -166,7 +166,7 @@ impl RangeBisection {
         true
     }
 
-    /// The plan is made anew for another reason: the search begins again.
+    /// The plan is made again for another reason: the search starts over.
     pub fn reset(&mut self) {
         *self = RangeBisection::default();
     }

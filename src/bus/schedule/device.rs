@@ -31,7 +31,7 @@ const NETWORK_PATIENCE_MIN: Duration = Duration::from_millis(500);
 /// Every so many-th try in a row waits for the whole timeout: the device may have become slow.
 const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
-/// A device of which nothing was heard, not even that it failed, is asked again after this time.
+/// A device without any result, not even a failure, is asked again after this time.
 const TRIED_AGAIN: Duration = Duration::from_secs(1);
 
 #[derive(Debug, Clone)]

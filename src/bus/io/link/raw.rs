@@ -31,7 +31,7 @@ impl Link {
                 break false;
             }
             reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
-            // A request is answered by one frame; what follows bytes that are none only silence tells.
+            // One frame answers a request; after other bytes only silence ends the response.
             if request.is_empty() {
                 until = (Instant::now() + self.idle).min(deadline);
                 continue;

@@ -124,7 +124,7 @@ impl Task<'_> {
                 self.keep_gap(link, schedule, &block, ended);
             }
             let outcome = Outcome { began, ended, took, answer, exchange: Some(exchange) };
-            self.settle(link, schedule, index, &block, outcome).await?;
+            self.finish_poll(link, schedule, index, &block, outcome).await?;
         }
         self.note_late(link, schedule);
         self.send(link, schedule, false).await

@@ -46,7 +46,7 @@ impl Task<'_> {
         let now = self.clock.now();
         let until = now.checked_add(CONFIRM_MAX).unwrap_or(Timestamp::MAX);
         self.unconfirmed.push(Unconfirmed { id, tag, result, next: now, until, backoff: Backoff::default() });
-        self.tell_failed(now, self.def.tag(tag).device, vec![tag], fault, None).await
+        self.publish_failure(now, self.def.tag(tag).device, vec![tag], fault, None).await
     }
 
     /// Is it time to read one of them?
@@ -54,7 +54,7 @@ impl Task<'_> {
         self.unconfirmed.iter().any(|write| write.next <= now)
     }
 
-    /// Reads the tag of the first that is due, and tells how its write has ended if that is known now.
+    /// Reads the tag of the first that is due, and publishes the result of its write if it is known now.
     pub(super) async fn confirm(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
         let now = self.clock.now();
         let Some(index) = self.unconfirmed.iter().position(|write| write.next <= now) else { return Ok(()) };
@@ -78,7 +78,7 @@ impl Task<'_> {
             write.next = at.checked_add(wait).unwrap_or(Timestamp::MAX);
             if write.until < write.next {
                 let write = self.unconfirmed.remove(index);
-                self.tell_wrote(write.id, write.result).await?;
+                self.publish_write_result(write.id, write.result).await?;
             }
             return Ok(());
         };
@@ -86,19 +86,19 @@ impl Task<'_> {
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
         schedule.answered(tag.device, Some(reply).filter(|reply| *reply > Duration::ZERO), at);
         let (device, values) = (tag.device, vec![(tag.id, raw)]);
-        self.tell(Event::Read { at, device, values, texts: Vec::new(), reply, exchange }).await?;
+        self.publish(Event::Read { at, device, values, texts: Vec::new(), reply, exchange }).await?;
         let write = self.unconfirmed.remove(index);
         let result = match write.result {
             WriteResult::NotRead(_) => WriteResult::ReadBack(raw),
             _ => WriteResult::Held(raw),
         };
-        self.tell_wrote(write.id, result).await
+        self.publish_write_result(write.id, result).await
     }
 
     /// The port is left: nothing more can be learned of them in time.
     pub(super) async fn give_up_unconfirmed(&mut self) -> Result<(), LinkExit> {
         for write in std::mem::take(&mut self.unconfirmed) {
-            self.tell_wrote(write.id, write.result).await?;
+            self.publish_write_result(write.id, write.result).await?;
         }
         Ok(())
     }

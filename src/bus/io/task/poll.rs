@@ -25,7 +25,7 @@ use crate::{
     },
 };
 
-/// Requests in a row without any answer after which a TCP connection is made anew.
+/// Requests in a row without any answer after which a TCP connection is opened again.
 const UNANSWERED_MAX: u32 = 5;
 
 /// How a read has ended.
@@ -47,7 +47,7 @@ impl Task<'_> {
         schedule: &mut Schedule,
         index: usize,
     ) -> Result<(), LinkExit> {
-        self.polls_since_test += 1;
+        self.polls_since_step += 1;
         if link.framing() == Framing::Mbap {
             return self.poll_tcp(link, schedule, index).await;
         }
@@ -76,7 +76,7 @@ impl Task<'_> {
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
         let took = span(began, ended);
-        self.settle(link, schedule, Some(index), &block, Outcome { began, ended, took, answer, exchange }).await?;
+        self.finish_poll(link, schedule, Some(index), &block, Outcome { began, ended, took, answer, exchange }).await?;
         Ok(())
     }
 
@@ -90,8 +90,8 @@ impl Task<'_> {
         }
     }
 
-    /// A peer may have forgotten a connection, or hold it without ever answering: only a new one tells.
-    pub(super) fn still_there(&self, link: &Link) -> Result<(), LinkExit> {
+    /// A peer may have forgotten a connection, or hold it without ever answering: only a new one shows which.
+    pub(super) fn check_connection(&self, link: &Link) -> Result<(), LinkExit> {
         if self.settings.transport.serial().is_some() || link.unanswered < UNANSWERED_MAX {
             return Ok(());
         }
@@ -106,8 +106,8 @@ impl Task<'_> {
         }
     }
 
-    /// Judges what came of a block and tells it.
-    pub(super) async fn settle(
+    /// Evaluates the outcome of a read and publishes it.
+    pub(super) async fn finish_poll(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
@@ -131,14 +131,14 @@ impl Task<'_> {
         }
         match answer {
             Ok(values) => {
-                self.tell_values(at, block, &values, reply.unwrap_or_default(), exchange).await?;
+                self.publish_values(at, block, &values, reply.unwrap_or_default(), exchange).await?;
                 self.bisection.answered(block);
                 let disproved = self.unreadable.disproved(block);
                 self.replan(link, schedule, at, disproved);
                 Ok(())
             }
             Err(fault @ Fault::Exception(code)) if is_answer => {
-                self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
+                self.publish_failure(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 let its_own = link.outstanding(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
                 schedule.again(index, at);
@@ -158,14 +158,14 @@ impl Task<'_> {
                 if let Some(index) = index {
                     schedule.again(index, at);
                 }
-                self.tell_failed(at, block.device, block.tags.to_vec(), fault, exchange).await?;
+                self.publish_failure(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 // It answers, and is asked again in its turn.
                 if fault == Fault::OutOfSync {
                     return Ok(());
                 }
                 if schedule.failed(block.device, began, took, at) {
                     let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
-                    self.tell_failed(at, block.device, tags, Fault::BackedOff, None).await?;
+                    self.publish_failure(at, block.device, tags, Fault::BackedOff, None).await?;
                     self.unreadable.forget(block.device);
                     self.replan(link, schedule, at, true);
                 }
@@ -197,7 +197,7 @@ impl Task<'_> {
         read
     }
 
-    /// Makes the plan anew when the search for what a device does not have has come to an end, or knowledge was `wrong`.
+    /// Plans again when a bisection has ended, or when known unreadable ranges were `wrong`.
     fn replan(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
         if wrong {
             self.bisection.reset();
@@ -216,7 +216,7 @@ impl Task<'_> {
         self.blocks = blocks;
     }
 
-    async fn tell_values(
+    async fn publish_values(
         &mut self,
         at: Timestamp,
         block: &Block,
@@ -232,10 +232,17 @@ impl Task<'_> {
                 (None, None) => corrupt.push(tag.id),
             }
         }
-        self.tell(Event::Read { at, device: block.device, values: numbers, texts, reply, exchange: exchange.clone() })
-            .await?;
+        self.publish(Event::Read {
+            at,
+            device: block.device,
+            values: numbers,
+            texts,
+            reply,
+            exchange: exchange.clone(),
+        })
+        .await?;
         if !corrupt.is_empty() {
-            self.tell_failed(at, block.device, corrupt, Fault::NotANumber, exchange).await?;
+            self.publish_failure(at, block.device, corrupt, Fault::NotANumber, exchange).await?;
         }
         Ok(())
     }

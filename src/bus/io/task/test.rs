@@ -25,21 +25,21 @@ use crate::{
 const POLLS_BETWEEN: u32 = 4;
 
 impl Task<'_> {
-    pub(super) fn is_turn_of_test(&self, next: Next) -> bool {
+    pub(super) fn is_turn_of_diagnostic(&self, next: Next) -> bool {
         let idle = !matches!(next, Next::Run(_));
-        self.job.as_ref().is_some_and(|job| job.next().is_some()) && (idle || POLLS_BETWEEN <= self.polls_since_test)
+        self.job.as_ref().is_some_and(|job| job.next().is_some()) && (idle || POLLS_BETWEEN <= self.polls_since_step)
     }
 
     /// One step of the diagnostic, between polls.
-    pub(super) async fn test_step(&mut self, link: &mut Link) -> Result<(), LinkExit> {
-        self.polls_since_test = 0;
+    pub(super) async fn diagnostic_step(&mut self, link: &mut Link) -> Result<(), LinkExit> {
+        self.polls_since_step = 0;
         let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) else { return Ok(()) };
         let Some(result) = self.step_unless_cut(link, &step, false).await? else { return Ok(()) };
         match (result, &mut self.job) {
             (Ok(result), Some(job)) => {
                 let in_sync = stays_in_sync(link.framing(), &step.ask, &result);
                 job.take(result);
-                self.tell_test().await?;
+                self.publish_diagnostic().await?;
                 if in_sync { Ok(()) } else { Err(LinkExit::Reopen) }
             }
             (Err(LinkError::Gone(why)), _) => Err(LinkExit::Lost(why)),
@@ -64,7 +64,7 @@ impl Task<'_> {
                     result = &mut result => return Ok(Some(result)),
                     request = self.requests.recv() => request?,
                 };
-                if !self.hear_while_testing(request, alone).await? {
+                if !self.on_request_during_diagnostic(request, alone).await? {
                     break;
                 }
             }
@@ -74,12 +74,12 @@ impl Task<'_> {
     }
 
     /// The diagnostic has the port for itself, opened with the serial parameters that each step wants.
-    pub(super) async fn test_alone(&mut self) -> Result<(), LinkExit> {
+    pub(super) async fn run_diagnostic_alone(&mut self) -> Result<(), LinkExit> {
         let mut open: Option<Link> = None;
         let mut settings = self.settings.clone();
         while let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) {
             if let Some(request) = self.requests.try_recv()? {
-                if self.hear_while_testing(request, true).await? {
+                if self.on_request_during_diagnostic(request, true).await? {
                     continue;
                 }
                 break;
@@ -90,7 +90,7 @@ impl Task<'_> {
                 None => match self.connector.open_as(&wanted.transport).await {
                     Ok(opened) => Link::new(opened, &wanted, self.clock, self.memory.clone()),
                     Err(why) => {
-                        self.end_test(&why).await?;
+                        self.end_diagnostic(&why).await?;
                         break;
                     }
                 },
@@ -102,22 +102,22 @@ impl Task<'_> {
             match (result, &mut self.job) {
                 (Ok(result), Some(job)) => job.take(result),
                 (Err(LinkError::Gone(why)), _) => {
-                    self.end_test(&why).await?;
+                    self.end_diagnostic(&why).await?;
                     break;
                 }
                 (Ok(_), None) | (Err(LinkError::Fault(_)), _) => {}
             }
-            self.tell_test().await?;
+            self.publish_diagnostic().await?;
             open = Some(link);
         }
-        self.tell_test().await
+        self.publish_diagnostic().await
     }
 
     /// Takes a request while a test is at work, `alone` on the port or between polls; `false` when the test is ended by it.
-    async fn hear_while_testing(&mut self, request: BusRequest, alone: bool) -> Result<bool, LinkExit> {
+    async fn on_request_during_diagnostic(&mut self, request: BusRequest, alone: bool) -> Result<bool, LinkExit> {
         match request {
             BusRequest::Write(WriteJob { id, urgent: false, .. }) if alone => {
-                self.tell_wrote(id, WriteResult::NotSent(Fault::NotConnected)).await?;
+                self.publish_write_result(id, WriteResult::NotSent(Fault::NotConnected)).await?;
                 Ok(true)
             }
             BusRequest::Refresh { .. } if alone => Ok(true),
@@ -126,16 +126,16 @@ impl Task<'_> {
                 Ok(true)
             }
             BusRequest::Write(WriteJob { urgent: true, .. }) => {
-                self.end_test("ended by an urgent stop").await?;
+                self.end_diagnostic("ended by an urgent stop").await?;
                 self.requests.put_first(request);
                 Ok(false)
             }
             BusRequest::StopTest => {
-                self.stop_test().await?;
+                self.stop_diagnostic().await?;
                 Ok(false)
             }
             BusRequest::Connect(_) | BusRequest::Test { .. } | BusRequest::Configure(_) => {
-                self.stop_test().await?;
+                self.stop_diagnostic().await?;
                 self.requests.put_first(request);
                 Ok(false)
             }
@@ -143,29 +143,29 @@ impl Task<'_> {
     }
 
     /// An operator stops the running diagnostic.
-    pub(super) async fn stop_test(&mut self) -> Result<(), LinkExit> {
+    pub(super) async fn stop_diagnostic(&mut self) -> Result<(), LinkExit> {
         if let Some(job) = &mut self.job {
             job.stop(DiagnosticState::Cancelled);
         }
-        self.tell_test().await
+        self.publish_diagnostic().await
     }
 
     /// The line cannot go on with the running diagnostic.
-    pub(super) async fn end_test(&mut self, why: &str) -> Result<(), LinkExit> {
+    pub(super) async fn end_diagnostic(&mut self, why: &str) -> Result<(), LinkExit> {
         if let Some(job) = &mut self.job {
             job.stop(DiagnosticState::Failed(why.to_owned()));
         }
-        self.tell_test().await
+        self.publish_diagnostic().await
     }
 
     /// Tells how the diagnostic stands, and forgets it when it is over.
-    pub(super) async fn tell_test(&mut self) -> Result<(), LinkExit> {
+    pub(super) async fn publish_diagnostic(&mut self) -> Result<(), LinkExit> {
         let Some(job) = &self.job else { return Ok(()) };
         let run = Arc::new(job.run().clone());
         if job.run().state != DiagnosticState::Running {
             self.job = None;
         }
-        self.tell(Event::Diagnostic { at: self.clock.now(), line: self.line, run }).await
+        self.publish(Event::Diagnostic { at: self.clock.now(), line: self.line, run }).await
     }
 }
 

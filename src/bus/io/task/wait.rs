@@ -29,18 +29,20 @@ impl Task<'_> {
                 () = pause => return Ok(()),
             };
             match request {
-                BusRequest::Write(job) => self.tell_wrote(job.id, WriteResult::NotSent(Fault::NotConnected)).await?,
+                BusRequest::Write(job) => {
+                    self.publish_write_result(job.id, WriteResult::NotSent(Fault::NotConnected)).await?
+                }
                 // An operator does not wait for the next try to open the port.
                 BusRequest::Refresh { .. } if until.is_some() => return Ok(()),
                 BusRequest::Refresh { .. } | BusRequest::StopTest => {}
                 BusRequest::Connect(true) => return Ok(()),
                 BusRequest::Connect(false) => {
                     until = None;
-                    self.tell_state(LineState::Disconnected).await?;
+                    self.publish_state(LineState::Disconnected).await?;
                 }
                 BusRequest::Configure(settings) => {
                     self.configure(*settings);
-                    self.tell_report(None).await?;
+                    self.publish_report(None).await?;
                     if until.is_some() {
                         return Ok(());
                     }
@@ -50,16 +52,16 @@ impl Task<'_> {
                     let alone = job.is_exclusive();
                     self.job = Some(job);
                     if alone {
-                        self.tell_state(LineState::Testing).await?;
-                        self.test_alone().await?;
+                        self.publish_state(LineState::Testing).await?;
+                        self.run_diagnostic_alone().await?;
                         // A line that an operator has closed stays closed.
                         if until.is_some() {
                             return Ok(());
                         }
-                        self.tell_state(LineState::Disconnected).await?;
+                        self.publish_state(LineState::Disconnected).await?;
                         continue;
                     }
-                    self.end_test("the line is not connected").await?;
+                    self.end_diagnostic("the line is not connected").await?;
                 }
             }
         }

@@ -67,7 +67,7 @@ impl Task<'_> {
             }
             Written::Ended(result) => result,
             Written::PortClosed(result, why) => {
-                self.tell_wrote(id, result).await?;
+                self.publish_write_result(id, result).await?;
                 return Err(LinkExit::Lost(why));
             }
         };
@@ -78,7 +78,7 @@ impl Task<'_> {
                 let (device, values) = (tag.device, vec![(tag.id, raw)]);
                 let exchange = link.last.clone();
                 let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
-                self.tell(Event::Read { at: self.clock.now(), device, values, texts: Vec::new(), reply, exchange })
+                self.publish(Event::Read { at: self.clock.now(), device, values, texts: Vec::new(), reply, exchange })
                     .await?;
             }
             // The value is unknown until it is read again.
@@ -94,7 +94,7 @@ impl Task<'_> {
             WriteResult::Lost(fault) | WriteResult::NotRead(fault) if job.verify && !job.urgent => {
                 self.confirm_later(id, tag.id, result, fault).await?;
             }
-            result => self.tell_wrote(id, result).await?,
+            result => self.publish_write_result(id, result).await?,
         }
         // It may still be queued here or on the way; closing the connection discards it. A waiting stop does not wait for
         // another connection and follows it on this one.
@@ -120,7 +120,7 @@ impl Task<'_> {
             return Ok(Unlocked::No(Written::Ended(ended)));
         }
         let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
-        self.tell(Event::Unlocked { at: self.clock.now(), id: job.id, key: key.id, result }).await?;
+        self.publish(Event::Unlocked { at: self.clock.now(), id: job.id, key: key.id, result }).await?;
         schedule.refresh(key.device, self.clock.now());
         Ok(match sent {
             Ok(WriteResult::Accepted) => Unlocked::Yes,
