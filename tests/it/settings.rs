@@ -165,7 +165,7 @@ async fn a_command_made_before_a_reload_is_refused() {
     until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
     let outcome = of(&session.snapshots.borrow(), id).unwrap().outcome;
     let Outcome::Refused(Refusal::NotPermitted(why)) = outcome else { panic!("{outcome:?}") };
-    assert!(why.contains("started again since this was shown"), "{why}");
+    assert!(why.contains("restarted since this was shown"), "{why}");
 
     // What is made on the new plant is done, so the refused one had its time.
     let again = write(&session.snapshots.borrow(), 2);
