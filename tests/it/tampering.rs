@@ -67,7 +67,7 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
         ("half of the tail", good[..good.len() - 20].to_owned(), count, "the audit log was cut here"),
         ("reordered", swapped, 2, "lines before it were cut out or moved"),
         ("doubled", doubled, 4, "it was moved or doubled"),
-        ("put in", [lines[0], "{\"n\":2}\n", &lines[1..].concat()].concat(), 2, "this does not end with a hash"),
+        ("put in", [lines[0], "{\"n\":2}\n", &lines[1..].concat()].concat(), 2, "the line has no hash at its end"),
     ];
     let head = folder.path().join("tank.audit.head");
     let noted = fs::read_to_string(&head).unwrap();
