@@ -68,6 +68,7 @@
 
 #![cfg_attr(test, allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss))]
 
+pub mod text;
 pub mod plant;
 pub mod profile;
 pub mod bus;

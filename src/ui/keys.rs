@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::tabs::Tab;
-use crate::plant::role::Role;
+use crate::{plant::role::Role, text::translate};
 
 /// One row of a key table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,7 +97,7 @@ pub fn chords_of<A>(table: &[Key<A>]) -> Vec<Chord> {
 
 /// The rows of a table for footer and help.
 pub fn hints<A>(table: &[Key<A>]) -> Vec<Hint> {
-    table.iter().map(|key| Hint { needs: key.needs, ..Hint::new(key.chord.name(), key.label, key.help) }).collect()
+    table.iter().map(|key| Hint { needs: key.needs, ..Hint::new(key.chord.name(), translate(key.label), translate(key.help)) }).collect()
 }
 
 impl Chord {

@@ -31,6 +31,7 @@ use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
+    text::Language,
     access::SessionStatus,
     plant::{alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot},
 };
@@ -58,6 +59,8 @@ pub struct Model {
     pub modal: Option<Modal>,
     /// How things look.
     pub theme: Theme,
+    /// The language of its texts.
+    pub language: Language,
     /// The whole screen.
     pub screen: Rect,
     /// What time it is and how the animation stands.
@@ -142,6 +145,7 @@ impl Model {
             tabs,
             modal: None,
             theme,
+            language: Language::default(),
             screen: Rect::default(),
             clock: Clock::default(),
             pending_command: None,
@@ -183,6 +187,10 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
+    model.language.within(|| on_msg(model, msg))
+}
+
+fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let keyed = matches!(msg, Msg::Key(_)) && model.is_as_drawn();
     if matches!(msg, Msg::Snapshot(_) | Msg::SessionStatus(_) | Msg::Answer(..) | Msg::Extension(_) | Msg::Tick { .. })
     {
@@ -244,7 +252,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
     let cx = context(model, frame.area());
-    chrome::view(model, &cx, frame);
+    model.language.within(|| chrome::view(model, &cx, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
 }
 

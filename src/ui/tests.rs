@@ -3,6 +3,7 @@
 mod keys;
 mod users;
 mod screens;
+mod texts;
 mod windows;
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};

@@ -24,6 +24,7 @@
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `guarded` | a station whose users must log in, for `rights` and `users` |
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
+//! | `texts` | the catalogue of texts: it has each text that the program shows, and no other |
 //! | `support` | what the others share: processes with deadlines, peers and their installation |
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -50,4 +51,5 @@ mod shift;
 mod support;
 mod tampering;
 mod terminal;
+mod texts;
 mod tools;

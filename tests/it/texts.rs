@@ -1,0 +1,176 @@
+//! The catalogue of texts: it has each text that the program shows, and no other.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+use syn::{
+    Attribute, ExprStruct, ImplItemFn, ItemFn, ItemMod, LitStr, Macro,
+    parse::Parser,
+    visit::{self, Visit},
+};
+
+type Texts = BTreeMap<String, BTreeSet<String>>;
+
+/// Texts of one file: of `t!`, of functions that label a state, and of rows of tables.
+#[derive(Default)]
+struct Found {
+    texts: BTreeSet<String>,
+    in_label: bool,
+}
+
+fn is_test(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("cfg") && attribute.parse_args::<syn::Ident>().is_ok_and(|name| name == "test")
+    })
+}
+
+impl Found {
+    fn add(&mut self, text: String) {
+        if text.chars().any(char::is_alphabetic) {
+            self.texts.insert(text);
+        }
+    }
+    fn within_label(&mut self, name: &syn::Ident, visit: impl FnOnce(&mut Self)) {
+        let before = std::mem::replace(&mut self.in_label, ["label", "word", "message", "advice", "mode"].iter().any(|label| name == label));
+        visit(self);
+        self.in_label = before;
+    }
+}
+
+impl<'a> Visit<'a> for Found {
+    fn visit_item_mod(&mut self, module: &'a ItemMod) {
+        if !is_test(&module.attrs) {
+            visit::visit_item_mod(self, module);
+        }
+    }
+    fn visit_item_fn(&mut self, function: &'a ItemFn) {
+        self.within_label(&function.sig.ident, |found| visit::visit_item_fn(found, function));
+    }
+    fn visit_impl_item_fn(&mut self, function: &'a ImplItemFn) {
+        self.within_label(&function.sig.ident, |found| visit::visit_impl_item_fn(found, function));
+    }
+    fn visit_lit_str(&mut self, text: &'a LitStr) {
+        if self.in_label {
+            self.add(text.value());
+        }
+    }
+    fn visit_expr_struct(&mut self, row: &'a ExprStruct) {
+        let of_keys = row.path.segments.last().is_some_and(|name| name.ident == "Key");
+        for field in row.fields.iter().filter(|_| of_keys) {
+            if let (syn::Member::Named(name), syn::Expr::Lit(literal)) = (&field.member, &field.expr)
+                && (["label", "word", "message", "advice", "mode"].iter().any(|label| name == label))
+                && let syn::Lit::Str(text) = &literal.lit
+            {
+                self.add(text.value());
+            }
+        }
+        visit::visit_expr_struct(self, row);
+    }
+    fn visit_expr_call(&mut self, call: &'a syn::ExprCall) {
+        // `Key::new(chord, label, help, action)`, or `row`, is a row of a key table.
+        let name = match &*call.func {
+            syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
+            _ => Vec::new(),
+        };
+        if name == ["row"] || name == ["Key", "new"] {
+            for argument in &call.args {
+                if let syn::Expr::Lit(literal) = argument
+                    && let syn::Lit::Str(text) = &literal.lit
+                {
+                    self.add(text.value());
+                }
+            }
+        }
+        visit::visit_expr_call(self, call);
+    }
+    fn visit_macro(&mut self, found: &'a Macro) {
+        let tokens = found.tokens.clone();
+        if found.path.is_ident("t") {
+            let first = |input: syn::parse::ParseStream| {
+                let text: LitStr = input.parse()?;
+                let _rest: proc_macro2::TokenStream = input.parse()?;
+                Ok(text)
+            };
+            if let Ok(text) = first.parse2(tokens.clone()) {
+                self.add(text.value());
+            }
+        }
+        if found.path.is_ident("tabs") {
+            literals(tokens.clone()).into_iter().for_each(|text| self.add(text));
+        }
+        // Arguments of any macro may hold texts too.
+        let arguments = syn::punctuated::Punctuated::<syn::Expr, syn::Token![,]>::parse_terminated;
+        if let Ok(arguments) = arguments.parse2(tokens) {
+            let within = self.in_label;
+            self.in_label &= !found.path.is_ident("t");
+            arguments.iter().for_each(|argument| self.visit_expr(argument));
+            self.in_label = within;
+        }
+    }
+}
+
+/// The strings between the tokens of a table.
+fn literals(tokens: proc_macro2::TokenStream) -> Vec<String> {
+    let text = |token| match token {
+        proc_macro2::TokenTree::Literal(literal) => syn::parse_str::<LitStr>(&literal.to_string()).ok(),
+        _ => None,
+    };
+    tokens.into_iter().filter_map(text).map(|text| text.value()).collect()
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name == "tests" || name == "tests.rs" || name.starts_with("fixture") {
+            continue;
+        }
+        if path.is_dir() {
+            sources(&path, found);
+        } else if name.ends_with(".rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The texts of the program by the file that they stand in.
+fn texts() -> Texts {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    files.sort();
+    let (mut all, mut known) = (Texts::new(), BTreeSet::new());
+    for path in files {
+        let mut found = Found::default();
+        found.visit_file(&syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap());
+        let new: BTreeSet<String> = found.texts.into_iter().filter(|text| known.insert(text.clone())).collect();
+        let name = path.strip_prefix(&root).unwrap().with_extension("").display().to_string();
+        if !new.is_empty() {
+            all.insert(name, new);
+        }
+    }
+    all
+}
+
+#[test]
+fn the_catalogue_has_every_text_and_no_other() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/text/en.toml");
+    let mut document = String::from(
+        "# Every text of the screens, by the file that it stands in. A language is a copy of this file with other values.\n\
+         # Made from the code: SIGHTGLASS_WRITE=1 cargo test --release --test it the_catalogue_has_every_text\n",
+    );
+    for (file, texts) in texts() {
+        let table: toml::Table = texts.into_iter().map(|text| (text.clone(), toml::Value::String(text))).collect();
+        document += &format!("\n[{file:?}]\n{}", toml::to_string(&table).unwrap());
+    }
+    if std::env::var_os("SIGHTGLASS_WRITE").is_some() {
+        fs::write(&path, &document).unwrap();
+    }
+    let written = fs::read_to_string(&path).unwrap_or_default();
+    let lines = |text: &str| text.lines().map(str::to_owned).collect::<BTreeSet<_>>();
+    let missing: Vec<_> = lines(&document).difference(&lines(&written)).cloned().collect();
+    let unused: Vec<_> = lines(&written).difference(&lines(&document)).cloned().collect();
+    assert!(written == document, "en.toml is not what the code shows; missing: {missing:#?}, unused: {unused:#?}");
+}
