@@ -3,6 +3,8 @@
 mod header;
 mod banner;
 
+use crate::t;
+use crate::text::translate;
 use header::header;
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -112,19 +114,23 @@ fn too_small(model: &Model, cx: &ViewContext, frame: &mut Frame) {
     let area = frame.area();
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = SIZE_MIN;
-    let size = format!("too small: {}x{}", area.width, area.height);
-    let words = [format!("screen {size}, needs {width}x{height}"), format!("{size}, needs {width}x{height}"), size];
+    let size = t!("too small: {width}x{height}", width = area.width, height = area.height);
+    let words = [
+        t!("screen {size}, needs {width}x{height}", size, width, height),
+        t!("{size}, needs {width}x{height}", size, width, height),
+        size,
+    ];
     let fits = words.iter().find(|words| super::widgets::text::width(words) <= area.width);
-    canvas.text(0, 1, fits.map_or("too small", String::as_str), cx.theme.normal());
+    canvas.text(0, 1, fits.map_or(t!("too small"), String::as_str), cx.theme.normal());
     // The query stands above the size where there are too few rows for both.
     match &model.modal {
         Some(Modal::Confirm(confirm)) if confirm.is_quit() => {
             let y = if area.height > 2 { 2 } else { area.height.saturating_sub(1) };
             canvas.run(0, y, area.width, ' ', cx.theme.normal());
-            canvas.text(0, y, &cx.theme.enter("Quit? ⏎ quit  Esc stay"), cx.theme.strong());
+            canvas.text(0, y, &cx.theme.enter(t!("Quit? ⏎ quit  Esc stay")), cx.theme.strong());
         }
         Some(_) | None => {
-            canvas.text(0, 2, "q quit", cx.theme.dim());
+            canvas.text(0, 2, t!("q quit"), cx.theme.dim());
         }
     }
 }
@@ -133,7 +139,7 @@ fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let name = |tab: Tab| {
         let count = if tab == Tab::Alarms { cx.snapshot.alarms.len() } else { 0 };
         let count = if count > 0 { format!(" {count}") } else { String::new() };
-        format!("{} {}{count}", tab.number(), tab.title())
+        format!("{} {}{count}", tab.number(), translate(tab.title()))
     };
     let names: Vec<(Tab, String)> = Tab::offered(cx).into_iter().map(|tab| (tab, name(tab))).collect();
     // Where there is no room for blanks around the names they stand closer; then all but the shown one are cut alike.
@@ -188,31 +194,31 @@ pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Sty
     let what = command_label(cx, kind, old);
     let Some(status) = &pending.status else {
         return match pending.undelivered {
-            Some(why) => (format!("{what}  NOT SENT: {why}"), theme.trouble()),
-            None => (format!("{what}  sent …"), theme.normal()),
+            Some(why) => (t!("{what}  NOT SENT: {why}", what, why), theme.trouble()),
+            None => (t!("{what}  sent …", what), theme.normal()),
         };
     };
     let (words, trouble) = match (&status.command.kind, &status.outcome) {
         // The line has taken it; what comes of it stands on the bus tab.
-        (CommandKind::Test(..), Outcome::Verified) => ("begun".to_owned(), false),
-        (CommandKind::StopTest(_), Outcome::Verified) => ("done".to_owned(), false),
+        (CommandKind::Test(..), Outcome::Verified) => (t!("begun").to_owned(), false),
+        (CommandKind::StopTest(_), Outcome::Verified) => (t!("done").to_owned(), false),
         // Whether they are the right ones only the devices can tell.
-        (CommandKind::Configure(_), Outcome::Verified) => ("in use".to_owned(), false),
-        (CommandKind::SaveSettings(_), Outcome::Verified) => ("written into the plant file".to_owned(), false),
+        (CommandKind::Configure(_), Outcome::Verified) => (t!("in use").to_owned(), false),
+        (CommandKind::SaveSettings(_), Outcome::Verified) => (t!("written into the plant file").to_owned(), false),
         // The line has been asked to; only the device tells whether it answers.
-        (CommandKind::Refresh(_), Outcome::Verified) => ("requested".to_owned(), false),
+        (CommandKind::Refresh(_), Outcome::Verified) => (t!("requested").to_owned(), false),
         // Nothing was written that could be read back.
         (
             CommandKind::Alarm(_) | CommandKind::HandOver | CommandKind::TakeOver | CommandKind::Connect(..),
             Outcome::Verified,
-        ) => ("done".to_owned(), false),
+        ) => (t!("done").to_owned(), false),
         (_, outcome) => outcome_words(outcome),
     };
     let at = clock(status.at, &cx.def().time_zone);
     let (words, trouble) = match status.recorded || status.is_pending() {
         true => (words, trouble),
         // Done all the same: the disk has not taken it yet.
-        false => (format!("{words}, NOT RECORDED"), true),
+        false => (t!("{words}, NOT RECORDED", words), true),
     };
     (format!("{what}  {words} {at}"), if trouble { theme.trouble() } else { theme.done() })
 }
@@ -220,12 +226,12 @@ pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Sty
 /// An outcome in words, and whether the operator should worry.
 pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
     match outcome {
-        Outcome::Pending => ("pending …".to_owned(), false),
-        Outcome::Verified => ("verified".to_owned(), false),
-        Outcome::Unchanged => ("unchanged, nothing written".to_owned(), false),
-        Outcome::Refused(why) => (format!("REFUSED: {why}"), true),
-        Outcome::NotConfirmed(NotConfirmed::NoReadBack) => ("accepted (cannot be read back)".to_owned(), false),
-        Outcome::NotConfirmed(NotConfirmed::Partly(how)) => (format!("STOPPED: {how}"), true),
+        Outcome::Pending => (t!("pending …").to_owned(), false),
+        Outcome::Verified => (t!("verified").to_owned(), false),
+        Outcome::Unchanged => (t!("unchanged, nothing written").to_owned(), false),
+        Outcome::Refused(why) => (t!("REFUSED: {why}", why), true),
+        Outcome::NotConfirmed(NotConfirmed::NoReadBack) => (t!("accepted (cannot be read back)").to_owned(), false),
+        Outcome::NotConfirmed(NotConfirmed::Partly(how)) => (t!("STOPPED: {how}", how), true),
         Outcome::NotConfirmed(
             why @ (NotConfirmed::NotAnswered(_)
             | NotConfirmed::NotApplied(_)
@@ -233,8 +239,8 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
             | NotConfirmed::NotRead(_)
             | NotConfirmed::StationStopped
             | NotConfirmed::ConnectionLost),
-        ) => (format!("NOT CONFIRMED: {why}"), true),
-        Outcome::Failed(fault) => (format!("FAILED, may have taken effect: {fault}"), true),
+        ) => (t!("NOT CONFIRMED: {why}", why), true),
+        Outcome::Failed(fault) => (t!("FAILED, may have taken effect: {fault}", fault), true),
     }
 }
 
@@ -255,21 +261,28 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> 
             let (action, target, _) = alarm_action(cx.def(), alarm_command);
             format!("{action} {target}")
         }
-        CommandKind::Refresh(device) => format!("refresh {}", cx.def().device(*device).name),
-        CommandKind::Connect(line, true) => format!("connect {}", cx.def().line(*line).name),
-        CommandKind::Connect(line, false) => format!("disconnect {}", cx.def().line(*line).name),
-        CommandKind::Configure(settings) => format!("settings of {}", settings.name),
-        CommandKind::SaveSettings(line) => format!("save settings of {}", cx.def().line(*line).name),
+        CommandKind::Refresh(device) => t!("refresh {name}", name = cx.def().device(*device).name),
+        CommandKind::Connect(line, true) => t!("connect {name}", name = cx.def().line(*line).name),
+        CommandKind::Connect(line, false) => t!("disconnect {name}", name = cx.def().line(*line).name),
+        CommandKind::Configure(settings) => t!("settings of {name}", name = settings.name),
+        CommandKind::SaveSettings(line) => t!("save settings of {name}", name = cx.def().line(*line).name),
         CommandKind::Test(line, diagnostic) => format!("{} {diagnostic}", cx.def().line(*line).name),
-        CommandKind::StopTest(line) => format!("stop test of {}", cx.def().line(*line).name),
-        CommandKind::ReadSets => "read parameter sets".to_owned(),
-        CommandKind::SaveSet { device, name, .. } => format!("save set {name} of {}", cx.def().device(*device).name),
-        CommandKind::Restore(request) => {
-            format!("{} to {}, {} changes", request.from, cx.def().device(request.device).name, request.changes.len())
+        CommandKind::StopTest(line) => t!("stop test of {name}", name = cx.def().line(*line).name),
+        CommandKind::ReadSets => t!("read parameter sets").to_owned(),
+        CommandKind::SaveSet { device, name, .. } => {
+            t!("save set {name} of {name2}", name, name2 = cx.def().device(*device).name)
         }
-        CommandKind::StopRestore(device) => format!("stop restore of {}", cx.def().device(*device).name),
-        CommandKind::HandOver => "hand over".to_owned(),
-        CommandKind::TakeOver => "take over".to_owned(),
+        CommandKind::Restore(request) => {
+            t!(
+                "{from} to {name}, {count} changes",
+                from = request.from,
+                name = cx.def().device(request.device).name,
+                count = request.changes.len()
+            )
+        }
+        CommandKind::StopRestore(device) => t!("stop restore of {name}", name = cx.def().device(*device).name),
+        CommandKind::HandOver => t!("hand over").to_owned(),
+        CommandKind::TakeOver => t!("take over").to_owned(),
     }
 }
 
@@ -298,7 +311,7 @@ fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option
         let named = |hint: &&Hint| !hint.label.is_empty();
         let keys: Vec<&str> = refused.iter().filter(named).map(|hint| hint.key.as_str()).collect();
         let keys = cx.theme.enter(&format!("{}: {}", rights::title(role), keys.join(" ")));
-        let words = [format!("needs {keys}"), keys];
+        let words = [t!("needs {keys}", keys), keys];
         if let Some(words) = words.iter().find(|words| x + width(words) < end) {
             canvas.text(x, 0, words, cx.theme.dim());
         }

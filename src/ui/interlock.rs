@@ -1,5 +1,7 @@
 //! What an operator is told before and after a command: what blocks it, when it acts, what it will change, how it went.
 
+use crate::t;
+use crate::text::translate;
 use std::time::Duration;
 
 use ratatui::style::Style;
@@ -47,12 +49,12 @@ pub fn is_refused(cx: &ViewContext, tag: TagId, value: f64) -> bool {
 /// All there is to say before a value is written, with its look.
 pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, Style)> {
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
-    let gone = gone.map(|why| (format!("! Nothing can be written now. {why}"), cx.theme.trouble()));
+    let gone = gone.map(|why| (t!("! Nothing can be written now. {why}", why), cx.theme.trouble()));
     let locks =
         cx.def().logic.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_text(cx, lock));
     let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
-        rows.push(("This is not sent: it would have no effect.".to_owned(), cx.theme.strong()));
+        rows.push((t!("This is not sent: it would have no effect.").to_owned(), cx.theme.strong()));
     }
     if let Some(words) = unmet_text(cx, tag) {
         rows.push((format!("! {words}"), cx.theme.strong()));
@@ -69,7 +71,11 @@ pub fn key_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     if cx.snapshot.sample(key).good_value() == Some(turned) {
         return None;
     }
-    Some(format!("First {} := {}; it stays so.", cx.def().tag(key).name, cx.snapshot.format(key, turned)))
+    Some(t!(
+        "First {name} := {format}; it stays so.",
+        name = cx.def().tag(key).name,
+        format = cx.snapshot.format(key, turned)
+    ))
 }
 
 /// `⊘ no heating below 5 cm of water: PLC-1.LT-1 is 3.2 cm`; `None` while it does not block.
@@ -79,17 +85,22 @@ pub fn interlock_text(cx: &ViewContext, lock: &InterlockDef) -> Option<(String, 
     match (lock.status(cx.snapshot.sample(lock.of)), lock.when) {
         (InterlockStatus::Free, _) => None,
         (InterlockStatus::Blocked, InterlockCondition::Bit(_)) => {
-            Some((format!("{mark} {}: {name} says so", lock.message), cx.theme.strong()))
+            Some((t!("{mark} {message}: {name} says so", mark, message = lock.message, name), cx.theme.strong()))
         }
         (
             InterlockStatus::Blocked,
             InterlockCondition::Below(_) | InterlockCondition::Above(_) | InterlockCondition::Is(_),
         ) => {
             let now = value::show(cx, lock.of).with_unit();
-            Some((format!("{mark} {}: {name} is {now}", lock.message), cx.theme.strong()))
+            Some((t!("{mark} {message}: {name} is {now}", mark, message = lock.message, name, now), cx.theme.strong()))
         }
         (InterlockStatus::Unknown(cause), _) => {
-            let words = format!("? unknown: {name} is not good ({}): {}", cause.label(), lock.message);
+            let words = t!(
+                "? unknown: {name} is not good ({cause}): {message}",
+                name,
+                cause = translate(cause.label()),
+                message = lock.message
+            );
             Some((words, cx.theme.trouble()))
         }
     }
@@ -105,10 +116,15 @@ pub fn unmet_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     let actuator = &cx.def().logic.actuators.iter().find(|actuator| actuator.command == tag)?;
     let (need, state) = unmet(cx, actuator)?;
     let now = match cx.snapshot.sample(need).good_value() {
-        Some(now) => format!("is {}", cx.snapshot.format(need, now)),
-        None => "is not known".to_owned(),
+        Some(now) => t!("is {format}", format = cx.snapshot.format(need, now)),
+        None => t!("is not known").to_owned(),
     };
-    Some(format!("effective in {} only ({} {now})", cx.snapshot.format(need, state), cx.def().tag(need).name))
+    Some(t!(
+        "effective in {format} only ({name} {now})",
+        format = cx.snapshot.format(need, state),
+        name = cx.def().tag(need).name,
+        now
+    ))
 }
 
 /// What starting or stopping a sequence does.
@@ -116,28 +132,30 @@ fn sequence_text(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let sequences = &cx.def().logic.sequences;
     if let Some(sequence) = sequences.iter().find(|sequence| sequence.auto == Some((tag, value))) {
         return vec![match (value::is_on(cx, sequence.run), cx.snapshot.text(sequence.step)) {
-            (Some(true), Some(step)) => format!("The sequence goes on with {step} and works the outputs."),
-            (Some(false), _) => "The sequence works the outputs once it is started.".to_owned(),
-            (Some(true) | None, _) => "The sequence works the outputs; where it is, is not known.".to_owned(),
+            (Some(true), Some(step)) => t!("The sequence goes on with {step} and works the outputs.", step),
+            (Some(false), _) => t!("The sequence works the outputs once it is started.").to_owned(),
+            (Some(true) | None, _) => t!("The sequence works the outputs; where it is, is not known.").to_owned(),
         }];
     }
     let Some(sequence) = sequences.iter().find(|sequence| sequence.run == tag) else { return Vec::new() };
     let step = |number: f64| cx.snapshot.format(sequence.step, number);
     if value == 0.0 {
         let now = cx.snapshot.sample(sequence.step).good_value();
-        let at =
-            now.map_or_else(|| "The sequence stops.".to_owned(), |now| format!("The sequence stops in {}.", step(now)));
+        let at = now.map_or_else(
+            || t!("The sequence stops.").to_owned(),
+            |now| t!("The sequence stops in {step}.", step = step(now)),
+        );
         return vec![at, switched_off(cx)];
     }
     let by_itself = sequence.auto.map(|(auto, state)| (cx.snapshot.sample(auto).good_value(), state, auto));
     match by_itself {
         Some((Some(now), state, _)) if now != state => {
-            vec!["In manual no step starts: the commands by hand act from now on.".to_owned()]
+            vec![t!("In manual no step starts: the commands by hand act from now on.").to_owned()]
         }
         Some((None, _, auto)) => {
-            vec![format!("Whether steps start is not known: {} is not known.", cx.def().tag(auto).name)]
+            vec![t!("Whether steps start is not known: {name} is not known.", name = cx.def().tag(auto).name)]
         }
-        Some(_) | None => vec![format!("The sequence starts with {}.", step(sequence.first))],
+        Some(_) | None => vec![t!("The sequence starts with {step}.", step = step(sequence.first))],
     }
 }
 
@@ -153,12 +171,13 @@ fn switched_off(cx: &ViewContext) -> String {
             None => unknown.push(def.short.clone()),
         }
     }
-    let mut words = if on.is_empty() { "No output is on.".to_owned() } else { format!("Off go: {}.", on.join(", ")) };
+    let mut words =
+        if on.is_empty() { t!("No output is on.").to_owned() } else { t!("Off go: {join}.", join = on.join(", ")) };
     if !unknown.is_empty() {
-        words = format!(
-            "{} Not known: {}.",
-            words.replace("No output is on.", "No output is known to be on."),
-            unknown.join(", ")
+        words = t!(
+            "{replace} Not known: {join}.",
+            replace = words.replace("No output is on.", "No output is known to be on."),
+            join = unknown.join(", ")
         );
     }
     words
@@ -185,7 +204,7 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
                 let new = cx.snapshot.format(actuator.command, command);
                 let mut locks = cx.def().logic.interlocks_of(actuator.command, command);
                 let blocked = locks.any(|lock| lock.status(cx.snapshot.sample(lock.of)) == InterlockStatus::Blocked);
-                let but = if blocked { ", blocked" } else { "" };
+                let but = if blocked { t!(", blocked") } else { "" };
                 changes.push(format!("{name} {} {arrow} {new}{but}", value::show(cx, actuator.output).with_unit()));
             }
             (Some(_), Some(_)) => {}
@@ -193,9 +212,9 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
         }
     }
     vec![if changes.is_empty() {
-        "The commands by hand take over; no output changes.".to_owned()
+        t!("The commands by hand take over; no output changes.").to_owned()
     } else {
-        format!("The commands by hand take over: {}.", changes.join(", "))
+        t!("The commands by hand take over: {join}.", join = changes.join(", "))
     }]
 }
 
@@ -227,15 +246,15 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
     let (place, actuator) = logic.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
     if cx.snapshot.watch.disobeys(logic, place, cx.snapshot.at).is_some() {
         let commanded = cx.snapshot.text(actuator.command).unwrap_or_default();
-        return Some((format!("{} not {commanded}", theme.pick("≠", "!=")), theme.trouble()));
+        return Some((t!("{pick} not {commanded}", pick = theme.pick("≠", "!="), commanded), theme.trouble()));
     }
     let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
     let mut statuses = logic.interlocks.iter().filter(blocks).map(|lock| lock.status(cx.snapshot.sample(lock.of)));
     let blocked = statuses.any(|status| status == InterlockStatus::Blocked);
     match news(cx, actuator.command) {
-        Some((_, None)) => return Some((theme.pick("… sent", ".. sent").to_owned(), theme.strong())),
+        Some((_, None)) => return Some((theme.pick(t!("… sent"), t!(".. sent")).to_owned(), theme.strong())),
         Some((outcome, Some(false))) => {
-            let word = outcome.label();
+            let word = translate(outcome.label());
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
         // A command that cannot be read back was taken, which says nothing while it is blocked.
@@ -243,15 +262,15 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
         // Only while the output is as commanded: another mode may have taken over since.
         Some((outcome, Some(true))) if obeys(cx, actuator) => {
             let word = match outcome {
-                Outcome::NotConfirmed(_) => "accepted",
-                Outcome::Unchanged => "as it was",
-                _ => "done",
+                Outcome::NotConfirmed(_) => t!("accepted"),
+                Outcome::Unchanged => t!("as it was"),
+                _ => t!("done"),
             };
-            return Some((format!("{} {word}", theme.pick("✓", "ok")), theme.normal()));
+            return Some((format!("{} {word}", theme.pick("✓", t!("ok"))), theme.normal()));
         }
         Some((_, Some(true))) | None => {}
     }
-    blocked.then(|| (theme.pick("⊘ blocked", "(/) blocked").to_owned(), theme.dim()))
+    blocked.then(|| (theme.pick(t!("⊘ blocked"), t!("(/) blocked")).to_owned(), theme.dim()))
 }
 
 /// Is the output certainly as commanded? One that need not follow its command counts as such.
@@ -267,25 +286,31 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     let Some((place, actuator)) = logic.actuator(tag) else { return Vec::new() };
     let command = cx.def().tag(actuator.command);
     let told = value::show(cx, actuator.command);
-    let mut rows = vec![("command", format!("{} {}", command.name, told.whole()), told.style)];
+    let mut rows = vec![(t!("command"), format!("{} {}", command.name, told.whole()), told.style)];
     let modes: Vec<String> = actuator.needs.iter().map(|(need, _)| value::show(cx, *need).whole()).collect();
     let mode = modes.join(", ");
     match unmet_text(cx, actuator.command) {
-        Some(words) => rows.push(("mode", format!("{mode}: {words}"), theme.strong())),
+        Some(words) => rows.push((t!("mode"), format!("{mode}: {words}"), theme.strong())),
         None if modes.is_empty() => {}
-        None => rows.push(("mode", format!("{mode}: the command acts"), theme.normal())),
+        None => rows.push((t!("mode"), t!("{mode}: the command acts", mode), theme.normal())),
     }
     let locks = logic.interlocks.iter().filter(|lock| lock.tag == actuator.command);
-    rows.extend(locks.filter_map(|lock| interlock_text(cx, lock)).map(|(words, style)| ("blocked", words, style)));
+    rows.extend(locks.filter_map(|lock| interlock_text(cx, lock)).map(|(words, style)| (t!("blocked"), words, style)));
     if let Some(lasts) = guards_disobeyed(cx, place) {
         let (wanted, is) = (told.text, value::show(cx, actuator.output).with_unit());
-        let words = format!("{} commanded {wanted}, still {is} after {}", theme.pick("≠", "!="), age(lasts));
-        rows.push(("differs", words, theme.trouble()));
+        let words = t!(
+            "{pick} commanded {wanted}, still {is} after {age}",
+            pick = theme.pick("≠", "!="),
+            wanted,
+            is,
+            age = age(lasts)
+        );
+        rows.push((t!("differs"), words, theme.trouble()));
     }
     if let Some((outcome, well)) = news(cx, actuator.command) {
         let words = outcome.to_string();
         let style = if well == Some(false) { theme.trouble() } else { theme.strong() };
-        rows.push(("last", words, style));
+        rows.push((t!("last"), words, style));
     }
     rows
 }

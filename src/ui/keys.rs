@@ -97,7 +97,10 @@ pub fn chords_of<A>(table: &[Key<A>]) -> Vec<Chord> {
 
 /// The rows of a table for footer and help.
 pub fn hints<A>(table: &[Key<A>]) -> Vec<Hint> {
-    table.iter().map(|key| Hint { needs: key.needs, ..Hint::new(key.chord.name(), translate(key.label), translate(key.help)) }).collect()
+    table
+        .iter()
+        .map(|key| Hint { needs: key.needs, ..Hint::new(key.chord.name(), translate(key.label), translate(key.help)) })
+        .collect()
 }
 
 impl Chord {

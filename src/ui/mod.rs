@@ -31,9 +31,9 @@ use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
-    text::Language,
     access::SessionStatus,
     plant::{alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot},
+    text::Language,
 };
 use extension::Extension;
 use keys::Global;

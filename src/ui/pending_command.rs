@@ -1,6 +1,7 @@
 //! The last command of this terminal, from the key to its outcome.
 
 use super::{Effect, Model, chrome, modal::Modal};
+use crate::t;
 use crate::{
     access::Credentials,
     plant::command::{Command, CommandId, CommandStatus, Outcome, Refusal},
@@ -47,7 +48,7 @@ impl Model {
     pub(super) fn send_command(&mut self, command: Command, credentials: Option<Credentials>) -> Option<Effect> {
         self.commands_sent = self.commands_sent.wrapping_add(1);
         let id = CommandId { terminal: self.terminal, number: self.commands_sent };
-        let undelivered = self.session.gone.as_ref().map(|_| "the station has gone");
+        let undelivered = self.session.gone.as_ref().map(|_| t!("the station has gone"));
         let changed_at = self.clock.phase;
         let expected_value = command.expected_value.or_else(|| self.snapshot.expected_value(&command.kind));
         let command = Command { id, run: self.snapshot.run, expected_value, ..command };
@@ -71,7 +72,7 @@ impl Model {
     pub(super) fn close_confirmation(&mut self) {
         let Some(pending) = &self.pending_command else { return };
         let refused = match (pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
-            (Some(why), _) => Some(format!("not sent: {why}")),
+            (Some(why), _) => Some(t!("not sent: {why}", why)),
             (None, Some(Outcome::Refused(Refusal::NotReauthenticated(why)))) => Some(why.clone()),
             (None, Some(_)) => None,
             (None, None) => return,

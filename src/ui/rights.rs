@@ -1,6 +1,7 @@
 //! Rights in the terminal: a missing right is shown before a command is tried. The station decides.
 
 use super::ViewContext;
+use crate::t;
 use crate::{
     access::right,
     plant::{command::CommandKind, role::Role},
@@ -9,18 +10,18 @@ use crate::{
 /// `Technician`.
 pub fn title(role: Role) -> &'static str {
     match role {
-        Role::Viewer => "Viewer",
-        Role::Technician => "Technician",
-        Role::Supervisor => "Supervisor",
+        Role::Viewer => t!("Viewer"),
+        Role::Technician => t!("Technician"),
+        Role::Supervisor => t!("Supervisor"),
     }
 }
 
 /// What a role may, in words.
 pub fn words(role: Role) -> &'static str {
     match role {
-        Role::Viewer => "view everything: process, curves, alarms, reports",
-        Role::Technician => "view everything, control the process, acknowledge alarms, write reports",
-        Role::Supervisor => "do everything: also users, the audit list, line settings, tests, stopping the station",
+        Role::Viewer => t!("view everything: process, curves, alarms, reports"),
+        Role::Technician => t!("view everything, control the process, acknowledge alarms, write reports"),
+        Role::Supervisor => t!("do everything: also users, the audit list, line settings, tests, stopping the station"),
     }
 }
 
@@ -32,8 +33,13 @@ pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
 /// The same for a role.
 pub fn lacks(cx: &ViewContext, role: Role) -> Option<String> {
     match &cx.session.who {
-        None => Some(format!("needs {}; no user is logged in", title(role))),
-        Some(who) if who.role < role => Some(format!("needs {}; {} is {}", title(role), who.user, title(who.role))),
+        None => Some(t!("needs {title}; no user is logged in", title = title(role))),
+        Some(who) if who.role < role => Some(t!(
+            "needs {title}; {user} is {title2}",
+            title = title(role),
+            user = who.user,
+            title2 = title(who.role)
+        )),
         Some(_) => None,
     }
 }

@@ -1,5 +1,6 @@
 //! The session of this terminal: what is open to its user, the idle lock and its warning, and activity messages to the station.
 
+use crate::t;
 use std::{mem, sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -244,8 +245,9 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     (model.snapshot, model.pending_command, model.kept) = (snapshot, None, None);
     model.plants = model.plants.wrapping_add(1);
     let words = vec![
-        "The plant file changed".to_owned(),
-        "The station has taken up another plant file. What was open here is closed; nothing of it was sent.".to_owned(),
+        t!("The plant file changed").to_owned(),
+        t!("The station has taken up another plant file. What was open here is closed; nothing of it was sent.")
+            .to_owned(),
     ];
     with_tabs(model, |tabs, cx| {
         tabs.login.on_session_status(cx);
@@ -253,7 +255,7 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
         Vec::new()
     });
     let closed = is_closed(&model.session);
-    model.modal = (!closed).then(|| Modal::Notice(Notice::new("plant file", words)));
+    model.modal = (!closed).then(|| Modal::Notice(Notice::new(t!("plant file"), words)));
     if closed { vec![UiAction::Show(Tab::Login)] } else { Vec::new() }
 }
 

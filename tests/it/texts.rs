@@ -34,7 +34,10 @@ impl Found {
         }
     }
     fn within_label(&mut self, name: &syn::Ident, visit: impl FnOnce(&mut Self)) {
-        let before = std::mem::replace(&mut self.in_label, ["label", "word", "message", "advice", "mode"].iter().any(|label| name == label));
+        let before = std::mem::replace(
+            &mut self.in_label,
+            ["label", "word", "words", "message", "advice", "mode"].iter().any(|label| name == label),
+        );
         visit(self);
         self.in_label = before;
     }
@@ -61,7 +64,7 @@ impl<'a> Visit<'a> for Found {
         let of_keys = row.path.segments.last().is_some_and(|name| name.ident == "Key");
         for field in row.fields.iter().filter(|_| of_keys) {
             if let (syn::Member::Named(name), syn::Expr::Lit(literal)) = (&field.member, &field.expr)
-                && (["label", "word", "message", "advice", "mode"].iter().any(|label| name == label))
+                && (["label", "word", "words", "message", "advice", "mode"].iter().any(|label| name == label))
                 && let syn::Lit::Str(text) = &literal.lit
             {
                 self.add(text.value());
@@ -70,12 +73,12 @@ impl<'a> Visit<'a> for Found {
         visit::visit_expr_struct(self, row);
     }
     fn visit_expr_call(&mut self, call: &'a syn::ExprCall) {
-        // `Key::new(chord, label, help, action)`, or `row`, is a row of a key table.
+        // Rows of the tables of keys and of alarm metrics.
         let name = match &*call.func {
             syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
             _ => Vec::new(),
         };
-        if name == ["row"] || name == ["Key", "new"] {
+        if [vec!["row"], vec!["goal"], vec!["Key", "new"]].iter().any(|row| *row == name) {
             for argument in &call.args {
                 if let syn::Expr::Lit(literal) = argument
                     && let syn::Lit::Str(text) = &literal.lit
@@ -98,7 +101,7 @@ impl<'a> Visit<'a> for Found {
                 self.add(text.value());
             }
         }
-        if found.path.is_ident("tabs") {
+        if found.path.is_ident("tabs") || found.path.is_ident("motions") || found.path.is_ident("macro_rules") {
             literals(tokens.clone()).into_iter().for_each(|text| self.add(text));
         }
         // Arguments of any macro may hold texts too.
@@ -112,13 +115,16 @@ impl<'a> Visit<'a> for Found {
     }
 }
 
-/// The strings between the tokens of a table.
+/// The strings among the tokens of a table.
 fn literals(tokens: proc_macro2::TokenStream) -> Vec<String> {
-    let text = |token| match token {
-        proc_macro2::TokenTree::Literal(literal) => syn::parse_str::<LitStr>(&literal.to_string()).ok(),
-        _ => None,
+    let texts = |token| match token {
+        proc_macro2::TokenTree::Group(group) => literals(group.stream()),
+        proc_macro2::TokenTree::Literal(literal) => {
+            syn::parse_str::<LitStr>(&literal.to_string()).map(|text| text.value()).into_iter().collect()
+        }
+        _ => Vec::new(),
     };
-    tokens.into_iter().filter_map(text).map(|text| text.value()).collect()
+    tokens.into_iter().flat_map(texts).collect()
 }
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

@@ -1,6 +1,8 @@
 //! The line of alarms that is on every tab: the most urgent one, how many there are, and why some might not be seen.
 
 use super::{Canvas, Model, SILENCE, ViewContext, between, fit_words, running, width};
+use crate::t;
+use crate::text::translate;
 use crate::{
     plant::{
         alarm::AlarmState,
@@ -32,7 +34,7 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
         let room = canvas.width().saturating_sub(1);
         match [blind, trouble].into_iter().flatten().reduce(|blind, trouble| format!("{blind}   {trouble}")) {
             Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
-            None => canvas.text(1, 0, "no alarms", cx.theme.dim()),
+            None => canvas.text(1, 0, t!("no alarms"), cx.theme.dim()),
         };
         let suppressed = suppressed_words(cx);
         if canvas.is_blank(room.saturating_sub(width(&suppressed) + 2), 0, width(&suppressed) + 2) {
@@ -50,9 +52,9 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     // The key is told where it is meant for this very alarm: on the alarms tab it is for the selected one.
     let meant = model.alarm_to_acknowledge().is_some_and(|meant| meant.id == alarm.id);
     let may = rights::missing(cx, &alarm.acknowledge()).is_none();
-    let ack = if waiting && meant && may { "a ack " } else { "" };
+    let ack = if waiting && meant && may { t!("a ack ") } else { "" };
     let worry = worry_text(model, cx);
-    let (suppressed, silenced) = (suppressed_words(cx), if is_silenced(cx) { "silenced   " } else { "" });
+    let (suppressed, silenced) = (suppressed_words(cx), if is_silenced(cx) { t!("silenced   ") } else { "" });
     let suppressed = if suppressed.is_empty() { suppressed } else { format!("{suppressed}   ") };
     let counts = counts(cx);
     // A long text must not push out the counts, the mark of an unacknowledged alarm and the reason for doubt.
@@ -78,8 +80,8 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 
 /// Why more may be wrong than can be seen: the station evaluates nothing, or there is a flood.
 fn worry_text(model: &Model, cx: &ViewContext) -> String {
-    let blind = if silent_text(model).is_some() { "alarms not evaluated   " } else { "" };
-    let flood = if cx.snapshot.alarm_metrics.flood_since.is_some() { "FLOOD   " } else { "" };
+    let blind = if silent_text(model).is_some() { t!("alarms not evaluated   ") } else { "" };
+    let flood = if cx.snapshot.alarm_metrics.flood_since.is_some() { t!("FLOOD   ") } else { "" };
     format!("{blind}{flood}")
 }
 
@@ -90,7 +92,7 @@ fn suppressed_words(cx: &ViewContext) -> String {
         cx.snapshot.suppressed.iter().filter(|suppressed| suppressed.state != AlarmState::SuppressedByDesign);
     match by_operator.count() {
         0 => String::new(),
-        many => format!("{many} suppressed"),
+        many => t!("{many} suppressed", many),
     }
 }
 
@@ -106,17 +108,17 @@ fn blind_text(model: &Model, cx: &ViewContext) -> Option<String> {
     let silent = silent_text(model);
     let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
         LineState::Connected => None,
-        LineState::Disconnected => Some(format!("{} disconnected", line.name)),
-        LineState::Testing => Some(format!("{} given to a test", line.name)),
-        LineState::Connecting | LineState::Waiting { .. } => Some(format!("{} not connected", line.name)),
+        LineState::Disconnected => Some(t!("{name} disconnected", name = line.name)),
+        LineState::Testing => Some(t!("{name} given to a test", name = line.name)),
+        LineState::Connecting | LineState::Waiting { .. } => Some(t!("{name} not connected", name = line.name)),
     });
     let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
     let devices = devices.filter_map(|device| match snapshot.device(device.id).state {
-        DeviceState::Down { .. } => Some(format!("{} not answering", device.name)),
+        DeviceState::Down { .. } => Some(t!("{name} not answering", name = device.name)),
         DeviceState::Answering | DeviceState::Failing(_)
             if snapshot.device(device.id).diagnosis == Some(Reason::NoValues) =>
         {
-            Some(format!("{} has no valid values", device.name))
+            Some(t!("{name} has no valid values", name = device.name))
         }
         DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
     });
@@ -125,20 +127,20 @@ fn blind_text(model: &Model, cx: &ViewContext) -> Option<String> {
 }
 
 fn not_judged(why: &str) -> String {
-    format!("alarms not evaluated: {why}")
+    t!("alarms not evaluated: {why}", why)
 }
 
 /// Why nothing is heard of the station.
 fn silent_text(model: &Model) -> Option<String> {
     match &model.session.gone {
-        Some(why) => Some(format!("station gone, {why}")),
-        None => (model.clock.silent >= SILENCE).then(|| "station silent".to_owned()),
+        Some(why) => Some(t!("station gone, {why}", why)),
+        None => (model.clock.silent >= SILENCE).then(|| t!("station silent").to_owned()),
     }
 }
 
 /// `history: disk full`; nothing while the history is well.
 pub fn history_text(cx: &ViewContext) -> Option<String> {
-    cx.snapshot.history.words().map(|words| format!("history: {words}"))
+    cx.snapshot.history.words().map(|words| t!("history: {words}", words))
 }
 
 /// `UNACK 00:41  TIC-1.PV temperature high  72.4 °C`.
@@ -173,7 +175,7 @@ fn state_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
         | AlarmState::SuppressedByDesign
         | AlarmState::OutOfService => alarm.raised_at,
     };
-    format!("{} {}", alarm.state.word(), running(between(since, cx.now)))
+    format!("{} {}", translate(alarm.state.word()), running(between(since, cx.now)))
 }
 
 /// How many of each priority: `[1]!1 (3)2`.

@@ -1,6 +1,7 @@
 //! The header: plant, lines, simulation, user and clock.
 
 use super::*;
+use crate::t;
 
 pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
@@ -27,26 +28,26 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, String, Style)> {
     let theme = cx.theme;
     let time = if let Some(gone) = model.gone() {
-        (0, format!("STATION GONE {} s: reconnecting", gone.as_secs()), theme.trouble())
+        (0, t!("STATION GONE {gone} s: reconnecting", gone = gone.as_secs()), theme.trouble())
     } else if model.clock.silent >= SILENCE {
-        (0, format!("STATION SILENT {}", running(model.clock.silent)), theme.trouble())
+        (0, t!("STATION SILENT {running}", running = running(model.clock.silent)), theme.trouble())
     } else {
         (0, clock(cx.now, &cx.def().time_zone), theme.normal())
     };
     let mut parts = vec![time, who_text(model, cx, role)];
     parts.extend(cx.extension.iter().flat_map(|extension| extension.header(cx)));
     if cx.snapshot.speed != 1.0 {
-        parts.push((8, format!("speed ×{}", cx.snapshot.speed), theme.strong()));
+        parts.push((8, t!("speed ×{speed}", speed = cx.snapshot.speed), theme.strong()));
     }
     let history = &cx.snapshot.history;
     if history.lost > 0 {
-        parts.push((1, format!("{} records lost", history.lost), theme.trouble()));
+        parts.push((1, t!("{lost} records lost", lost = history.lost), theme.trouble()));
     }
     if history.failing.is_some() {
         let share = history.waiting * 100 / history.waiting_max.max(1);
-        parts.push((2, format!("not recording, buffer {share} %"), theme.trouble()));
+        parts.push((2, t!("not recording, buffer {share} %", share), theme.trouble()));
     } else if history.trouble.is_some() {
-        parts.push((2, "history: see 3".to_owned(), theme.trouble()));
+        parts.push((2, t!("history: see 3").to_owned(), theme.trouble()));
     }
     for line in cx.def().lines.iter().rev() {
         let (text, style) = line_words(cx, line);
@@ -60,12 +61,12 @@ pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(
 /// Who sits here: `user: tech1 (Technician)`, `LOCKED by anna`, and when it will be locked.
 pub(super) fn who_text(model: &Model, cx: &ViewContext, role: bool) -> (usize, String, Style) {
     let theme = cx.theme;
-    let Some(who) = &model.session.who else { return (9, "not logged in".to_owned(), theme.strong()) };
+    let Some(who) = &model.session.who else { return (9, t!("not logged in").to_owned(), theme.strong()) };
     let user = fit(&who.user, 12);
     match model.locks_in() {
-        _ if model.session.locked => (2, format!("LOCKED by {user}"), theme.trouble()),
-        Some(left) => (1, format!("locks in {} s: press a key", left.as_secs()), theme.trouble()),
-        None if role => (9, format!("user: {user} ({})", rights::title(who.role)), theme.dim()),
+        _ if model.session.locked => (2, t!("LOCKED by {user}", user), theme.trouble()),
+        Some(left) => (1, t!("locks in {left} s: press a key", left = left.as_secs()), theme.trouble()),
+        None if role => (9, t!("user: {user} ({title})", user, title = rights::title(who.role)), theme.dim()),
         None => (9, user, theme.dim()),
     }
 }
@@ -83,17 +84,26 @@ pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
             let busy = counters.utilisation * 100.0;
             let overloaded = is_overloaded(status);
             let style = if replies && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
-            let overload = if overloaded { " OVERLOADED" } else { "" };
-            let silent = if replies { "" } else { "no reply, " };
-            (format!("{} {silent}load {busy:.0} %{overload}", line.name), style)
+            let overload = if overloaded { t!(" OVERLOADED") } else { "" };
+            let silent = if replies { "" } else { t!("no reply, ") };
+            (
+                t!(
+                    "{name} {silent}load {busy} %{overload}",
+                    name = line.name,
+                    silent,
+                    busy = format!("{busy:.0}"),
+                    overload
+                ),
+                style,
+            )
         }
-        LineState::Connecting => (format!("{} connecting", line.name), cx.theme.trouble()),
+        LineState::Connecting => (t!("{name} connecting", name = line.name), cx.theme.trouble()),
         LineState::Waiting { retry_at, .. } => {
             let left = between(cx.now, *retry_at).as_secs();
-            (format!("{} DOWN retry {left}s", line.name), cx.theme.trouble())
+            (t!("{name} DOWN retry {left}s", name = line.name, left), cx.theme.trouble())
         }
-        LineState::Disconnected => (format!("{} DISCONNECTED", line.name), cx.theme.trouble()),
-        LineState::Testing => (format!("{} TEST", line.name), cx.theme.trouble()),
+        LineState::Disconnected => (t!("{name} DISCONNECTED", name = line.name), cx.theme.trouble()),
+        LineState::Testing => (t!("{name} TEST", name = line.name), cx.theme.trouble()),
     }
 }
 

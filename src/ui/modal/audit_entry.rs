@@ -1,5 +1,6 @@
 //! All fields of one audit entry: what the list has no room for.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -32,21 +33,22 @@ impl AuditEntryDialog {
         let entry = &self.0;
         let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
         let at = entry.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
-        let chain_hash = entry.chain_hash.map_or((String::new(), "not in the audit log".to_owned()), |chain_hash| {
-            (chain_hash.number.to_string(), chain_hash.hash_hex())
-        });
+        let chain_hash =
+            entry.chain_hash.map_or((String::new(), t!("not in the audit log").to_owned()), |chain_hash| {
+                (chain_hash.number.to_string(), chain_hash.hash_hex())
+            });
         let lines = [
-            ("number", chain_hash.0),
-            ("time", at),
-            ("who", entry.by.to_string()),
-            ("from", entry.from.to_string()),
-            ("action", entry.action.to_string()),
-            ("target", entry.target.to_string()),
-            ("old", told(&entry.old)),
-            ("new", told(&entry.new)),
-            ("outcome", entry.outcome.to_string()),
-            ("note", told(&entry.note)),
-            ("hash", chain_hash.1),
+            (t!("number"), chain_hash.0),
+            (t!("time"), at),
+            (t!("who"), entry.by.to_string()),
+            (t!("from"), entry.from.to_string()),
+            (t!("action"), entry.action.to_string()),
+            (t!("target"), entry.target.to_string()),
+            (t!("old"), told(&entry.old)),
+            (t!("new"), told(&entry.new)),
+            (t!("outcome"), entry.outcome.to_string()),
+            (t!("note"), told(&entry.note)),
+            (t!("hash"), chain_hash.1),
         ];
         lines.into_iter().filter(|(_, words)| !words.is_empty()).collect()
     }
@@ -56,7 +58,7 @@ impl AuditEntryDialog {
         let lines = self.lines(cx).into_iter().map(|(name, words)| (name, broken(&words, room)));
         let lines: Vec<(&str, Vec<String>)> = lines.collect();
         let height = lines.iter().map(|(_, rows)| to_u16(rows.len())).sum::<u16>();
-        let mut canvas = window(cx, frame, body, "audit entry", (room + NAMES, height));
+        let mut canvas = window(cx, frame, body, t!("audit entry"), (room + NAMES, height));
         let mut y = 0;
         for (name, rows) in &lines {
             canvas.text(0, y, &pad(name, NAMES), cx.theme.dim());

@@ -1,5 +1,6 @@
 //! One of a few: the values of an enumeration, or the actions of a device.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -52,7 +53,7 @@ impl Choice {
         });
         let now = cx.snapshot.sample(tag).value;
         let selected = choices().position(|(number, _)| Some(*number as f64) == now).unwrap_or(0);
-        Choice { title: format!("write {} {}", def.name, def.label), rows: rows.collect(), selected }
+        Choice { title: t!("write {name} {label}", name = def.name, label = def.label), rows: rows.collect(), selected }
     }
 
     /// The actions of a device; `None` if it has none.
@@ -63,7 +64,7 @@ impl Choice {
             Row { text: format!("{}  {}", action.name, cx.def().tag(action.tag).label), tag: action.tag, next }
         });
         let rows: Vec<Row> = rows.collect();
-        (!rows.is_empty()).then(|| Choice { title: format!("actions of {}", def.name), rows, selected: 0 })
+        (!rows.is_empty()).then(|| Choice { title: t!("actions of {name}", name = def.name), rows, selected: 0 })
     }
 
     pub(super) fn on_key(mut self, _cx: &ViewContext, event: KeyEvent) -> Next {
@@ -82,7 +83,7 @@ impl Choice {
         let inner = self.rows.iter().map(|row| width(&row.text)).max().unwrap_or(0).max(46);
         let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(shown) + 4));
         if let Some(row) = self.rows.get(self.selected) {
-            canvas.text(0, 0, &format!("now {}", value::show(cx, row.tag).whole()), cx.theme.normal());
+            canvas.text(0, 0, &t!("now {whole}", whole = value::show(cx, row.tag).whole()), cx.theme.normal());
             canvas.text(0, 1, &wire_text(cx.def().tag(row.tag)), cx.theme.dim());
         }
         for (y, n, row) in on_screen(&self.rows, first, shown) {
@@ -91,6 +92,6 @@ impl Choice {
             canvas.text(2, y + 2, &row.text, style);
         }
         let last = canvas.height().saturating_sub(1);
-        canvas.text(0, last, "↑↓ select   ⏎ next   Esc cancel", cx.theme.strong());
+        canvas.text(0, last, t!("↑↓ select   ⏎ next   Esc cancel"), cx.theme.strong());
     }
 }

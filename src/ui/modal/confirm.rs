@@ -1,5 +1,6 @@
 //! "Do it or not": the window that carries a finished intent.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -62,11 +63,11 @@ impl Confirm {
     /// Leave? Says what ends with it.
     pub fn quit(leaving: Leaving) -> Confirm {
         let ends = match leaving {
-            Leaving::Station => "Polling and alarms stop too: the station runs in this terminal.",
-            Leaving::Demo => "The demonstration ends: its simulated plant, polling and alarms stop.",
-            Leaving::Terminal => "Only this terminal closes. Polling and alarms go on.",
+            Leaving::Station => t!("Polling and alarms stop too: the station runs in this terminal."),
+            Leaving::Demo => t!("The demonstration ends: its simulated plant, polling and alarms stop."),
+            Leaving::Terminal => t!("Only this terminal closes. Polling and alarms go on."),
         };
-        Confirm::new(Intent::Quit, "quit", vec!["Quit?".to_owned(), ends.to_owned()])
+        Confirm::new(Intent::Quit, t!("quit"), vec![t!("Quit?").to_owned(), ends.to_owned()])
     }
 
     fn new(intent: Intent, title: impl Into<String>, notes: Vec<String>) -> Confirm {
@@ -95,7 +96,7 @@ impl Confirm {
         let value = if rounded.is_some() { cx.snapshot.held(tag, value) } else { value };
         let intent = Intent::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
-        let confirm = Confirm::new(intent, format!("write {}", def.name), notes);
+        let confirm = Confirm::new(intent, t!("write {name}", name = def.name), notes);
         Confirm { expected: Some(ConfirmedValue::new(cx, tag)), ..confirm }.with_reauthentication(cx)
     }
 
@@ -141,31 +142,31 @@ impl Confirm {
     /// What Enter does.
     pub fn verb(&self) -> &'static str {
         match &self.intent {
-            Intent::Quit => "quit",
-            Intent::Command(CommandKind::Write { .. }) => "write and verify",
+            Intent::Quit => t!("quit"),
+            Intent::Command(CommandKind::Write { .. }) => t!("write and verify"),
             Intent::Command(CommandKind::Alarm(alarm_command)) => match alarm_command {
-                AlarmCommand::Acknowledge { .. } | AlarmCommand::AcknowledgeAll { .. } => "acknowledge",
-                AlarmCommand::Silence => "silence",
-                AlarmCommand::Reset(_) => "reset",
-                AlarmCommand::Shelve { .. } => "shelve",
-                AlarmCommand::Unshelve(_) => "unshelve",
-                AlarmCommand::OutOfService(_) => "put out of service",
-                AlarmCommand::InService(_) => "put in service",
+                AlarmCommand::Acknowledge { .. } | AlarmCommand::AcknowledgeAll { .. } => t!("acknowledge"),
+                AlarmCommand::Silence => t!("silence"),
+                AlarmCommand::Reset(_) => t!("reset"),
+                AlarmCommand::Shelve { .. } => t!("shelve"),
+                AlarmCommand::Unshelve(_) => t!("unshelve"),
+                AlarmCommand::OutOfService(_) => t!("put out of service"),
+                AlarmCommand::InService(_) => t!("put in service"),
             },
-            Intent::Command(CommandKind::Refresh(_)) => "refresh",
-            Intent::Command(CommandKind::Connect(_, true)) => "connect",
-            Intent::Command(CommandKind::Connect(_, false)) => "disconnect",
-            Intent::Command(CommandKind::Configure(_)) => "use these settings",
-            Intent::Command(CommandKind::SaveSettings(_)) => "save",
-            Intent::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => "scan",
-            Intent::Command(CommandKind::Test(..)) => "send",
-            Intent::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => "stop",
-            Intent::Command(CommandKind::ReadSets) => "read",
-            Intent::Command(CommandKind::HandOver) => "hand over",
-            Intent::Command(CommandKind::TakeOver) => "take over",
-            Intent::Command(CommandKind::SaveSet { replace: true, .. }) => "replace it",
-            Intent::Command(CommandKind::SaveSet { replace: false, .. }) => "save",
-            Intent::Command(CommandKind::Restore(_)) => "write and verify",
+            Intent::Command(CommandKind::Refresh(_)) => t!("refresh"),
+            Intent::Command(CommandKind::Connect(_, true)) => t!("connect"),
+            Intent::Command(CommandKind::Connect(_, false)) => t!("disconnect"),
+            Intent::Command(CommandKind::Configure(_)) => t!("use these settings"),
+            Intent::Command(CommandKind::SaveSettings(_)) => t!("save"),
+            Intent::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => t!("scan"),
+            Intent::Command(CommandKind::Test(..)) => t!("send"),
+            Intent::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => t!("stop"),
+            Intent::Command(CommandKind::ReadSets) => t!("read"),
+            Intent::Command(CommandKind::HandOver) => t!("hand over"),
+            Intent::Command(CommandKind::TakeOver) => t!("take over"),
+            Intent::Command(CommandKind::SaveSet { replace: true, .. }) => t!("replace it"),
+            Intent::Command(CommandKind::SaveSet { replace: false, .. }) => t!("save"),
+            Intent::Command(CommandKind::Restore(_)) => t!("write and verify"),
         }
     }
 
@@ -176,7 +177,7 @@ impl Confirm {
 
     /// What Esc does.
     pub fn escape(&self) -> &'static str {
-        if self.is_quit() { "stay" } else { "cancel" }
+        if self.is_quit() { t!("stay") } else { t!("cancel") }
     }
 
     /// Is it certainly without effect now?
@@ -278,7 +279,7 @@ impl Confirm {
             form.view(cx, canvas, y);
             let y = y + form.rows();
             if self.waiting {
-                canvas.text(0, y, "asking the station …", cx.theme.dim());
+                canvas.text(0, y, t!("asking the station …"), cx.theme.dim());
             }
             let room = canvas.width();
             for (n, words) in self.problem.iter().flat_map(|words| wrap(words, room)).enumerate() {
@@ -311,8 +312,8 @@ impl Confirm {
         rows.extend(told.flat_map(|words| wrap(&words, room)).map(|line| (line, cx.theme.trouble())));
         let yes = if self.wants_y() { "y".to_owned() } else { cx.theme.enter("⏎") };
         let keys = match self.is_refused(cx) {
-            true => format!("Esc {}", self.escape()),
-            false => format!("{yes} {}   Esc {}", self.verb(), self.escape()),
+            true => t!("Esc {escape}", escape = self.escape()),
+            false => t!("{yes} {verb}   Esc {escape}", yes, verb = self.verb(), escape = self.escape()),
         };
         let inner = rows.iter().map(|(text, _)| width(text)).max().unwrap_or(0).max(width(&keys));
         let inner = inner.max(self.reauthentication.as_ref().map_or(0, Form::width));
@@ -331,8 +332,8 @@ impl Confirm {
 /// What is filled in where a tag asks for it again.
 fn reauthentication_form(kind: Reauthentication) -> Form {
     Form::new(match kind {
-        Reauthentication::Password => vec![Field::secret("your password again")],
-        Reauthentication::SecondUser => vec![Field::name("second user"), Field::secret("password")],
+        Reauthentication::Password => vec![Field::secret(t!("your password again"))],
+        Reauthentication::SecondUser => vec![Field::name(t!("second user")), Field::secret(t!("password"))],
     })
 }
 
@@ -348,8 +349,10 @@ fn credentials(form: &Form) -> Credentials {
 pub(super) fn old_and_new(cx: &ViewContext, tag: TagId, new: f64) -> String {
     let new = format!("{} {}", cx.snapshot.format(tag, new), cx.snapshot.unit(tag));
     match cx.def().tag(tag).access {
-        Access::Write => format!("writes {}", new.trim_end()),
-        Access::Read | Access::ReadWrite => format!("old {}  →  new {}", value::show(cx, tag).whole(), new.trim_end()),
+        Access::Write => t!("writes {trim_end}", trim_end = new.trim_end()),
+        Access::Read | Access::ReadWrite => {
+            t!("old {whole}  →  new {trim_end}", whole = value::show(cx, tag).whole(), trim_end = new.trim_end())
+        }
     }
 }
 
@@ -357,7 +360,13 @@ pub(super) fn old_and_new(cx: &ViewContext, tag: TagId, new: f64) -> String {
 pub fn wire_text(def: &TagDef) -> String {
     let fc = def.write_function().unwrap_or(def.point.table.read_fc());
     let address = def.point.address;
-    format!("{} / 0x{address:04X}, FC {fc:02} / 0x{fc:02X}", def.point.table.modicon(address))
+    t!(
+        "{modicon} / 0x{address}, FC {fc} / 0x{fc2}",
+        modicon = def.point.table.modicon(address),
+        address = format!("{address:04X}"),
+        fc = format!("{fc:02}"),
+        fc2 = format!("{fc:02X}")
+    )
 }
 
 /// What the profile wants said before a write.
@@ -365,8 +374,8 @@ pub(super) fn write_notes(def: &TagDef) -> Vec<String> {
     let mut notes: Vec<String> = def.confirm.iter().cloned().collect();
     match def.confidence {
         Confidence::Proven | Confidence::High => {}
-        Confidence::Medium => notes.push("! not verified: this row of the register map has one source".to_owned()),
-        Confidence::Low => notes.push("! not verified: this row of the register map is inferred".to_owned()),
+        Confidence::Medium => notes.push(t!("! not verified: this row of the register map has one source").to_owned()),
+        Confidence::Low => notes.push(t!("! not verified: this row of the register map is inferred").to_owned()),
     }
     notes
 }

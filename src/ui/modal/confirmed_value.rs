@@ -1,5 +1,6 @@
 //! The value displayed when a window opened. If it changes before the write, the window asks again.
 
+use crate::t;
 use crate::{
     plant::{command::Outcome, def::TagId},
     ui::{ViewContext, widgets::text::clock},
@@ -48,23 +49,25 @@ impl ConfirmedValue {
         let now = cx.snapshot.sample(self.tag).good_value();
         let other = now.is_some() && now != self.value && self.asked < ASKED_MAX;
         match (other, self.asked) {
-            (true, _) => Some(format!("{}; ⏎ asks again", self.words(cx, self.value, now))),
+            (true, _) => Some(t!("{words}; ⏎ asks again", words = self.words(cx, self.value, now))),
             (false, 0) => None,
-            (false, _) => Some(format!("{}; ⏎ writes all the same", self.words(cx, self.before, self.value))),
+            (false, _) => Some(t!("{words}; ⏎ writes all the same", words = self.words(cx, self.before, self.value))),
         }
     }
 
     /// `changed to 65.0 °C by anna 14:02:31 (was 70.0)`.
     fn words(&self, cx: &ViewContext, before: Option<f64>, now: Option<f64>) -> String {
-        let text = |value: Option<f64>| value.map_or("unknown".to_owned(), |value| cx.snapshot.format(self.tag, value));
+        let text =
+            |value: Option<f64>| value.map_or(t!("unknown").to_owned(), |value| cx.snapshot.format(self.tag, value));
         let unit = cx.snapshot.unit(self.tag);
         let by = cx.snapshot.commands.iter().find(|status| {
             status.outcome == Outcome::Verified
                 && status.command.kind.written().is_some_and(|(tag, new)| tag == self.tag && Some(new) == now)
         });
-        let by =
-            by.map_or(String::new(), |status| format!(" by {} {}", status.by, clock(status.at, &cx.def().time_zone)));
+        let by = by.map_or(String::new(), |status| {
+            t!(" by {by} {clock}", by = status.by, clock = clock(status.at, &cx.def().time_zone))
+        });
         let now = format!("{} {unit}", text(now));
-        format!("changed to {}{by} (was {})", now.trim_end(), text(before))
+        t!("changed to {trim_end}{by} (was {text})", trim_end = now.trim_end(), by, text = text(before))
     }
 }

@@ -1,5 +1,6 @@
 //! A number for a tag: old value, new value, range, address, and what the profile wants said.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -48,7 +49,7 @@ impl Entry {
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
             let checked = match self.line.missed() {
-                true => Err("the text was cut; Ctrl-U clears the line".to_owned()),
+                true => Err(t!("the text was cut; Ctrl-U clears the line").to_owned()),
                 false => number::check(cx, self.tag, &self.line.text()),
             };
             match checked {
@@ -87,8 +88,8 @@ impl Entry {
     /// What cannot be in a number is not shown, it might be a secret; the number is not written either.
     fn reject(&mut self, c: char) {
         self.line.miss();
-        let named = if c.is_control() || c.is_whitespace() { "a blank".to_owned() } else { format!("\"{c}\"") };
-        self.problem = Some(format!("{named} is no part of a number; Ctrl-U empties the line"));
+        let named = if c.is_control() || c.is_whitespace() { t!("a blank").to_owned() } else { format!("\"{c}\"") };
+        self.problem = Some(t!("{named} is no part of a number; Ctrl-U empties the line", named));
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
@@ -111,13 +112,13 @@ impl Entry {
             .max()
             .unwrap_or(0)
             .max(46);
-        let title = format!("write {} {}", def.name, def.label);
+        let title = t!("write {name} {label}", name = def.name, label = def.label);
         let told = to_u16(problem.len().max(1));
         let mut canvas = window(cx, frame, body, &title, (inner, to_u16(rows.len()) + 3 + told));
         let old = value::show(cx, self.tag);
-        let x = canvas.text(0, 0, "old ", theme.dim());
+        let x = canvas.text(0, 0, t!("old "), theme.dim());
         let x = canvas.text(x, 0, &old.whole(), old.style);
-        let x = canvas.text(x, 0, "  →  new ", theme.dim());
+        let x = canvas.text(x, 0, t!("  →  new "), theme.dim());
         let x = self.line.view(theme, &mut canvas, x, 0);
         let x = canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
         if let Some(words) = number::relative_text(cx, self.tag, &self.line.text()) {
@@ -130,7 +131,7 @@ impl Entry {
         for (y, line) in problem.iter().enumerate() {
             canvas.text(0, last.saturating_sub(told) + to_u16(y), line, theme.trouble());
         }
-        canvas.text(0, last, &theme.enter("⏎ write and verify   Esc cancel"), theme.strong());
+        canvas.text(0, last, &theme.enter(t!("⏎ write and verify   Esc cancel")), theme.strong());
     }
 }
 

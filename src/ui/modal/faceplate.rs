@@ -1,5 +1,7 @@
 //! What there is to know about an item of the mimic: its tags with value, quality, age, range, alarms and device.
 
+use crate::t;
+use crate::text::translate;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -41,7 +43,7 @@ impl Faceplate {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = Vec::new();
         if self.tags.len() > 1 {
-            hints.push(hint("↑↓", "select"));
+            hints.push(hint("↑↓", t!("select")));
         }
         match (self.toggle(cx), command_tag(cx, self.tag())) {
             (Some((tag, value)), _) => {
@@ -49,13 +51,13 @@ impl Faceplate {
                 hints.insert(0, hint("t", &words));
             }
             (None, Some(tag)) if tag != self.tag() => {
-                hints.push(hint("⏎", &format!("write {}", cx.def().tag(tag).short)));
+                hints.push(hint("⏎", &t!("write {short}", short = cx.def().tag(tag).short)));
             }
-            (None, Some(_)) => hints.push(hint("⏎", "write")),
+            (None, Some(_)) => hints.push(hint("⏎", t!("write"))),
             (None, None) => {}
         }
-        hints.push(hint("w", "why"));
-        hints.push(hint("Esc", "close"));
+        hints.push(hint("w", t!("why")));
+        hints.push(hint(t!("Esc"), t!("close")));
         hints
     }
 
@@ -101,9 +103,9 @@ impl Faceplate {
         });
         let confirm = match missing {
             Some((need, state)) => {
-                let words = format!(
-                    "{} has no effect now. This comes first; then t again for the command itself.",
-                    cx.def().tag(command).name
+                let words = t!(
+                    "{name} has no effect now. This comes first; then t again for the command itself.",
+                    name = cx.def().tag(command).name
                 );
                 Confirm::from_faceplate(cx, need, state, Some(words), self)
             }
@@ -158,54 +160,66 @@ fn wrapped(rows: Vec<(&'static str, String, Style)>, room: u16) -> Vec<(&'static
 fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
     let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
     let quality = match def.access {
-        Access::Write => "none: write only".to_owned(),
+        Access::Write => t!("none: write only").to_owned(),
         Access::Read | Access::ReadWrite => sample.quality.to_string(),
     };
     let read = match def.access {
-        Access::Write => "never".to_owned(),
+        Access::Write => t!("never").to_owned(),
         Access::Read | Access::ReadWrite => {
-            format!("{} ago, {}", age(cx.age(tag)), clock(sample.at, &cx.def().time_zone))
+            t!("{age} ago, {clock}", age = age(cx.age(tag)), clock = clock(sample.at, &cx.def().time_zone))
         }
     };
     let poll = match def.poll {
-        Poll::Every(period) => format!("every {} s", period.as_secs_f64()),
-        Poll::Once => "once, and on refresh".to_owned(),
-        Poll::Never => "never by itself".to_owned(),
+        Poll::Every(period) => t!("every {period} s", period = period.as_secs_f64()),
+        Poll::Once => t!("once, and on refresh").to_owned(),
+        Poll::Never => t!("never by itself").to_owned(),
     };
     let access = match def.access {
-        Access::Read => "read only",
-        Access::ReadWrite => "read and write",
-        Access::Write => "write only",
+        Access::Read => t!("read only"),
+        Access::ReadWrite => t!("read and write"),
+        Access::Write => t!("write only"),
     };
     let device = cx.def().device(def.device);
     // What can be done comes first, what there is to know about the tag behind it.
     let mut rows = interlock::facts(cx, tag);
     rows.extend([
-        ("quality", quality, theme.quality(sample.quality)),
-        ("read", format!("{read} ({poll})"), theme.normal()),
-        ("range", range_text(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
-        ("access", format!("{access}  {}  map row {}", wire_text(def), def.confidence.word()), theme.normal()),
+        (t!("quality"), quality, theme.quality(sample.quality)),
+        (t!("read"), format!("{read} ({poll})"), theme.normal()),
+        (t!("range"), range_text(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
         (
-            "device",
-            format!(
-                "{} {} unit {} on {}  {}",
-                device.name,
-                device.model,
-                device.unit,
-                cx.def().line(device.line).name,
-                device_text(cx, def.device)
+            t!("access"),
+            t!(
+                "{access}  {wire_text}  map row {confidence}",
+                access,
+                wire_text = wire_text(def),
+                confidence = translate(def.confidence.word())
+            ),
+            theme.normal(),
+        ),
+        (
+            t!("device"),
+            t!(
+                "{name} {model} unit {unit} on {name2}  {device_text}",
+                name = device.name,
+                model = device.model,
+                unit = device.unit,
+                name2 = cx.def().line(device.line).name,
+                device_text = device_text(cx, def.device)
             ),
             theme.normal(),
         ),
     ]);
     for alarm in cx.snapshot.alarms_of(tag) {
         let def = cx.def().alarm(alarm.id);
-        let text = format!("{} {} {}", theme.priority_mark(def.priority), def.message, alarm.state.word());
-        rows.push(("alarm", text, theme.alarm(def.priority, alarm.state, cx.flash())));
+        let text = format!("{} {} {}", theme.priority_mark(def.priority), def.message, translate(alarm.state.word()));
+        rows.push((t!("alarm"), text, theme.alarm(def.priority, alarm.state, cx.flash())));
     }
     let meaning = wrap(&def.meaning, room.saturating_sub(9));
     rows.extend(
-        meaning.into_iter().enumerate().map(|(n, line)| (if n == 0 { "meaning" } else { "" }, line, theme.normal())),
+        meaning
+            .into_iter()
+            .enumerate()
+            .map(|(n, line)| (if n == 0 { t!("meaning") } else { "" }, line, theme.normal())),
     );
     rows
 }
@@ -225,14 +239,18 @@ fn command_of(cx: &ViewContext, tag: TagId) -> Option<TagId> {
 pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let status = cx.snapshot.device(device);
     match status.state {
-        DeviceState::Unknown => "not asked yet".to_owned(),
+        DeviceState::Unknown => t!("not asked yet").to_owned(),
         DeviceState::Answering => match status.reply {
-            Some(reply) => format!("OK, {} ms", reply.as_millis()),
-            None => "answering".to_owned(),
+            Some(reply) => t!("OK, {reply} ms", reply = reply.as_millis()),
+            None => t!("answering").to_owned(),
         },
-        DeviceState::Failing(n) => format!("failing, {n} in a row"),
+        DeviceState::Failing(n) => t!("failing, {n} in a row", n),
         DeviceState::Down { since } => {
-            format!("DOWN since {}{}", clock(since, &cx.def().time_zone), retry_text(cx, device))
+            t!(
+                "DOWN since {clock}{retry_text}",
+                clock = clock(since, &cx.def().time_zone),
+                retry_text = retry_text(cx, device)
+            )
         }
     }
 }
@@ -241,8 +259,8 @@ pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> Str
 pub fn retry_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
     match report.and_then(|report| report.retry_at(device)) {
-        Some(at) if cx.now < at => format!(", retry in {} s", between(cx.now, at).as_secs_f64().ceil()),
-        Some(_) => ", retrying".to_owned(),
+        Some(at) if cx.now < at => t!(", retry in {ceil} s", ceil = between(cx.now, at).as_secs_f64().ceil()),
+        Some(_) => t!(", retrying").to_owned(),
         None => String::new(),
     }
 }
@@ -251,13 +269,13 @@ pub fn retry_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> Stri
 pub fn line_state_text(cx: &ViewContext, line: crate::plant::def::LineId) -> String {
     let status = cx.snapshot.line(line);
     match &status.state {
-        LineState::Connecting => "connecting".to_owned(),
+        LineState::Connecting => t!("connecting").to_owned(),
         LineState::Connected => match status.report.as_ref().and_then(|report| report.strain.as_deref()) {
             Some(strain) => strain.trim_start_matches("line overloaded: ").to_owned(),
-            None => "connected".to_owned(),
+            None => t!("connected").to_owned(),
         },
-        LineState::Disconnected => "closed by an operator".to_owned(),
-        LineState::Testing => "a test has it".to_owned(),
-        LineState::Waiting { why, .. } => format!("not connected: {why}"),
+        LineState::Disconnected => t!("closed by an operator").to_owned(),
+        LineState::Testing => t!("a test has it").to_owned(),
+        LineState::Waiting { why, .. } => t!("not connected: {why}", why),
     }
 }

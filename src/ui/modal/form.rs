@@ -1,5 +1,7 @@
 //! A few lines to fill in, one below the other: names, passwords that are never shown, a role.
 
+use crate::t;
+use crate::text::translate;
 use std::fmt;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -112,7 +114,7 @@ impl Form {
     pub fn lacking(&mut self) -> Option<String> {
         let lacks = |field: &Field| match &field.what {
             What::Text(line) | What::Secret(line) if line.missed() => {
-                Some("the text was cut; Ctrl-U clears the line".to_owned())
+                Some(t!("the text was cut; Ctrl-U clears the line").to_owned())
             }
             What::Text(line) if line.text().trim().is_empty() => Some(type_words(field.label)),
             What::Secret(line) if line.text().is_empty() => Some(type_words(field.label)),
@@ -199,9 +201,9 @@ impl Form {
             match &field.what {
                 What::Role(role) => {
                     let style = if here { theme.focus() } else { theme.strong() };
-                    let end = canvas.text(x, y, role.word(), style);
+                    let end = canvas.text(x, y, translate(role.word()), style);
                     if here {
-                        canvas.text(end + 2, y, theme.pick("← → another", "left/right another"), theme.dim());
+                        canvas.text(end + 2, y, theme.pick(t!("← → another"), t!("left/right another")), theme.dim());
                     }
                 }
                 What::Text(line) => draw(cx, canvas, (x, y), line, here),
@@ -230,8 +232,8 @@ impl fmt::Debug for Field {
 
 /// `type the name`, `type your password again`.
 fn type_words(label: &str) -> String {
-    let the = if label.starts_with("your ") { "" } else { "the " };
-    format!("type {the}{label}")
+    let the = if label.starts_with("your ") { "" } else { t!("the ") };
+    t!("type {the}{label}", the, label)
 }
 
 #[cfg(test)]

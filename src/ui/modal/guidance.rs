@@ -1,5 +1,6 @@
 //! What to do about an alarm, whole: the tab below it has less room.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -39,8 +40,8 @@ impl Guidance {
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        let faceplate = self.faceplate.is_some().then(|| hint("⏎", "faceplate"));
-        faceplate.into_iter().chain([hint("↑↓", "scroll"), hint("Esc", "close")]).collect()
+        let faceplate = self.faceplate.is_some().then(|| hint("⏎", t!("faceplate")));
+        faceplate.into_iter().chain([hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))]).collect()
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
@@ -65,14 +66,14 @@ impl Guidance {
     fn lines(&self, cx: &ViewContext, room: u16) -> Vec<(&'static str, String)> {
         let listed = cx.snapshot.alarms.iter().find(|alarm| alarm.id == self.alarm);
         let suppressed = cx.snapshot.suppressed.iter().find(|suppressed| suppressed.id == self.alarm);
-        let now = suppressed.map_or("no longer active".to_owned(), |suppressed| suppressed_words(cx, suppressed));
+        let now = suppressed.map_or(t!("no longer active").to_owned(), |suppressed| suppressed_words(cx, suppressed));
         let mut rows = match listed {
             Some(alarm) => guidance::rows(cx, alarm),
             None => guidance::rows_of_any(cx, self.alarm, now),
         }
         .to_vec();
         let respond = listed.and_then(|alarm| guidance::respond_text(cx, cx.def().alarm(self.alarm), alarm));
-        rows.splice(0..0, respond.map(|(words, _)| ("time", words)));
+        rows.splice(0..0, respond.map(|(words, _)| (t!("time"), words)));
         let lines = |(name, text): (&'static str, String)| {
             let names = std::iter::once(name).chain(std::iter::repeat(""));
             names.zip(wrap(&text, room)).collect::<Vec<_>>()

@@ -1,5 +1,7 @@
 //! All keys of the shown tab and of every tab, from their tables.
 
+use crate::t;
+use crate::text::translate;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -36,17 +38,17 @@ pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, b
     let global = keys::hints(&there.collect::<Vec<_>>());
     let heading = |text: &str| Hint::new("", text, "");
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
-    let rows: Vec<Hint> = [heading(tabs.shown.title())]
+    let rows: Vec<Hint> = [heading(translate(tabs.shown.title()))]
         .into_iter()
         .chain(own)
-        .chain([heading(""), heading("every tab")])
+        .chain([heading(""), heading(t!("every tab"))])
         .chain(global)
         .collect();
     let keys = rows.iter().map(|hint| width(&hint.key)).max().unwrap_or(0);
     let inner = rows.iter().map(|hint| keys + 2 + width(&hint.help)).max().unwrap_or(0).max(40);
     let shown = body.height.saturating_sub(2);
     let first = row.min(to_u16(rows.len()).saturating_sub(shown));
-    let mut canvas = window(cx, frame, body, "keys", (inner, to_u16(rows.len())));
+    let mut canvas = window(cx, frame, body, t!("keys"), (inner, to_u16(rows.len())));
     for (y, hint) in rows.iter().skip(usize::from(first)).enumerate() {
         let y = to_u16(y);
         if hint.key.is_empty() {

@@ -18,6 +18,7 @@ pub(crate) mod settings;
 pub(crate) mod user_form;
 pub(crate) mod why;
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -203,25 +204,25 @@ impl Modal {
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = match self {
-            Modal::Help(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
-            Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![hint("Esc", confirm.escape())],
-            Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint("Esc", confirm.escape())],
-            Modal::Entry(_) => vec![hint("⏎", "write and verify"), hint("Esc", "cancel")],
-            Modal::Choice(_) => vec![hint("↑↓", "select"), hint("⏎", "next"), hint("Esc", "cancel")],
-            Modal::Prompt(_) => vec![hint("⏎", "OK"), hint("Esc", "cancel")],
+            Modal::Help(_) => vec![hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))],
+            Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![hint(t!("Esc"), confirm.escape())],
+            Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint(t!("Esc"), confirm.escape())],
+            Modal::Entry(_) => vec![hint("⏎", t!("write and verify")), hint(t!("Esc"), t!("cancel"))],
+            Modal::Choice(_) => vec![hint("↑↓", t!("select")), hint("⏎", t!("next")), hint(t!("Esc"), t!("cancel"))],
+            Modal::Prompt(_) => vec![hint("⏎", t!("OK")), hint(t!("Esc"), t!("cancel"))],
             Modal::Reason(reason) => reason.hints().into_iter().map(|(key, label)| hint(key, label)).collect(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
-            Modal::Notice(_) => vec![hint("Esc", "close")],
+            Modal::Notice(_) => vec![hint(t!("Esc"), t!("close"))],
             Modal::Guidance(guidance) => guidance.hints(),
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
-            Modal::UserForm(form) => form.hints().into_iter().chain([hint("Esc", "cancel")]).collect(),
-            Modal::AuditEntry(_) => vec![hint("Esc", "close")],
+            Modal::UserForm(form) => form.hints().into_iter().chain([hint(t!("Esc"), t!("cancel"))]).collect(),
+            Modal::AuditEntry(_) => vec![hint(t!("Esc"), t!("close"))],
         };
         // A digit is typed here: the tabs are one key further away.
         if let Some(last) = Tab::offered(cx).last().filter(|_| self.takes_text()) {
-            hints.push(hint(&format!("Esc, 0-{}", last.number()), "another tab"));
+            hints.push(hint(&t!("Esc, 0-{number}", number = last.number()), t!("another tab")));
         }
         hints
     }

@@ -1,5 +1,6 @@
 //! Words to be read: why something cannot be done now.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -24,7 +25,8 @@ impl Notice {
     pub fn unreachable(cx: &ViewContext, device: DeviceId) -> Option<Notice> {
         let def = cx.def().device(device);
         let why = Notice::why_unreachable(cx, device)?;
-        let words = vec![format!("{} is not answering", def.name), why, "Nothing can be written now.".to_owned()];
+        let words =
+            vec![t!("{name} is not answering", name = def.name), why, t!("Nothing can be written now.").to_owned()];
         Some(Notice { title: def.name.clone(), words })
     }
 
@@ -33,12 +35,12 @@ impl Notice {
         let def = cx.def().device(device);
         let line = &cx.def().line(def.line).name;
         let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
-            (LineState::Disconnected, _) => format!("Line {line} was disconnected by an operator."),
-            (LineState::Testing, _) => format!("A test has line {line} for itself (tab Bus)."),
-            (LineState::Waiting { why, .. }, _) => format!("Line {line} is not connected: {why}."),
-            (LineState::Connecting, _) => format!("Line {line} is being connected."),
+            (LineState::Disconnected, _) => t!("Line {line} was disconnected by an operator.", line),
+            (LineState::Testing, _) => t!("A test has line {line} for itself (tab Bus).", line),
+            (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why),
+            (LineState::Connecting, _) => t!("Line {line} is being connected.", line),
             (LineState::Connected, DeviceState::Down { since }) => {
-                format!("Nothing heard since {}.", clock(since, &cx.def().time_zone))
+                t!("Nothing heard since {clock}.", clock = clock(since, &cx.def().time_zone))
             }
             (LineState::Connected, DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_)) => {
                 return None;
@@ -77,6 +79,6 @@ impl Notice {
             canvas.text(0, to_u16(y), row, style);
         }
         let last = canvas.height().saturating_sub(1);
-        canvas.text(0, last, "Esc close", cx.theme.strong());
+        canvas.text(0, last, t!("Esc close"), cx.theme.strong());
     }
 }

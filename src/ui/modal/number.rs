@@ -1,5 +1,6 @@
 //! A typed number: what it means, whether it can be written, and why to ask again before it is.
 
+use crate::t;
 use crate::{
     access::control::reauthentication,
     plant::{
@@ -22,30 +23,34 @@ pub fn is_numeric(c: char) -> bool {
 pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
     let text = text.trim();
     if text.is_empty() {
-        return Err("type a number".to_owned());
+        return Err(t!("type a number").to_owned());
     }
-    let (number, typed) = parse(text).ok_or_else(|| format!("\"{text}\" is no number"))?;
+    let (number, typed) = parse(text).ok_or_else(|| t!("\"{text}\" is no number", text))?;
     // Zeros count: where no decimals are taken, `1,000` and `1.000` mean a thousand to their author, and are refused.
     let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
     if typed > decimals {
         return Err(match decimals {
-            0 => "whole numbers only".to_owned(),
-            1 => "at most 1 decimal".to_owned(),
-            n => format!("at most {n} decimals"),
+            0 => t!("whole numbers only").to_owned(),
+            1 => t!("at most 1 decimal").to_owned(),
+            n => t!("at most {n} decimals", n),
         });
     }
     let value = match number {
         Number::Whole(value) => value,
         Number::Step(by) => {
-            stepped(cx, tag, by).ok_or("the present value is not known: type the new value without a sign")?
+            stepped(cx, tag, by).ok_or(t!("the present value is not known: type the new value without a sign"))?
         }
     };
     let Some((min, max)) = cx.snapshot.range(tag) else { return Ok(value) };
     let inside = |value| scale::is_inside(Some(min), Some(max), value);
     let held = cx.snapshot.held(tag, value);
     match (inside(value), inside(held)) {
-        (false, _) => Err(format!("outside {}", range_text(cx, tag))),
-        (true, false) => Err(format!("the device would hold {}, outside {}", plain(held), range_text(cx, tag))),
+        (false, _) => Err(t!("outside {range_text}", range_text = range_text(cx, tag))),
+        (true, false) => Err(t!(
+            "the device would hold {plain}, outside {range_text}",
+            plain = plain(held),
+            range_text = range_text(cx, tag)
+        )),
         (true, true) => Ok(value),
     }
 }
@@ -60,8 +65,8 @@ pub fn relative_text(cx: &ViewContext, tag: TagId, text: &str) -> Option<String>
 /// How to type a change.
 pub fn help(cx: &ViewContext, tag: TagId) -> String {
     match cx.snapshot.range(tag) {
-        Some((min, _)) if min < 0.0 => "+5 adds 5, -5 subtracts 5, =-5 sets -5".to_owned(),
-        Some(_) | None => "+5 adds 5, -5 subtracts 5".to_owned(),
+        Some((min, _)) if min < 0.0 => t!("+5 adds 5, -5 subtracts 5, =-5 sets -5").to_owned(),
+        Some(_) | None => t!("+5 adds 5, -5 subtracts 5").to_owned(),
     }
 }
 
@@ -79,7 +84,14 @@ pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> 
     // A single-precision register is as good as exact.
     let same = (held - value).abs() <= 1e-6 * value.abs().max(1.0);
     let step = plain(cx.snapshot.step(tag));
-    (!same).then(|| format!("{} → the device holds steps of {step}: {}", cx.snapshot.format(tag, value), plain(held)))
+    (!same).then(|| {
+        t!(
+            "{format} → the device holds steps of {step}: {plain}",
+            format = cx.snapshot.format(tag, value),
+            step,
+            plain = plain(held)
+        )
+    })
 }
 
 /// Why a number that is allowed may still not be what its author meant.
@@ -89,7 +101,9 @@ pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let step = cx.snapshot.sample(tag).value.map(|now| (value - now).abs());
     let share = step.zip(cx.snapshot.range(tag)).map(|(step, (min, max))| (step, step / (max - min)));
     let large = share.filter(|(_, share)| STEP_MAX < *share);
-    let large = large.map(|(step, share)| format!("! a step of {}, {:.0} % of the range", text(step), share * 100.0));
+    let large = large.map(|(step, share)| {
+        t!("! a step of {text}, {share} % of the range", text = text(step), share = format!("{:.0}", share * 100.0))
+    });
     let faceplate = cx.def().device(cx.def().tag(tag).device).faceplate.as_ref();
     let process = faceplate.filter(|faceplate| faceplate.sv == tag).map(|faceplate| faceplate.pv);
     let alarms = cx.def().alarms.iter().filter(|alarm| alarm.subject == Subject::Tag(process.unwrap_or(tag)));
@@ -99,9 +113,15 @@ pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
             Level::High | Level::HighHigh => value - limit,
             Level::Low | Level::LowLow => limit - value,
         };
-        let place = if beyond > 0.0 { "beyond" } else { "at" };
+        let place = if beyond > 0.0 { t!("beyond") } else { t!("at") };
         (beyond >= 0.0).then(|| {
-            format!("! {place} the alarm limit of {} {} ({})", subject(cx, alarm.id), alarm.message, text(limit))
+            t!(
+                "! {place} the alarm limit of {subject} {message} ({text})",
+                place,
+                subject = subject(cx, alarm.id),
+                message = alarm.message,
+                text = text(limit)
+            )
         })
     });
     large.into_iter().chain(limits).collect()
@@ -111,16 +131,21 @@ pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
 pub fn range_text(cx: &ViewContext, tag: TagId) -> String {
     let labels = &cx.def().tag(tag).labels;
     if !labels.is_empty() {
-        return format!("range one of {}", labels.len());
+        return t!("range one of {count}", count = labels.len());
     }
     match cx.snapshot.range(tag) {
         Some((min, max)) => {
             let unit = cx.snapshot.unit(tag);
-            format!("range {} … {} {unit}", cx.snapshot.format(tag, min), cx.snapshot.format(tag, max))
-                .trim_end()
-                .to_owned()
+            t!(
+                "range {format} … {format2} {unit}",
+                format = cx.snapshot.format(tag, min),
+                format2 = cx.snapshot.format(tag, max),
+                unit
+            )
+            .trim_end()
+            .to_owned()
         }
-        None => "range not known".to_owned(),
+        None => t!("range not known").to_owned(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! A text for the tab below, which says whether it can use it.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -44,6 +45,6 @@ impl Prompt {
         canvas.text(0, 0, &self.hint, cx.theme.dim());
         self.line.view(cx.theme, &mut canvas, 0, 1);
         canvas.text(0, 3, &problem, cx.theme.trouble());
-        canvas.text(0, 4, &cx.theme.enter("⏎ OK   Esc cancel"), cx.theme.strong());
+        canvas.text(0, 4, &cx.theme.enter(t!("⏎ OK   Esc cancel")), cx.theme.strong());
     }
 }

@@ -1,5 +1,6 @@
 //! Asks for a reason or a note: of an acknowledgement, a suppression, a handover.
 
+use crate::t;
 use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -47,17 +48,18 @@ impl Reason {
     pub fn shelve(notes: Vec<String>, alarm: AlarmId, times: Vec<(String, Duration)>, max: Duration) -> Reason {
         let kind = |lasts| CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts });
         let mut choices: Vec<_> = times.into_iter().map(|(words, lasts)| (words, kind(lasts))).collect();
-        choices.push(("other:".to_owned(), kind(max)));
+        choices.push((t!("other:").to_owned(), kind(max)));
         let time = Some(Time { alarm, max, line: Line::default(), typing: choices.len() == 1 });
         let first = choices[0].1.clone();
-        Reason { choices, time, ..Reason::new("shelve an alarm", "shelve", notes, first, true) }
+        Reason { choices, time, ..Reason::new(t!("shelve an alarm"), t!("shelve"), notes, first, true) }
     }
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<(&'static str, &'static str)> {
-        let choose = (1 < self.choices.len()).then_some(("↑↓", "select"));
-        let other = self.other().map(|time| ("Tab", if time.typing { "type the reason" } else { "type the time" }));
-        [("⏎", self.verb)].into_iter().chain(choose).chain(other).chain([("Esc", "cancel")]).collect()
+        let choose = (1 < self.choices.len()).then_some(("↑↓", t!("select")));
+        let other =
+            self.other().map(|time| (t!("Tab"), if time.typing { t!("type the reason") } else { t!("type the time") }));
+        [("⏎", self.verb)].into_iter().chain(choose).chain(other).chain([(t!("Esc"), t!("cancel"))]).collect()
     }
 
     pub(super) fn paste(&mut self, text: &str) {
@@ -129,12 +131,12 @@ impl Reason {
         }
         let words = self.line.text().trim().to_owned();
         self.problem = if self.line.missed() {
-            Some("the text was cut; Ctrl-U clears the line".to_owned())
+            Some(t!("the text was cut; Ctrl-U clears the line").to_owned())
         } else if self.needed && words.is_empty() {
-            Some("reason required".to_owned())
+            Some(t!("reason required").to_owned())
         } else if self.time.as_ref().is_some_and(|time| typed_time(&words, time.max).is_ok()) {
             // Typed for the time, while another one was selected.
-            Some("a time is not a reason: select \"other\" to type a time".to_owned())
+            Some(t!("a time is not a reason: select \"other\" to type a time").to_owned())
         } else {
             rights::missing(cx, &kind)
         };
@@ -165,11 +167,16 @@ impl Reason {
                     Some(_) => time.line.view(theme, &mut canvas, x + 1, y),
                     None => x,
                 };
-                canvas.text(x + 2, y, &format!("45 min, 1.5 h, 1:30; at most {}", spelled(time.max)), theme.dim());
+                canvas.text(
+                    x + 2,
+                    y,
+                    &t!("45 min, 1.5 h, 1:30; at most {spelled}", spelled = spelled(time.max)),
+                    theme.dim(),
+                );
             }
             y += 1;
         }
-        canvas.text(0, y, if self.needed { "reason:" } else { "note, if there is one:" }, theme.dim());
+        canvas.text(0, y, if self.needed { t!("reason:") } else { t!("note, if there is one:") }, theme.dim());
         self.line.view(theme, &mut canvas, 0, y + 1);
         let problem = self.problem.clone().or_else(|| rights::missing(cx, &self.choices[self.chosen].1));
         for (n, line) in wrap(&problem.unwrap_or_default(), room).iter().take(2).enumerate() {
@@ -195,7 +202,7 @@ struct Time {
 /// `45`, `45 min`, `1.5 h`, `1:30`: a time of at most `max`, a bare number in minutes.
 fn typed_time(text: &str, max: Duration) -> Result<Duration, String> {
     let text = text.trim();
-    let wrong = || format!("\"{text}\" is no time: 45 min, 1.5 h or 1:30");
+    let wrong = || t!("\"{text}\" is no time: 45 min, 1.5 h or 1:30", text);
     let number = |text: &str| text.trim().replacen(',', ".", 1).parse::<f64>().ok();
     let minutes = match text.split_once(':') {
         Some((hours, minutes)) => {
@@ -212,7 +219,7 @@ fn typed_time(text: &str, max: Duration) -> Result<Duration, String> {
     match (lasts.is_zero(), lasts <= max) {
         (true, _) => Err(wrong()),
         (false, true) => Ok(lasts),
-        (false, false) => Err(format!("at most {}", spelled(max))),
+        (false, false) => Err(t!("at most {spelled}", spelled = spelled(max))),
     }
 }
 
@@ -220,7 +227,7 @@ fn typed_time(text: &str, max: Duration) -> Result<Duration, String> {
 pub fn spelled(span: Duration) -> String {
     match span.as_secs() / 60 {
         minutes if minutes % 60 == 0 => format!("{} h", minutes / 60),
-        minutes => format!("{minutes} min"),
+        minutes => t!("{minutes} min", minutes),
     }
 }
 

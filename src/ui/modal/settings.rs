@@ -4,6 +4,7 @@ mod draft;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -54,17 +55,17 @@ impl Settings {
     pub(super) fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         if self.asking.is_some() {
-            return vec![hint("⏎", "yes"), hint("n", "no"), hint("Esc", "close")];
+            return vec![hint("⏎", t!("yes")), hint("n", t!("no")), hint(t!("Esc"), t!("close"))];
         }
-        let mut hints = vec![hint("↑↓", "select")];
+        let mut hints = vec![hint("↑↓", t!("select"))];
         if self.field().is_choice() {
-            hints.push(hint("←→", "change"));
+            hints.push(hint("←→", t!("change")));
         }
-        hints.push(hint("⏎", "apply"));
+        hints.push(hint("⏎", t!("apply")));
         if !self.field().is_text() {
-            hints.extend([hint("u", "revert"), hint("S", "save to plant file")]);
+            hints.extend([hint("u", t!("revert")), hint("S", t!("save to plant file"))]);
         }
-        hints.push(hint("Esc", "close"));
+        hints.push(hint(t!("Esc"), t!("close")));
         hints
     }
 
@@ -111,7 +112,7 @@ impl Settings {
         let fields = self.draft.fields();
         let room = body.width.saturating_sub(4).min(72);
         let (status, pinned) = (self.status(cx, used, room), self.pinned(cx, used, room));
-        let title = format!("communication settings of {}", used.name);
+        let title = t!("communication settings of {name}", name = used.name);
         let wanted = 1 + fields.len() + 1 + status.len() + 1 + pinned.len();
         let mut canvas = window(cx, frame, body, &title, (room, to_u16(wanted)));
         // On a small screen: first the keys and what is asked, then the fields around the selected one, then the rest.
@@ -119,8 +120,8 @@ impl Settings {
         let shown = fields.len().min(height.saturating_sub(1 + pinned.len()));
         let first = (self.row + 1).saturating_sub(shown);
         let new_at = NAME + room.saturating_sub(NAME) / 2;
-        canvas.text(NAME, 0, "in use", theme.dim());
-        canvas.text(new_at, 0, "new", theme.dim());
+        canvas.text(NAME, 0, t!("in use"), theme.dim());
+        canvas.text(new_at, 0, t!("new"), theme.dim());
         let old = Draft::of(used);
         for (y, (n, field)) in fields.iter().enumerate().skip(first).take(shown).enumerate() {
             let y = to_u16(y) + 1;
@@ -163,7 +164,7 @@ impl Settings {
         };
         canvas.text(end + 1, y, field.unit(), theme.dim());
         if differs {
-            canvas.text_right(canvas.width(), y, "◂ changed", theme.strong());
+            canvas.text_right(canvas.width(), y, t!("◂ changed"), theme.strong());
         }
     }
 
@@ -177,7 +178,7 @@ impl Settings {
             rows.extend(wrap(&why, room).into_iter().map(|row| (row, theme.trouble())));
         }
         if let Some(before) = &cx.snapshot.line(self.line).settings_before {
-            let words = format!("tried out; before: {}", difference(used, before));
+            let words = t!("tried out; before: {difference}", difference = difference(used, before));
             rows.extend(wrap(&words, room).into_iter().map(|row| (row, theme.normal())));
         }
         rows
@@ -192,24 +193,33 @@ impl Settings {
             (None, None) => (String::new(), theme.normal()),
         };
         let keys = match self.asking {
-            Some(_) => "⏎ yes   n no",
-            None if self.field().is_text() => "type it   ⏎ apply   Esc close",
-            None => "⏎ apply   u revert   S save to plant file   Esc close",
+            Some(_) => t!("⏎ yes   n no"),
+            None if self.field().is_text() => t!("type it   ⏎ apply   Esc close"),
+            None => t!("⏎ apply   u revert   S save to plant file   Esc close"),
         };
         let rows = wrap(&words, room).into_iter().map(|row| (row, style));
         rows.chain([(fit_words(keys, room), theme.strong())]).collect()
     }
 
     fn query(&self, cx: &ViewContext, used: &LineDef, action: &SettingsAction) -> String {
-        let restart = "Polling restarts; values are bad until the devices answer.";
+        let restart = t!("Polling restarts; values are bad until the devices answer.");
         match action {
-            SettingsAction::Apply(new) => format!("Apply {}? {restart}", difference(used, new)),
-            SettingsAction::Revert(before) => format!("Revert to {}? {restart}", difference(used, before)),
+            SettingsAction::Apply(new) => {
+                t!("Apply {difference}? {restart}", difference = difference(used, new), restart)
+            }
+            SettingsAction::Revert(before) => {
+                t!("Revert to {difference}? {restart}", difference = difference(used, before), restart)
+            }
             SettingsAction::Save => {
                 let (answer, well) = answers(cx, self.line);
                 let doubt = if well { String::new() } else { format!("! {answer} ") };
                 let title = &cx.def().title;
-                format!("{doubt}Write {} into the plant file of {title}? Everything else in it stays.", whole(used))
+                t!(
+                    "{doubt}Write {whole} into the plant file of {title}? Everything else in it stays.",
+                    doubt,
+                    whole = whole(used),
+                    title
+                )
             }
         }
     }
@@ -224,14 +234,14 @@ impl Settings {
     fn ask_apply(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let (used, new) = (in_use(cx, self.line), self.draft.settings()?);
         if new == *used {
-            return Err("these settings are in use; change one first".to_owned());
+            return Err(t!("these settings are in use; change one first").to_owned());
         }
         Ok(Some(SettingsAction::Apply(Box::new(new))))
     }
 
     fn ask_revert(&mut self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let before = cx.snapshot.line(self.line).settings_before.as_ref();
-        let before = before.ok_or("nothing to revert: no other settings were applied")?;
+        let before = before.ok_or(t!("nothing to revert: no other settings were applied"))?;
         self.draft = Draft::of(before);
         Ok(Some(SettingsAction::Revert(Box::new(LineDef::clone(before)))))
     }
@@ -239,10 +249,10 @@ impl Settings {
     fn ask_save(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let used = in_use(cx, self.line);
         if self.draft.settings()? != *used {
-            return Err("only settings in use are saved: apply these first (⏎)".to_owned());
+            return Err(t!("only settings in use are saved: apply these first (⏎)").to_owned());
         }
         if cx.snapshot.line(self.line).settings_before.is_none() {
-            return Err("nothing to save: these settings are in the plant file".to_owned());
+            return Err(t!("nothing to save: these settings are in the plant file").to_owned());
         }
         Ok(Some(SettingsAction::Save))
     }
@@ -276,34 +286,34 @@ fn in_use<'a>(cx: &ViewContext<'a>, line: LineId) -> &'a LineDef {
 fn difference(from: &LineDef, to: &LineDef) -> String {
     let mut words = to.transport.to_string();
     if from.timeout != to.timeout {
-        words += &format!(", timeout {} ms", to.timeout.as_millis());
+        words += &t!(", timeout {timeout} ms", timeout = to.timeout.as_millis());
     }
     if from.gap != to.gap {
-        words += &format!(", gap {} ms", to.gap.as_millis());
+        words += &t!(", gap {gap} ms", gap = to.gap.as_millis());
     }
     words
 }
 
 fn whole(settings: &LineDef) -> String {
     let (timeout, gap) = (settings.timeout.as_millis(), settings.gap.as_millis());
-    format!("{}, timeout {timeout} ms, gap {gap} ms", settings.transport)
+    t!("{transport}, timeout {timeout} ms, gap {gap} ms", transport = settings.transport, timeout, gap)
 }
 
 /// Whether the devices of a line answer, in words, and whether that is well.
 fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
     let name = &cx.def().line(line).name;
     match &cx.snapshot.line(line).state {
-        LineState::Connecting => (format!("{name} is being connected"), true),
-        LineState::Disconnected => (format!("{name} is disconnected: connect it with L on tab 4"), false),
-        LineState::Testing => (format!("a test has {name} for itself"), true),
-        LineState::Waiting { why, .. } => (format!("{name} is not connected: {why}"), false),
+        LineState::Connecting => (t!("{name} is being connected", name), true),
+        LineState::Disconnected => (t!("{name} is disconnected: connect it with L on tab 4", name), false),
+        LineState::Testing => (t!("a test has {name} for itself", name), true),
+        LineState::Waiting { why, .. } => (t!("{name} is not connected: {why}", name, why), false),
         LineState::Connected => {
             let devices = cx.def().devices.iter().filter(|device| device.line == line);
             let well = |state| matches!(state, DeviceState::Answering | DeviceState::Unknown);
             let all_well = devices.clone().all(|device| well(cx.snapshot.device(device.id).state));
             let words: Vec<String> =
                 devices.map(|device| format!("{} {}", device.name, device_text(cx, device.id))).collect();
-            (format!("{name} connected: {}", words.join("; ")), all_well)
+            (t!("{name} connected: {join}", name, join = words.join("; ")), all_well)
         }
     }
 }

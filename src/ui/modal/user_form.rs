@@ -2,6 +2,7 @@
 
 mod text;
 
+use crate::t;
 use std::sync::Arc;
 
 use crossterm::event::KeyEvent;
@@ -68,29 +69,33 @@ pub struct UserForm {
 impl UserForm {
     /// An empty form.
     pub fn new(purpose: Purpose) -> UserForm {
-        let twice = || [Field::secret("password"), Field::secret("password again")];
+        let twice = || [Field::secret(t!("password")), Field::secret(t!("password again"))];
         let fields = match &purpose {
-            Purpose::First => [Field::name("name")].into_iter().chain(twice()).collect(),
-            Purpose::Login => vec![Field::name("name"), Field::secret("password")],
+            Purpose::First => [Field::name(t!("name"))].into_iter().chain(twice()).collect(),
+            Purpose::Login => vec![Field::name(t!("name")), Field::secret(t!("password"))],
             Purpose::Change(given) => {
-                let present = given.is_none().then(|| Field::secret("present password"));
-                present.into_iter().chain([Field::secret("new password"), Field::secret("new one again")]).collect()
+                let present = given.is_none().then(|| Field::secret(t!("present password")));
+                present
+                    .into_iter()
+                    .chain([Field::secret(t!("new password")), Field::secret(t!("new one again"))])
+                    .collect()
             }
-            Purpose::Unlock(_) => vec![Field::secret("password")],
-            Purpose::Add => {
-                [Field::name("name"), Field::role("role", Role::Technician)].into_iter().chain(twice()).collect()
-            }
+            Purpose::Unlock(_) => vec![Field::secret(t!("password"))],
+            Purpose::Add => [Field::name(t!("name")), Field::role(t!("role"), Role::Technician)]
+                .into_iter()
+                .chain(twice())
+                .collect(),
             Purpose::Reset(_) => twice().to_vec(),
-            Purpose::Role(_) => vec![Field::role("role", Role::Technician)],
+            Purpose::Role(_) => vec![Field::role(t!("role"), Role::Technician)],
             Purpose::Disable(..) => Vec::new(),
-            Purpose::Delete(_) => vec![Field::name("name")],
+            Purpose::Delete(_) => vec![Field::name(t!("name"))],
         };
         UserForm { purpose, form: Form::new(fields), waiting: false, number: 0, problem: None, below: None }
     }
 
     /// Another role for this user; the present one is shown first.
     pub fn role_of(row: &UserRow) -> UserForm {
-        let form = Form::new(vec![Field::role("role", row.role)]);
+        let form = Form::new(vec![Field::role(t!("role"), row.role)]);
         UserForm { form, ..UserForm::new(Purpose::Role(row.user.clone())) }
     }
 
@@ -190,7 +195,7 @@ impl UserForm {
             }
             Purpose::Disable(user, disabled) => SessionRequest::Disable { user: user.to_string(), disabled: *disabled },
             Purpose::Delete(user) if name == **user => SessionRequest::DeleteUser { user: name },
-            Purpose::Delete(user) => return Err(format!("\"{name}\" is not \"{user}\"")),
+            Purpose::Delete(user) => return Err(t!("\"{name}\" is not \"{user}\"", name, user)),
         })
     }
 
@@ -199,10 +204,10 @@ impl UserForm {
         let (password, again) = (self.form.secret(n), self.form.secret(n + 1));
         let (chars, least) = (password.0.chars().count(), cx.session.password_chars_min);
         if password != again {
-            return Err("the two passwords differ".to_owned());
+            return Err(t!("the two passwords differ").to_owned());
         }
         if chars < usize::from(least) {
-            return Err(format!("{chars} characters; at least {least}"));
+            return Err(t!("{chars} characters; at least {least}", chars, least));
         }
         Ok(password)
     }
@@ -270,7 +275,7 @@ impl UserForm {
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
-        let keys = cx.theme.enter(&format!("{}   Esc leave", keys.join("   ")));
+        let keys = cx.theme.enter(&t!("{join}   Esc leave", join = keys.join("   ")));
         let inner = self.form.width().max(width(&keys)).clamp(40, body.width.saturating_sub(8).clamp(40, 72));
         let problem = self.problem_text(cx).map_or(1, |words| to_u16(wrap(&words, inner).len()));
         let height = to_u16(self.rows(cx, inner).len()) + self.form.rows() + problem + 2;

@@ -9,6 +9,7 @@ mod wire;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
@@ -69,8 +70,8 @@ impl Why {
 
     pub(super) fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        let others = (1 < self.tags.len()).then(|| hint("←→", "other value"));
-        others.into_iter().chain([hint("↑↓", "scroll"), hint("Esc", "close")]).collect()
+        let others = (1 < self.tags.len()).then(|| hint("←→", t!("other value")));
+        others.into_iter().chain([hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))]).collect()
     }
 
     pub(super) fn on_key(mut self, event: KeyEvent) -> Next {
@@ -95,7 +96,7 @@ impl Why {
         let shown = body.height.saturating_sub(2);
         let first = self.row.min(to_u16(rows.len()).saturating_sub(shown));
         let place = if self.tags.len() < 2 { String::new() } else { format!("  {}/{}", self.at + 1, self.tags.len()) };
-        let title = format!("why {} {}{place}", def.name, def.label);
+        let title = t!("why {name} {label}{place}", name = def.name, label = def.label, place);
         let mut canvas = window(cx, frame, body, &title, (room, to_u16(rows.len())));
         for (y, row) in rows.iter().skip(usize::from(first)).enumerate() {
             let y = to_u16(y);
@@ -104,7 +105,7 @@ impl Why {
         }
         let (inner, below) = (canvas.area(), to_u16(rows.len()).saturating_sub(first + canvas.height()));
         if 0 < below {
-            let words = format!(" {below} more ↓ ");
+            let words = t!(" {below} more ↓ ", below);
             let frame_row = Rect { y: inner.bottom(), height: 1, ..inner };
             Canvas::new(frame.buffer_mut(), frame_row).text_right(inner.width, 0, &words, cx.theme.strong());
         }

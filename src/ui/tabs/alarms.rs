@@ -16,6 +16,7 @@ mod view;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
 use crossterm::event::KeyEvent;
 use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
@@ -69,12 +70,12 @@ impl Page {
     /// Its heading.
     pub fn title(self) -> &'static str {
         match self {
-            Page::Active => "active",
-            Page::Suppressed => "suppressed",
-            Page::System => "system",
-            Page::Journal => "journal",
-            Page::Metrics => "metrics",
-            Page::Handover => "handover",
+            Page::Active => t!("active"),
+            Page::Suppressed => t!("suppressed"),
+            Page::System => t!("system"),
+            Page::Journal => t!("journal"),
+            Page::Metrics => t!("metrics"),
+            Page::Handover => t!("handover"),
         }
     }
 }

@@ -14,6 +14,7 @@ mod window;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
 use std::path::PathBuf;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -73,10 +74,10 @@ impl Page {
 
     fn title(self) -> &'static str {
         match self {
-            Page::Line => "Line",
-            Page::Plan => "Plan",
-            Page::Frames => "Frames",
-            Page::Test => "Test",
+            Page::Line => t!("Line"),
+            Page::Plan => t!("Plan"),
+            Page::Frames => t!("Frames"),
+            Page::Test => t!("Test"),
         }
     }
 }
@@ -137,7 +138,7 @@ impl TabView for Bus {
             Action::Settings => {
                 let kind = CommandKind::Configure(Box::new(at.settings.clone()));
                 let window = Modal::Settings(Box::new(Settings::new(cx, self.line)));
-                return vec![Notice::or(cx, "settings of the line", &kind, window)];
+                return vec![Notice::or(cx, t!("settings of the line"), &kind, window)];
             }
         }
         self.on_snapshot(cx)
@@ -146,12 +147,12 @@ impl TabView for Bus {
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = hints(&table(self.page));
         if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
-            for hint in hints.iter_mut().filter(|hint| hint.label == "stop") {
+            for hint in hints.iter_mut().filter(|hint| hint.label == t!("stop")) {
                 hint.label.clear();
             }
         }
         if 1 < cx.def().lines.len() {
-            hints.iter_mut().filter(|hint| hint.key == "n").for_each(|hint| hint.label = "line".to_owned());
+            hints.iter_mut().filter(|hint| hint.key == "n").for_each(|hint| hint.label = t!("line").to_owned());
         }
         hints
     }
@@ -208,7 +209,7 @@ impl TabView for Bus {
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let Some(at) = Place::of(cx, self.line) else {
-            canvas.text(1, 1, "this plant has no lines", cx.theme.normal());
+            canvas.text(1, 1, t!("this plant has no lines"), cx.theme.normal());
             return;
         };
         self.heading(cx, &at, &mut canvas);
@@ -339,19 +340,18 @@ pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
 fn state_text(cx: &ViewContext, at: &Place) -> String {
     let zone = &cx.def().time_zone;
-    let since = at
-        .status
-        .since
-        .map_or(String::new(), |since| format!(" since {}", crate::ui::widgets::text::moment(since, cx.now, zone)));
+    let since = at.status.since.map_or(String::new(), |since| {
+        t!(" since {moment}", moment = crate::ui::widgets::text::moment(since, cx.now, zone))
+    });
     match &at.status.state {
-        LineState::Connected => format!("connected{since}"),
-        LineState::Connecting => "connecting".to_owned(),
+        LineState::Connected => t!("connected{since}", since),
+        LineState::Connecting => t!("connecting").to_owned(),
         LineState::Waiting { why, retry_at } => {
             let lost =
                 at.status.lost_since.map_or(String::new(), |lost| format!(" {}", running(between(lost, cx.now))));
-            format!("DOWN{lost}, next try in {}s: {why}", between(cx.now, *retry_at).as_secs())
+            t!("DOWN{lost}, next try in {between}s: {why}", lost, between = between(cx.now, *retry_at).as_secs(), why)
         }
-        LineState::Disconnected => format!("DISCONNECTED by an operator{since}"),
-        LineState::Testing => format!("TEST{since}, polling stopped"),
+        LineState::Disconnected => t!("DISCONNECTED by an operator{since}", since),
+        LineState::Testing => t!("TEST{since}, polling stopped", since),
     }
 }

@@ -16,6 +16,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
 use crossterm::event::KeyEvent;
 use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
@@ -139,7 +140,7 @@ impl TabView for Controllers {
             Action::Open => self.open(cx, device),
             Action::Program => {
                 if device.program.is_none() {
-                    return notice(device, "this device has no ramp/soak program");
+                    return notice(device, t!("this device has no ramp/soak program"));
                 }
                 self.page = Page::Program;
                 Vec::new()
@@ -150,9 +151,9 @@ impl TabView for Controllers {
             }
             Action::Find => {
                 self.asked_for = Asked::Filter;
-                let hint = "words in name or meaning; empty shows all";
+                let hint = t!("words in name or meaning; empty shows all");
                 vec![UiAction::Open(Modal::Prompt(Prompt::new(
-                    "find a parameter",
+                    t!("find a parameter"),
                     hint,
                     &self.table.filter.to_string(),
                 )))]
@@ -163,7 +164,7 @@ impl TabView for Controllers {
             }
             Action::Save => {
                 self.asked_for = Asked::SetName;
-                let title = format!("save the settings of {} as a set", device.name);
+                let title = t!("save the settings of {name} as a set", name = device.name);
                 vec![UiAction::Open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))]
             }
             Action::All | Action::Turnaround => self.in_compare(cx, action),
@@ -176,7 +177,7 @@ impl TabView for Controllers {
                     keys::ProgramCommand::Off => Some(program.off),
                 };
                 value.map_or_else(
-                    || notice(device, "this program cannot be held"),
+                    || notice(device, t!("this program cannot be held")),
                     |value| confirm(cx, program.command, value),
                 )
             }),
@@ -213,7 +214,7 @@ impl TabView for Controllers {
         // On the page of a device there is no room left for what everybody tries anyway.
         if !matches!(self.page, Page::List | Page::Device) {
             let place = hints.iter().position(|hint| hint.key == "⏎").map_or(hints.len(), |enter| enter + 1);
-            hints.insert(place, Hint::new("Esc", "back", "a page back"));
+            hints.insert(place, Hint::new("Esc", t!("back"), t!("a page back")));
         }
         // What the device cannot do is not offered; the help has it all the same.
         for hint in hints.iter_mut().filter(|hint| lacks(&hint.label)) {
@@ -287,7 +288,7 @@ impl TabView for Controllers {
                 let filter = Words::parse(text);
                 let mut table = Table { selected: 0, filter, ..self.table.clone() };
                 if table.rows(cx, self.device).is_empty() {
-                    return Err(format!("no parameter has \"{text}\" in its name or meaning"));
+                    return Err(t!("no parameter has \"{text}\" in its name or meaning", text));
                 }
                 table.selected = table.best(cx, self.device);
                 self.table = table;
@@ -299,7 +300,7 @@ impl TabView for Controllers {
                 let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
                 let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
                 let words = sets::replace_text(cx, there);
-                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::command(format!("save set {text}"), words, kind)))])
+                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::command(t!("save set {text}", text), words, kind)))])
             }
         }
     }
@@ -307,7 +308,7 @@ impl TabView for Controllers {
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let Some(device) = cx.def().devices.get(self.device.index()) else {
-            canvas.text(1, 1, "this plant has no devices", cx.theme.normal());
+            canvas.text(1, 1, t!("this plant has no devices"), cx.theme.normal());
             return;
         };
         match (&self.page, &device.program) {

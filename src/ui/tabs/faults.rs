@@ -5,6 +5,8 @@ mod view;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
+use crate::text::translate;
 use std::collections::BTreeMap;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -83,7 +85,7 @@ impl TabView for Faults {
         let Some(status) = open(cx) else { return Rows::default() };
         let rows = rows(status);
         let seen = |(target, fault): &(FaultTarget, Fault)| {
-            (format!("{target:?}"), fault.word(), status.find(*target, *fault).is_some())
+            (format!("{target:?}"), translate(fault.word()), status.find(*target, *fault).is_some())
         };
         Rows::of(rows.iter().map(seen), self.selected.min(rows.len().saturating_sub(1)))
     }
@@ -162,12 +164,13 @@ fn demo_part(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
     match (status.is_open(), status.active.len()) {
         (false, _) => {
             let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
-            let left = status.scenario.as_ref().map_or(String::new(), |progress| format!(" {} left", left(progress)));
-            (4, format!("EXAM{left}"), cx.theme.strong())
+            let left =
+                status.scenario.as_ref().map_or(String::new(), |progress| t!(" {left} left", left = left(progress)));
+            (4, t!("EXAM{left}", left), cx.theme.strong())
         }
-        (true, 0) => (4, "DEMO".to_owned(), cx.theme.strong()),
-        (true, 1) => (4, "DEMO 1 FAULT".to_owned(), cx.theme.trouble()),
-        (true, count) => (4, format!("DEMO {count} FAULTS"), cx.theme.trouble()),
+        (true, 0) => (4, t!("DEMO").to_owned(), cx.theme.strong()),
+        (true, 1) => (4, t!("DEMO 1 FAULT").to_owned(), cx.theme.trouble()),
+        (true, count) => (4, t!("DEMO {count} FAULTS", count), cx.theme.trouble()),
     }
 }
 
@@ -175,9 +178,9 @@ fn demo_part(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
 fn result_part(cx: &ViewContext, status: &Status) -> Option<(usize, String, Style)> {
     let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
     Some(if verdict.passed() {
-        (5, "drill PASSED: see 8".to_owned(), cx.theme.strong())
+        (5, t!("drill PASSED: see 8").to_owned(), cx.theme.strong())
     } else {
-        (5, "drill FAILED: see 8".to_owned(), cx.theme.trouble())
+        (5, t!("drill FAILED: see 8").to_owned(), cx.theme.trouble())
     })
 }
 

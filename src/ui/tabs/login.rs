@@ -2,6 +2,7 @@
 
 mod view;
 
+use crate::t;
 use std::sync::Arc;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -72,8 +73,8 @@ impl TabView for Login {
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let Some(form) = &self.form else { return keys::hints(KEYS) };
-        let leads = if self.changing || cx.session.view || cx.session.locked { "back" } else { "clear" };
-        let quit = Hint::new("Ctrl-C", "quit", "");
+        let leads = if self.changing || cx.session.view || cx.session.locked { t!("back") } else { t!("clear") };
+        let quit = Hint::new("Ctrl-C", t!("quit"), "");
         form.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
     }
 
@@ -85,7 +86,7 @@ impl TabView for Login {
                 }
                 if form.answered(cx, answer) {
                     if matches!(form.purpose, Purpose::Change(_)) {
-                        self.told = Some(Ok("The new password is in force."));
+                        self.told = Some(Ok(t!("The new password is in force.")));
                     }
                     self.changing = false;
                     self.form = None;

@@ -1,5 +1,6 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
@@ -77,9 +78,10 @@ impl TabView for Mimic {
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let commands = cx.def().mimic.commands.iter();
         let commands = commands.map(|command| {
-            Hint::new(command.key, &command.label, format!("{} (asks first)", command.label)).needs(Role::Technician)
+            Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label))
+                .needs(Role::Technician)
         });
-        commands.chain([Hint::new("←↑↓→", "select", "select an item")]).chain(keys::hints(KEYS)).collect()
+        commands.chain([Hint::new("←↑↓→", t!("select"), t!("select an item"))]).chain(keys::hints(KEYS)).collect()
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
@@ -167,7 +169,7 @@ impl TabView for Mimic {
             }
         }
         if items.is_empty() {
-            canvas.text(1, 1, "the plant file defines no mimic", cx.theme.dim());
+            canvas.text(1, 1, t!("the plant file defines no mimic"), cx.theme.dim());
         }
     }
 
@@ -195,7 +197,7 @@ impl Mimic {
             Action::Motion => self.motion = !self.motion,
             Action::Actuators => {
                 let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
-                let faceplate = Faceplate::new("commands", outputs);
+                let faceplate = Faceplate::new(t!("commands"), outputs);
                 return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
             }
             Action::Why => {

@@ -6,6 +6,7 @@ mod view;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
 use std::path::PathBuf;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -202,7 +203,7 @@ impl Reports {
                 self.follow = true;
             }
             Action::Free => {
-                let prompt = Prompt::new("report of a period", period::FORMS, "");
+                let prompt = Prompt::new(t!("report of a period"), period::FORMS, "");
                 return vec![UiAction::Open(Modal::Prompt(prompt))];
             }
             Action::Move(motion) => self.scroll(cx, motion),
@@ -270,7 +271,7 @@ impl Reports {
     /// Writes exactly the figures that are shown.
     fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(report) = &self.report else {
-            self.export = Export::Failed("nothing to write yet".to_owned());
+            self.export = Export::Failed(t!("nothing to write yet").to_owned());
             return Vec::new();
         };
         if self.outgoing.is_some() {

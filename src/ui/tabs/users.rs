@@ -3,6 +3,7 @@
 mod audit;
 mod view;
 
+use crate::t;
 use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
 
@@ -165,10 +166,10 @@ impl Users {
             // Only a Supervisor sees this page: a station with users has at least one.
             (Action::Add, None) => {
                 let words = [
-                    "This station keeps no users.",
-                    "A demonstration needs no login; a station started with `sightglass run` has users.",
+                    t!("This station keeps no users."),
+                    t!("A demonstration needs no login; a station started with `sightglass run` has users."),
                 ];
-                let notice = Notice::new("add a user", words.map(str::to_owned).to_vec());
+                let notice = Notice::new(t!("add a user"), words.map(str::to_owned).to_vec());
                 return vec![UiAction::Open(Modal::Notice(notice))];
             }
             (Action::Add, Some(_)) => Some(UserForm::new(Purpose::Add)),
@@ -195,11 +196,11 @@ impl Users {
 fn state(cx: &ViewContext, row: &UserRow) -> String {
     let locked = row.locked_until.filter(|until| *until > cx.now);
     match (row.disabled, locked, row.must_change) {
-        (true, ..) => "disabled".to_owned(),
+        (true, ..) => t!("disabled").to_owned(),
         (false, Some(until), _) => {
-            format!("locked out until {}", crate::ui::widgets::text::clock(until, &cx.def().time_zone))
+            t!("locked out until {clock}", clock = crate::ui::widgets::text::clock(until, &cx.def().time_zone))
         }
-        (false, None, true) => "must change password".to_owned(),
-        (false, None, false) => "active".to_owned(),
+        (false, None, true) => t!("must change password").to_owned(),
+        (false, None, false) => t!("active").to_owned(),
     }
 }

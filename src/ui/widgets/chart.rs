@@ -6,6 +6,7 @@ pub(crate) mod axis;
 pub(crate) mod raster;
 pub(crate) mod trace;
 
+use crate::t;
 use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp, tz::TimeZone};
@@ -245,7 +246,7 @@ pub fn span_text(span: Duration) -> String {
     let seconds = span.as_secs();
     match seconds {
         0..=99 => format!("{seconds} s"),
-        100..=5_999 => format!("{} min", (seconds + 30) / 60),
+        100..=5_999 => t!("{seconds} min", seconds = (seconds + 30) / 60),
         6_000..=172_799 => format!("{:.1} h", span.as_secs_f64() / 3_600.0),
         _ => format!("{:.1} d", span.as_secs_f64() / 86_400.0),
     }

@@ -1,5 +1,6 @@
 //! How a line did over the last day: the share of requests that failed, and how busy it was, in two rows of bars.
 
+use crate::t;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
@@ -68,7 +69,7 @@ pub fn line_trend(cx: &ViewContext, canvas: &mut Canvas, minutes: &[LineMinute])
     let room = canvas.width().saturating_sub(NAME + FIGURES);
     let columns = columns(minutes, cx.now, usize::from(room));
     let Some(last) = minutes.last() else {
-        canvas.text(0, 0, "no minute of this line is stored yet", theme.dim());
+        canvas.text(0, 0, t!("no minute of this line is stored yet"), theme.dim());
         return;
     };
     let failed: Vec<Option<f64>> = columns.iter().map(|column| column.and_then(|column| column.failed)).collect();
@@ -78,14 +79,18 @@ pub fn line_trend(cx: &ViewContext, canvas: &mut Canvas, minutes: &[LineMinute])
     let now = last.failed();
     let style = if now.is_some_and(|now| ERRORS_MIN <= now) { theme.trouble() } else { theme.normal() };
     let rows = [
-        ("errors", bars(&failed, worst.max(ERRORS_MIN), theme.glyphs), now, worst, style),
-        ("busy", bars(&busy, 1.0, theme.glyphs), Some(f64::from(last.utilisation)), most, theme.normal()),
+        (t!("errors"), bars(&failed, worst.max(ERRORS_MIN), theme.glyphs), now, worst, style),
+        (t!("busy"), bars(&busy, 1.0, theme.glyphs), Some(f64::from(last.utilisation)), most, theme.normal()),
     ];
     for (y, (name, curve, now, most, style)) in rows.into_iter().enumerate() {
         let y = to_u16(y);
         canvas.text(0, y, &pad(name, NAME), theme.dim());
         let x = canvas.text(NAME, y, &curve, style);
-        let figures = format!(" {} now {} most", pad_left(&percent(now), 8), pad_left(&percent(Some(most)), 7));
+        let figures = t!(
+            " {pad_left} now {pad_left2} most",
+            pad_left = pad_left(&percent(now), 8),
+            pad_left2 = pad_left(&percent(Some(most)), 7)
+        );
         canvas.text(x, y, &figures, style);
     }
     let zone = &cx.def().time_zone;

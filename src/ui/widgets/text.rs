@@ -1,5 +1,6 @@
 //! Text on a clipped canvas: no widget can write outside its area, whatever the size of the screen.
 
+use crate::t;
 use std::time::Duration;
 
 use jiff::{Timestamp, tz::TimeZone};
@@ -199,8 +200,10 @@ pub fn age(span: Duration) -> String {
     let seconds = span.as_secs();
     match seconds {
         0..=99 => format!("{seconds}s"),
-        100..=5_999 => format!("{}m{:02}s", seconds / 60, seconds % 60),
-        6_000..=172_799 => format!("{}h{:02}m", seconds / 3_600, seconds / 60 % 60),
+        100..=5_999 => t!("{seconds}m{seconds2}s", seconds = seconds / 60, seconds2 = format!("{:02}", seconds % 60)),
+        6_000..=172_799 => {
+            t!("{seconds}h{seconds2}m", seconds = seconds / 3_600, seconds2 = format!("{:02}", seconds / 60 % 60))
+        }
         _ => format!("{}d", seconds / 86_400),
     }
 }
@@ -234,7 +237,7 @@ pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     } else if days < 6 {
         "%a %H:%M"
     } else {
-        "%m-%d %Hh"
+        t!("%m-%d %Hh")
     })
     .to_string()
 }

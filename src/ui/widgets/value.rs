@@ -1,5 +1,7 @@
 //! A value as an operator sees it: number, unit and how far to trust it, with one look everywhere.
 
+use crate::t;
+use crate::text::translate;
 use ratatui::style::Style;
 
 use super::text;
@@ -43,13 +45,13 @@ pub fn show(cx: &ViewContext, tag: TagId) -> Shown {
         style,
     };
     match (sample.quality, words(cx, tag)) {
-        _ if def.access == Access::Write => nothing("–", "write only", cx.theme.dim()),
-        (Quality::Good, Some(text)) if text.is_empty() => nothing("\"\"", "empty text", style),
+        _ if def.access == Access::Write => nothing("–", t!("write only"), cx.theme.dim()),
+        (Quality::Good, Some(text)) if text.is_empty() => nothing("\"\"", t!("empty text"), style),
         (Quality::Good, Some(text)) => Shown { text, unit, note: String::new(), number, style },
         (Quality::Uncertain(_), Some(text)) => {
             Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), number, style }
         }
-        (quality, _) => nothing("----", quality.cause().unwrap_or(Cause::NotRead).label(), style),
+        (quality, _) => nothing("----", translate(quality.cause().unwrap_or(Cause::NotRead).label()), style),
     }
 }
 
@@ -69,7 +71,7 @@ fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
         .filter(|(bit, _)| to_u64(value) >> (*bit).min(63) & 1 == 1)
         .map(|(_, name)| name.as_str())
         .collect();
-    Some(if set.is_empty() { "none".to_owned() } else { set.join(", ") })
+    Some(if set.is_empty() { t!("none").to_owned() } else { set.join(", ") })
 }
 
 impl Shown {

@@ -1,5 +1,6 @@
 //! Settings while they are being typed: choices and texts, and the line that they make.
 
+use crate::t;
 use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -32,16 +33,16 @@ pub(super) enum Field {
 impl Field {
     pub fn name(self) -> &'static str {
         match self {
-            Field::Mode => "mode",
-            Field::Port => "port",
-            Field::Baud => "baud rate",
-            Field::DataBits => "data bits",
-            Field::Parity => "parity",
-            Field::StopBits => "stop bits",
-            Field::Host => "host",
-            Field::TcpPort => "TCP port",
-            Field::Timeout => "timeout",
-            Field::Gap => "gap",
+            Field::Mode => t!("mode"),
+            Field::Port => t!("port"),
+            Field::Baud => t!("baud rate"),
+            Field::DataBits => t!("data bits"),
+            Field::Parity => t!("parity"),
+            Field::StopBits => t!("stop bits"),
+            Field::Host => t!("host"),
+            Field::TcpPort => t!("TCP port"),
+            Field::Timeout => t!("timeout"),
+            Field::Gap => t!("gap"),
         }
     }
 
@@ -103,7 +104,7 @@ impl Draft {
         let mut draft = Draft {
             base: settings.clone(),
             mode: Mode::Rtu,
-            port: Line::new("/dev/ttyUSB0"),
+            port: Line::new(t!("/dev/ttyUSB0")),
             serial: Serial::USUAL,
             rs485: Rs485::Off,
             host: Line::default(),
@@ -128,12 +129,12 @@ impl Draft {
     pub fn settings(&self) -> Result<LineDef, String> {
         let missed = [&self.port, &self.host, &self.tcp_port, &self.timeout, &self.gap];
         if missed.iter().any(|line| line.missed()) {
-            return Err("not all of a text was taken; Ctrl-U empties it".to_owned());
+            return Err(t!("not all of a text was taken; Ctrl-U empties it").to_owned());
         }
         let settings = LineDef {
             transport: self.transport()?,
-            timeout: millis("timeout", &self.timeout)?,
-            gap: millis("gap", &self.gap)?,
+            timeout: millis(t!("timeout"), &self.timeout)?,
+            gap: millis(t!("gap"), &self.gap)?,
             ..self.base.clone()
         };
         match check_settings(&settings).into_iter().next() {
@@ -151,7 +152,7 @@ impl Draft {
         };
         let tcp = |framing| {
             let text = self.tcp_port.text();
-            let port = text.trim().parse().map_err(|_| format!("\"{text}\" is no TCP port, expected 1 to 65535"))?;
+            let port = text.trim().parse().map_err(|_| t!("\"{text}\" is no TCP port, expected 1 to 65535", text))?;
             Ok(Transport::Tcp { host: self.host.text().trim().to_owned(), port, framing })
         };
         match self.mode {
@@ -181,14 +182,14 @@ impl Draft {
                 Mode::Rtu => "RTU".to_owned(),
                 Mode::Ascii => "ASCII".to_owned(),
                 Mode::Tcp => "TCP".to_owned(),
-                Mode::RtuOverTcp => "RTU over TCP".to_owned(),
+                Mode::RtuOverTcp => t!("RTU over TCP").to_owned(),
             },
             Field::Baud => self.serial.baud.to_string(),
             Field::DataBits => self.serial.data_bits.to_string(),
             Field::Parity => match self.serial.parity {
-                Parity::None => "none".to_owned(),
-                Parity::Even => "even".to_owned(),
-                Parity::Odd => "odd".to_owned(),
+                Parity::None => t!("none").to_owned(),
+                Parity::Even => t!("even").to_owned(),
+                Parity::Odd => t!("odd").to_owned(),
             },
             Field::StopBits => self.serial.stop_bits.to_string(),
             Field::Port | Field::Host | Field::TcpPort | Field::Timeout | Field::Gap => {
@@ -248,7 +249,7 @@ impl Draft {
             }
             Field::Baud => serial.baud = next(BAUDS, serial.baud, by),
             Field::DataBits if self.mode == Mode::Ascii => serial.data_bits = next(&[7, 8], serial.data_bits, by),
-            Field::DataBits => return Err("Modbus RTU always has 8 data bits; 7 are for ASCII".to_owned()),
+            Field::DataBits => return Err(t!("Modbus RTU always has 8 data bits; 7 are for ASCII").to_owned()),
             Field::Parity => serial.parity = next(&[Parity::None, Parity::Even, Parity::Odd], serial.parity, by),
             Field::StopBits => serial.stop_bits = next(&[1, 2], serial.stop_bits, by),
             Field::Port | Field::Host | Field::TcpPort | Field::Timeout | Field::Gap => {}
@@ -264,6 +265,7 @@ fn next<T: Copy + PartialEq>(all: &[T], now: T, by: isize) -> T {
 
 fn millis(name: &str, line: &Line) -> Result<Duration, String> {
     let text = line.text();
-    let number = text.trim().parse().map_err(|_| format!("{name} \"{text}\" is no whole number of milliseconds"));
+    let number =
+        text.trim().parse().map_err(|_| t!("{name} \"{text}\" is no whole number of milliseconds", name, text));
     number.map(Duration::from_millis)
 }

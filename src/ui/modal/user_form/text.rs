@@ -1,21 +1,22 @@
 //! What the form about users says: keys, headings and explanations.
 
 use super::*;
+use crate::t;
 
 impl UserForm {
     /// What Enter does at the end.
     pub(super) fn verb(&self) -> &'static str {
         match &self.purpose {
-            Purpose::First => "create",
-            Purpose::Login => "log in",
-            Purpose::Change(_) => "change it",
-            Purpose::Unlock(_) => "unlock",
-            Purpose::Add => "add",
-            Purpose::Reset(_) => "set it",
-            Purpose::Role(_) => "change it",
-            Purpose::Disable(_, true) => "disable",
-            Purpose::Disable(_, false) => "enable",
-            Purpose::Delete(_) => "delete",
+            Purpose::First => t!("create"),
+            Purpose::Login => t!("log in"),
+            Purpose::Change(_) => t!("change it"),
+            Purpose::Unlock(_) => t!("unlock"),
+            Purpose::Add => t!("add"),
+            Purpose::Reset(_) => t!("set it"),
+            Purpose::Role(_) => t!("change it"),
+            Purpose::Disable(_, true) => t!("disable"),
+            Purpose::Disable(_, false) => t!("enable"),
+            Purpose::Delete(_) => t!("delete"),
         }
     }
 
@@ -24,13 +25,13 @@ impl UserForm {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = vec![hint("⏎", self.verb())];
         if self.form.rows() > 1 {
-            hints.push(hint("Tab", "next line"));
+            hints.push(hint(t!("Tab"), t!("next line")));
         }
         if self.form.has_secret() {
-            hints.push(hint("Ctrl-R", "show password"));
+            hints.push(hint(t!("Ctrl-R"), t!("show password")));
         }
         if matches!(self.purpose, Purpose::Unlock(_)) {
-            hints.push(hint("Ctrl-O", "other user"));
+            hints.push(hint(t!("Ctrl-O"), t!("other user")));
         }
         hints
     }
@@ -38,52 +39,55 @@ impl UserForm {
     /// Its heading.
     pub fn title(&self) -> String {
         match &self.purpose {
-            Purpose::First => "the first Supervisor".to_owned(),
-            Purpose::Login => "log in".to_owned(),
-            Purpose::Change(_) => "choose a new password".to_owned(),
-            Purpose::Unlock(user) => format!("locked by {user}"),
-            Purpose::Add => "add a user".to_owned(),
-            Purpose::Reset(user) => format!("new password for {user}"),
-            Purpose::Role(user) => format!("role of {user}"),
-            Purpose::Disable(user, true) => format!("disable {user}"),
-            Purpose::Disable(user, false) => format!("enable {user}"),
-            Purpose::Delete(user) => format!("delete {user}"),
+            Purpose::First => t!("the first Supervisor").to_owned(),
+            Purpose::Login => t!("log in").to_owned(),
+            Purpose::Change(_) => t!("choose a new password").to_owned(),
+            Purpose::Unlock(user) => t!("locked by {user}", user),
+            Purpose::Add => t!("add a user").to_owned(),
+            Purpose::Reset(user) => t!("new password for {user}", user),
+            Purpose::Role(user) => t!("role of {user}", user),
+            Purpose::Disable(user, true) => t!("disable {user}", user),
+            Purpose::Disable(user, false) => t!("enable {user}", user),
+            Purpose::Delete(user) => t!("delete {user}", user),
         }
     }
 
     pub(super) fn words(&self, cx: &ViewContext) -> Vec<String> {
         let least = cx.session.password_chars_min;
-        let rule = format!("A password has at least {least} characters. A phrase is good, in any language, Thai too.");
-        let first = "It must be changed at the first login.".to_owned();
+        let rule =
+            t!("A password has at least {least} characters. A phrase is good, in any language, Thai too.", least);
+        let first = t!("It must be changed at the first login.").to_owned();
         let own = |user: &Arc<str>| cx.session.who.as_ref().is_some_and(|who| who.user == *user);
         let you = |user: &Arc<str>| {
-            own(user).then_some(
-                "This is your own account: you are logged out at once, and only another Supervisor can undo it.",
-            )
+            own(user).then_some(t!(
+                "This is your own account: you are logged out at once, and only another Supervisor can undo it."
+            ))
         };
         match &self.purpose {
             Purpose::First => vec![
-                "No users exist. Create the first Supervisor account: it may do everything, and adds the others."
+                t!("No users exist. Create the first Supervisor account: it may do everything, and adds the others.")
                     .to_owned(),
                 rule,
             ],
             Purpose::Login => Vec::new(),
             Purpose::Change(Some(_)) => {
-                vec!["Another user set your present password: choose one that only you know.".to_owned(), rule]
+                vec![t!("Another user set your present password: choose one that only you know.").to_owned(), rule]
             }
             Purpose::Change(None) => vec![rule],
-            Purpose::Unlock(_) => vec!["Process and alarms stay visible. Your open window is kept.".to_owned()],
+            Purpose::Unlock(_) => vec![t!("Process and alarms stay visible. Your open window is kept.").to_owned()],
             Purpose::Add => vec![rule, first],
             Purpose::Reset(_) => vec![rule, first],
             Purpose::Role(_) => vec![],
             Purpose::Disable(user, true) => {
-                let words = format!("{user} is logged out everywhere and cannot log in until enabled again.");
+                let words = t!("{user} is logged out everywhere and cannot log in until enabled again.", user);
                 you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
-            Purpose::Disable(user, false) => vec![format!("{user} may log in again; a lockout ends too.")],
+            Purpose::Disable(user, false) => vec![t!("{user} may log in again; a lockout ends too.", user)],
             Purpose::Delete(user) => {
-                let words =
-                    format!("{user} is removed; all that {user} did stays in the audit log. Type the name to be sure.");
+                let words = t!(
+                    "{user} is removed; all that {user} did stays in the audit log. Type the name to be sure.",
+                    user
+                );
                 you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
         }
@@ -97,16 +101,16 @@ impl UserForm {
 
     pub(super) fn problem_text(&self, cx: &ViewContext) -> Option<String> {
         if self.waiting {
-            return Some("asking the station …".to_owned());
+            return Some(t!("asking the station …").to_owned());
         }
         let (words, _) = self.problem.as_ref()?;
         Some(match (seconds(words), self.wait(cx)) {
             (None, _) => words.clone(),
-            (Some(_), 0) => format!("{}; try again now", words.split(';').next().unwrap_or_default()),
+            (Some(_), 0) => t!("{next}; try again now", next = words.split(';').next().unwrap_or_default()),
             (Some((place, _)), left) => {
                 let rest = words[place..].find(" s").map_or("", |end| &words[place + end + 2..]);
                 let start = words[..place].trim_end_matches([' ', ';', ',']);
-                format!("{start}; wait {left} s{rest}")
+                t!("{start}; wait {left} s{rest}", start, left, rest)
             }
         })
     }
@@ -114,7 +118,7 @@ impl UserForm {
 
 /// Where the station's words tell a wait in seconds (`wait 8 s`, `in 8 s`), and how many.
 pub(super) fn seconds(words: &str) -> Option<(usize, u32)> {
-    ["wait ", "in "].iter().find_map(|lead| {
+    [t!("wait "), t!("in ")].iter().find_map(|lead| {
         words.match_indices(lead).find_map(|(place, _)| {
             let rest = &words[place + lead.len()..];
             let digits = rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_digit()).len();

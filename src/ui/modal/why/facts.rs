@@ -1,5 +1,6 @@
 //! What there is to say about a value, row by row, the most urgent first.
 
+use crate::t;
 use std::time::Duration;
 
 use ratatui::style::Style;
@@ -22,7 +23,7 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     let exchange = cx.snapshot.source_frames[tag.index()].as_deref();
     let found = exchange.and_then(|exchange| source_frame::find(def.point, exchange));
     let mut rows = value::value_rows(cx, def, exchange, found.as_ref());
-    let label = if def.is_text() { "text" } else { "number" };
+    let label = if def.is_text() { t!("text") } else { t!("number") };
     rows.push(row(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
     rows.push(row("where", wire::place(cx, def, device), cx.theme.normal()));
     rows.push(row("", wire::point(def), cx.theme.normal()));
@@ -55,9 +56,9 @@ pub(super) fn words(fault: Fault) -> String {
 pub(super) fn span(span: Duration) -> String {
     let ms = span.as_secs_f64() * 1e3;
     match ms {
-        ..10.0 => format!("{} ms", (ms * 10.0).round() / 10.0),
-        10.0..1_000.0 => format!("{ms:.0} ms"),
+        ..10.0 => t!("{round} ms", round = (ms * 10.0).round() / 10.0),
+        10.0..1_000.0 => t!("{ms} ms", ms = format!("{ms:.0}")),
         1_000.0..100_000.0 => format!("{} s", (ms / 100.0).round() / 10.0),
-        _ => format!("{:.0} min", ms / 60_000.0),
+        _ => t!("{ms} min", ms = format!("{:.0}", ms / 60_000.0)),
     }
 }

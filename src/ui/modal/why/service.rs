@@ -1,5 +1,6 @@
 //! How the device and its line do, and how the value's poll keeps its time.
 
+use crate::t;
 use std::time::Duration;
 
 use super::{
@@ -30,10 +31,10 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     let stats = line.report.as_ref().and_then(|report| report.device(device.id));
     let mut text = device_text(cx, device.id);
     if let Some(p99) = stats.and_then(|stats| stats.reply.p99()) {
-        text += &format!(", 99 % within {}", span(p99));
+        text += &t!(", 99 % within {span}", span = span(p99));
     }
     if let Some((failed, of)) = stats.map(|stats| stats.recent()).filter(|(failed, _)| 0 < *failed) {
-        text += &format!(", {failed} of the last {of} failed");
+        text += &t!(", {failed} of the last {of} failed", failed, of);
     }
     let well = matches!(status.state, DeviceState::Answering | DeviceState::Unknown);
     let mut rows = vec![row("device", text, if well { theme.normal() } else { theme.trouble() })];
@@ -61,24 +62,30 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
     }
     let Some(poll) = report.poll_of(def.id) else { return Vec::new() };
     let period = match poll.poll {
-        Poll::Every(period) => format!("every {}", span(period)),
-        Poll::Once => "once, and on refresh".to_owned(),
-        Poll::Never => "never by itself".to_owned(),
+        Poll::Every(period) => t!("every {span}", span = span(period)),
+        Poll::Once => t!("once, and on refresh").to_owned(),
+        Poll::Never => t!("never by itself").to_owned(),
     };
     let next = poll.next.map(|next| match between(cx.now, next) {
-        Duration::ZERO => ", due now".to_owned(),
-        wait => format!(", next in {}", span(wait)),
+        Duration::ZERO => t!(", due now").to_owned(),
+        wait => t!(", next in {span}", span = span(wait)),
     });
     let busy = match (poll.shed, poll.factor) {
-        (true, _) => ", skipped while the line is overloaded".to_owned(),
+        (true, _) => t!(", skipped while the line is overloaded").to_owned(),
         (false, factor) if factor < 1.05 => String::new(),
-        (false, factor) => format!(", now every {factor:.1} periods: the line is overloaded"),
+        (false, factor) => t!(", now every {factor} periods: the line is overloaded", factor = format!("{factor:.1}")),
     };
-    let mut text = format!("{period}{busy}{}, {} missed", next.unwrap_or_default(), poll.stats.missed);
+    let mut text = t!(
+        "{period}{busy}{next}, {missed} missed",
+        period,
+        busy,
+        next = next.unwrap_or_default(),
+        missed = poll.stats.missed
+    );
     if let Some(p99) = poll.stats.jitter.p99() {
-        text += &format!(", jitter {}", span(p99));
+        text += &t!(", jitter {span}", span = span(p99));
     }
-    text += &format!(", costs {}", span(poll.cost));
+    text += &t!(", costs {span}", span = span(poll.cost));
     vec![row(
         "poll",
         text,
@@ -90,11 +97,13 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
 pub(super) fn line_words(cx: &ViewContext, state: &LineState) -> Option<String> {
     match state {
         LineState::Connected => None,
-        LineState::Connecting => Some("being connected".to_owned()),
-        LineState::Disconnected => Some("disconnected by an operator".to_owned()),
-        LineState::Testing => Some("a test has it for itself".to_owned()),
-        LineState::Waiting { why, retry_at } => {
-            Some(format!("not connected: {why}; tried again in {}", running(between(cx.now, *retry_at))))
-        }
+        LineState::Connecting => Some(t!("being connected").to_owned()),
+        LineState::Disconnected => Some(t!("disconnected by an operator").to_owned()),
+        LineState::Testing => Some(t!("a test has it for itself").to_owned()),
+        LineState::Waiting { why, retry_at } => Some(t!(
+            "not connected: {why}; tried again in {running}",
+            why,
+            running = running(between(cx.now, *retry_at))
+        )),
     }
 }

@@ -5,6 +5,8 @@ use super::{
     facts::{row, span, words},
     service::line_words,
 };
+use crate::t;
+use crate::text::translate;
 use crate::{
     bus::{
         codec,
@@ -38,12 +40,17 @@ pub(super) fn value_rows(
     let shown = value::show(cx, def.id);
     let at = clock(sample.at, &cx.def().time_zone);
     let quality = match sample.quality {
-        _ if def.access == Access::Write => "write only: it cannot be read".to_owned(),
-        Quality::Good => format!("good, read {} ago at {at}", age(cx.age(def.id))),
+        _ if def.access == Access::Write => t!("write only: it cannot be read").to_owned(),
+        Quality::Good => t!("good, read {age} ago at {at}", age = age(cx.age(def.id)), at),
         Quality::Uncertain(cause) => {
-            format!("uncertain: {}; read {} ago at {at}", cause.label(), age(cx.age(def.id)))
+            t!(
+                "uncertain: {cause}; read {age} ago at {at}",
+                cause = translate(cause.label()),
+                age = age(cx.age(def.id)),
+                at
+            )
         }
-        Quality::Bad(cause) => format!("bad: {}, since {at}", cause.label()),
+        Quality::Bad(cause) => t!("bad: {cause}, since {at}", cause = translate(cause.label()), at),
     };
     let mut rows = vec![row("value", format!("{}  {quality}", shown.with_unit()), shown.style)];
     let Some(cause) = sample.quality.cause().filter(|_| def.access != Access::Write) else { return rows };
@@ -65,27 +72,34 @@ fn because(
     found: Option<&Found>,
 ) -> Option<String> {
     let line = cx.def().device(def.device).line;
-    let words_of = |tag: TagId| format!("{} is {}", cx.def().tag(tag).name, value::show(cx, tag).whole());
+    let words_of =
+        |tag: TagId| t!("{name} is {whole}", name = cx.def().tag(tag).name, whole = value::show(cx, tag).whole());
     match cause {
         Cause::NotConnected => line_words(cx, &cx.snapshot.line(line).state),
         Cause::SensorFault => {
             let raw = found.and_then(|found| found.raw);
             if let Some(raw) = raw.filter(|raw| def.bad_if.iter().any(|bad| *bad as f64 == *raw)) {
-                return Some(format!("raw {raw} means \"no value\" for this device"));
+                return Some(t!("raw {raw} means \"no value\" for this device", raw));
             }
             match (exchange.and_then(|exchange| exchange.outcome.err()), def.quality_from) {
                 (Some(Fault::NotANumber), _) => Some(words(Fault::NotANumber)),
-                (_, Some((word, mask))) => Some(format!("{} (bits 0x{mask:X} any bit set = fault)", words_of(word))),
+                (_, Some((word, mask))) => Some(t!(
+                    "{words_of} (bits 0x{mask} any bit set = fault)",
+                    words_of = words_of(word),
+                    mask = format!("{mask:X}")
+                )),
                 (_, None) => None,
             }
         }
         Cause::Unscaled => match def.decimals {
-            Decimals::From(from) => Some(format!("its decimals come from another value: {}", words_of(from))),
+            Decimals::From(from) => {
+                Some(t!("its decimals come from another value: {words_of}", words_of = words_of(from)))
+            }
             Decimals::Fixed(_) => None,
         },
         Cause::Stale => match def.poll {
-            Poll::Every(period) => Some(format!("read every {}, and not for longer than that", span(period))),
-            Poll::Once | Poll::Never => Some("it is not read by itself".to_owned()),
+            Poll::Every(period) => Some(t!("read every {span}, and not for longer than that", span = span(period))),
+            Poll::Once | Poll::Never => Some(t!("it is not read by itself").to_owned()),
         },
         // The verdict on the last answer says it all.
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown => None,
@@ -101,26 +115,26 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
     let of = |fault: Fault| Some(source_frame::advice(fault).to_owned());
     match cause {
         Cause::NotConnected => match cx.snapshot.line(device.line).state {
-            LineState::Disconnected => Some("connect the line again: tab 4, L".to_owned()),
-            LineState::Testing => Some("wait for the end of the test, or stop it".to_owned()),
+            LineState::Disconnected => Some(t!("connect the line again: tab 4, L").to_owned()),
+            LineState::Testing => Some(t!("wait for the end of the test, or stop it").to_owned()),
             LineState::Waiting { .. } | LineState::Connecting | LineState::Connected => of(Fault::NotConnected),
         },
         Cause::Timeout | Cause::DeviceDown => of(fault.or(last).unwrap_or(Fault::Timeout)),
         Cause::Corrupt => of(fault.unwrap_or(Fault::Crc { got: 0, computed: 0 })),
         Cause::Exception => fault.or(last).and_then(of),
         Cause::SensorFault if fault == Some(Fault::NotANumber) => of(Fault::NotANumber),
-        Cause::SensorFault => Some("check the sensor, its wires and the input range of the device".to_owned()),
-        Cause::Unscaled => Some("make the other value good first; w on it says why it is not".to_owned()),
+        Cause::SensorFault => Some(t!("check the sensor, its wires and the input range of the device").to_owned()),
+        Cause::Unscaled => Some(t!("make the other value good first; w on it says why it is not").to_owned()),
         Cause::Stale => match def.poll {
-            Poll::Every(_) => Some("the line may be overloaded: see missed reads below, poll slower".to_owned()),
-            Poll::Once | Poll::Never => Some("read it now: tab 4, u".to_owned()),
+            Poll::Every(_) => Some(t!("the line may be overloaded: see missed reads below, poll slower").to_owned()),
+            Poll::Once | Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),
         },
         Cause::NotRead => match def.poll {
             Poll::Every(_) | Poll::Once => None,
-            Poll::Never => Some("read it now: tab 4, u".to_owned()),
+            Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),
         },
-        Cause::OutOfRange => Some("compare the value with the range of the device".to_owned()),
-        Cause::NotAuthorised => Some("log in: tab 0".to_owned()),
+        Cause::OutOfRange => Some(t!("compare the value with the range of the device").to_owned()),
+        Cause::NotAuthorised => Some(t!("log in: tab 0").to_owned()),
         Cause::StationOff | Cause::Unreadable => None,
     }
 }
@@ -132,11 +146,11 @@ fn text(cx: &ViewContext, def: &TagDef, found: Option<&Found>) -> String {
         (Some(text), Some(found), _) => {
             let hex: Vec<String> = found.words.iter().map(|word| format!("{word:04X}")).collect();
             let odd = text.contains(codec::UNPRINTABLE);
-            let note = if odd { ", · stands for a byte that cannot be printed" } else { "" };
-            format!("\"{text}\"{note}, from {}", hex.join(" "))
+            let note = if odd { t!(", · stands for a byte that cannot be printed") } else { "" };
+            t!("\"{text}\"{note}, from {join}", text, note, join = hex.join(" "))
         }
-        (_, _, Some(text)) => format!("\"{text}\", earlier answer"),
-        (..) => "none".to_owned(),
+        (_, _, Some(text)) => t!("\"{text}\", earlier answer", text),
+        (..) => t!("none").to_owned(),
     }
 }
 
@@ -155,12 +169,12 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     let hex = found.map(|found| found.words.iter().map(|word| format!(" {word:04X}")).collect::<String>());
     let Some(raw) = from_answer.or(shown) else {
         return match hex {
-            Some(hex) => format!("none:{hex} is no {}", def.point.kind),
-            None => "none".to_owned(),
+            Some(hex) => t!("none:{hex} is no {kind}", hex, kind = def.point.kind),
+            None => t!("none").to_owned(),
         };
     };
     let hex = hex.filter(|_| !def.point.table.is_bits()).map(|hex| format!(" ({})", hex.trim_start()));
-    let mut words = format!("raw {raw}{}", hex.unwrap_or_default());
+    let mut words = t!("raw {raw}{hex}", raw, hex = hex.unwrap_or_default());
     if 0 < scaling {
         words += &format!(" × 10^-{scaling}");
     }
@@ -174,12 +188,14 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     words += &format!(" = {result} {}", cx.snapshot.unit(def.id));
     let mut words = words.trim_end().to_owned();
     match def.decimals {
-        Decimals::From(from) => words += &format!(", decimals from {}", cx.def().tag(from).name),
-        Decimals::Fixed(_) if def.scale == 1.0 && def.offset == 0.0 && def.labels.is_empty() => words += ", not scaled",
+        Decimals::From(from) => words += &t!(", decimals from {name}", name = cx.def().tag(from).name),
+        Decimals::Fixed(_) if def.scale == 1.0 && def.offset == 0.0 && def.labels.is_empty() => {
+            words += t!(", not scaled")
+        }
         Decimals::Fixed(_) => {}
     }
     if from_answer.is_none() && exchange.is_some() {
-        words += ", earlier answer";
+        words += t!(", earlier answer");
     }
     words
 }

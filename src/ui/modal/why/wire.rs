@@ -4,6 +4,7 @@ use super::{
     Row, bytes,
     facts::{row, settings, span, words},
 };
+use crate::t;
 use crate::{
     bus::{
         dissect::{self, Direction, Dissection},
@@ -40,7 +41,7 @@ pub(super) fn exchange_rows(
     };
     let hex = |label, text: String, style| Row { label, text: text.trim_start().to_owned(), style, wraps: false };
     for (n, text) in frame(&exchange.request, None).into_iter().enumerate() {
-        rows.push(hex(if n == 0 { "asked" } else { "" }, text, theme.normal()));
+        rows.push(hex(if n == 0 { t!("asked") } else { "" }, text, theme.normal()));
     }
     let at = clock(exchange.at, &cx.def().time_zone);
     // What was good then says nothing of now.
@@ -51,18 +52,18 @@ pub(super) fn exchange_rows(
         rows.push(row("answer", format!("none within {}", span(timeout)), theme.trouble()));
     } else {
         for (n, text) in frame(&exchange.answer, found.map(|found| &found.range)).into_iter().enumerate() {
-            rows.push(hex(if n == 0 { "answer" } else { "" }, text, theme.normal()));
+            rows.push(hex(if n == 0 { t!("answer") } else { "" }, text, theme.normal()));
         }
         rows.push(Row { wraps: false, ..row("", answer.summary.clone(), theme.dim()) });
     }
-    let reply = exchange.reply.map(|reply| format!(", after {}", span(reply))).unwrap_or_default();
-    let tries = if 1 < exchange.tries { ", second try: the first answer was corrupt" } else { ", first try" };
+    let reply = exchange.reply.map(|reply| t!(", after {span}", span = span(reply))).unwrap_or_default();
+    let tries = if 1 < exchange.tries { t!(", second try: the first answer was corrupt") } else { t!(", first try") };
     let (verdict, style) = match exchange.outcome {
         Ok(()) if old => {
             let ago = running(between(exchange.at, cx.now));
-            (format!("ok, but {ago} ago: no good answer since"), theme.trouble())
+            (t!("ok, but {ago} ago: no good answer since", ago), theme.trouble())
         }
-        Ok(()) => ("ok".to_owned(), theme.normal()),
+        Ok(()) => (t!("ok").to_owned(), theme.normal()),
         Err(fault) => (words(fault), theme.trouble()),
     };
     rows.push(row("verdict", format!("{verdict}{reply}{tries}"), style));
@@ -78,11 +79,9 @@ pub(super) fn every_byte(
     room: u16,
 ) -> Vec<Row> {
     let mut rows = Vec::new();
-    let frames = [("asked", request, None), ("answer", answer, found.map(|found| &found.range))];
-    for (label, dissection, marked) in
-        frames.into_iter().filter(|(label, ..)| *label == "asked" || !exchange.answer.is_empty())
-    {
-        let heading = format!("{label}, byte by byte");
+    let frames = [(t!("asked"), request, None), (t!("answer"), answer, found.map(|found| &found.range))];
+    for (label, dissection, marked) in frames.into_iter().take(if exchange.answer.is_empty() { 1 } else { 2 }) {
+        let heading = t!("{label}, byte by byte", label);
         rows.push(Row { label: "", text: heading, style: cx.theme.strong(), wraps: false });
         for field in &dissection.fields {
             let own = marked.is_some_and(|marked| field.range.start < marked.end && marked.start < field.range.end);
@@ -99,18 +98,25 @@ pub(super) fn every_byte(
 
 pub(super) fn never_asked(cx: &ViewContext, def: &TagDef) -> &'static str {
     match (def.access, def.poll, &cx.snapshot.line(cx.def().device(def.device).line).state) {
-        (Access::Write, ..) => "never: it can only be written",
-        (_, Poll::Never, _) => "never: it is not read by itself",
-        (_, _, LineState::Connected) => "not yet: its turn has not come",
+        (Access::Write, ..) => t!("never: it can only be written"),
+        (_, Poll::Never, _) => t!("never: it is not read by itself"),
+        (_, _, LineState::Connected) => t!("not yet: its turn has not come"),
         (_, _, LineState::Connecting | LineState::Waiting { .. } | LineState::Disconnected | LineState::Testing) => {
-            "not yet: nothing could be sent"
+            t!("not yet: nothing could be sent")
         }
     }
 }
 
 pub(super) fn place(cx: &ViewContext, def: &TagDef, device: &DeviceDef) -> String {
     let line = settings(cx, def);
-    format!("{} {} unit {} on {}, {}", device.name, device.model, device.unit, line.name, line.transport)
+    t!(
+        "{name} {model} unit {unit} on {name2}, {transport}",
+        name = device.name,
+        model = device.model,
+        unit = device.unit,
+        name2 = line.name,
+        transport = line.transport
+    )
 }
 
 /// Function, both numbers of the address, type, word order.
@@ -118,20 +124,20 @@ pub(super) fn point(def: &TagDef) -> String {
     let point = def.point;
     let function = dissect::function_words(point.table.read_fc());
     let what = match (point.table.is_bits(), point.field) {
-        (true, _) => "one bit".to_owned(),
-        (false, Some((low, 1))) => format!("bit {low} of a word"),
-        (false, Some((low, bits))) => format!("bits {low}–{} of a word", low + bits - 1),
+        (true, _) => t!("one bit").to_owned(),
+        (false, Some((low, 1))) => t!("bit {low} of a word", low),
+        (false, Some((low, bits))) => t!("bits {low}–{low2} of a word", low, low2 = low + bits - 1),
         (false, None) => point.kind.to_string(),
     };
     let order = match (point.table.is_bits(), point.order) {
         (true, _) => "",
         (false, ByteOrder::Abcd | ByteOrder::Cdab) if point.kind.registers() == 1 => "",
-        (false, ByteOrder::Abcd) if def.is_text() => " ABCD (high byte first)",
-        (false, ByteOrder::Abcd) => " ABCD (high word first)",
-        (false, ByteOrder::Cdab) => " CDAB (low word first)",
-        (false, ByteOrder::Badc) if def.is_text() => " BADC (low byte first)",
-        (false, ByteOrder::Badc) => " BADC (bytes swapped)",
-        (false, ByteOrder::Dcba) => " DCBA (little-endian)",
+        (false, ByteOrder::Abcd) if def.is_text() => t!(" ABCD (high byte first)"),
+        (false, ByteOrder::Abcd) => t!(" ABCD (high word first)"),
+        (false, ByteOrder::Cdab) => t!(" CDAB (low word first)"),
+        (false, ByteOrder::Badc) if def.is_text() => t!(" BADC (low byte first)"),
+        (false, ByteOrder::Badc) => t!(" BADC (bytes swapped)"),
+        (false, ByteOrder::Dcba) => t!(" DCBA (little-endian)"),
     };
     let address = point.address;
     format!("{function}  {} / 0x{address:04X}  {what}{order}", point.table.modicon(address))

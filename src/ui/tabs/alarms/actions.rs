@@ -1,5 +1,6 @@
 //! What an operator does with alarms: the windows that ask, and the commands that need no query.
 
+use crate::t;
 use std::time::Duration;
 
 use super::super::reports::period;
@@ -33,11 +34,11 @@ pub fn acknowledge(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
 /// Says that this one needs no acknowledgement, and who gave it.
 pub fn acknowledged(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     let by = alarm.acknowledged.as_ref().map(|note| {
-        let by = note.by.as_deref().unwrap_or("the station");
-        format!("It was acknowledged {} by {by}.", clock(note.at, &cx.def().time_zone))
+        let by = note.by.as_deref().unwrap_or(t!("the station"));
+        t!("It was acknowledged {clock} by {by}.", clock = clock(note.at, &cx.def().time_zone), by)
     });
-    let words = ["already acknowledged".to_owned(), name(cx, alarm.id)].into_iter().chain(by).collect();
-    open(Modal::Notice(Notice::new("acknowledge", words)))
+    let words = [t!("already acknowledged").to_owned(), name(cx, alarm.id)].into_iter().chain(by).collect();
+    open(Modal::Notice(Notice::new(t!("acknowledge"), words)))
 }
 
 /// Acknowledges one alarm with a note.
@@ -47,7 +48,7 @@ pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     }
     let needed = cx.def().alarm(alarm.id).ack_comment;
     let notes = vec![name(cx, alarm.id)];
-    let reason = Reason::new("acknowledge with a note", "acknowledge", notes, alarm.acknowledge(), needed);
+    let reason = Reason::new(t!("acknowledge with a note"), t!("acknowledge"), notes, alarm.acknowledge(), needed);
     open(Modal::Reason(Box::new(reason)))
 }
 
@@ -59,20 +60,20 @@ pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a Ac
         return Vec::new();
     }
     let asked = match waiting.len() {
-        1 => "Acknowledge 1 alarm?".to_owned(),
-        n => format!("Acknowledge {n} alarms?"),
+        1 => t!("Acknowledge 1 alarm?").to_owned(),
+        n => t!("Acknowledge {n} alarms?", n),
     };
     let mut notes: Vec<String> = waiting.iter().take(NAMED).map(|alarm| marked(cx, alarm.id)).collect();
     if NAMED < waiting.len() {
-        notes.push(format!("… and {} more", waiting.len() - NAMED));
+        notes.push(t!("… and {count} more", count = waiting.len() - NAMED));
     }
     let seen = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
     let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen });
-    let title = "acknowledge all";
+    let title = t!("acknowledge all");
     if needed {
         notes.insert(0, asked);
-        notes.push("At least one of them needs a note.".to_owned());
-        return open(Modal::Reason(Box::new(Reason::new(title, "acknowledge", notes, kind, true))));
+        notes.push(t!("At least one of them needs a note.").to_owned());
+        return open(Modal::Reason(Box::new(Reason::new(title, t!("acknowledge"), notes, kind, true))));
     }
     open(Modal::Confirm(Confirm::command(title, asked, kind).with_notes(notes)))
 }
@@ -85,20 +86,20 @@ pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
     let shift = period::at(cx.def(), cx.now).filter(|_| !cx.def().shifts.is_empty());
     let rest = shift.and_then(|shift| Duration::try_from(shift.to.duration_since(cx.now)).ok());
     if let Some(rest) = rest.filter(|rest| !rest.is_zero() && *rest <= max) {
-        times.push((format!("rest of the shift, {}", running(rest)), rest));
+        times.push((t!("rest of the shift, {running}", running = running(rest)), rest));
     }
-    let notes = vec![name(cx, alarm), "It is not annunciated for this time, and comes back by itself:".to_owned()];
+    let notes = vec![name(cx, alarm), t!("It is not annunciated for this time, and comes back by itself:").to_owned()];
     let kind = CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: max });
     let window = Modal::Reason(Box::new(Reason::shelve(notes, alarm, times, max)));
-    vec![Notice::or(cx, "shelve an alarm", &kind, window)]
+    vec![Notice::or(cx, t!("shelve an alarm"), &kind, window)]
 }
 
 /// Asks why an alarm is taken out of service.
 pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
-    let notes = vec![name(cx, alarm), "It is not annunciated until it is put back in service.".to_owned()];
+    let notes = vec![name(cx, alarm), t!("It is not annunciated until it is put back in service.").to_owned()];
     let kind = CommandKind::Alarm(AlarmCommand::OutOfService(alarm));
-    let reason = Reason::new("out of service", "put out of service", notes, kind.clone(), true);
-    vec![Notice::or(cx, "out of service", &kind, Modal::Reason(Box::new(reason)))]
+    let reason = Reason::new(t!("out of service"), t!("put out of service"), notes, kind.clone(), true);
+    vec![Notice::or(cx, t!("out of service"), &kind, Modal::Reason(Box::new(reason)))]
 }
 
 /// Asks whether to reset a latched alarm.
@@ -106,10 +107,10 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     let why = match alarm.state {
         AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             let kind = CommandKind::Alarm(AlarmCommand::Reset(alarm.id));
-            return open(Modal::Confirm(Confirm::command("reset a latched alarm", name(cx, alarm.id), kind)));
+            return open(Modal::Confirm(Confirm::command(t!("reset a latched alarm"), name(cx, alarm.id), kind)));
         }
         AlarmState::Unacknowledged | AlarmState::Acknowledged if cx.def().alarm(alarm.id).latch => {
-            "Its cause lasts: it can be reset once that is gone."
+            t!("Its cause lasts: it can be reset once that is gone.")
         }
         AlarmState::Normal
         | AlarmState::Unacknowledged
@@ -117,19 +118,19 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
         | AlarmState::ReturnedToNormal
         | AlarmState::Shelved
         | AlarmState::SuppressedByDesign
-        | AlarmState::OutOfService => "It does not latch: there is nothing to reset.",
+        | AlarmState::OutOfService => t!("It does not latch: there is nothing to reset."),
     };
-    open(Modal::Notice(Notice::new("reset", vec![name(cx, alarm.id), why.to_owned()])))
+    open(Modal::Notice(Notice::new(t!("reset"), vec![name(cx, alarm.id), why.to_owned()])))
 }
 
 /// Asks whether to unshelve, or to put back in service.
 pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction> {
     let (title, alarm_command) = match suppressed.state {
-        AlarmState::Shelved => ("unshelve", AlarmCommand::Unshelve(suppressed.id)),
-        AlarmState::OutOfService => ("put in service", AlarmCommand::InService(suppressed.id)),
+        AlarmState::Shelved => (t!("unshelve"), AlarmCommand::Unshelve(suppressed.id)),
+        AlarmState::OutOfService => (t!("put in service"), AlarmCommand::InService(suppressed.id)),
         AlarmState::SuppressedByDesign => {
-            let words = "It is suppressed by design, and comes back when its enabling condition holds again.";
-            return open(Modal::Notice(Notice::new("suppressed", vec![words.to_owned()])));
+            let words = t!("It is suppressed by design, and comes back when its enabling condition holds again.");
+            return open(Modal::Notice(Notice::new(t!("suppressed"), vec![words.to_owned()])));
         }
         AlarmState::Normal
         | AlarmState::Unacknowledged
@@ -138,7 +139,7 @@ pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction>
         | AlarmState::LatchedUnacknowledged
         | AlarmState::LatchedAcknowledged => return Vec::new(),
     };
-    let holds = suppressed.active.then(|| "Its condition holds: it will be annunciated at once.".to_owned());
+    let holds = suppressed.active.then(|| t!("Its condition holds: it will be annunciated at once.").to_owned());
     let kind = CommandKind::Alarm(alarm_command);
     let confirm = Confirm::command(title, name(cx, suppressed.id), kind.clone());
     vec![Notice::or(cx, title, &kind, Modal::Confirm(confirm.with_notes(holds)))]
@@ -146,22 +147,22 @@ pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction>
 
 /// Asks for what the next shift should know.
 pub fn hand_over() -> Vec<UiAction> {
-    let notes = vec!["What the next shift should know besides what stands on this page:".to_owned()];
-    let reason = Reason::new("hand over", "hand over", notes, CommandKind::HandOver, false);
+    let notes = vec![t!("What the next shift should know besides what stands on this page:").to_owned()];
+    let reason = Reason::new(t!("hand over"), t!("hand over"), notes, CommandKind::HandOver, false);
     open(Modal::Reason(Box::new(reason)))
 }
 
 /// Says that a handover takes two.
 pub fn own_handover() -> Vec<UiAction> {
-    let words = ["You have handed over yourself.", "Another person reads this page and takes the plant over."];
-    open(Modal::Notice(Notice::new("take over", words.map(str::to_owned).to_vec())))
+    let words = [t!("You have handed over yourself."), t!("Another person reads this page and takes the plant over.")];
+    open(Modal::Notice(Notice::new(t!("take over"), words.map(str::to_owned).to_vec())))
 }
 
 /// Asks whether the user takes the plant over.
 pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     let who = cx.session.who.as_ref().map_or("–", |who| &who.user);
-    let words = format!("{who} has read this page and takes the plant over.");
-    open(Modal::Confirm(Confirm::command("take over", words, CommandKind::TakeOver)))
+    let words = t!("{who} has read this page and takes the plant over.", who);
+    open(Modal::Confirm(Confirm::command(t!("take over"), words, CommandKind::TakeOver)))
 }
 
 fn open(modal: Modal) -> Vec<UiAction> {

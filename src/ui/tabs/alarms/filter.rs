@@ -1,5 +1,7 @@
 //! Which alarms of the audit log the list shows: by priority, state, area and words; pure.
 
+use crate::t;
+use crate::text::translate;
 use crate::{
     plant::{
         alarm::{AlarmState, manager::subject_name},
@@ -81,9 +83,9 @@ impl Filter {
     /// What it asks for: `high  UNACK  area TK-1  "tic"`; empty where it lets everything through.
     pub fn describe(&self) -> String {
         let parts = [
-            self.priority.map(|priority| priority.word().to_owned()),
-            self.state.map(|state| state.word().to_owned()),
-            self.area.as_ref().map(|area| format!("area {area}")),
+            self.priority.map(|priority| translate(priority.word()).to_owned()),
+            self.state.map(|state| translate(state.word()).to_owned()),
+            self.area.as_ref().map(|area| t!("area {area}", area)),
             (!self.words.is_empty()).then(|| format!("\"{}\"", self.typed())),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
@@ -93,7 +95,7 @@ impl Filter {
 /// All that is looked through for words: what the view shows, nothing that is hidden.
 fn text_of(cx: &ViewContext, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
     let by = alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default();
-    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.message, alarm.state.word())
+    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.message, translate(alarm.state.word()))
 }
 
 /// The one after `now`, nothing after the last one.

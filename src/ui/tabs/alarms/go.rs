@@ -1,13 +1,14 @@
 //! Where the keys of an alarm lead.
 
 use super::*;
+use crate::t;
 
 impl Alarms {
     pub(super) fn ask_text(&self) -> Vec<UiAction> {
         let prompt = match self.page {
-            Page::Journal => Prompt::new("search the journal", journal::FORMS, &self.journal.typed()),
+            Page::Journal => Prompt::new(t!("search the journal"), journal::FORMS, &self.journal.typed()),
             Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
-                Prompt::new("show only alarms with", filter::FORMS, &self.filter.typed())
+                Prompt::new(t!("show only alarms with"), filter::FORMS, &self.filter.typed())
             }
         };
         vec![UiAction::Open(Modal::Prompt(prompt))]

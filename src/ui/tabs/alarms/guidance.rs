@@ -1,5 +1,6 @@
 //! What to do about an alarm: cause, effect, action, the time there is left, and where to look.
 
+use crate::t;
 use ratatui::style::Style;
 
 use crate::{
@@ -36,10 +37,10 @@ pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> [(&'static str, String); 4
 pub fn rows_of_any(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
     let guidance = &cx.def().alarm(alarm).guidance;
     [
-        ("now", now),
-        ("cause", or_dash(&guidance.cause).to_owned()),
-        ("effect", or_dash(&guidance.effect).to_owned()),
-        ("action", or_dash(&guidance.action).to_owned()),
+        (t!("now"), now),
+        (t!("cause"), or_dash(&guidance.cause).to_owned()),
+        (t!("effect"), or_dash(&guidance.effect).to_owned()),
+        (t!("action"), or_dash(&guidance.action).to_owned()),
     ]
 }
 
@@ -85,7 +86,7 @@ fn title(
     let mine = listed.is_some_and(|alarm| {
         alarm.state.needs_acknowledgement() && rights::missing(cx, &alarm.acknowledge()).is_none()
     });
-    let ack = if mine { "a ack " } else { "" };
+    let ack = if mine { t!("a ack ") } else { "" };
     let name = format!(" {ack}{} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
     let whole = format!("{name} {}", condition_text(cx, def.id));
     let room = end.saturating_sub(text::width(&words) + 3);
@@ -108,7 +109,7 @@ fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str,
     // Where there is no room for all of it the action is told whole, and one line of the others; the least wanted go.
     let free = usize::from(height.saturating_sub(1 + y));
     let mut rows: Vec<&(&str, String)> = rows.iter().collect();
-    for least in ["effect", "cause", "now"] {
+    for least in [t!("effect"), t!("cause"), t!("now")] {
         if free < rows.len() {
             rows.retain(|(label, _)| *label != least);
         }
@@ -117,9 +118,9 @@ fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str,
     let whole = lines.iter().map(Vec::len).sum::<usize>() <= free;
     let spare = (free + 1).saturating_sub(rows.len()).max(1);
     for ((label, text), lines) in rows.iter().zip(lines) {
-        let style = if *label == "action" { theme.strong() } else { theme.normal() };
+        let style = if *label == t!("action") { theme.strong() } else { theme.normal() };
         canvas.text(1, y, label, theme.dim());
-        let shown = match (whole, *label == "action") {
+        let shown = match (whole, *label == t!("action")) {
             (true, _) => lines,
             (false, true) => lines.into_iter().take(spare).collect(),
             (false, false) => vec![fit_words(text, room)],
@@ -130,7 +131,7 @@ fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str,
         }
     }
     let last = height.saturating_sub(1);
-    canvas.text(1, last, "go to", theme.dim());
+    canvas.text(1, last, t!("go to"), theme.dim());
     canvas.text(9, last, &fit_words(go, room), theme.normal());
 }
 
@@ -144,20 +145,20 @@ fn now_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
     let mut words = match def.subject {
         Subject::Tag(tag) => {
             let raised = alarm.value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
-            format!("{}, raised at {raised}", value::show(cx, tag).whole())
+            t!("{whole}, raised at {raised}", whole = value::show(cx, tag).whole(), raised)
         }
         Subject::Device(device) => device_text(cx, device),
         Subject::Line(line) => line_state_text(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
     if 1 < alarm.times {
-        words += &format!(", {} times since the start", alarm.times);
+        words += &t!(", {times} times since the start", times = alarm.times);
     }
     if let Some(note) = &alarm.acknowledged {
-        let by = note.by.as_deref().unwrap_or("the station");
-        words += &format!(", acknowledged {} by {by}", clock(note.at, zone));
+        let by = note.by.as_deref().unwrap_or(t!("the station"));
+        words += &t!(", acknowledged {clock} by {by}", clock = clock(note.at, zone), by);
         if !note.recorded {
-            words += " (NOT RECORDED)";
+            words += t!(" (NOT RECORDED)");
         }
         if let Some(reason) = &note.reason {
             words += &format!(": {reason}");
@@ -169,12 +170,12 @@ fn now_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
 /// `respond within 10 min, 09:19 left`, and whether that time is over; nothing where the plant file gives no time.
 pub fn respond_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
     let respond = def.guidance.response_time?;
-    let within = format!("respond within {} min", respond.as_secs().div_ceil(60));
+    let within = t!("respond within {div_ceil} min", div_ceil = respond.as_secs().div_ceil(60));
     let gone = between(alarm.raised_at, cx.now);
     Some(match alarm.state {
         AlarmState::Unacknowledged | AlarmState::Acknowledged => match respond.checked_sub(gone) {
-            Some(left) => (format!("{within}, {} left", running(left)), false),
-            None => (format!("{within}, OVERDUE by {}", running(gone - respond)), true),
+            Some(left) => (t!("{within}, {running} left", within, running = running(left)), false),
+            None => (t!("{within}, OVERDUE by {running}", within, running = running(gone - respond)), true),
         },
         AlarmState::Normal
         | AlarmState::ReturnedToNormal
@@ -188,11 +189,12 @@ pub fn respond_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Op
 
 /// The keys that lead from an alarm to what it watches.
 pub fn go_text(cx: &ViewContext, def: &AlarmDef, alarm: Option<&ActiveAlarm>) -> String {
-    let at = alarm.map(|alarm| format!(" at {}", clock(alarm.raised_at, &cx.def().time_zone))).unwrap_or_default();
-    let journal = format!("j journal of {}", journal_of(cx, def.subject));
+    let at =
+        alarm.map(|alarm| t!(" at {clock}", clock = clock(alarm.raised_at, &cx.def().time_zone))).unwrap_or_default();
+    let journal = t!("j journal of {journal_of}", journal_of = journal_of(cx, def.subject));
     match def.subject {
-        Subject::Tag(_) => format!("m mimic   t trend{at}   c controller   {journal}"),
-        Subject::Device(_) => format!("m mimic   c controller   {journal}"),
+        Subject::Tag(_) => t!("m mimic   t trend{at}   c controller   {journal}", at, journal),
+        Subject::Device(_) => t!("m mimic   c controller   {journal}", journal),
         Subject::Line(_) | Subject::Station => journal,
     }
 }

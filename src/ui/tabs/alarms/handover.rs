@@ -1,5 +1,7 @@
 //! The handover: what the next shift must know, as the plant stands and as the shift has left it, and who took it over.
 
+use crate::t;
+use crate::text::translate;
 use jiff::Timestamp;
 use ratatui::style::Style;
 
@@ -135,14 +137,14 @@ impl Handover {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
-        let x = canvas.text(1, 0, "Handover  ", theme.strong());
+        let x = canvas.text(1, 0, t!("Handover  "), theme.strong());
         let x = match self.period(cx) {
             Some(shown) => canvas.text(x, 0, &span::words(cx, &shown), theme.normal()),
             None => x,
         };
         match &self.trouble {
             Some(trouble) => canvas.text(x + 2, 0, trouble, theme.trouble()),
-            None if !self.answered => canvas.text(x + 2, 0, "collecting data", theme.dim()),
+            None if !self.answered => canvas.text(x + 2, 0, t!("collecting data"), theme.dim()),
             None => x,
         };
         let lines = self.lines(cx, width);
@@ -153,7 +155,7 @@ impl Handover {
         }
         let more = lines.len().saturating_sub(first + room);
         if more > 0 {
-            canvas.text_right(width.saturating_sub(1), 0, &format!("{more} more below"), theme.strong());
+            canvas.text_right(width.saturating_sub(1), 0, &t!("{more} more below", more), theme.strong());
         }
     }
 
@@ -163,28 +165,28 @@ impl Handover {
         let mut lines = self.note_lines(cx, room);
         let mut section = |title: &str, rows: Vec<String>, worry: bool| {
             let style = if worry && !rows.is_empty() { theme.strong() } else { theme.dim() };
-            let title = if rows.is_empty() { format!("{title}: none") } else { format!("{title}: {}", rows.len()) };
+            let title = if rows.is_empty() { t!("{title}: none", title) } else { format!("{title}: {}", rows.len()) };
             lines.push((title, style));
             let rows = rows.into_iter().map(|row| (format!("  {}", fit_words(row.trim_start(), room)), theme.normal()));
             lines.extend(rows);
         };
         section(
-            "suppressed",
+            t!("suppressed"),
             cx.snapshot.suppressed.iter().map(|suppressed| suppressed_words(cx, suppressed)).collect(),
             true,
         );
-        section("abnormal: manual, disabled, under test", unusual(cx), true);
-        section("bad or uncertain values", doubtful(cx), true);
+        section(t!("abnormal: manual, disabled, under test"), unusual(cx), true);
+        section(t!("bad or uncertain values"), doubtful(cx), true);
         if self.answered {
             let from = self.period(cx).map_or(Timestamp::MIN, |shown| shown.from);
             let of = |keep: fn(&ActionRecord) -> bool| {
                 let rows = self.actions.iter().filter(|row| from <= row.at && keep(row));
                 folded(cx, rows.map(|row| (row.at, action_text(cx, row).trim_start().to_owned())))
             };
-            section("failed in this shift", of(|row| is_failed(row) && is_change(row)), true);
-            section("changed in this shift", of(|row| !is_failed(row) && is_change(row)), false);
+            section(t!("failed in this shift"), of(|row| is_failed(row) && is_change(row)), true);
+            section(t!("changed in this shift"), of(|row| !is_failed(row) && is_change(row)), false);
             if self.actions.len() >= ROWS {
-                section("the oldest actions are left out", Vec::new(), true);
+                section(t!("the oldest actions are left out"), Vec::new(), true);
             }
         }
         lines
@@ -196,17 +198,19 @@ impl Handover {
         let when = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
         let note = self.actions.iter().position(|row| &*row.action == HAND_OVER && !is_failed(row));
         let Some((n, note)) = note.and_then(|n| Some((n, self.actions.get(n)?))) else {
-            let words = if self.answered { "No handover recorded for this shift or the one before." } else { "" };
+            let words = if self.answered { t!("No handover recorded for this shift or the one before.") } else { "" };
             return vec![(words.to_owned(), theme.normal())];
         };
-        let mut lines = vec![(format!("handed over {} by {}", when(note), note.by), theme.strong())];
-        let text = note.note.as_deref().unwrap_or("without a note");
+        let mut lines = vec![(t!("handed over {when} by {by}", when = when(note), by = note.by), theme.strong())];
+        let text = note.note.as_deref().unwrap_or(t!("without a note"));
         lines.extend(wrap(text, room).into_iter().map(|line| (format!("  {line}"), theme.normal())));
         let taken = self.actions[..n].iter().rev().find(|row| &*row.action == TAKE_OVER && !is_failed(row));
         lines.push(match taken {
-            Some(row) => (format!("taken over {} by {}", when(row), row.by), theme.strong()),
-            None if is_own(cx, note) => ("not taken over yet: another person does, with o".to_owned(), theme.trouble()),
-            None => ("not taken over yet: o takes over".to_owned(), theme.trouble()),
+            Some(row) => (t!("taken over {when} by {by}", when = when(row), by = row.by), theme.strong()),
+            None if is_own(cx, note) => {
+                (t!("not taken over yet: another person does, with o").to_owned(), theme.trouble())
+            }
+            None => (t!("not taken over yet: o takes over").to_owned(), theme.trouble()),
         });
         lines
     }
@@ -244,13 +248,27 @@ fn folded(cx: &ViewContext, rows: impl Iterator<Item = (Timestamp, String)>) -> 
 pub fn suppressed_words(cx: &ViewContext, suppressed: &SuppressedAlarm) -> String {
     let def = cx.def().alarm(suppressed.id);
     let mark = cx.theme.priority_tag(def.priority);
-    let left = suppressed.until.map(|until| format!(", {} left", running(between(cx.now, until)))).unwrap_or_default();
+    let left = suppressed
+        .until
+        .map(|until| t!(", {running} left", running = running(between(cx.now, until))))
+        .unwrap_or_default();
     let since = moment(suppressed.note.at, cx.now, &cx.def().time_zone);
-    let by = suppressed.note.by.as_ref().map(|by| format!(", by {by}")).unwrap_or_default();
+    let by = suppressed.note.by.as_ref().map(|by| t!(", by {by}", by)).unwrap_or_default();
     let reason = suppressed.note.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
-    let active = if suppressed.active { " ACTIVE" } else { "" };
+    let active = if suppressed.active { t!(" ACTIVE") } else { "" };
     let name = subject(cx, suppressed.id);
-    format!("{} {mark} {name} {}{active}{left}{by}{reason}, since {since}", suppressed.state.word(), def.message)
+    t!(
+        "{state} {mark} {name} {message}{active}{left}{by}{reason}, since {since}",
+        state = translate(suppressed.state.word()),
+        mark,
+        name,
+        message = def.message,
+        active,
+        left,
+        by,
+        reason,
+        since
+    )
 }
 
 /// Disconnected lines and devices, sequences in manual, actuators that do not follow their command.
@@ -260,14 +278,14 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
     let lines = def.lines.iter().flat_map(|line| {
         let status = snapshot.line(line.id);
         let state = match status.state {
-            LineState::Disconnected => Some("closed by an operator".to_owned()),
-            LineState::Testing => Some("given to a test".to_owned()),
+            LineState::Disconnected => Some(t!("closed by an operator").to_owned()),
+            LineState::Testing => Some(t!("given to a test").to_owned()),
             LineState::Waiting { .. } | LineState::Connecting => {
-                status.lost_since.map(|since| format!("not connected since {}", clock(since, zone)))
+                status.lost_since.map(|since| t!("not connected since {clock}", clock = clock(since, zone)))
             }
             LineState::Connected => None,
         };
-        let tried = status.settings_before.as_ref().map(|_| "settings on trial, not saved".to_owned());
+        let tried = status.settings_before.as_ref().map(|_| t!("settings on trial, not saved").to_owned());
         state.into_iter().chain(tried).map(|words| format!("{} {words}", line.name))
     });
     let devices = def.devices.iter().filter_map(|device| {
@@ -276,7 +294,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
             (DeviceState::Down { .. }, _) => device_text(cx, device.id),
             (DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_), reason) => {
                 let signal = reason?.signal();
-                format!("{} {}", signal.letter(), signal.word())
+                format!("{} {}", signal.letter(), translate(signal.word()))
             }
         };
         Some(format!("{} {words}", device.name))
@@ -288,7 +306,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
     });
     let stubborn = def.logic.actuators.iter().enumerate().filter_map(|(n, actuator)| {
         let lasts = snapshot.watch.disobeys(&def.logic, n, cx.now)?;
-        Some(format!("{} has not obeyed for {}", def.tag(actuator.output).name, running(lasts)))
+        Some(t!("{name} has not obeyed for {running}", name = def.tag(actuator.output).name, running = running(lasts)))
     });
     lines.chain(devices).chain(sequences).chain(stubborn).collect()
 }
@@ -310,14 +328,19 @@ fn doubtful(cx: &ViewContext) -> Vec<String> {
     });
     let stale = stale.map(|alarm| {
         let lasts = running(between(alarm.raised_at, cx.now));
-        format!("{} {} active for {lasts}", subject(cx, alarm.id), cx.def().alarm(alarm.id).message)
+        t!(
+            "{subject} {message} active for {lasts}",
+            subject = subject(cx, alarm.id),
+            message = cx.def().alarm(alarm.id).message,
+            lasts
+        )
     });
-    let more = (more > 0).then(|| format!("… and {more} more values"));
+    let more = (more > 0).then(|| t!("… and {more} more values", more));
     bad.into_iter().take(NAMED).chain(more).chain(stale).collect()
 }
 
 fn is_failed(row: &ActionRecord) -> bool {
-    ["refused", "not confirmed", "failed"].iter().any(|word| row.outcome.starts_with(word))
+    [t!("refused"), t!("not confirmed"), t!("failed")].iter().any(|word| row.outcome.starts_with(word))
 }
 
 /// Did it change the plant, or was it meant to?

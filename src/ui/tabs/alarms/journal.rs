@@ -1,5 +1,7 @@
 //! The journal: steps of alarms and actions of operators in one list, searched by words and by time.
 
+use crate::t;
+use crate::text::translate;
 use jiff::{SignedDuration, Timestamp};
 use ratatui::style::Style;
 
@@ -157,20 +159,20 @@ impl Journal {
     /// Draws it.
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
-        let x = canvas.text(1, 0, "Journal  ", theme.strong());
+        let x = canvas.text(1, 0, t!("Journal  "), theme.strong());
         let rows = self.rows(cx);
         let all = self.alarms.len() + self.actions.len();
-        let period = self.period.as_ref().map_or("last 24 hours".to_owned(), |period| span::words(cx, period));
+        let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| span::words(cx, period));
         let mut what = vec![period];
         if !self.words.is_empty() {
-            what.push(format!("\"{}\": {} of {all}, / changes it", self.typed(), rows.len()));
+            what.push(t!("\"{typed}\": {count} of {all}, / changes it", typed = self.typed(), count = rows.len(), all));
         }
         if self.alarms.len() >= self.limit() || self.actions.len() >= self.limit() {
-            what.push("the oldest left out".to_owned());
+            what.push(t!("the oldest left out").to_owned());
         }
         if let times @ 1.. = cx.snapshot.history.epoch {
-            let often = if times == 1 { "once".to_owned() } else { format!("{times} times") };
-            what.push(format!("clock set {often} (epoch {times})"));
+            let often = if times == 1 { t!("once").to_owned() } else { t!("{times} times", times) };
+            what.push(t!("clock set {often} (epoch {times})", often, times));
         }
         let x = canvas.text(x, 0, &what.join(", "), theme.normal());
         if let Some(trouble) = &self.trouble {
@@ -178,9 +180,9 @@ impl Journal {
         }
         if rows.is_empty() {
             let words = match (self.answered, self.words.is_empty()) {
-                (false, _) => "collecting data",
-                (true, true) => "Nothing happened.",
-                (true, false) => "Nothing found.",
+                (false, _) => t!("collecting data"),
+                (true, true) => t!("Nothing happened."),
+                (true, false) => t!("Nothing found."),
             };
             canvas.text(6, 2, words, theme.normal());
             return;
@@ -211,14 +213,14 @@ fn alarm_words(cx: &ViewContext, row: &AlarmRecord) -> String {
         None => format!(" {value}"),
     };
     let number = row.value.map(shown).unwrap_or_default();
-    let by = row.by.as_ref().map(|by| format!(" by {by}")).unwrap_or_default();
+    let by = row.by.as_ref().map(|by| t!(" by {by}", by)).unwrap_or_default();
     let reason = row.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let mark = cx.theme.priority_mark(row.priority);
     format!(
         "{mark} {} {} {}{number}{by}{reason}",
         pad(&row.subject, 12),
         pad(&row.message, 22),
-        pad(row.event.word(), 12)
+        pad(translate(row.event.word()), 12)
     )
 }
 
@@ -231,5 +233,14 @@ pub fn action_text(cx: &ViewContext, row: &ActionRecord) -> String {
     };
     let note = row.note.as_ref().map(|note| format!(": {note}")).unwrap_or_default();
     let dot = cx.theme.pick("·", ".");
-    format!("  {dot}  {} {} {change}{} by {}{note}", pad(&row.target, 12), row.action, row.outcome, row.by)
+    t!(
+        "  {dot}  {pad} {action} {change}{outcome} by {by}{note}",
+        dot,
+        pad = pad(&row.target, 12),
+        action = row.action,
+        change,
+        outcome = row.outcome,
+        by = row.by,
+        note
+    )
 }

@@ -1,5 +1,6 @@
 //! The keys of the alarms tab, page by page.
 
+use crate::t;
 use crossterm::event::KeyCode;
 
 use super::Page;
@@ -149,8 +150,8 @@ pub fn page_hints(page: Page) -> Vec<Hint> {
     let everywhere = match page {
         // Keys of every tab, but here is where they are looked for.
         Page::Active | Page::System => vec![
-            Hint::new("a", "ack", "acknowledge the selected alarm").needs(Role::Technician),
-            Hint::new("A", "all", "acknowledge all that are listed (asks first)").needs(Role::Technician),
+            Hint::new("a", t!("ack"), t!("acknowledge the selected alarm")).needs(Role::Technician),
+            Hint::new("A", t!("all"), t!("acknowledge all that are listed (asks first)")).needs(Role::Technician),
         ],
         Page::Suppressed | Page::Journal | Page::Metrics | Page::Handover => Vec::new(),
     };

@@ -1,5 +1,7 @@
 //! How good the alarm system is: every figure of the meter beside target and limit, and the alarms to look into.
 
+use crate::t;
+use crate::text::translate;
 use std::time::Duration;
 
 use ratatui::style::Style;
@@ -112,18 +114,18 @@ impl Metrics {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
-        let x = canvas.text(1, 0, "Now  ", theme.strong());
+        let x = canvas.text(1, 0, t!("Now  "), theme.strong());
         let (words, flood) = now_text(cx);
         canvas.text(x, 0, &words, if flood { theme.trouble() } else { theme.normal() });
         let what = match &self.period {
-            None => "last 24 hours".to_owned(),
+            None => t!("last 24 hours").to_owned(),
             Some(period) => span::words(cx, period),
         };
         let count = self.figures(cx).map(|figures| match figures.annunciated() {
-            1 => format!(": 1 alarm{}", alarm_metrics::quiet(figures)),
-            many => format!(": {many} alarms{}", alarm_metrics::quiet(figures)),
+            1 => t!(": 1 alarm{quiet}", quiet = alarm_metrics::quiet(figures)),
+            many => t!(": {many} alarms{quiet}", many, quiet = alarm_metrics::quiet(figures)),
         });
-        let wait = if self.trouble.is_none() { ": collecting data" } else { "" };
+        let wait = if self.trouble.is_none() { t!(": collecting data") } else { "" };
         let x = canvas.text(1, 1, &format!("{what}{}", count.as_deref().unwrap_or(wait)), theme.strong());
         if let Some(trouble) = &self.trouble {
             canvas.text(x + 2, 1, trouble, theme.trouble());
@@ -142,8 +144,8 @@ impl Metrics {
         }
         let more = lines.len().saturating_sub(first + room);
         let last = height.saturating_sub(1);
-        let words = "ISA-18.2, one operator, meant for 30 days or more";
-        let more = if more > 0 { format!("{more} more below") } else { String::new() };
+        let words = t!("ISA-18.2, one operator, meant for 30 days or more");
+        let more = if more > 0 { t!("{more} more below", more) } else { String::new() };
         let end = width.saturating_sub(1);
         canvas.text(1, last, &fit_words(words, end.saturating_sub(3 + text::width(&more))), theme.dim());
         canvas.text_right(end, last, &more, theme.strong());
@@ -152,11 +154,12 @@ impl Metrics {
     /// The table, and below it the alarms to look into unless they stand beside it.
     fn lines(&self, cx: &ViewContext, width: u16) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
-        let head = line(cx.theme, ["measure", "figure", "target", "limit", "verdict"]);
+        let head = line(cx.theme, [t!("measure"), t!("figure"), t!("target"), t!("limit"), t!("verdict")]);
         let mut lines = vec![(head, cx.theme.dim())];
         for (goal, row) in METRIC_TARGETS.iter().zip(alarm_metrics::rows(figures)) {
             let value = row.value.map_or("–".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
-            let text = line(cx.theme, [row.measure, &value, &row.target, &row.limit, row.verdict]);
+            let text =
+                line(cx.theme, [translate(row.measure), &value, &row.target, &row.limit, translate(row.verdict)]);
             let style = match goal.verdict(figures) {
                 Verdict::Good => cx.theme.normal(),
                 Verdict::Beyond => cx.theme.strong(),
@@ -176,7 +179,7 @@ impl Metrics {
     fn bad_actors(&self, cx: &ViewContext) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
         let all = figures.annunciated().max(1) as f64;
-        let mut lines = vec![("alarms to look into".to_owned(), cx.theme.dim())];
+        let mut lines = vec![(t!("alarms to look into").to_owned(), cx.theme.dim())];
         let style = cx.theme.normal();
         for bad_actor in alarm_metrics::bad_actors(figures) {
             let share = bad_actor.raised.map(|raised| format!("{raised:>5} {:>3.0} %", raised as f64 * 100.0 / all));
@@ -197,12 +200,12 @@ impl Metrics {
             });
             lines.extend(stale.map(|alarm| {
                 let (since, name) = (running(between(alarm.raised_at, cx.now)), subject(cx, alarm.id));
-                let text = format!("{} {since:11}  {name}  {}", pad("stale", 10), cx.def().alarm(alarm.id).message);
+                let text = format!("{} {since:11}  {name}  {}", pad(t!("stale"), 10), cx.def().alarm(alarm.id).message);
                 (fit_words(&text, TABLE), style)
             }));
         }
         if lines.len() == 1 {
-            lines.push(("none".to_owned(), style));
+            lines.push((t!("none").to_owned(), style));
         }
         lines
     }
@@ -212,10 +215,15 @@ impl Metrics {
 fn now_text(cx: &ViewContext) -> (String, bool) {
     let metrics = &cx.snapshot.alarm_metrics;
     let flood = match metrics.flood_since {
-        Some(since) => format!("FLOOD since {}", clock(since, &cx.def().time_zone)),
-        None => "no flood".to_owned(),
+        Some(since) => t!("FLOOD since {clock}", clock = clock(since, &cx.def().time_zone)),
+        None => t!("no flood").to_owned(),
     };
-    let words = format!("last 10 min {}   last hour {}   {flood}", metrics.last_10_min, metrics.last_hour);
+    let words = t!(
+        "last 10 min {last_10_min}   last hour {last_hour}   {flood}",
+        last_10_min = metrics.last_10_min,
+        last_hour = metrics.last_hour,
+        flood
+    );
     (words, metrics.flood_since.is_some())
 }
 

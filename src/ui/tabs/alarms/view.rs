@@ -1,5 +1,7 @@
 //! How the alarms tab looks: the views and what is in them, the list, what is suppressed, and the guidance below.
 
+use crate::t;
+use crate::text::translate;
 use ratatui::{Frame, layout::Rect};
 
 use super::{Alarms, Page, guidance, handover::suppressed_words, is_on, list::Row};
@@ -90,11 +92,11 @@ fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         };
         Page::ALL.into_iter().zip(counts).map(name).collect()
     };
-    let bell = if tab.bell { "bell" } else { "" };
+    let bell = if tab.bell { t!("bell") } else { "" };
     let room = canvas.width().saturating_sub(2 + width(bell));
     let fits = |names: &Vec<String>| names.iter().map(|name| width(name) + 3).sum::<u16>() <= room + 3;
     // Where there is no room for the word the brackets alone tell how many wait.
-    let all = Some(names(" unack")).filter(fits).unwrap_or_else(|| names(""));
+    let all = Some(names(t!(" unack"))).filter(fits).unwrap_or_else(|| names(""));
     let bar = if fits(&all) { " │ " } else { "│" };
     let mut x = 1;
     for (page, name) in Page::ALL.into_iter().zip(all) {
@@ -118,12 +120,17 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let first = first(place, rows.len(), room);
     filter_line(tab, cx, (&rows, all, first, room), canvas);
     let columns = Columns::of(&rows[first.min(rows.len())..], cx, room, width);
-    canvas.text(1, 1, &columns.row(["", "", "time", "tag", "what", "value", "state", "for", "by"]), theme.dim());
+    canvas.text(
+        1,
+        1,
+        &columns.row(["", "", t!("time"), t!("tag"), t!("what"), t!("value"), t!("state"), t!("for"), t!("by")]),
+        theme.dim(),
+    );
     if rows.is_empty() {
         let words = match all {
-            0 if tab.page == Page::System => "No system alarm is active. j shows what was.",
-            0 => "No alarm is active. j shows what was.",
-            _ => "No alarm fits the filter. Esc shows all again.",
+            0 if tab.page == Page::System => t!("No system alarm is active. j shows what was."),
+            0 => t!("No alarm is active. j shows what was."),
+            _ => t!("No alarm fits the filter. Esc shows all again."),
         };
         canvas.text(6, 3, words, theme.normal());
         return;
@@ -162,23 +169,28 @@ fn filter_line(
     let below = rows.len().saturating_sub(first + room);
     let more = match (first, below) {
         (0, 0) => String::new(),
-        (0, below) => format!("{below} more below"),
-        (above, 0) => format!("{above} more above"),
-        (above, below) => format!("{above} above, {below} more below"),
+        (0, below) => t!("{below} more below", below),
+        (above, 0) => t!("{above} more above", above),
+        (above, below) => t!("{above} above, {below} more below", above, below),
     };
     let mut words = Vec::new();
     if !tab.filter.is_off() {
-        words.push(format!("FILTER {}: {shown} of {all} shown, Esc shows all", tab.filter.describe()));
+        words.push(t!(
+            "FILTER {describe}: {shown} of {all} shown, Esc shows all",
+            describe = tab.filter.describe(),
+            shown,
+            all
+        ));
     }
     if folded > 0 {
-        words.push(format!("{folded} folded, space unfolds"));
+        words.push(t!("{folded} folded, space unfolds", folded));
     }
     if tab.filter.is_off() && words.is_empty() && all > 0 {
         let sorted = match rows.iter().any(|row| row.first || row.under) {
-            true => "grouped under the first-out alarm",
-            false => "the most urgent first",
+            true => t!("grouped under the first-out alarm"),
+            false => t!("the most urgent first"),
         };
-        words.push(format!("{all} shown, {sorted}"));
+        words.push(t!("{all} shown, {sorted}", all, sorted));
     }
     let room = end.saturating_sub(3 + width(&more));
     let style = if tab.filter.is_off() { theme.dim() } else { theme.strong() };
@@ -190,9 +202,9 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let all: &[SuppressedAlarm] = &cx.snapshot.suppressed;
-    canvas.text(1, 0, "Evaluated and journaled, but not annunciated. u puts back.", theme.dim());
+    canvas.text(1, 0, t!("Evaluated and journaled, but not annunciated. u puts back."), theme.dim());
     if all.is_empty() {
-        canvas.text(6, 2, "No alarm is suppressed.", theme.normal());
+        canvas.text(6, 2, t!("No alarm is suppressed."), theme.normal());
         return;
     }
     let place =
@@ -211,7 +223,7 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     }
     if all.len() > first + room {
         let end = width.saturating_sub(1);
-        canvas.text_right(end, 0, &format!("{} more below", all.len() - first - room), theme.strong());
+        canvas.text_right(end, 0, &t!("{count} more below", count = all.len() - first - room), theme.strong());
     }
     let now = suppressed_words(cx, &all[place]);
     let free = height.saturating_sub(1 + all.len().min(room) as u16);
@@ -265,7 +277,7 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
             Subject::Tag(tag) => value::show(cx, tag).within(10),
             Subject::Device(_) | Subject::Line(_) | Subject::Station => "–".to_owned(),
         },
-        alarm.state.word().to_owned(),
+        translate(alarm.state.word()).to_owned(),
         running(between(alarm.raised_at, cx.now)),
         alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default().to_owned(),
     ]
@@ -275,17 +287,17 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
 /// disk, are never cut off.
 fn what_text(cx: &ViewContext, row: &Row, room: u16) -> String {
     let mark = match (row.first, row.under) {
-        (true, _) => "First-out ",
+        (true, _) => t!("First-out "),
         (false, true) => cx.theme.pick("└ ", "` "),
         (false, false) => "",
     };
     let (long, short) = match (row.folded, row.more, row.more_waiting) {
         (false, ..) => (String::new(), String::new()),
-        (true, more, 0) => (format!(" +{more} more"), format!(" +{more}")),
-        (true, more, waiting) => (format!(" +{more} more, {waiting} unack"), format!(" +{more} ({waiting})")),
+        (true, more, 0) => (t!(" +{more} more", more), format!(" +{more}")),
+        (true, more, waiting) => (t!(" +{more} more, {waiting} unack", more, waiting), format!(" +{more} ({waiting})")),
     };
     let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|note| !note.recorded);
-    let unrecorded = if unrecorded { " NOT RECORDED" } else { "" };
+    let unrecorded = if unrecorded { t!(" NOT RECORDED") } else { "" };
     let (long, short) = (long + unrecorded, short + unrecorded);
     let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).message);
     let text = format!("{name} {}", guidance::condition_text(cx, row.alarm.id));

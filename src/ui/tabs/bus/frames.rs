@@ -1,5 +1,6 @@
 //! Page Frames: what went over the line, newest at the bottom, in words; runs, or is held still.
 
+use crate::t;
 use std::{collections::VecDeque, path::PathBuf};
 
 use super::{
@@ -126,8 +127,8 @@ impl Ring {
 
     /// Asks for the filter.
     pub fn ask_filter(&self) -> UiAction {
-        let hint = "unit 1   fc 3   tx   rx   error   03EA (bytes); all must hold; empty: all frames";
-        UiAction::Open(Modal::Prompt(Prompt::new("filter frames", hint, &self.filter.to_string())))
+        let hint = t!("unit 1   fc 3   tx   rx   error   03EA (bytes); all must hold; empty: all frames");
+        UiAction::Open(Modal::Prompt(Prompt::new(t!("filter frames"), hint, &self.filter.to_string())))
     }
 
     /// Takes a filter that was typed.
@@ -147,7 +148,7 @@ impl Ring {
         let frames: Vec<Frame> = self.shown().into_iter().cloned().collect();
         self.saved.clear();
         if frames.is_empty() {
-            self.saved.push(Err("there is no frame to save".to_owned()));
+            self.saved.push(Err(t!("there is no frame to save").to_owned()));
             return Vec::new();
         }
         let stamp = cx.now.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d-%H%M%S").to_string();
@@ -189,7 +190,7 @@ impl Ring {
         let notice = self.notice();
         let room = usize::from(height).saturating_sub(1 + notice.len());
         if shown.is_empty() {
-            canvas.text(1, 2, "no frame yet, or none that passes the filter", theme.dim());
+            canvas.text(1, 2, t!("no frame yet, or none that passes the filter"), theme.dim());
         }
         let place = ring.place(&shown);
         let first = list::first(place, shown.len(), room);
@@ -205,15 +206,15 @@ impl Ring {
 
     fn heading(&self, cx: &ViewContext, count: usize) -> (String, ratatui::style::Style) {
         let filter = self.filter.to_string();
-        let filter = if filter.is_empty() { String::new() } else { format!("   filter: {filter}") };
+        let filter = if filter.is_empty() { String::new() } else { t!("   filter: {filter}", filter) };
         let zone = &cx.def().time_zone;
         let newest = self.held.iter().next_back().map_or(String::new(), |frame| clock(frame.at, zone));
         let state = match self.runs {
-            true => format!("running, newest {newest} below"),
-            false => format!("PAUSED at {newest}, Esc resumes"),
+            true => t!("running, newest {newest} below", newest),
+            false => t!("PAUSED at {newest}, Esc resumes", newest),
         };
         let style = if self.runs { cx.theme.dim() } else { cx.theme.strong() };
-        (format!("{count} of {} frames, {state}{filter}", self.held.len().max(count)), style)
+        (t!("{count} of {max} frames, {state}{filter}", count, max = self.held.len().max(count), state, filter), style)
     }
 
     /// What became of the files, and how to open them.
@@ -223,10 +224,10 @@ impl Ring {
             match result {
                 Ok(path) => {
                     let wireshark = path.extension().is_some_and(|end| end == "pcapng");
-                    let how = if wireshark { "open with: wireshark " } else { "read with: less " };
-                    lines.push((format!("written; {how}{}", path.display()), true));
+                    let how = if wireshark { t!("open with: wireshark ") } else { t!("read with: less ") };
+                    lines.push((t!("written; {how}{display}", how, display = path.display()), true));
                 }
-                Err(why) => lines.push((format!("NOT WRITTEN: {why}"), false)),
+                Err(why) => lines.push((t!("NOT WRITTEN: {why}", why), false)),
             }
         }
         lines
@@ -288,8 +289,8 @@ impl Ring {
 /// Without what the columns before it say: `read holding 41001–41003 (0x03E8, 3)`.
 fn short(summary: &str) -> String {
     let rest = summary.strip_prefix("unit ").and_then(|rest| rest.split_once(' ')).map_or(summary, |(_, rest)| rest);
-    rest.replacen("holding registers", "holding", 1).replacen("input registers", "input", 1).replacen(
-        " registers:",
+    rest.replacen(t!("holding registers"), t!("holding"), 1).replacen(t!("input registers"), t!("input"), 1).replacen(
+        t!(" registers:"),
         ":",
         1,
     )

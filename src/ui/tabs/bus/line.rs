@@ -2,6 +2,8 @@
 
 mod worries;
 
+use crate::t;
+use crate::text::translate;
 use std::time::Duration;
 use worries::worries;
 
@@ -40,7 +42,7 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
     let Some(report) = at.report else {
-        rows.push(plain("nothing heard from this line yet", cx.theme.trouble()));
+        rows.push(plain(t!("nothing heard from this line yet"), cx.theme.trouble()));
         return rows;
     };
     rows.extend(load(cx, report, width));
@@ -83,12 +85,12 @@ fn sentence(cx: &ViewContext, words: &str, width: u16) -> Vec<Row> {
 
 fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let (theme, line) = (cx.theme, at.settings);
-    let mut flow = Flow::new("settings", theme.dim(), width);
+    let mut flow = Flow::new(t!("settings"), theme.dim(), width);
     flow.add(plain(line.transport.to_string(), theme.strong()));
-    flow.add(value(cx, "timeout", &ms(line.timeout)));
+    flow.add(value(cx, t!("timeout"), &ms(line.timeout)));
     if let Some(serial) = line.transport.serial() {
-        flow.add(value(cx, "silence", &ms(serial.silence().max(line.gap))));
-        flow.add(value(cx, "end of answer", &ms(line.idle)));
+        flow.add(value(cx, t!("silence"), &ms(serial.silence().max(line.gap))));
+        flow.add(value(cx, t!("end of answer"), &ms(line.idle)));
     }
     let lamp = |on: bool| if on { theme.pick("●", "@") } else { theme.pick("○", "o") };
     let counters = &at.status.counters;
@@ -97,7 +99,12 @@ fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     };
     let (tx, rx) = (recent(counters.last_tx), recent(counters.last_rx));
     let deaf = tx && !rx;
-    let lamps = format!("TX {} RX {}{}", lamp(tx), lamp(rx), if deaf { " nothing comes back" } else { "" });
+    let lamps = t!(
+        "TX {lamp} RX {lamp2}{value}",
+        lamp = lamp(tx),
+        lamp2 = lamp(rx),
+        value = if deaf { t!(" nothing comes back") } else { "" }
+    );
     flow.add(plain(lamps, if deaf { theme.trouble() } else { theme.normal() }));
     flow.rows()
 }
@@ -105,26 +112,26 @@ fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
 fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     let (theme, counters) = (cx.theme, &report.counters);
     let (now, minute) = (f64::from(counters.utilisation), f64::from(counters.utilisation_minute));
-    let mut flow = Flow::new("load", theme.dim(), width);
+    let mut flow = Flow::new(t!("load"), theme.dim(), width);
     let style = if now < 0.9 { theme.normal() } else { theme.trouble() };
     let mark = if now < 0.9 { "" } else { "! " };
     flow.add(vec![
         (format!("{mark}{:>3.0} % ", now * 100.0), style),
         (bar(cx, now, 12), style),
-        (format!(" {:>3.0} % of the last minute ", minute * 100.0), theme.normal()),
+        (t!(" {minute} % of the last minute ", minute = format!("{:>3.0}", minute * 100.0)), theme.normal()),
         (spark::shares(&report.busy, usize::from(width.saturating_sub(60)).min(60), theme.glyphs), theme.dim()),
     ]);
     flow.rows()
 }
 
 fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
-    let mut flow = Flow::new("cycle", cx.theme.dim(), width);
+    let mut flow = Flow::new(t!("cycle"), cx.theme.dim(), width);
     let plan = Planned::of(report);
-    flow.add(value(cx, "blocks", &plan.blocks.to_string()));
-    let measured = plan.measured.map_or("not yet".to_owned(), ms);
-    flow.add(value(cx, "worst-case scan time", &format!("{}, measured {measured}", ms(plan.round))));
-    flow.add(value(cx, "load at worst", &format!("{:.0} %", plan.load * 100.0)));
-    flow.add(count(cx, "missed", report.counters.missed, missed_lately(report)));
+    flow.add(value(cx, t!("blocks"), &plan.blocks.to_string()));
+    let measured = plan.measured.map_or(t!("not yet").to_owned(), ms);
+    flow.add(value(cx, t!("worst-case scan time"), &t!("{ms}, measured {measured}", ms = ms(plan.round), measured)));
+    flow.add(value(cx, t!("load at worst"), &format!("{:.0} %", plan.load * 100.0)));
+    flow.add(count(cx, t!("missed"), report.counters.missed, missed_lately(report)));
     flow.rows()
 }
 
@@ -162,35 +169,39 @@ fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Ve
     let (theme, counters) = (cx.theme, &report.counters);
     let sum = DeviceStats::of(report);
     let ill = sum.lately;
-    let mut flow = Flow::new("requests", theme.dim(), width);
+    let mut flow = Flow::new(t!("requests"), theme.dim(), width);
     flow.add(plain(grouped(counters.requests), theme.normal()));
-    flow.add(value(cx, "ok", &grouped(counters.ok)));
-    flow.add(count(cx, "no answer", counters.timeouts, ill));
-    flow.add(count(cx, "corrupt", counters.corrupt, ill));
-    for (name, kind) in [("check", sum.check), ("length", sum.length), ("not ours", sum.foreign)] {
+    flow.add(value(cx, t!("ok"), &grouped(counters.ok)));
+    flow.add(count(cx, t!("no answer"), counters.timeouts, ill));
+    flow.add(count(cx, t!("corrupt"), counters.corrupt, ill));
+    for (name, kind) in [(t!("check"), sum.check), (t!("length"), sum.length), (t!("not ours"), sum.foreign)] {
         if 0 < kind {
             flow.add(count(cx, name, kind, ill));
         }
     }
-    flow.add(count(cx, "refused", counters.exceptions, ill));
+    flow.add(count(cx, t!("refused"), counters.exceptions, ill));
     for (code, times) in &sum.exceptions {
-        flow.add(count(cx, &format!("{:02X} {}", code.0, code.label()), *times, ill));
+        flow.add(count(cx, &format!("{:02X} {}", code.0, translate(code.label())), *times, ill));
     }
-    flow.add(value(cx, "retries", &grouped(sum.retries)));
-    flow.add(count(cx, "late", counters.late, ill));
-    flow.add(count(cx, "stale", counters.stale, ill));
+    flow.add(value(cx, t!("retries"), &grouped(sum.retries)));
+    flow.add(count(cx, t!("late"), counters.late, ill));
+    flow.add(count(cx, t!("stale"), counters.stale, ill));
     let mut rows = flow.rows();
-    let mut flow = Flow::new("traffic", theme.dim(), width);
-    flow.add(value(cx, "bytes out", &grouped(counters.sent_bytes)));
-    flow.add(value(cx, "in", &grouped(counters.received_bytes)));
-    flow.add(value(cx, "frames", &grouped(counters.frames)));
+    let mut flow = Flow::new(t!("traffic"), theme.dim(), width);
+    flow.add(value(cx, t!("bytes out"), &grouped(counters.sent_bytes)));
+    flow.add(value(cx, t!("in"), &grouped(counters.received_bytes)));
+    flow.add(value(cx, t!("frames"), &grouped(counters.frames)));
     let lost = at.status.state != LineState::Connected;
-    flow.add(count(cx, "reconnects", counters.opens.saturating_sub(1), lost));
+    flow.add(count(cx, t!("reconnects"), counters.opens.saturating_sub(1), lost));
     rows.extend(flow.rows());
     if let Some(uart) = counters.uart {
-        let mut flow = Flow::new("port", theme.dim(), width);
-        let kinds =
-            [("parity", uart.parity), ("framing", uart.framing), ("overrun", uart.overrun), ("break", uart.breaks)];
+        let mut flow = Flow::new(t!("port"), theme.dim(), width);
+        let kinds = [
+            (t!("parity"), uart.parity),
+            (t!("framing"), uart.framing),
+            (t!("overrun"), uart.overrun),
+            (t!("break"), uart.breaks),
+        ];
         for (name, times) in kinds {
             flow.add(count(cx, name, u64::from(times), ill));
         }
@@ -234,16 +245,16 @@ impl DeviceStats {
 fn devices(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
     let columns = [
         words("", 0),
-        words("device", 0),
-        number("unit", 0),
-        words("state", 0),
-        number("ok", 2),
-        number("failed", 1),
-        number("of last", 4),
-        number("reply", 1),
+        words(t!("device"), 0),
+        number(t!("unit"), 0),
+        words(t!("state"), 0),
+        number(t!("ok"), 2),
+        number(t!("failed"), 1),
+        number(t!("of last"), 4),
+        number(t!("reply"), 1),
         number("p99", 3),
-        number("max", 3),
-        words("of the timeout", 5),
+        number(t!("max"), 3),
+        words(t!("of the timeout"), 5),
     ];
     let mut styles = Vec::new();
     let mut lines = Vec::new();
@@ -281,11 +292,15 @@ fn devices(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec
 
 fn state(cx: &ViewContext, device: &DeviceDef) -> String {
     match cx.snapshot.device(device.id).state {
-        DeviceState::Unknown => "not asked".to_owned(),
-        DeviceState::Answering => "answering".to_owned(),
-        DeviceState::Failing(times) => format!("failing {times}×"),
+        DeviceState::Unknown => t!("not asked").to_owned(),
+        DeviceState::Answering => t!("answering").to_owned(),
+        DeviceState::Failing(times) => t!("failing {times}×", times),
         DeviceState::Down { since } => {
-            format!("DOWN {}{}", running(between(since, cx.now)), retry_text(cx, device.id))
+            t!(
+                "DOWN {running}{retry_text}",
+                running = running(between(since, cx.now)),
+                retry_text = retry_text(cx, device.id)
+            )
         }
     }
 }
@@ -325,10 +340,10 @@ pub fn grouped(count: u64) -> String {
 /// `45.8 ms`, `300 ms`, `2.5 s`.
 pub fn ms(span: Duration) -> String {
     match span.as_secs_f64() {
-        seconds @ 120.0.. => format!("{:.0} min", seconds / 60.0),
+        seconds @ 120.0.. => t!("{seconds} min", seconds = format!("{:.0}", seconds / 60.0)),
         seconds @ 10.0.. => format!("{seconds:.0} s"),
         seconds @ 1.0.. => format!("{seconds:.1} s"),
-        seconds => format!("{} ms", tenths(seconds * 1e3)),
+        seconds => t!("{tenths} ms", tenths = tenths(seconds * 1e3)),
     }
 }
 

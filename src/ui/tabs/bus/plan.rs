@@ -1,5 +1,6 @@
 //! Page Plan: every block of the read plan with its addresses, its cost and how its reads end.
 
+use crate::t;
 use std::time::Duration;
 
 use super::{
@@ -65,7 +66,7 @@ impl Plan {
     pub fn view(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
         let theme = cx.theme;
         let Some(report) = at.report.filter(|report| !report.polls.is_empty()) else {
-            canvas.text(1, 0, "nothing is polled on this line yet", theme.normal());
+            canvas.text(1, 0, t!("nothing is polled on this line yet"), theme.normal());
             return;
         };
         let (width, height) = (canvas.width(), canvas.height());
@@ -92,7 +93,7 @@ impl Plan {
         }
         let below = lines.len().saturating_sub(first + room);
         if 0 < below {
-            canvas.text_right(width.saturating_sub(1), 0, &format!(" {below} more ▼"), theme.strong());
+            canvas.text_right(width.saturating_sub(1), 0, &t!(" {below} more ▼", below), theme.strong());
         }
         let bottom = (2 + to_u16(lines.len().min(room))).min(height.saturating_sub(DETAIL - 1));
         let told = detail(cx, report, &report.polls[selected]);
@@ -150,7 +151,7 @@ fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
 /// `1 s`, `1 s ×1.3` where it is stretched, `left out`.
 fn pace(poll: &PollReport) -> String {
     match (poll.shed, poll.factor) {
-        (true, _) => "skipped".to_owned(),
+        (true, _) => t!("skipped").to_owned(),
         (false, factor) if factor < 1.05 => every(poll.poll),
         (false, factor) => format!("{} ×{factor:.1}", every(poll.poll)),
     }
@@ -161,8 +162,8 @@ fn every(poll: Poll) -> String {
     match poll {
         Poll::Every(period) if period.subsec_nanos() == 0 => format!("{} s", period.as_secs()),
         Poll::Every(period) => ms(period),
-        Poll::Once => "once".to_owned(),
-        Poll::Never => "asked".to_owned(),
+        Poll::Once => t!("once").to_owned(),
+        Poll::Never => t!("asked").to_owned(),
     }
 }
 
@@ -174,17 +175,24 @@ fn ill(poll: &PollReport) -> bool {
 fn summary(report: &LineReport) -> (String, bool) {
     let (blocks, admission) = (report.polls.len(), &report.admission);
     let load = admission.utilisation * 100.0;
-    let words = format!("{blocks} {} take {load:.0} % of the line at worst", plural(blocks, "block", "blocks"));
+    let words = t!(
+        "{blocks} {plural} take {load} % of the line at worst",
+        blocks,
+        plural = plural(blocks, t!("block"), t!("blocks")),
+        load = format!("{load:.0}")
+    );
     let refused = match report.refused.len() {
         0 => String::new(),
-        count => format!("; {count} {} refused by the device", plural(count, "tag is", "tags are")),
+        count => {
+            t!("; {count} {plural} refused by the device", count, plural = plural(count, t!("tag is"), t!("tags are")))
+        }
     };
     match &admission.verdict {
-        Verdict::Fits => (format!("{words}: they fit{refused}"), false),
-        Verdict::TooMuch { .. } => (format!("! {words}: OVERLOADED, polls skipped{refused}"), true),
+        Verdict::Fits => (t!("{words}: they fit{refused}", words, refused), false),
+        Verdict::TooMuch { .. } => (t!("! {words}: OVERLOADED, polls skipped{refused}", words, refused), true),
         Verdict::Blocked(overload) => {
             let blocker = &overload.blocker.name;
-            (format!("! {words}: some come late behind {blocker}{refused}"), true)
+            (t!("! {words}: some come late behind {blocker}{refused}", words, blocker, refused), true)
         }
     }
 }
@@ -200,32 +208,42 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
     let last = poll.address.saturating_add(poll.count.saturating_sub(1));
     let used: u16 = poll.tags.iter().map(|tag| cx.def().tag(*tag).point.len()).sum();
     let over = poll.count.saturating_sub(used);
-    let over = if over == 0 { String::new() } else { format!(", {over} gap registers read") };
+    let over = if over == 0 { String::new() } else { t!(", {over} gap registers read", over) };
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
-    let late =
-        stats.jitter.max().map_or("no polling delay".to_owned(), |late| format!("polling delay at most {}", ms(late)));
+    let late = stats
+        .jitter
+        .max()
+        .map_or(t!("no polling delay").to_owned(), |late| t!("polling delay at most {ms}", ms = ms(late)));
     let dead = report.admission.dead_cost(poll.device);
-    let dead = dead.map_or(String::new(), |cost| format!("; while {} is dead a probe costs {}", device.name, ms(cost)));
+    let dead = dead.map_or(String::new(), |cost| {
+        t!("; while {name} is dead a probe costs {ms}", name = device.name, ms = ms(cost))
+    });
     let mut lines = vec![
-        format!(
-            "{} unit {}, {code} / 0x{code:02X} {}: {} = wire {}–{} (0x{:04X}–0x{last:04X}), {} {}{over}",
-            device.name,
-            device.unit,
-            names::function(code).unwrap_or_default(),
-            names::span(code, poll.address, poll.count),
-            poll.address,
+        t!(
+            "{name} unit {unit}, {code} / 0x{code2} {function}: {span} = wire {address}–{last} (0x{address2}–0x{last2}), {count} {plural}{over}",
+            name = device.name,
+            unit = device.unit,
+            code,
+            code2 = format!("{code:02X}"),
+            function = names::function(code).unwrap_or_default(),
+            span = names::span(code, poll.address, poll.count),
+            address = poll.address,
             last,
-            poll.address,
-            poll.tags.len(),
-            plural(poll.tags.len(), "tag", "tags"),
+            address2 = format!("{:04X}", poll.address),
+            last2 = format!("{last:04X}"),
+            count = poll.tags.len(),
+            plural = plural(poll.tags.len(), t!("tag"), t!("tags")),
+            over
         ),
-        format!(
-            "reply {} ms, p99 {}, max {}; {late}; missed {}; retries {}{dead}",
-            span(stats.reply.last()),
-            span(stats.reply.p99()),
-            span(stats.reply.max()),
-            grouped(stats.missed),
-            grouped(stats.retries),
+        t!(
+            "reply {span} ms, p99 {span2}, max {span3}; {late}; missed {grouped}; retries {grouped2}{dead}",
+            span = span(stats.reply.last()),
+            span2 = span(stats.reply.p99()),
+            span3 = span(stats.reply.max()),
+            late,
+            grouped = grouped(stats.missed),
+            grouped2 = grouped(stats.retries),
+            dead
         ),
     ];
     let fault = poll.tags.iter().find_map(|tag| {
@@ -234,7 +252,7 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
     });
     if let Some(fault) = fault.filter(|_| ill(poll)) {
         let (failed, of) = stats.recent();
-        lines.push(format!("! {fault}; {failed} of the last {of} failed"));
+        lines.push(t!("! {fault}; {failed} of the last {of} failed", fault, failed, of));
     }
     lines
 }

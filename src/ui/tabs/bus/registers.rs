@@ -1,5 +1,7 @@
 //! The register browser: every register in hex and as numbers, and the selected pair as 32 bits in all four orders.
 
+use crate::t;
+use crate::text::translate;
 use std::collections::BTreeMap;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -76,7 +78,7 @@ impl Registers {
     fn values(&self, cx: &ViewContext) -> (BTreeMap<u16, u16>, String, bool) {
         let run = cx.snapshot.lines.get(self.line.index()).and_then(|line| line.test.as_ref());
         let Some(run) = run.filter(|run| run.diagnostic == self.diagnostic()) else {
-            return (BTreeMap::new(), "asked, nothing came yet".to_owned(), false);
+            return (BTreeMap::new(), t!("asked, nothing came yet").to_owned(), false);
         };
         let mut words = BTreeMap::new();
         let mut fault = None;
@@ -95,11 +97,13 @@ impl Registers {
         }
         let at = crate::ui::widgets::text::clock(run.started, &cx.def().time_zone);
         let (state, ill) = match (&run.state, fault) {
-            (DiagnosticState::Running, _) => (format!("reading, {} of {} requests", run.done, run.total), false),
-            (DiagnosticState::Failed(why), _) => (format!("FAILED: {why}"), true),
-            (DiagnosticState::Cancelled, _) => ("STOPPED".to_owned(), true),
-            (DiagnosticState::Done, Some(why)) => (format!("read {at}; ---- is {why}"), true),
-            (DiagnosticState::Done, None) => (format!("read {at}"), false),
+            (DiagnosticState::Running, _) => {
+                (t!("reading, {done} of {total} requests", done = run.done, total = run.total), false)
+            }
+            (DiagnosticState::Failed(why), _) => (t!("FAILED: {why}", why), true),
+            (DiagnosticState::Cancelled, _) => (t!("STOPPED").to_owned(), true),
+            (DiagnosticState::Done, Some(why)) => (t!("read {at}; ---- is {why}", at, why), true),
+            (DiagnosticState::Done, None) => (t!("read {at}", at), false),
         };
         (words, state, ill)
     }
@@ -108,7 +112,12 @@ impl Registers {
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let theme = cx.theme;
         let (words, state, ill) = self.values(cx);
-        let title = format!("unit {}, {} from {}", self.unit, self.table.word(), self.table.modicon(self.address));
+        let title = t!(
+            "unit {unit}, {table} from {modicon}",
+            unit = self.unit,
+            table = translate(self.table.word()),
+            modicon = self.table.modicon(self.address)
+        );
         let pair = if self.table.is_bits() { 0 } else { 6 };
         let wanted = self.count.saturating_add(pair + 4);
         let mut canvas = window(cx, screen, body, &title, (74.min(body.width), wanted));
@@ -119,11 +128,11 @@ impl Registers {
         let (state, ill) = self.problem.clone().map_or((state, ill), |why| (why, true));
         canvas.text(0, 0, &fit_words(&state, width), if ill { theme.trouble() } else { theme.normal() });
         let heading = match (self.table.is_bits(), bits) {
-            (true, _) => "bit",
-            (false, true) => "hex       unsigned   signed  bits",
-            (false, false) => "hex       unsigned   signed",
+            (true, _) => t!("bit"),
+            (false, true) => t!("hex       unsigned   signed  bits"),
+            (false, false) => t!("hex       unsigned   signed"),
         };
-        canvas.text(0, 1, &format!("  {:18} {heading}", "register / wire"), theme.dim());
+        canvas.text(0, 1, &format!("  {:18} {heading}", t!("register / wire")), theme.dim());
         let room = usize::from(height.saturating_sub(pair + 3)).max(1);
         let first = list::first(usize::from(self.selected), usize::from(self.count), room);
         for (y, n) in (first..usize::from(self.count)).take(room).enumerate() {
@@ -133,19 +142,19 @@ impl Registers {
         }
         let below = usize::from(self.count).saturating_sub(first + room);
         if 0 < below {
-            canvas.text_right(width, 0, &format!(" {below} more ▼"), theme.strong());
+            canvas.text_right(width, 0, &t!(" {below} more ▼", below), theme.strong());
         }
         if 0 < pair {
             let y = (2 + to_u16(room.min(usize::from(self.count)))).min(height.saturating_sub(pair + 1));
             self.pair(cx, &words, &mut canvas.part(0, y, width, pair));
         }
-        let keys = "↑↓ move   r read again   Esc close";
+        let keys = t!("↑↓ move   r read again   Esc close");
         let x = canvas.text(0, height.saturating_sub(1), keys, theme.strong());
         if too_low {
             canvas.text(
                 x + 2,
                 height.saturating_sub(1),
-                &fit_words("enlarge for more", width.saturating_sub(x + 2)),
+                &fit_words(t!("enlarge for more"), width.saturating_sub(x + 2)),
                 theme.dim(),
             );
         }
@@ -175,11 +184,16 @@ impl Registers {
         let first = self.address.wrapping_add(self.selected);
         let second = first.wrapping_add(1);
         let (Some(a), Some(b)) = (words.get(&first), words.get(&second)) else {
-            canvas.text(0, 1, "32 bits: select a register that is followed by another", theme.dim());
+            canvas.text(0, 1, t!("32 bits: select a register that is followed by another"), theme.dim());
             return;
         };
         let (from, to) = (self.table.modicon(first), self.table.modicon(second));
-        canvas.text(0, 1, &format!("  {:18} unsigned 32    signed 32  float", format!("{from}+{to}")), theme.dim());
+        canvas.text(
+            0,
+            1,
+            &t!("  {text} unsigned 32    signed 32  float", text = format!("{:18}", format!("{from}+{to}"))),
+            theme.dim(),
+        );
         for (y, (name, order)) in ORDERS.into_iter().enumerate() {
             canvas.text(0, to_u16(y) + 2, &format!("  {name:18} {}", pair_text([*a, *b], order)), theme.normal());
         }
@@ -199,7 +213,7 @@ fn pair_text(words: [u16; 2], order: ByteOrder) -> String {
     let point = |kind| Point { table: Table::Holding, address: 0, kind, order, field: None };
     let number = |kind| codec::decode(point(kind), &words);
     let whole = |kind| number(kind).map_or("–".to_owned(), |value| format!("{value:.0}"));
-    let float = number(DataType::F32).map_or("no number".to_owned(), |value| {
+    let float = number(DataType::F32).map_or(t!("no number").to_owned(), |value| {
         let value = to_f32(value);
         let plain = value == 0.0 || (1e-4..1e7).contains(&value.abs());
         if plain { format!("{value}") } else { format!("{value:e}") }

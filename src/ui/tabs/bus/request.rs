@@ -2,6 +2,7 @@
 
 mod fields;
 
+use crate::t;
 pub use fields::address;
 use fields::{all_settings, bit, number, register};
 use std::{ops::RangeInclusive, time::Duration};
@@ -77,35 +78,35 @@ impl Form {
         let unit = cx.def().devices.iter().find(|device| device.line == at.id).map_or(1, |device| device.unit);
         let text = |label, text: &str| Field { label, input: Input::Text(Line::long(text, 400)) };
         let choice = |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0) };
-        let unit = text("unit", &unit.to_string());
+        let unit = text(t!("unit"), &unit.to_string());
         let fields = match tried {
             Tried::Bytes | Tried::Request => vec![
                 unit,
-                choice("function", FUNCTIONS.map(dissect::function_words).to_vec()),
-                text("address", "40001"),
-                text("count", "1"),
+                choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec()),
+                text(t!("address"), "40001"),
+                text(t!("count"), "1"),
             ],
             Tried::Registers => vec![
                 unit,
                 choice(
-                    "table",
+                    t!("table"),
                     TABLES.map(|table| names::function(table.read_fc()).unwrap_or_default().to_owned()).to_vec(),
                 ),
-                text("address", "40001"),
-                text("count", "16"),
+                text(t!("address"), "40001"),
+                text(t!("count"), "16"),
             ],
-            Tried::Loopback => vec![unit, text("times", "10")],
+            Tried::Loopback => vec![unit, text(t!("times"), "10")],
             Tried::Identify => vec![unit],
             Tried::Scan => {
-                let mut settings = vec![format!("as the line has now: {}", at.settings.transport)];
+                let mut settings = vec![t!("as the line has now: {transport}", transport = at.settings.transport)];
                 if at.settings.transport.serial().is_some() {
-                    settings.push("all baud rates and parities; polling pauses".to_owned());
+                    settings.push(t!("all baud rates and parities; polling pauses").to_owned());
                 }
                 vec![
-                    text("from unit", "1"),
-                    text("to unit", "247"),
-                    choice("settings", settings),
-                    text("wait ms", "200"),
+                    text(t!("from unit"), "1"),
+                    text(t!("to unit"), "247"),
+                    choice(t!("settings"), settings),
+                    text(t!("wait ms"), "200"),
                 ]
             }
         };
@@ -161,18 +162,18 @@ impl Form {
         }
         if let (Tried::Request, Some(function)) = (self.tried, FUNCTIONS.get(self.chosen(1))) {
             self.fields[3].label = match function {
-                1..=4 => "count",
-                5 | 6 => "value",
-                _ => "values",
+                1..=4 => t!("count"),
+                5 | 6 => t!("value"),
+                _ => t!("values"),
             };
         }
     }
 
     fn start(&self, cx: &ViewContext) -> Result<Vec<UiAction>, String> {
-        let at = Place::of(cx, self.line).ok_or("this line has gone")?;
+        let at = Place::of(cx, self.line).ok_or(t!("this line has gone"))?;
         let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
         if self.fields.iter().any(missed) {
-            return Err("the text was cut; Ctrl-U clears a field".to_owned());
+            return Err(t!("the text was cut; Ctrl-U clears a field").to_owned());
         }
         let diagnostic = self.build(at.settings)?.diagnostic;
         let mut acts = vec![test::start(&at, diagnostic.clone())?];
@@ -211,18 +212,20 @@ impl Form {
             Tried::Registers => {
                 let (unit, table) = (unit(0)?, TABLES[self.chosen(1)]);
                 let address = address(&self.text(2), table)?;
-                let count = to_u16(number(&self.text(3), "count", 1..=if table.is_bits() { 2_000 } else { 125 })?);
+                let count = to_u16(number(&self.text(3), t!("count"), 1..=if table.is_bits() { 2_000 } else { 125 })?);
                 let told = request_text(&read(unit, table, address, count), framing)?;
                 Ok(Built { diagnostic: Diagnostic::Read { unit, table, address, count }, told })
             }
             Tried::Loopback => {
-                let (unit, count) = (unit(0)?, to_u16(number(&self.text(1), "times", 1..=1_000)?));
-                let told = vec![format!("sends a word to unit {unit} and waits for the same word, {count} times")];
+                let (unit, count) = (unit(0)?, to_u16(number(&self.text(1), t!("times"), 1..=1_000)?));
+                let told =
+                    vec![t!("sends a word to unit {unit} and waits for the same word, {count} times", unit, count)];
                 Ok(Built { diagnostic: Diagnostic::Loopback { unit, data: 0xA537, count }, told })
             }
             Tried::Identify => {
                 let unit = unit(0)?;
-                let told = vec![format!("asks unit {unit} for its maker, product and version; else for its server id")];
+                let told =
+                    vec![t!("asks unit {unit} for its maker, product and version; else for its server id", unit)];
                 Ok(Built { diagnostic: Diagnostic::Identify { unit }, told })
             }
             Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?),
@@ -231,14 +234,17 @@ impl Form {
 
     fn build_scan(&self, line: &LineDef, first: u8, last: u8) -> Result<Built, String> {
         if last < first {
-            return Err(format!("from unit {first} to unit {last}: the first is the greater one"));
+            return Err(t!("from unit {first} to unit {last}: the first is the greater one", first, last));
         }
-        let timeout = Duration::from_millis(to_u64(number(&self.text(3), "wait ms", 10..=10_000)?));
+        let timeout = Duration::from_millis(to_u64(number(&self.text(3), t!("wait ms"), 10..=10_000)?));
         let serials = if self.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
         let (units, settings) = (u32::from(last - first) + 1, to_u32(serials.len().max(1)));
         let longest = ms(timeout * units * settings);
-        let told = vec![format!(
-            "{units} units, {settings} settings: about {longest}, if no unit answers. Any answer counts, also an exception."
+        let told = vec![t!(
+            "{units} units, {settings} settings: about {longest}, if no unit answers. Any answer counts, also an exception.",
+            units,
+            settings,
+            longest
         )];
         Ok(Built { diagnostic: Diagnostic::Scan(Scan { first, last, serials, timeout }), told })
     }
@@ -295,20 +301,20 @@ impl Form {
             canvas.text(0, shown + 1 + to_u16(n), line, *style);
         }
         if cut {
-            let more = format!(" {} more lines: enlarge the screen", told.len() - room);
+            let more = t!(" {count} more lines: enlarge the screen", count = told.len() - room);
             canvas.text_right(canvas.width(), last.saturating_sub(1), &more, theme.strong());
         }
-        let keys = theme.enter("↑↓ field   ←→ choose   ⏎ start   Esc close");
+        let keys = theme.enter(t!("↑↓ field   ←→ choose   ⏎ start   Esc close"));
         canvas.text(0, last, &pad(&keys, width(&keys)), theme.strong());
     }
 
     fn title(&self) -> &'static str {
         match self.tried {
-            Tried::Bytes | Tried::Request => "request by fields",
-            Tried::Registers => "browse registers",
-            Tried::Loopback => "loopback",
-            Tried::Identify => "identify a device",
-            Tried::Scan => "scan for units",
+            Tried::Bytes | Tried::Request => t!("request by fields"),
+            Tried::Registers => t!("browse registers"),
+            Tried::Loopback => t!("loopback"),
+            Tried::Identify => t!("identify a device"),
+            Tried::Scan => t!("scan for units"),
         }
     }
 }
@@ -336,7 +342,7 @@ fn message(unit: u8, function: u8, place: &str, rest: &str) -> Result<Vec<u8>, S
     let mut message = vec![unit, function, start[0], start[1]];
     let each = || rest.split([' ', ',', ';']).filter(|word| !word.is_empty());
     match function {
-        1..=4 => message.extend(to_u16(number(rest, "count", 1..=2_000)?).to_be_bytes()),
+        1..=4 => message.extend(to_u16(number(rest, t!("count"), 1..=2_000)?).to_be_bytes()),
         5 => message.extend(if bit(rest)? { [0xFF, 0] } else { [0, 0] }),
         6 => message.extend(register(rest)?.to_be_bytes()),
         15 => {

@@ -1,5 +1,6 @@
 //! What came of a test, in words.
 
+use crate::t;
 use jiff::SignedDuration;
 
 use super::{
@@ -23,14 +24,17 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let theme = cx.theme;
     let room = width.saturating_sub(3);
     let Some(run) = &at.status.test else {
-        return vec![plain("nothing tried yet: ⏎ starts the selected test; polling goes on meanwhile", theme.dim())];
+        return vec![plain(
+            t!("nothing tried yet: ⏎ starts the selected test; polling goes on meanwhile"),
+            theme.dim(),
+        )];
     };
     let mut rows = heading(cx, run);
     let bare = matches!(run.diagnostic, Diagnostic::Send(_));
     if let Diagnostic::Send(bytes) = &run.diagnostic {
         let framing = at.settings.transport.framing();
         let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Request), None);
-        let sent = broken(&format!("TX {}", bytes_text(framing, bytes)), room);
+        let sent = broken(&t!("TX {bytes_text}", bytes_text = bytes_text(framing, bytes)), room);
         rows.extend(sent.into_iter().map(|line| plain(line, theme.dim())));
         rows.extend(
             wrap(&dissection.summary, room - 3).into_iter().map(|line| plain(format!("   {line}"), theme.dim())),
@@ -40,16 +44,17 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
         match finding {
             Finding::Bytes { bytes, reply } => rows.extend(came_back(cx, at, run, bytes, *reply, room)),
             Finding::Exchange(exchange) if matches!(run.diagnostic, Diagnostic::Loopback { .. }) => {
-                let reply = exchange.reply.map_or("–".to_owned(), |reply| format!("{} ms", short_ms(reply)));
+                let reply =
+                    exchange.reply.map_or("–".to_owned(), |reply| t!("{short_ms} ms", short_ms = short_ms(reply)));
                 rows.push(match exchange.outcome {
-                    Ok(()) => plain(format!("✓ came back after {reply}"), theme.normal()),
+                    Ok(()) => plain(t!("✓ came back after {reply}", reply), theme.normal()),
                     Err(fault) => plain(format!("✗ {fault}"), theme.trouble()),
                 });
             }
             Finding::Exchange(exchange) => rows.extend(exchange_rows(cx, exchange, room)),
             Finding::Unit { unit, serial, words } => {
-                let serial = serial.map_or(String::new(), |serial| format!(" at {serial}"));
-                rows.push(plain(format!("● unit {unit}{serial}: {words}"), theme.strong()));
+                let serial = serial.map_or(String::new(), |serial| t!(" at {serial}", serial));
+                rows.push(plain(t!("● unit {unit}{serial}: {words}", unit, serial, words), theme.strong()));
             }
             Finding::Object { name, text } => {
                 rows.push(vec![(format!("{name:20} "), theme.dim()), (text.clone(), theme.strong())])
@@ -75,23 +80,23 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
     let theme = cx.theme;
     let at = clock(run.started, &cx.def().time_zone);
     let (state, style) = match &run.state {
-        DiagnosticState::Running => ("at work".to_owned(), theme.strong()),
-        DiagnosticState::Done => ("done".to_owned(), theme.normal()),
-        DiagnosticState::Cancelled => ("STOPPED".to_owned(), theme.trouble()),
-        DiagnosticState::Failed(why) => (format!("FAILED: {why}"), theme.trouble()),
+        DiagnosticState::Running => (t!("at work").to_owned(), theme.strong()),
+        DiagnosticState::Done => (t!("done").to_owned(), theme.normal()),
+        DiagnosticState::Cancelled => (t!("STOPPED").to_owned(), theme.trouble()),
+        DiagnosticState::Failed(why) => (t!("FAILED: {why}", why), theme.trouble()),
     };
     let what = match &run.diagnostic {
-        Diagnostic::Send(_) => "sent".to_owned(),
+        Diagnostic::Send(_) => t!("sent").to_owned(),
         diagnostic @ (Diagnostic::Loopback { .. }
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. }
         | Diagnostic::Scan(_)) => diagnostic.to_string(),
     };
-    let mut rows = vec![vec![(format!("{at} {what} by {}   ", run.by), theme.normal()), (state, style)]];
+    let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
     if run.state == DiagnosticState::Running && 1 < run.total {
         let share = f64::from(run.done) / f64::from(run.total);
-        let left = remaining(cx, run).map_or(String::new(), |left| format!(", {} left", ms(left)));
-        let words = format!(" {} of {}{left}   {}", run.done, run.total, run.now);
+        let left = remaining(cx, run).map_or(String::new(), |left| t!(", {ms} left", ms = ms(left)));
+        let words = t!(" {done} of {total}{left}   {now}", done = run.done, total = run.total, left, now = run.now);
         rows.push(vec![(bar(cx, share, 20), theme.normal()), (words, theme.normal())]);
     }
     rows
@@ -120,10 +125,10 @@ fn came_back(
             && dissect::message_of(sent, framing).is_some_and(|message| message.first() == Some(&0))
     };
     if bytes.is_empty() && matches!(&run.diagnostic, Diagnostic::Send(sent) if to_all(sent)) {
-        return vec![plain("sent to all units; a broadcast has no response", theme.normal())];
+        return vec![plain(t!("sent to all units; a broadcast has no response"), theme.normal())];
     }
     if bytes.is_empty() {
-        return vec![plain(format!("✗ nothing came back within {}", ms(at.settings.timeout)), theme.trouble())];
+        return vec![plain(t!("✗ nothing came back within {ms}", ms = ms(at.settings.timeout)), theme.trouble())];
     }
     let asked = match &run.diagnostic {
         Diagnostic::Send(sent) => dissect::message_of(sent, framing),
@@ -132,15 +137,15 @@ fn came_back(
         }
     };
     let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());
-    let mut rows: Vec<Row> = broken(&format!("RX {}", bytes_text(framing, bytes)), room)
+    let mut rows: Vec<Row> = broken(&t!("RX {bytes_text}", bytes_text = bytes_text(framing, bytes)), room)
         .into_iter()
         .map(|line| plain(line, theme.normal()))
         .collect();
-    let reply = reply.map_or(String::new(), |reply| format!("   after {} ms", short_ms(reply)));
+    let reply = reply.map_or(String::new(), |reply| t!("   after {short_ms} ms", short_ms = short_ms(reply)));
     let refused = dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
     let (mark, style) = match (dissection.verdict.as_str(), refused) {
-        ("ok", false) => ("✓ ok".to_owned(), theme.normal()),
-        ("ok", true) => ("✗ the device refuses".to_owned(), theme.trouble()),
+        ("ok", false) => (t!("✓ ok").to_owned(), theme.normal()),
+        ("ok", true) => (t!("✗ the device refuses").to_owned(), theme.trouble()),
         (verdict, _) => (format!("✗ {verdict}"), theme.trouble()),
     };
     rows.push(plain(format!("{mark}{reply}"), style));

@@ -1,5 +1,6 @@
 //! Rows of styled words that scroll, words that flow into rows, and tables that leave out columns where there is no room.
 
+use crate::t;
 use ratatui::style::Style;
 
 use crate::{
@@ -38,7 +39,7 @@ pub fn draw(cx: &ViewContext, canvas: &mut Canvas, rows: &[Row], first: usize) {
     }
     let below = rows.len().saturating_sub(first + room);
     let above = if 0 < first { format!(" {first} ▲") } else { String::new() };
-    let mark = if 0 < below { format!("{above} {below} more ▼") } else { above };
+    let mark = if 0 < below { t!("{above} {below} more ▼", above, below) } else { above };
     canvas.text_right(canvas.width().saturating_sub(1), canvas.height().saturating_sub(1), &mark, cx.theme.strong());
 }
 

@@ -2,6 +2,8 @@
 
 mod send;
 
+use crate::t;
+use crate::text::translate;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame as Screen, layout::Rect};
 pub use send::Send;
@@ -67,12 +69,14 @@ impl Tried {
     /// Its key, its name and what it is for.
     fn words(self) -> [&'static str; 3] {
         match self {
-            Tried::Bytes => ["t", "type bytes", "hex of a request: what it means at once, its check added"],
-            Tried::Request => ["f", "request by fields", "unit, function, address (41003 or 0x03EA), count or value"],
-            Tried::Registers => ["b", "browse registers", "hex, numbers, 32 bits and float in all four orders"],
-            Tried::Loopback => ["l", "loopback", "08 / 0x08: does the line carry what is sent, and how fast"],
-            Tried::Identify => ["i", "identify", "43 / 0x2B: maker, product, version of a device"],
-            Tried::Scan => ["s", "scan for units", "who answers, with these or with all serial settings"],
+            Tried::Bytes => ["t", t!("type bytes"), t!("hex of a request: what it means at once, its check added")],
+            Tried::Request => {
+                ["f", t!("request by fields"), t!("unit, function, address (41003 or 0x03EA), count or value")]
+            }
+            Tried::Registers => ["b", t!("browse registers"), t!("hex, numbers, 32 bits and float in all four orders")],
+            Tried::Loopback => ["l", t!("loopback"), t!("08 / 0x08: does the line carry what is sent, and how fast")],
+            Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: maker, product, version of a device")],
+            Tried::Scan => ["s", t!("scan for units"), t!("who answers, with these or with all serial settings")],
         }
     }
 }
@@ -118,7 +122,7 @@ impl Bench {
             Tried::Bytes | Tried::Request => Diagnostic::Send(Vec::new()),
             Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => Diagnostic::Identify { unit: 1 },
         };
-        vec![Notice::or(cx, "test", &CommandKind::Test(at.id, diagnostic), Modal::Bus(Box::new(window)))]
+        vec![Notice::or(cx, t!("test"), &CommandKind::Test(at.id, diagnostic), Modal::Bus(Box::new(window)))]
     }
 
     /// Single rows move the selection; pages scroll the results.
@@ -141,7 +145,7 @@ impl Bench {
         let tests = height.saturating_sub(3).min(TOP - 2);
         let first = list::first(self.selected, Tried::ALL.len(), usize::from(tests));
         for (y, (n, tried)) in Tried::ALL.into_iter().enumerate().skip(first).take(usize::from(tests)).enumerate() {
-            let [key, name, what] = tried.words();
+            let [key, name, what] = tried.words().map(translate);
             let y = to_u16(y);
             let chosen = n == self.selected;
             let x = canvas.text(1, y, key, theme.strong());
@@ -176,9 +180,9 @@ pub fn closed(at: &Place) -> Option<String> {
     let name = &at.settings.name;
     match &at.status.state {
         LineState::Connected | LineState::Testing => None,
-        LineState::Connecting => Some(format!("line {name} is being connected: nothing can be sent yet")),
-        LineState::Waiting { why, .. } => Some(format!("line {name} is not connected: {why}")),
-        LineState::Disconnected => Some(format!("line {name} is closed: connect it first (tab 4, L)")),
+        LineState::Connecting => Some(t!("line {name} is being connected: nothing can be sent yet", name)),
+        LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why)),
+        LineState::Disconnected => Some(t!("line {name} is closed: connect it first (tab 4, L)", name)),
     }
 }
 
@@ -191,9 +195,11 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
     let query = danger(at, &diagnostic);
     let command = CommandKind::Test(at.id, diagnostic);
     Ok(match query {
-        Some(words) => {
-            UiAction::Open(Modal::Confirm(Confirm::command(format!("test of {}", at.settings.name), words, command)))
-        }
+        Some(words) => UiAction::Open(Modal::Confirm(Confirm::command(
+            t!("test of {name}", name = at.settings.name),
+            words,
+            command,
+        ))),
         None => UiAction::Command(command),
     })
 }
@@ -201,9 +207,9 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
 /// What must be asked before a test; `None` for one that only reads.
 fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
     match diagnostic {
-        Diagnostic::Scan(scan) if !scan.serials.is_empty() => Some(format!(
-            "Polling of {} pauses while other settings are tried, and its alarms are not judged. Start the scan?",
-            at.settings.name
+        Diagnostic::Scan(scan) if !scan.serials.is_empty() => Some(t!(
+            "Polling of {name} pauses while other settings are tried, and its alarms are not judged. Start the scan?",
+            name = at.settings.name
         )),
         Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
             None
@@ -216,17 +222,18 @@ fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
             let broadcast = dissection.message.first() == Some(&0) && framing != Framing::Mbap;
             match (whole, broadcast, only_reads(&dissection.message)) {
                 (true, false, true) => None,
-                (true, true, _) => {
-                    Some(format!("{}. Every device of the line obeys, none answers. Send it?", dissection.summary))
-                }
-                (true, false, false) => Some(format!(
-                    "{}. This is past all limits of the plant file and is not read back. Send it?",
-                    dissection.summary
+                (true, true, _) => Some(t!(
+                    "{summary}. Every device of the line obeys, none answers. Send it?",
+                    summary = dissection.summary
                 )),
-                (false, ..) => Some(format!(
-                    "These bytes are no good request: {}. Send {} all the same?",
-                    dissection.verdict,
-                    hex(bytes)
+                (true, false, false) => Some(t!(
+                    "{summary}. This is past all limits of the plant file and is not read back. Send it?",
+                    summary = dissection.summary
+                )),
+                (false, ..) => Some(t!(
+                    "These bytes are no good request: {verdict}. Send {hex} all the same?",
+                    verdict = dissection.verdict,
+                    hex = hex(bytes)
                 )),
             }
         }

@@ -1,5 +1,6 @@
 //! Windows of this tab: sheets to read, and entries for tests.
 
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame as Screen, layout::Rect};
 
@@ -82,12 +83,21 @@ impl Window {
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         match self {
-            Window::Text(_) => vec![hint("↑↓", "scroll"), hint("Esc", "close")],
-            Window::Send(_) => vec![hint("⏎", "send"), hint("Tab", "check on or off"), hint("Esc", "close")],
-            Window::Form(_) => {
-                vec![hint("↑↓", "field"), hint("←→", "choose"), hint("⏎", "start"), hint("Esc", "close")]
+            Window::Text(_) => vec![hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))],
+            Window::Send(_) => {
+                vec![hint("⏎", t!("send")), hint(t!("Tab"), t!("check on or off")), hint(t!("Esc"), t!("close"))]
             }
-            Window::Registers(_) => vec![hint("↑↓", "move"), hint("r", "read again"), hint("Esc", "close")],
+            Window::Form(_) => {
+                vec![
+                    hint("↑↓", t!("field")),
+                    hint("←→", t!("choose")),
+                    hint("⏎", t!("start")),
+                    hint(t!("Esc"), t!("close")),
+                ]
+            }
+            Window::Registers(_) => {
+                vec![hint("↑↓", t!("move")), hint("r", t!("read again")), hint(t!("Esc"), t!("close"))]
+            }
         }
     }
 
@@ -158,13 +168,16 @@ impl TextWindow {
         let (title, rows) = match &self.shown {
             Shown::Frame { line, frame, before } => {
                 let dissection = dissect::in_traffic(frame, before.iter());
-                (format!("frame {} on {line}", frame.number), frame_rows(cx, frame, &dissection, room))
+                (t!("frame {number} on {line}", number = frame.number, line), frame_rows(cx, frame, &dissection, room))
             }
-            Shown::Block { line, device, table, address } => {
-                (format!("tags of {} from {}", cx.def().device(*device).name, table.modicon(*address)), {
-                    block_rows(cx, *line, *device, *table, *address)
-                })
-            }
+            Shown::Block { line, device, table, address } => (
+                t!(
+                    "tags of {name} from {modicon}",
+                    name = cx.def().device(*device).name,
+                    modicon = table.modicon(*address)
+                ),
+                { block_rows(cx, *line, *device, *table, *address) },
+            ),
         };
         let wide = rows.iter().map(|row| row.iter().map(|(text, _)| width(text)).sum::<u16>()).max().unwrap_or(0);
         let mut canvas = window(cx, screen, body, &title, (wide.min(room).max(40) + 1, to_u16(rows.len())));
@@ -176,9 +189,9 @@ impl TextWindow {
 fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
     let theme = cx.theme;
     let at = frame.at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M:%S%.6f");
-    let direction = if frame.sent { "TX sent" } else { "RX received" };
+    let direction = if frame.sent { t!("TX sent") } else { t!("RX received") };
     let count = frame.bytes.len();
-    let mut rows = vec![plain(format!("{at}  {direction}, {count} bytes"), theme.normal())];
+    let mut rows = vec![plain(t!("{at}  {direction}, {count} bytes", at, direction, count), theme.normal())];
     rows.extend(
         broken(&bytes_text(frame.framing, &frame.bytes), room).into_iter().map(|line| plain(line, theme.strong())),
     );
@@ -214,7 +227,7 @@ pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room:
         rows.extend(lines.map(|line| plain(indent.clone() + &line, theme.normal())));
     }
     if let Some(also) = &dissection.also {
-        rows.extend(wrap(&format!("or: {also}"), room).into_iter().map(|line| plain(line, theme.dim())));
+        rows.extend(wrap(&t!("or: {also}", also), room).into_iter().map(|line| plain(line, theme.dim())));
     }
     rows
 }
@@ -231,8 +244,8 @@ pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Ro
         lines.into_iter().map(|line| plain(line, style)).collect::<Vec<Row>>()
     };
     let mut rows = row("TX", &exchange.request, &request.summary, theme.dim());
-    let reply = exchange.reply.map_or(String::new(), |reply| format!("   after {} ms", short_ms(reply)));
-    let outcome = exchange.outcome.map_or_else(|fault| format!("✗ {fault}{reply}"), |()| format!("✓ ok{reply}"));
+    let reply = exchange.reply.map_or(String::new(), |reply| t!("   after {short_ms} ms", short_ms = short_ms(reply)));
+    let outcome = exchange.outcome.map_or_else(|fault| format!("✗ {fault}{reply}"), |()| t!("✓ ok{reply}", reply));
     let style = if exchange.outcome.is_ok() { theme.normal() } else { theme.trouble() };
     if !exchange.answer.is_empty() {
         let answer = dissect::dissect(&exchange.answer, framing, Some(dissect::Direction::Answer), asked.as_deref());
@@ -249,7 +262,7 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
         report.polls.iter().find(|poll| (poll.device, poll.table, poll.address) == (device, table, address))
     });
     let Some(poll) = poll else {
-        return vec![plain("this block is no longer in the plan", cx.theme.trouble())];
+        return vec![plain(t!("this block is no longer in the plan"), cx.theme.trouble())];
     };
     let lines: Vec<[String; 5]> = poll
         .tags
@@ -263,26 +276,29 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
         })
         .collect();
     let columns = [
-        rows::words("tag", 0),
-        rows::words("address", 0),
-        rows::number("value", 0),
-        rows::number("age", 2),
-        rows::words("what", 3),
+        rows::words(t!("tag"), 0),
+        rows::words(t!("address"), 0),
+        rows::number(t!("value"), 0),
+        rows::number(t!("age"), 2),
+        rows::words(t!("what"), 3),
     ];
     let (heading, lines) = rows::table(&columns, &lines, cx.area.width.saturating_sub(8));
     let code = table.read_fc();
-    let what = format!(
-        "{code} / 0x{code:02X} {}: {} (0x{address:04X}), {} in one request",
-        names::function(code).unwrap_or_default(),
-        names::span(code, address, poll.count),
-        poll.count
+    let what = t!(
+        "{code} / 0x{code2} {function}: {span} (0x{address}), {count} in one request",
+        code,
+        code2 = format!("{code:02X}"),
+        function = names::function(code).unwrap_or_default(),
+        span = names::span(code, address, poll.count),
+        address = format!("{address:04X}"),
+        count = poll.count
     );
     let mut rows = vec![plain(what, cx.theme.normal()), plain(heading, cx.theme.dim())];
     rows.extend(poll.tags.iter().zip(lines).map(|(tag, line)| plain(line, value::show(cx, *tag).style)));
     let last = poll.tags.first().and_then(|tag| cx.snapshot.source_frames.get(tag.index())?.clone());
     if let Some(exchange) = last {
         rows.push(Row::new());
-        rows.push(plain(format!("last read: {}", hex(&exchange.answer)), cx.theme.dim()));
+        rows.push(plain(t!("last read: {hex}", hex = hex(&exchange.answer)), cx.theme.dim()));
     }
     rows
 }

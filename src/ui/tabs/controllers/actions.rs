@@ -1,6 +1,7 @@
 //! What can be done with a device on any of its pages, and the windows that ask before it.
 
 use super::{Action, Controllers, Page};
+use crate::t;
 use crate::{
     plant::{
         command::CommandKind,
@@ -29,13 +30,15 @@ impl Controllers {
             Action::Actions => {
                 let actions = Choice::actions(cx, device.id).map(Modal::Choice);
                 let window = actions.map(|list| Notice::unreachable(cx, device.id).map_or(list, Modal::Notice));
-                window
-                    .map_or_else(|| notice(device, "this device has no actions"), |window| vec![UiAction::Open(window)])
+                window.map_or_else(
+                    || notice(device, t!("this device has no actions")),
+                    |window| vec![UiAction::Open(window)],
+                )
             }
             Action::Tune => tune(cx, device),
             Action::Run => match device.faceplate.as_ref().and_then(|faceplate| faceplate.run) {
                 Some(run) => write(cx, Some(run)),
-                None => notice(device, "this device cannot be put in standby from here"),
+                None => notice(device, t!("this device cannot be put in standby from here")),
             },
             Action::Settings => vec![UiAction::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
             Action::Line => vec![UiAction::Open(Modal::Confirm(connect(cx, device.line)))],
@@ -59,7 +62,7 @@ pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction>
 /// Auto-tuning at work is stopped, else the window asks which kind is wanted.
 fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
     let Some(tune) = device.faceplate.as_ref().and_then(|faceplate| faceplate.tune) else {
-        return notice(device, "this device has no auto-tuning");
+        return notice(device, t!("this device has no auto-tuning"));
     };
     let on = cx.snapshot.sample(tune).good_value().is_some_and(|value| value != 0.0);
     if on { confirm(cx, tune, 0.0) } else { write(cx, Some(tune)) }
@@ -74,14 +77,17 @@ fn connect(cx: &ViewContext, line: LineId) -> Confirm {
     let name = &cx.def().line(line).name;
     if cx.snapshot.line(line).state == LineState::Disconnected {
         return Confirm::command(
-            format!("connect {name}"),
-            format!("Open line {name} and read its devices again?"),
+            t!("connect {name}", name),
+            t!("Open line {name} and read its devices again?", name),
             CommandKind::Connect(line, true),
         );
     }
     let devices: Vec<&str> =
         cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
-    let words =
-        format!("Close line {name}? {} will be read no more, and their alarms cannot be seen.", devices.join(", "));
-    Confirm::command(format!("disconnect {name}"), words, CommandKind::Connect(line, false))
+    let words = t!(
+        "Close line {name}? {join} will be read no more, and their alarms cannot be seen.",
+        name,
+        join = devices.join(", ")
+    );
+    Confirm::command(t!("disconnect {name}", name), words, CommandKind::Connect(line, false))
 }

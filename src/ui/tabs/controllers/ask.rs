@@ -1,5 +1,6 @@
 //! The query before a restore: what would be written, and what the profile wants said before any of it is.
 
+use crate::t;
 use std::sync::Arc;
 
 use super::sets::Source;
@@ -32,17 +33,20 @@ pub fn query(
     changes: Vec<Change>,
 ) -> Confirm {
     let from: Arc<str> = source.words(cx).into();
-    let count = if changes.len() == 1 { "1 value".to_owned() } else { format!("{} values", changes.len()) };
-    let query =
-        format!("Write {count} to {}, one after the other, each read back? The first failure stops it.", device.name);
+    let count = if changes.len() == 1 { t!("1 value").to_owned() } else { t!("{count} values", count = changes.len()) };
+    let query = t!(
+        "Write {count} to {name}, one after the other, each read back? The first failure stops it.",
+        count,
+        name = device.name
+    );
     let warnings = warnings(cx.def(), &changes);
     let shown = if warnings.len() <= 2 { 6 } else { 4 };
     let mut notes: Vec<String> = changes.iter().take(shown).map(|change| change_text(cx, change)).collect();
     if changes.len() > shown {
-        notes.push(format!("… and {} more, as listed", changes.len() - shown));
+        notes.push(t!("… and {count} more, as listed", count = changes.len() - shown));
     }
     if !set.missing.is_empty() {
-        notes.push(format!("not in the set, stay as they are: {}", names(&set.missing, ROOM - 35)));
+        notes.push(t!("not in the set, stay as they are: {names}", names = names(&set.missing, ROOM - 35)));
     }
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
@@ -69,7 +73,7 @@ fn warnings(def: &PlantDef, changes: &[Change]) -> Vec<String> {
             None => asked.push((words, vec![&tag.short])),
         }
     }
-    let marked = (!unsure.is_empty()).then(|| format!("! not verified: {}", names(&unsure, ROOM - 16)));
+    let marked = (!unsure.is_empty()).then(|| t!("! not verified: {names}", names = names(&unsure, ROOM - 16)));
     let mut lines: Vec<String> = Vec::new();
     let room = WARNINGS_MAX - usize::from(marked.is_some());
     let count = asked.len();
@@ -78,7 +82,7 @@ fn warnings(def: &PlantDef, changes: &[Change]) -> Vec<String> {
         // The last line is kept for how many more there are.
         if room < lines.len() + text.len() + usize::from(n + 1 < count) {
             let tags = count - n;
-            lines.push(format!("… and {tags} more that ask before a write: see their own windows"));
+            lines.push(t!("… and {tags} more that ask before a write: see their own windows", tags));
             break;
         }
         lines.extend(text);
@@ -95,7 +99,7 @@ fn names<S: AsRef<str>>(all: &[S], room: u16) -> String {
     }
     let mut shown = String::new();
     for (n, name) in all.iter().enumerate() {
-        let tail = format!("… and {} more", all.len() - n);
+        let tail = t!("… and {count} more", count = all.len() - n);
         let longer = format!("{shown}{} ", name.as_ref());
         // A tail that is one name later is not longer than this one.
         if room < width(&longer) + width(&tail) {

@@ -4,6 +4,7 @@ use super::{
     ask,
     sets::{Source, shown, shown_of_set, some_lines, trusted},
 };
+use crate::t;
 use crate::{
     plant::{
         def::DeviceDef,
@@ -84,13 +85,16 @@ impl Compare {
             return Err(notice);
         }
         let Some((set, plan)) = self.source.set(cx).zip(self.plan(cx, device)) else {
-            return words(vec![format!("{} is not there any more", self.source.words(cx))]);
+            return words(vec![t!("{words} is not there any more", words = self.source.words(cx))]);
         };
         let changes = match plan {
-            Ok(changes) if changes.is_empty() => return words(vec!["nothing differs: nothing to write".to_owned()]),
+            Ok(changes) if changes.is_empty() => {
+                return words(vec![t!("nothing differs: nothing to write").to_owned()]);
+            }
             Ok(changes) => changes,
             Err(problems) => {
-                let mut lines = vec![format!("{} cannot be written to {}", self.source.words(cx), device.name)];
+                let mut lines =
+                    vec![t!("{words} cannot be written to {name}", words = self.source.words(cx), name = device.name)];
                 lines.extend(problems.iter().take(8).map(Problem::to_string));
                 return words(lines);
             }
@@ -104,7 +108,7 @@ impl Compare {
         let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
         let x = canvas.text(1, 0, &format!("{} → {}", self.source.words(cx), device.name), theme.focus());
         let Some(plan) = self.plan(cx, device) else {
-            canvas.text(1, 2, "it is not there any more", theme.trouble());
+            canvas.text(1, 2, t!("it is not there any more"), theme.trouble());
             return;
         };
         let run = self.at_work(cx, device);
@@ -112,13 +116,14 @@ impl Compare {
         canvas.text(x + 2, 0, &fit_words(&self.summary(cx, device, &rows), end.saturating_sub(x + 2)), theme.normal());
         let mut top = 1;
         if let (Err(problems), None) = (&plan, run) {
-            let words: Vec<String> = problems.iter().map(|problem| format!("cannot be written: {problem}")).collect();
+            let words: Vec<String> =
+                problems.iter().map(|problem| t!("cannot be written: {problem}", problem)).collect();
             for line in some_lines(&words, end, 3) {
                 canvas.text(1, top, &line, theme.trouble());
                 top += 1;
             }
         }
-        let names = ["parameter", "", "in the set", "in the device", ""];
+        let names = [t!("parameter"), "", t!("in the set"), t!("in the device"), ""];
         canvas.text(1, top + 1, &columns(names, end), theme.dim());
         let room = usize::from(bottom.saturating_sub(top + 3)).max(1);
         let first = self.scroll.first(rows.len(), room);
@@ -126,11 +131,11 @@ impl Compare {
             self.row(cx, canvas, top + 2 + y, row, run);
         }
         if rows.is_empty() {
-            canvas.text(1, top + 2, "nothing differs", theme.normal());
+            canvas.text(1, top + 2, t!("nothing differs"), theme.normal());
         }
         let below = rows.len().saturating_sub(first + room);
         if below > 0 {
-            canvas.text_right(end, bottom.saturating_sub(1), &format!("{below} more ▼"), theme.normal());
+            canvas.text_right(end, bottom.saturating_sub(1), &t!("{below} more ▼", below), theme.normal());
         }
         if let Some(run) = self.run(cx, device) {
             let (words, trouble) = run_text(cx, device, run);
@@ -144,25 +149,25 @@ impl Compare {
         let same = rows.iter().filter(|row| row.same).count();
         let differ = rows.iter().filter(|row| row.set.is_some() && !row.same).count();
         let silent = rows.iter().filter(|row| row.set.is_none()).count();
-        let silent = if silent > 0 { format!(", {silent} not in the set") } else { String::new() };
-        let hidden = if shown.len() < rows.len() { " (= shows all)" } else { "" };
-        format!("{differ} differ, {same} the same{silent}{hidden}")
+        let silent = if silent > 0 { t!(", {silent} not in the set", silent) } else { String::new() };
+        let hidden = if shown.len() < rows.len() { t!(" (= shows all)") } else { "" };
+        t!("{differ} differ, {same} the same{silent}{hidden}", differ, same, silent, hidden)
     }
 
     fn row(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16, row: &Compared, run: Option<&Restore>) {
         let theme = cx.theme;
         let step = run.and_then(|run| run.steps.iter().find(|step| Some(step.change.tag) == row.tag));
-        let label = row.tag.map_or("no such setting", |tag| cx.def().tag(tag).label.as_str());
+        let label = row.tag.map_or(t!("no such setting"), |tag| cx.def().tag(tag).label.as_str());
         let (note, trouble) = match (step, run) {
             (Some(step), Some(_)) => match (&step.outcome, step.command) {
                 (Some(outcome), _) => outcome_words(outcome),
-                (None, Some(_)) => ("writing …".to_owned(), false),
-                (None, None) => ("waits".to_owned(), false),
+                (None, Some(_)) => (t!("writing …").to_owned(), false),
+                (None, None) => (t!("waits").to_owned(), false),
             },
-            _ if row.set.is_none() => ("not in the set".to_owned(), false),
-            _ if row.device.is_none() => ("not known now".to_owned(), true),
-            _ if row.same => ("same".to_owned(), false),
-            _ => ("differs".to_owned(), false),
+            _ if row.set.is_none() => (t!("not in the set").to_owned(), false),
+            _ if row.device.is_none() => (t!("not known now").to_owned(), true),
+            _ if row.same => (t!("same").to_owned(), false),
+            _ => (t!("differs").to_owned(), false),
         };
         let cells = [row.short.as_str(), label, &shown_of_set(cx, row), &shown(cx, row, row.device), &note];
         let style = match (trouble, row.same && step.is_none()) {
@@ -191,26 +196,28 @@ fn run_text(cx: &ViewContext, device: &DeviceDef, run: &Restore) -> (String, boo
     let (done, all) = (run.done(), run.steps.len());
     let (at, by) = (moment(run.at, cx.now, &cx.def().time_zone), &run.by);
     match run.state {
-        State::Reading if run.stopping => ("stopping: nothing is written yet".to_owned(), true),
-        State::Reading => ("reading the device first …   x stops it".to_owned(), false),
-        State::Running if run.stopping => (format!("stopping: {done} of {all} written"), true),
-        State::Running => (format!("writing: {done} of {all} written and verified   x stops it"), false),
+        State::Reading if run.stopping => (t!("stopping: nothing is written yet").to_owned(), true),
+        State::Reading => (t!("reading the device first …   x stops it").to_owned(), false),
+        State::Running if run.stopping => (t!("stopping: {done} of {all} written", done, all), true),
+        State::Running => (t!("writing: {done} of {all} written and verified   x stops it", done, all), false),
         State::Done => {
             let fix = device.actions.iter().find(|action| action.saves);
-            let fix = fix.map_or(String::new(), |action| format!("   f {} keeps them", action.name));
-            (format!("{all} of {all} written and verified, begun {at} by {by}{fix}"), false)
+            let fix = fix.map_or(String::new(), |action| t!("   f {name} keeps them", name = action.name));
+            (t!("{all} of {all} written and verified, begun {at} by {by}{fix}", all, at, by, fix), false)
         }
         State::Failed if run.refused.is_some() => {
             let why = run.refused.as_ref().map_or(String::new(), ToString::to_string);
-            (format!("NOTHING WRITTEN, asked {at} by {by}: {why}"), true)
+            (t!("NOTHING WRITTEN, asked {at} by {by}: {why}", at, by, why), true)
         }
         State::Failed => {
             let failed = run.steps.iter().rev().find_map(|step| Some((step.change.tag, step.outcome.as_ref()?)));
             let why = failed.map_or(String::new(), |(tag, outcome)| {
                 format!("{}: {}", cx.def().tag(tag).short, outcome_words(outcome).0)
             });
-            (format!("STOPPED after {done} of {all}, {at}; {why}"), true)
+            (t!("STOPPED after {done} of {all}, {at}; {why}", done, all, at, why), true)
         }
-        State::Stopped => (format!("STOPPED by an operator: {done} of {all} written and verified, begun {at}"), true),
+        State::Stopped => {
+            (t!("STOPPED by an operator: {done} of {all} written and verified, begun {at}", done, all, at), true)
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! The page of one device: heading, faceplate, parameter table, what the selected parameter means, the last write.
 
+use crate::t;
+use crate::text::translate;
 use ratatui::style::Style;
 
 use super::{
@@ -53,7 +55,7 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Tabl
         let y = bottom.saturating_sub(words);
         let meaning = if tag.meaning.is_empty() { &tag.label } else { &tag.meaning };
         // The default first: it must not be what a narrow screen cuts off.
-        let default = default_text(cx, tag).map_or(String::new(), |default| format!("default {default}; "));
+        let default = default_text(cx, tag).map_or(String::new(), |default| t!("default {default}; ", default));
         let x = canvas.text(1, y, &tag.name, cx.theme.strong()) + 2;
         let text = format!("{default}{meaning}");
         let lines = wrap(&text, end.saturating_sub(x));
@@ -65,14 +67,14 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Tabl
     }
     let more = match (hidden, table.filter.to_string().as_str()) {
         (0, "") => String::new(),
-        (n, "") => format!("{n} more ▼"),
-        (0, filter) => format!("only \"{filter}\", Esc shows all"),
-        (n, filter) => format!("only \"{filter}\", {n} more ▼"),
+        (n, "") => t!("{n} more ▼", n),
+        (0, filter) => t!("only \"{filter}\", Esc shows all", filter),
+        (n, filter) => t!("only \"{filter}\", {n} more ▼", filter, n),
     };
     let differ = cx.def().tags_of(device.id).filter(|tag| differs(cx, tag)).count();
     let more = if table.defaults {
         let mark = cx.theme.pick("≠", "#");
-        format!("{mark} {differ} differ from default  {more}").trim_end().to_owned()
+        t!("{mark} {differ} differ from default  {more}", mark, differ, more).trim_end().to_owned()
     } else {
         more
     };
@@ -92,7 +94,7 @@ fn heading(cx: &ViewContext, device: &DeviceDef, canvas: &mut Canvas) {
     // On a narrow screen whether it answers counts for more than what it is for.
     let least = if cx.snapshot.device(device.id).diagnosis.is_some() { 100 } else { 80 };
     let title = if canvas.width() < least { String::new() } else { format!("{}  ", device.title) };
-    let words = format!("{}  {title}unit {}  {line}", device.model, device.unit);
+    let words = t!("{model}  {title}unit {unit}  {line}", model = device.model, title, unit = device.unit, line);
     let x = canvas.text(x + 2, 0, &words, theme.normal());
     let (words, style) = status_text(cx, device.id);
     let (end, place) = (canvas.width().saturating_sub(1), format!("{}/{count}", device.id.0 + 1));
@@ -108,7 +110,7 @@ pub fn status_text(cx: &ViewContext, device: DeviceId) -> (String, Style) {
         (Some(reason), _) => {
             let signal = reason.signal();
             let retry = if reason == Reason::Down { retry_text(cx, device) } else { String::new() };
-            (format!("{} {}: {reason}{retry}", signal_mark(signal), signal.word()), theme.trouble())
+            (format!("{} {}: {reason}{retry}", signal_mark(signal), translate(signal.word())), theme.trouble())
         }
         (None, DeviceState::Answering) => (format!("✓ {}", device_text(cx, device)), theme.normal()),
         (None, DeviceState::Unknown) => (format!("? {}", device_text(cx, device)), theme.dim()),
@@ -139,5 +141,14 @@ fn last_write(cx: &ViewContext, device: DeviceId) -> Option<(String, bool)> {
         .find(|status| status.command.kind.written().is_some_and(|(tag, _)| to_device(tag)))?;
     let (words, trouble) = outcome_words(&status.outcome);
     let what = command_label(cx, &status.command.kind, status.old);
-    Some((format!("last: {what}  {words} {} by {}", clock(status.at, &cx.def().time_zone), status.by), trouble))
+    Some((
+        t!(
+            "last: {what}  {words} {clock} by {by}",
+            what,
+            words,
+            clock = clock(status.at, &cx.def().time_zone),
+            by = status.by
+        ),
+        trouble,
+    ))
 }

@@ -1,5 +1,7 @@
 //! The faceplate of a controller: PV, SV and MV as bars on their ranges, its states, its alarms and a small trend.
 
+use crate::t;
+use crate::text::translate;
 use ratatui::style::Modifier;
 
 use super::list;
@@ -58,12 +60,12 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
         let def = cx.def().alarm(alarm.id);
         let style = cx.theme.alarm(def.priority, alarm.state, cx.flash());
         let x = canvas.text(0, y, cx.theme.priority_mark(def.priority), style) + 1;
-        let words = format!("{} {}", def.message, alarm.state.word());
+        let words = format!("{} {}", def.message, translate(alarm.state.word()));
         canvas.text(x, y, &fit_words(&words, wide.saturating_sub(x)), style);
         y += 1;
     }
     if y == rows + 2 {
-        canvas.text(0, y, "no alarm", cx.theme.dim());
+        canvas.text(0, y, t!("no alarm"), cx.theme.dim());
         y += 1;
     }
     y += 1;
@@ -114,7 +116,7 @@ fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool
             }
             (0, y + 1, canvas.width())
         } else {
-            let words = ends.map_or("range not known".to_owned(), |(low, high)| format!("{low} … {high}"));
+            let words = ends.map_or(t!("range not known").to_owned(), |(low, high)| format!("{low} … {high}"));
             let words = apart.unwrap_or(words);
             let wide = canvas.width().saturating_sub(5 + values + 1 + 18);
             canvas.text(5 + values + wide + 1, y, &words, cx.theme.dim());
@@ -182,7 +184,7 @@ fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = f64> {
 /// `PID   AT off   RUN   ‹2›! temperature high UNACK`.
 fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, faceplate: &Faceplate) {
     let mut x = 1;
-    for (name, tag) in [("", faceplate.mode), ("AT", faceplate.tune), ("", faceplate.run)] {
+    for (name, tag) in [("", faceplate.mode), (t!("AT"), faceplate.tune), ("", faceplate.run)] {
         let Some(tag) = tag else { continue };
         if !name.is_empty() {
             x = canvas.text(x, 0, name, cx.theme.dim()) + 1;
@@ -193,8 +195,9 @@ fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, faceplate: 
     let alarms: Vec<_> = list::alarms(cx, device.id).collect();
     let Some(alarm) = alarms.first() else { return };
     let def = cx.def().alarm(alarm.id);
-    let more = if alarms.len() > 1 { format!(", {} more", alarms.len() - 1) } else { String::new() };
-    let words = format!("{} {} {}{more}", cx.theme.priority_tag(def.priority), def.message, alarm.state.word());
+    let more = if alarms.len() > 1 { t!(", {count} more", count = alarms.len() - 1) } else { String::new() };
+    let words =
+        format!("{} {} {}{more}", cx.theme.priority_tag(def.priority), def.message, translate(alarm.state.word()));
     let room = canvas.width().saturating_sub(x);
     canvas.text(x, 0, &fit_words(&words, room), cx.theme.alarm(def.priority, alarm.state, cx.flash()));
 }
@@ -209,18 +212,22 @@ fn tuning_row(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tuni
 /// How a tuning goes, or what it has found.
 pub fn tuning_text(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) -> Vec<String> {
     let elapsed = running(tuning.elapsed(cx.now));
-    let least = if tuning.seen { "" } else { "more than " };
+    let least = if tuning.seen { "" } else { t!("more than ") };
     let number = |value: f64| cx.snapshot.format(faceplate.pv, value);
     let Some(ended) = tuning.ended else {
-        let around = tuning.sv.map_or(String::new(), |sv| format!(" around {}", number(sv)));
+        let around = tuning.sv.map_or(String::new(), |sv| t!(" around {number}", number = number(sv)));
         let turns = tuning.extrema.iter().rev().take(4).rev();
         let arrow = |high| if high { cx.theme.pick("↑", "^") } else { cx.theme.pick("↓", "v") };
         let turns: Vec<String> = turns.map(|turn| format!("{}{}", arrow(turn.high), number(turn.pv))).collect();
-        let swings = if turns.is_empty() { "no swing yet".to_owned() } else { format!("swings {}", turns.join(" ")) };
-        let period = tuning.period().map_or(String::new(), |period| format!(", {} s each", period.as_secs()));
+        let swings =
+            if turns.is_empty() { t!("no swing yet").to_owned() } else { t!("swings {join}", join = turns.join(" ")) };
+        let period = tuning.period().map_or(String::new(), |period| t!(", {period} s each", period = period.as_secs()));
         let known = faceplate.tune.is_some_and(|tune| cx.snapshot.sample(tune).good_value().is_some());
-        let how = if known { "AUTO-TUNING" } else { "not known now; when last heard AUTO-TUNING" };
-        return vec![format!("{how} {least}{elapsed}{around} (T stops)"), format!("{swings}{period}")];
+        let how = if known { t!("AUTO-TUNING") } else { t!("not known now; when last heard AUTO-TUNING") };
+        return vec![
+            t!("{how} {least}{elapsed}{around} (T stops)", how, least, elapsed, around),
+            format!("{swings}{period}"),
+        ];
     };
     let found = tuning.found.iter().map(|found| {
         let text = |value: Option<f64>| value.map_or("?".to_owned(), |value| cx.snapshot.format(found.tag, value));
@@ -233,6 +240,6 @@ pub fn tuning_text(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) -> 
     let words: Vec<String> = found.collect();
     // Stopped by hand, given up, ended by a broken sensor: it looks the same from here, and nothing was found.
     let same = tuning.found.iter().all(|found| found.new.is_some() && found.new == found.old);
-    let how = if same { "tuning ended, nothing changed," } else { "tuned" };
-    vec![format!("{how} {at} in {least}{elapsed}"), words.join("  ")]
+    let how = if same { t!("tuning ended, nothing changed,") } else { t!("tuned") };
+    vec![t!("{how} {at} in {least}{elapsed}", how, at, least, elapsed), words.join("  ")]
 }

@@ -1,5 +1,6 @@
 //! The first page: every device in one row, with how it stands and what it controls.
 
+use crate::t;
 use ratatui::style::Style;
 
 use super::device::{signal_mark, status_text};
@@ -66,7 +67,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
     }
     let below = devices.len().saturating_sub(first + room);
     if below > 0 {
-        canvas.text_right(end, bottom.saturating_sub(1), &format!("{below} more ▼"), theme.normal());
+        canvas.text_right(end, bottom.saturating_sub(1), &t!("{below} more ▼", below), theme.normal());
     }
     if let Some(device) = devices.get(selected) {
         let x = canvas.text(1, bottom, &device.name, theme.strong());
@@ -86,10 +87,10 @@ fn summary(cx: &ViewContext) -> String {
     });
     let alarmed = devices.iter().filter(|device| alarms(cx, device.id).next().is_some()).count();
     let mut words = match devices.len() {
-        1 => "1 device".to_owned(),
-        n => format!("{n} devices"),
+        1 => t!("1 device").to_owned(),
+        n => t!("{n} devices", n),
     };
-    for (count, what) in [(down.count(), "not answering"), (alarmed, "with alarms")] {
+    for (count, what) in [(down.count(), t!("not answering")), (alarmed, t!("with alarms"))] {
         if count > 0 {
             words.push_str(&format!("   {count} {what}"));
         }
@@ -113,16 +114,16 @@ fn put(canvas: &mut Canvas, y: u16, cells: Cells) {
 fn heading(columns: &Columns, style: Style) -> Cells {
     let value = |name| (pad_left(name, Columns::VALUE), Columns::VALUE, style);
     vec![
-        ("device".to_owned(), columns.name, style),
-        ("model".to_owned(), columns.model, style),
-        ("unit".to_owned(), columns.line, style),
-        (if columns.state > 3 { "state" } else { "" }.to_owned(), columns.state, style),
-        ("alarm".to_owned(), Columns::ALARM, style),
+        (t!("device").to_owned(), columns.name, style),
+        (t!("model").to_owned(), columns.model, style),
+        (t!("unit").to_owned(), columns.line, style),
+        (if columns.state > 3 { t!("state") } else { "" }.to_owned(), columns.state, style),
+        (t!("alarm").to_owned(), Columns::ALARM, style),
         value("PV"),
         value("SV"),
         value("MV"),
-        ("mode".to_owned(), Columns::MODE, style),
-        (pad_left("answer", Columns::REPLY), Columns::REPLY, style),
+        (t!("mode").to_owned(), Columns::MODE, style),
+        (pad_left(t!("answer"), Columns::REPLY), Columns::REPLY, style),
     ]
 }
 
@@ -175,12 +176,12 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
                 (good + usize::from(cx.snapshot.sample(tag.id).quality.is_good()), all + 1)
             });
             let style = if good == all { theme.dim() } else { theme.trouble() };
-            cells.push((format!("{good} of {all} values good"), Columns::VALUE * 3 + 2, style));
+            cells.push((t!("{good} of {all} values good", good, all), Columns::VALUE * 3 + 2, style));
             cells.push((String::new(), Columns::MODE, style));
         }
     }
     let reply = cx.snapshot.device(device.id).reply.filter(|_| answers(cx, device.id));
-    let reply = reply.map_or(String::new(), |reply| format!("{} ms", reply.as_millis()));
+    let reply = reply.map_or(String::new(), |reply| t!("{reply} ms", reply = reply.as_millis()));
     cells.push((pad_left(&reply, Columns::REPLY), Columns::REPLY, theme.dim()));
     cells
 }
@@ -202,7 +203,7 @@ fn mode(cx: &ViewContext, device: &DeviceDef) -> String {
     let Some(faceplate) = &device.faceplate else { return String::new() };
     let on = |tag: Option<_>| tag.is_some_and(|tag| value::is_on(cx, tag) == Some(true));
     if on(faceplate.tune) {
-        return "AT".to_owned();
+        return t!("AT").to_owned();
     }
     let shown = faceplate.run.filter(|_| on(faceplate.run)).or(faceplate.mode);
     shown.map_or(String::new(), |tag| value::show(cx, tag).bare(Columns::MODE))
@@ -217,10 +218,10 @@ fn state(cx: &ViewContext, device: DeviceId) -> (String, String, Style) {
     let status = cx.snapshot.device(device);
     match (status.diagnosis, status.state) {
         (Some(reason), _) => (signal_mark(reason.signal()), reason.to_string(), cx.theme.trouble()),
-        (None, DeviceState::Answering) => ("✓".to_owned(), "good".to_owned(), cx.theme.dim()),
-        (None, DeviceState::Unknown) => ("?".to_owned(), "not asked yet".to_owned(), cx.theme.dim()),
-        (None, DeviceState::Failing(n)) => ("✗".to_owned(), format!("failing, {n} in a row"), cx.theme.trouble()),
-        (None, DeviceState::Down { .. }) => ("✗".to_owned(), "not answering".to_owned(), cx.theme.trouble()),
+        (None, DeviceState::Answering) => ("✓".to_owned(), t!("good").to_owned(), cx.theme.dim()),
+        (None, DeviceState::Unknown) => ("?".to_owned(), t!("not asked yet").to_owned(), cx.theme.dim()),
+        (None, DeviceState::Failing(n)) => ("✗".to_owned(), t!("failing, {n} in a row", n), cx.theme.trouble()),
+        (None, DeviceState::Down { .. }) => ("✗".to_owned(), t!("not answering").to_owned(), cx.theme.trouble()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Moving between the pages and rows of the controllers tab.
 
 use super::*;
+use crate::t;
 
 impl Controllers {
     pub(super) fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
@@ -71,7 +72,7 @@ impl Controllers {
             }
             (_, Source::Set(_)) => {
                 let device = cx.def().device(self.device);
-                return notice(device, "only a copy between two controllers can be turned around");
+                return notice(device, t!("only a copy between two controllers can be turned around"));
             }
         }
         Vec::new()

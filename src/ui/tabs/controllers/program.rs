@@ -1,5 +1,6 @@
 //! The ramp/soak program as a table and as a curve, with the place where it is now.
 
+use crate::t;
 use std::time::Duration;
 
 use super::device::signal_mark;
@@ -55,7 +56,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: 
 fn heading(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let theme = cx.theme;
     let x = canvas.text(1, 0, &device.name, theme.focus());
-    let x = canvas.text(x + 2, 0, "ramp/soak program", theme.normal());
+    let x = canvas.text(x + 2, 0, t!("ramp/soak program"), theme.normal());
     let (words, style) = match cx.snapshot.device(device.id).diagnosis {
         Some(reason) => (format!("{} {reason}", signal_mark(reason.signal())), theme.trouble()),
         None => (now_text(cx, device, program), theme.strong()),
@@ -66,21 +67,21 @@ fn heading(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &
 /// `RUN, ramp 2, 03:12 of 10 min`.
 fn now_text(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> String {
     let command = value::show(cx, program.command).text;
-    let Some(place) = place(cx, program) else { return format!("{command}, position not known") };
+    let Some(place) = place(cx, program) else { return t!("{command}, position not known", command) };
     let (what, length) = match place {
         ProgramPosition::Off => return command,
-        ProgramPosition::Ended => return format!("{command}, ended"),
-        ProgramPosition::Ramp(step) => (format!("ramp {}", step + 1), program.steps[step].ramp),
-        ProgramPosition::Soak(step) => (format!("soak {}", step + 1), program.steps[step].soak),
+        ProgramPosition::Ended => return t!("{command}, ended", command),
+        ProgramPosition::Ramp(step) => (t!("ramp {step}", step = step + 1), program.steps[step].ramp),
+        ProgramPosition::Soak(step) => (t!("soak {step}", step = step + 1), program.steps[step].soak),
     };
     let into = cx.snapshot.programs.get(device.id.index()).copied().flatten();
     let into = match into {
         Some((into, true)) => running(into),
         // Its beginning was not seen.
-        Some((into, false)) => format!("more than {}", running(into)),
+        Some((into, false)) => t!("more than {running}", running = running(into)),
         None => "?".to_owned(),
     };
-    format!("{command}, {what}, {into} of {}", value::show(cx, length).with_unit())
+    t!("{command}, {what}, {into} of {with_unit}", command, what, into, with_unit = value::show(cx, length).with_unit())
 }
 
 fn place(cx: &ViewContext, program: &ProgramDef) -> Option<ProgramPosition> {
@@ -94,8 +95,8 @@ fn chosen(cx: &ViewContext, program: &ProgramDef) -> Option<(usize, usize)> {
 
 fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell) {
     let theme = cx.theme;
-    let names = ["target", "ramp", "soak"].map(|name| pad_left(name, CELL));
-    canvas.text(1, 0, &format!("{} {}", pad("step", 6), names.join(" ")), theme.dim());
+    let names = [t!("target"), t!("ramp"), t!("soak")].map(|name| pad_left(name, CELL));
+    canvas.text(1, 0, &format!("{} {}", pad(t!("step"), 6), names.join(" ")), theme.dim());
     let (now, chosen) = (place(cx, program), chosen(cx, program));
     for (row, step) in program.steps.iter().enumerate() {
         let y = to_u16(row) + 1;
@@ -119,7 +120,7 @@ fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell
             canvas.text(x, y, &pad_left(&text, CELL), style);
         }
         if !runs {
-            canvas.text(8 + 3 * (CELL + 1), y, "not run", theme.dim());
+            canvas.text(8 + 3 * (CELL + 1), y, t!("not run"), theme.dim());
         }
     }
 }
@@ -129,9 +130,9 @@ fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pr
     let sv = device.faceplate.as_ref().map(|faceplate| faceplate.aim());
     let pv = device.faceplate.as_ref().map(|faceplate| faceplate.pv);
     let rows = [
-        ("command", Some(program.command)),
-        ("pattern", program.pattern),
-        ("mode", program.mode),
+        (t!("command"), Some(program.command)),
+        (t!("pattern"), program.pattern),
+        (t!("mode"), program.mode),
         ("PV", pv),
         ("SV", sv),
     ];
@@ -141,7 +142,7 @@ fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &Pr
         let room = canvas.width().saturating_sub(9);
         canvas.text(9, to_u16(y), &shown.within(room), shown.style);
     }
-    canvas.text(0, 6, "r run   p hold   o off", cx.theme.strong());
+    canvas.text(0, 6, t!("r run   p hold   o off"), cx.theme.strong());
 }
 
 /// One straight piece of the curve: how long, from where (`None`: unknown), to where, and which place it is.
@@ -173,12 +174,12 @@ fn segments(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Optio
 fn curve(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let theme = cx.theme;
     let Some(segments) = segments(cx, device, program) else {
-        canvas.text(0, 0, "no curve: a target or time of the program is not known", theme.dim());
+        canvas.text(0, 0, t!("no curve: a target or time of the program is not known"), theme.dim());
         return;
     };
     let total: f64 = segments.iter().map(|segment| segment.minutes).sum();
     if total <= 0.0 {
-        canvas.text(0, 0, "no curve: all times of the chosen steps are 0", theme.dim());
+        canvas.text(0, 0, t!("no curve: all times of the chosen steps are 0"), theme.dim());
         return;
     }
     let (low, high) = segments
@@ -247,7 +248,7 @@ fn axis(
     let share = (before + into.min(segments[segment].minutes)) / total;
     let x = to_u16((share.clamp(0.0, 1.0) * f64::from(canvas.width().saturating_sub(1))).round());
     canvas.glyph(x, 0, '▲', theme.strong());
-    canvas.text(if x + 6 < end { x + 1 } else { x.saturating_sub(4) }, 0, " now", theme.strong());
+    canvas.text(if x + 6 < end { x + 1 } else { x.saturating_sub(4) }, 0, t!(" now"), theme.strong());
 }
 
 fn seconds_of(unit: &str) -> f64 {

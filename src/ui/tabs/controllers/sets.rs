@@ -1,5 +1,6 @@
 //! Parameter sets of a device: those that the station keeps, and the other controllers of the same kind to copy from.
 
+use crate::t;
 use std::sync::Arc;
 
 use crate::{
@@ -30,8 +31,8 @@ impl Source {
     /// In words: `set winter`, `copy of TIC-2`.
     pub fn words(&self, cx: &ViewContext) -> String {
         match self {
-            Source::Set(name) => format!("set {name}"),
-            Source::Device(device) => format!("copy of {}", cx.def().device(*device).name),
+            Source::Set(name) => t!("set {name}", name),
+            Source::Device(device) => t!("copy of {name}", name = cx.def().device(*device).name),
         }
     }
     /// Its values as they are now; `None` if it has gone or cannot be used.
@@ -69,12 +70,12 @@ pub fn problems(cx: &ViewContext, source: &Source) -> Option<Notice> {
     let Source::Set(name) = source else { return None };
     let stored = cx.snapshot.sets.iter().find(|stored| stored.name == *name)?;
     let problems = stored.set.as_ref().err()?;
-    let mut words = vec![format!("{name} cannot be used")];
+    let mut words = vec![t!("{name} cannot be used", name)];
     words.extend(problems.iter().take(8).cloned());
     if problems.len() > 8 {
-        words.push(format!("and {} more", problems.len() - 8));
+        words.push(t!("and {count} more", count = problems.len() - 8));
     }
-    Some(Notice::new(format!("set {name}"), words))
+    Some(Notice::new(t!("set {name}", name), words))
 }
 
 /// Draws the list of sources.
@@ -83,14 +84,19 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     let x = canvas.text(1, 0, &device.name, theme.focus());
     let settings = cx.def().tags_of(device.id).filter(|tag| tag.in_sets).count();
-    let words = format!("parameter sets of {}, {settings} settings", device.model);
+    let words = t!("parameter sets of {model}, {settings} settings", model = device.model, settings);
     canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 2)), theme.normal());
     let all = sources(cx, device);
-    canvas.text(1, 2, &columns(["", "set or controller", "from", "saved", "by", "values", "differ"]), theme.dim());
+    canvas.text(
+        1,
+        2,
+        &columns(["", t!("set or controller"), t!("from"), t!("saved"), t!("by"), t!("values"), t!("differ")]),
+        theme.dim(),
+    );
     if all.is_empty() {
         let words = match settings {
-            0 => "this device has no settings that a set could hold",
-            _ => "no set yet: n saves what the device holds now",
+            0 => t!("this device has no settings that a set could hold"),
+            _ => t!("no set yet: n saves what the device holds now"),
         };
         canvas.text(1, 4, words, theme.normal());
     }
@@ -105,7 +111,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
         };
         canvas.text(1, y + 3, &fit(&text, end), style);
     }
-    let words = "Sets are files of the station, in the folder sets beside its history; u refreshes the list.";
+    let words = t!("Sets are files of the station, in the folder sets beside its history; u refreshes the list.");
     canvas.text(1, bottom, &fit_words(words, end), theme.dim());
 }
 
@@ -127,7 +133,7 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
     let counts = |set: &ParameterSet| {
         let rows = parameter_set::compare(cx.def(), device.id, set, &trusted(cx));
         let differ = rows.iter().filter(|row| row.set.is_some() && !row.same).count();
-        (set.values.len().to_string(), if differ == 0 { "same".to_owned() } else { differ.to_string() })
+        (set.values.len().to_string(), if differ == 0 { t!("same").to_owned() } else { differ.to_string() })
     };
     match source {
         Source::Set(name) => {
@@ -148,7 +154,7 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
             let Some(set) = source.set(cx) else { return (String::new(), false) };
             let (values, differ) = counts(&set);
             let name = &cx.def().device(*other).name;
-            (columns([mark, &format!("{name} as it is now"), name, "", "", &values, &differ]), false)
+            (columns([mark, &t!("{name} as it is now", name), name, "", "", &values, &differ]), false)
         }
     }
 }
@@ -157,10 +163,10 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
 pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
     let set = parameter_set::capture(cx.def(), device, "", "".into(), cx.now, &trusted(cx));
     match set.missing.as_slice() {
-        [] => format!("all {} settings, for example: winter", set.values.len()),
+        [] => t!("all {count} settings, for example: winter", count = set.values.len()),
         missing => {
             let names = fit_words(&missing.join(" "), 40);
-            format!("{} settings; not known now, so left out: {names}", set.values.len())
+            t!("{count} settings; not known now, so left out: {names}", count = set.values.len(), names)
         }
     }
 }
@@ -172,9 +178,16 @@ pub fn replace_text(cx: &ViewContext, there: &StoredSet) -> String {
         Ok(set) => {
             let saved = set.saved.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M");
             let (device, profile, by) = (&set.device, &set.profile, &set.by);
-            format!("There is a set {name} already: of {device}, profile {profile}, saved {saved} by {by}. Replace it?")
+            t!(
+                "There is a set {name} already: of {device}, profile {profile}, saved {saved} by {by}. Replace it?",
+                name,
+                device,
+                profile,
+                saved,
+                by
+            )
         }
-        Err(_) => format!("There is a file {name}.toml already that is no usable set. Replace it?"),
+        Err(_) => t!("There is a file {name}.toml already that is no usable set. Replace it?", name),
     }
 }
 
@@ -205,7 +218,7 @@ pub fn some_lines(words: &[String], room: u16, most: usize) -> Vec<String> {
     if more > 0
         && let Some(last) = lines.last_mut()
     {
-        let tail = format!(" … {more} more lines");
+        let tail = t!(" … {more} more lines", more);
         *last = fit(last, room.saturating_sub(width(&tail))) + &tail;
     }
     lines

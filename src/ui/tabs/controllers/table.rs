@@ -1,5 +1,6 @@
 //! The parameter table of a device: grouped as the maker groups them, with value, range, default, age and meaning.
 
+use crate::t;
 use crate::{
     plant::{
         def::DeviceId,
@@ -64,10 +65,10 @@ impl Table {
         let theme = cx.theme;
         let tags = self.rows(cx, device);
         let columns = Columns::of(cx, device, canvas.width());
-        let names = ["", "parameter", "value", "", "range", "default", "age", "meaning"];
+        let names = ["", t!("parameter"), t!("value"), "", t!("range"), t!("default"), t!("age"), t!("meaning")];
         canvas.text(1, 0, &columns.row(names), theme.dim());
         if tags.is_empty() {
-            let words = if self.filter.is_empty() { "this device has no values" } else { "no parameter fits" };
+            let words = if self.filter.is_empty() { t!("this device has no values") } else { t!("no parameter fits") };
             canvas.text(1, 1, words, theme.dim());
             return 0;
         }

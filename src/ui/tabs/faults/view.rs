@@ -1,5 +1,6 @@
 //! Draws the faults: a list by target, the selected one described, and actual beside displayed values.
 
+use crate::t;
 use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{Faults, open, rows};
@@ -27,7 +28,7 @@ const TRUTH_MIN: u16 = 5;
 pub(super) fn view(tab: &Faults, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let Some(status) = open(cx) else {
-        canvas.text(1, 1, "nothing is simulated here", cx.theme.dim());
+        canvas.text(1, 1, t!("nothing is simulated here"), cx.theme.dim());
         return;
     };
     let mut top = 0;
@@ -52,7 +53,8 @@ pub(super) fn view(tab: &Faults, cx: &ViewContext, frame: &mut Frame, area: Rect
 
 fn heading(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
     let Progress { elapsed, duration, verdict, .. } = progress;
-    let time = format!("{} of {}", running((*elapsed).min(*duration)), running(*duration));
+    let time =
+        t!("{running} of {running2}", running = running((*elapsed).min(*duration)), running2 = running(*duration));
     let right = format!("{time}   {}", verdict.summary());
     let room = canvas.width().saturating_sub(width(&right) + 4);
     canvas.text(1, 0, &fit(&verdict.title, room), cx.theme.strong());
@@ -75,8 +77,10 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
             let active = status.find(available.target, *fault);
             let name = tab.number(status, available.target, *fault).to_string();
             let (state, style) = match active {
-                Some(active) => (format!("ON {}", running(between(active.since, cx.now))), cx.theme.trouble()),
-                None => ("off".to_owned(), cx.theme.normal()),
+                Some(active) => {
+                    (t!("ON {running}", running = running(between(active.since, cx.now))), cx.theme.trouble())
+                }
+                None => (t!("off").to_owned(), cx.theme.normal()),
             };
             lines.push((format!("  {name}"), state, style, selected));
             number += 1;
@@ -88,7 +92,7 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
         let y = to_u16(y);
         let x = canvas.text(0, y, if *selected { cx.theme.pick("▸", ">") } else { " " }, cx.theme.strong());
         canvas.text(x, y, &pad(name, LIST - 12), *style);
-        canvas.text_right(LIST - 2, y, state, if state == "off" { cx.theme.dim() } else { *style });
+        canvas.text_right(LIST - 2, y, state, if state == t!("off") { cx.theme.dim() } else { *style });
         if *selected {
             canvas.paint(0, y, LIST, 1, cx.theme.focus());
         }
@@ -104,10 +108,12 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
 fn target_label(cx: &ViewContext, target: FaultTarget) -> String {
     let name = target.name(cx.def());
     match target {
-        FaultTarget::Line(_) => format!("{name} line"),
-        FaultTarget::Unit(line, unit) => format!("{name} unit {unit} on {}", cx.def().line(line).name),
+        FaultTarget::Line(_) => t!("{name} line", name),
+        FaultTarget::Unit(line, unit) => {
+            t!("{name} unit {unit} on {name2}", name, unit, name2 = cx.def().line(line).name)
+        }
         FaultTarget::Tag(_) => name,
-        FaultTarget::Process => "process".to_owned(),
+        FaultTarget::Process => t!("process").to_owned(),
     }
 }
 
@@ -120,8 +126,8 @@ fn describe(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
     };
     paragraph("", description.cause);
-    paragraph("Symptoms: ", description.symptoms);
-    paragraph("Response: ", description.response);
+    paragraph(t!("Symptoms: "), description.symptoms);
+    paragraph(t!("Response: "), description.response);
 
     let truth = compare(cx, status, target);
     let wanted = (to_u16(truth.len()) + 1).min(canvas.height().saturating_sub(to_u16(lines.len()) + 1));
@@ -192,12 +198,12 @@ fn allowed(cx: &ViewContext, tag: TagId) -> f64 {
 
 fn comparison(cx: &ViewContext, rows: &[Compared], canvas: &mut Canvas) {
     if rows.is_empty() {
-        canvas.text(0, 0, "actual values are not known here", cx.theme.dim());
+        canvas.text(0, 0, t!("actual values are not known here"), cx.theme.dim());
         return;
     }
     let names = rows.iter().map(|row| width(&cx.def().tag(row.tag).name)).max().unwrap_or(0).clamp(10, 16);
-    canvas.text(names + 2, 0, "actual", cx.theme.dim());
-    canvas.text(names + 15, 0, "displayed", cx.theme.dim());
+    canvas.text(names + 2, 0, t!("actual"), cx.theme.dim());
+    canvas.text(names + 15, 0, t!("displayed"), cx.theme.dim());
     for (y, row) in rows.iter().enumerate() {
         let y = to_u16(y) + 1;
         canvas.text(0, y, &pad(&cx.def().tag(row.tag).name, names), cx.theme.normal());
@@ -220,11 +226,11 @@ fn verdict(cx: &ViewContext, progress: &Progress, canvas: &mut Canvas) {
     let mut y = 1;
     for row in &progress.verdict.rows {
         let (mark, points, note, style) = match &row.status {
-            ExpectationStatus::Open => (theme.pick("○", "o"), 0, "open".to_owned(), theme.dim()),
+            ExpectationStatus::Open => (theme.pick("○", "o"), 0, t!("open").to_owned(), theme.dim()),
             ExpectationStatus::Met(at) => {
-                (theme.pick("●", "+"), row.points, format!("met {}", running(*at)), theme.normal())
+                (theme.pick("●", "+"), row.points, t!("met {running}", running = running(*at)), theme.normal())
             }
-            ExpectationStatus::Missed(why) => (theme.pick("✗", "x"), 0, format!("MISSED {why}"), theme.trouble()),
+            ExpectationStatus::Missed(why) => (theme.pick("✗", "x"), 0, t!("MISSED {why}", why), theme.trouble()),
         };
         canvas.text(0, y, mark, style);
         canvas.text(2, y, &format!("{points:>3}/{:<3}", row.points), theme.normal());

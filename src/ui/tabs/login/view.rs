@@ -1,5 +1,6 @@
 //! The view of the login page: the banner, the form or who is in, and the most urgent alarms, which never hide.
 
+use crate::t;
 use ratatui::{Frame, layout::Rect};
 
 use super::Login;
@@ -53,7 +54,7 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
 /// The heading of the form; on a locked terminal it names the user who locked it.
 fn heading(cx: &ViewContext, title: &str) -> String {
     match &cx.session.who {
-        Some(who) if cx.session.locked => format!("{title} as another person than {}", who.user),
+        Some(who) if cx.session.locked => t!("{title} as another person than {user}", title, user = who.user),
         Some(_) | None => title.to_owned(),
     }
 }
@@ -81,16 +82,16 @@ fn who(login: &Login, cx: &ViewContext, canvas: &mut Canvas, y: u16) -> u16 {
     let x = canvas.text(0, y, &who.user, theme.strong());
     let x = canvas.text(x + 2, y, rights::title(who.role), theme.normal());
     if let Some((_, since)) = &login.since {
-        canvas.text(x + 2, y, &format!("since {}", clock(*since, &cx.def().time_zone)), theme.dim());
+        canvas.text(x + 2, y, &t!("since {clock}", clock = clock(*since, &cx.def().time_zone)), theme.dim());
     }
     let mut y = y + 1;
-    for line in wrap(&format!("may {}", rights::words(who.role)), canvas.width()) {
+    for line in wrap(&t!("may {words}", words = rights::words(who.role)), canvas.width()) {
         canvas.text(0, y, &line, theme.normal());
         y += 1;
     }
     let lock = match cx.session.idle_lock {
-        Some(idle) => format!("This terminal locks itself after {} without a key.", running(idle)),
-        None => "This terminal does not lock itself.".to_owned(),
+        Some(idle) => t!("This terminal locks itself after {running} without a key.", running = running(idle)),
+        None => t!("This terminal does not lock itself.").to_owned(),
     };
     canvas.text(0, y, &lock, theme.dim());
     y + 1
@@ -102,8 +103,11 @@ fn alarms(cx: &ViewContext, canvas: &mut Canvas) {
     let all = &cx.snapshot.alarms;
     let width = canvas.width();
     canvas.run(0, 0, width, '─', theme.dim());
-    let title =
-        if all.is_empty() { " alarms: none ".to_owned() } else { format!(" alarms {}  {} ", all.len(), counts(cx)) };
+    let title = if all.is_empty() {
+        t!(" alarms: none ").to_owned()
+    } else {
+        t!(" alarms {count}  {counts} ", count = all.len(), counts = counts(cx))
+    };
     canvas.text(1, 0, &title, theme.dim());
     let rows = usize::from(canvas.height().saturating_sub(1));
     // The last row tells what it leaves out.
@@ -116,6 +120,6 @@ fn alarms(cx: &ViewContext, canvas: &mut Canvas) {
         canvas.text(x, y, &text, theme.alarm(def.priority, alarm.state, false));
     }
     if all.len() > shown {
-        canvas.text(1, to_u16(rows), &format!("… and {} more", all.len() - shown), theme.dim());
+        canvas.text(1, to_u16(rows), &t!("… and {count} more", count = all.len() - shown), theme.dim());
     }
 }

@@ -1,5 +1,6 @@
 //! Which period a report is of: the shifts of the plant, days where it has none, or a typed period; pure.
 
+use crate::t;
 use jiff::{SignedDuration, Timestamp, ToSpan, civil};
 
 use crate::{
@@ -18,7 +19,7 @@ pub fn at(def: &PlantDef, at: Timestamp) -> Option<Period> {
         return shift::shift_at(def, at);
     }
     let date = at.to_zoned(def.time_zone.clone()).date();
-    Some(Period { name: format!("day {date}"), from: midnight(def, date)?, to: midnight(def, date.tomorrow().ok()?)? })
+    Some(Period { name: t!("day {date}", date), from: midnight(def, date)?, to: midnight(def, date.tomorrow().ok()?)? })
 }
 
 /// The shift or day before a period.
@@ -37,7 +38,7 @@ pub fn typed(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, Strin
     let text = text.trim();
     let said = |error: period_parser::PeriodError| error.to_string();
     let period = match split(text) {
-        _ if text.is_empty() => return Err(format!("expected {FORMS}")),
+        _ if text.is_empty() => return Err(t!("expected {FORMS}", FORMS)),
         (from, None) if from.starts_with(|c: char| c.is_alphabetic()) => {
             return period_parser::period(def, Some(from), None, None, now).map_err(said);
         }
@@ -47,14 +48,14 @@ pub fn typed(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, Strin
         }
     };
     if period.to.duration_since(period.from) > LONGEST {
-        return Err("a report covers 92 days at most".to_owned());
+        return Err(t!("a report covers 92 days at most").to_owned());
     }
     Ok(period)
 }
 
 /// Cuts `from-to` in two; the dashes of a date are no cut.
 fn split(text: &str) -> (&str, Option<&str>) {
-    for cut in ["–", "..", " - ", " to "] {
+    for cut in ["–", "..", " - ", t!(" to ")] {
         if let Some((from, to)) = text.split_once(cut) {
             return (from.trim(), Some(to.trim()));
         }
@@ -92,7 +93,7 @@ fn whole(def: &PlantDef, from: &str, to: Option<&str>, now: Timestamp) -> Result
 
 /// Date and time of one end; at least one of them is there.
 fn parts(text: &str) -> Result<(Option<civil::Date>, Option<civil::Time>), String> {
-    let wrong = || format!("`{text}` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
+    let wrong = || t!("`{text}` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00", text);
     let mut words = text.split([' ', 'T']).filter(|word| !word.is_empty());
     let (first, second) = (words.next().ok_or_else(wrong)?, words.next());
     let time = |word: &str| word.contains(':').then(|| word.parse::<civil::Time>().ok()).flatten();

@@ -1,5 +1,7 @@
 //! The view of the reports tab: which period, its figures, alarms and actions, and what the CSV will be.
 
+use crate::t;
+use crate::text::translate;
 use std::{collections::BTreeMap, time::Duration};
 
 use jiff::{SignedDuration, Timestamp, tz::TimeZone};
@@ -53,7 +55,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         None => {
-            let words = reports.trouble.as_deref().unwrap_or("collecting data");
+            let words = reports.trouble.as_deref().unwrap_or(t!("collecting data"));
             let style = if reports.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
             canvas.text_centred(height / 2, words, style);
         }
@@ -69,11 +71,11 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     let running = reports.is_running(cx.now);
     let until = reports.report.as_ref().map_or(cx.now, |report| report.until);
     let state = match (running, &reports.report) {
-        (true, _) => format!("RUNNING, until now {}", local(until, zone, "%H:%M:%S")),
+        (true, _) => t!("RUNNING, until now {local}", local = local(until, zone, "%H:%M:%S")),
         (false, Some(report)) if report.until < report.period.to => {
-            format!("figures until {} only", local(until, zone, "%H:%M:%S"))
+            t!("figures until {local} only", local = local(until, zone, "%H:%M:%S"))
         }
-        (false, _) => "closed".to_owned(),
+        (false, _) => t!("closed").to_owned(),
     };
     let x = canvas.text(x + 3, 0, &state, if running { theme.strong() } else { theme.normal() });
     let slow =
@@ -82,7 +84,7 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
         let right = canvas.width().saturating_sub(1);
         match &reports.trouble {
             Some(trouble) => canvas.text_right(right, 0, &fit(trouble, right.saturating_sub(x + 2)), theme.trouble()),
-            None if slow => canvas.text_right(right, 0, &fit("reading", right.saturating_sub(x + 2)), theme.dim()),
+            None if slow => canvas.text_right(right, 0, &fit(t!("reading"), right.saturating_sub(x + 2)), theme.dim()),
             None => {}
         }
     }
@@ -91,21 +93,27 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
 /// What the CSV is like, and where it went.
 fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden: usize, row: &mut Canvas) {
     let (theme, dialect) = (cx.theme, reports.dialect);
-    let separator = if dialect.separator == ';' { "semicolons" } else { "commas" };
-    let decimal = if dialect.decimal == ',' { "decimal comma" } else { "decimal point" };
-    let bom = if dialect.bom { ", BOM" } else { "" };
+    let separator = if dialect.separator == ';' { t!("semicolons") } else { t!("commas") };
+    let decimal = if dialect.decimal == ',' { t!("decimal comma") } else { t!("decimal point") };
+    let bom = if dialect.bom { t!(", BOM") } else { "" };
     let path = reports.path(cx, report);
     let (text, style) = match &reports.export {
-        Export::Not => (format!("e writes {}", path.display()), theme.dim()),
-        Export::Writing => (format!("writing {}", path.display()), theme.normal()),
-        Export::Done(path) => (format!("{} written {}", theme.pick("✓", "ok"), path.display()), theme.done()),
-        Export::Failed(why) => (format!("not written: {why}"), theme.trouble()),
+        Export::Not => (t!("e writes {display}", display = path.display()), theme.dim()),
+        Export::Writing => (t!("writing {display}", display = path.display()), theme.normal()),
+        Export::Done(path) => {
+            (t!("{pick} written {display}", pick = theme.pick("✓", t!("ok")), display = path.display()), theme.done())
+        }
+        Export::Failed(why) => (t!("not written: {why}", why), theme.trouble()),
     };
-    let more = if hidden > 0 { format!("   {} {hidden} more", theme.pick("↓", "down")) } else { String::new() };
+    let more = if hidden > 0 {
+        t!("   {pick} {hidden} more", pick = theme.pick("↓", t!("down")), hidden)
+    } else {
+        String::new()
+    };
     // The path matters most: the format is told in full where there is room.
     let kinds = [
-        format!("CSV: {separator}, {decimal}{bom}{more}"),
-        format!("CSV {} {}{bom}{more}", dialect.separator, dialect.decimal),
+        t!("CSV: {separator}, {decimal}{bom}{more}", separator, decimal, bom, more),
+        t!("CSV {separator} {decimal}{bom}{more}", separator = dialect.separator, decimal = dialect.decimal, bom, more),
         more.trim().to_owned(),
     ];
     let end = row.width().saturating_sub(1);
@@ -123,8 +131,10 @@ fn widths(width: u16) -> (u16, u16) {
 
 fn heading(cx: &ViewContext, width: u16) -> Line<'static> {
     let (tag, figure) = widths(width);
-    let mut text = format!("  {}{}", pad("tag", tag), pad("unit", 7));
-    for (name, more) in [("min", 0), ("mean/+", 0), ("max", 0), ("last", 0), ("in alarm", 1), ("good", 0)] {
+    let mut text = format!("  {}{}", pad(t!("tag"), tag), pad(t!("unit"), 7));
+    for (name, more) in
+        [(t!("min"), 0), (t!("mean/+"), 0), (t!("max"), 0), (t!("last"), 0), (t!("in alarm"), 1), (t!("good"), 0)]
+    {
         text.push_str(&pad_left(name, figure + more));
     }
     Line::from(Span::styled(text, cx.theme.dim()))
@@ -135,7 +145,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
     let theme = cx.theme;
     let mut lines = Vec::new();
     if report.tags.iter().all(|tag| tag.good == 0.0) {
-        let words = "  no data: no good value was recorded in this period";
+        let words = t!("  no data: no good value was recorded in this period");
         lines.push(Line::from(Span::styled(words, theme.trouble())));
     }
     lines.extend(report.tags.iter().map(|tag| figures(cx, tag)));
@@ -143,37 +153,37 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
     lines.push(counts(cx, report));
     if let Some(entry) = report.audit {
         // The CSV has the whole hash.
-        let words = fit(&format!("  audit log: entry {entry}"), cx.area.width);
+        let words = fit(&t!("  audit log: entry {entry}", entry), cx.area.width);
         lines.push(Line::from(Span::styled(words, theme.dim())));
     }
     for gap in &report.unreadable {
         let time = |at: Timestamp| local(at, &cx.def().time_zone, "%m-%d %H:%M");
-        let words = format!("  not readable, not counted: {} to {}", time(gap.from), time(gap.to));
+        let words = t!("  not readable, not counted: {time} to {time2}", time = time(gap.from), time2 = time(gap.to));
         lines.push(Line::from(Span::styled(words, theme.trouble())));
     }
     if let Some((of, _)) = &report.record_of {
-        let words = format!("  record of {of}: {} rows in the CSV", report.record.len());
+        let words = t!("  record of {of}: {count} rows in the CSV", of, count = report.record.len());
         lines.push(Line::from(Span::styled(words, theme.normal())));
     }
     // The name of a shift tells its day; only a longer period needs the date in every line.
     let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
     let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
     let time = |at: Timestamp| format!("  {}  ", local(at, &cx.def().time_zone, form));
-    let more = |n: usize| Line::from(Span::styled(format!("  and {n} more in the CSV"), theme.dim()));
+    let more = |n: usize| Line::from(Span::styled(t!("  and {n} more in the CSV", n), theme.dim()));
     if !report.suppressed.is_empty() {
-        lines.push(section(cx, "suppressed alarms"));
+        lines.push(section(cx, t!("suppressed alarms")));
         lines.extend(report.suppressed.iter().take(LIST_MAX).map(|alarm| suppressed_line(cx, alarm)));
         lines.extend(report.suppressed.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
     }
     let annunciated = |alarm: &&AlarmRecord| !alarm.event.is_suppressed();
     let alarms: Vec<&AlarmRecord> = report.alarms.iter().filter(annunciated).collect();
     if !alarms.is_empty() {
-        lines.push(section(cx, "alarms"));
+        lines.push(section(cx, t!("alarms")));
         lines.extend(alarms.iter().take(LIST_MAX).map(|alarm| alarm_line(cx, alarm, time(alarm.at))));
         lines.extend(alarms.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
     }
     if !report.actions.is_empty() {
-        lines.push(section(cx, "operator actions"));
+        lines.push(section(cx, t!("operator actions")));
         lines.extend(report.actions.iter().take(LIST_MAX).map(|action| action_line(cx, action, time(action.at))));
         lines.extend(report.actions.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
     }
@@ -205,25 +215,25 @@ fn figures(cx: &ViewContext, tag: &TagFigures) -> Line<'static> {
 /// `alarms 3 (high 1, medium 2)   most TIC-1.PV ×2   operator actions 4`.
 fn counts(cx: &ViewContext, report: &ShiftReport) -> Line<'static> {
     let priorities = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low];
-    let by = priorities.map(|priority| (raised(&report.alarms, priority), priority.word()));
+    let by = priorities.map(|priority| (raised(&report.alarms, priority), translate(priority.word())));
     let total: usize = by.iter().map(|(n, _)| n).sum();
     let parts: Vec<String> = by.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{word} {n}")).collect();
-    let mut text = format!("  alarms {total}");
+    let mut text = t!("  alarms {total}", total);
     if total > 0 {
         text.push_str(&format!(" ({})", parts.join(", ")));
     }
     let suppressed: u64 = report.suppressed.iter().map(|alarm| alarm.raised).sum();
     if suppressed > 0 {
-        text.push_str(&format!(", {suppressed} more while suppressed"));
+        text.push_str(&t!(", {suppressed} more while suppressed", suppressed));
     }
     let mut subjects: BTreeMap<&str, usize> = BTreeMap::new();
     for alarm in report.alarms.iter().filter(|alarm| alarm.event == AlarmEvent::Raised) {
         *subjects.entry(&alarm.subject).or_default() += 1;
     }
     if let Some((subject, n)) = subjects.into_iter().max_by_key(|(_, n)| *n).filter(|(_, n)| *n > 1) {
-        text.push_str(&format!("   most {subject} {}{n}", cx.theme.pick("×", "x")));
+        text.push_str(&t!("   most {subject} {pick}{n}", subject, pick = cx.theme.pick("×", "x"), n));
     }
-    text.push_str(&format!("   operator actions {}", report.actions.len()));
+    text.push_str(&t!("   operator actions {count}", count = report.actions.len()));
     Line::from(Span::styled(text, cx.theme.normal()))
 }
 
@@ -242,7 +252,10 @@ fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static>
             format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.message, room.clamp(12, 41))),
             theme.normal(),
         ),
-        Span::styled(format!("active {}, raised {}", long(alarm.active), alarm.raised), theme.normal()),
+        Span::styled(
+            t!("active {long}, raised {raised}", long = long(alarm.active), raised = alarm.raised),
+            theme.normal(),
+        ),
     ])
 }
 
@@ -256,7 +269,7 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
     let active = alarm.event == AlarmEvent::Raised;
     let style: Style = if active { theme.normal() } else { theme.dim() };
     let detail = match (&alarm.by, alarm.value) {
-        (Some(by), _) => format!("by {by}"),
+        (Some(by), _) => t!("by {by}", by),
         (None, Some(number)) => pad_left(value(number).trim(), 10),
         (None, None) => String::new(),
     };
@@ -268,7 +281,7 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
             if active { theme.severity(alarm.priority) } else { theme.dim() },
         ),
         Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.message, text)), style),
-        Span::styled(format!("{} {detail}", pad(alarm.event.word(), 13)), style),
+        Span::styled(format!("{} {detail}", pad(translate(alarm.event.word()), 13)), style),
     ])
 }
 

@@ -1,5 +1,6 @@
 //! Which stretch of time the trends show: windows, zoom, pan and the grid of columns; pure arithmetic.
 
+use crate::t;
 use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp, tz::TimeZone};
@@ -76,7 +77,7 @@ pub fn midnight(now: Timestamp, zone: &TimeZone) -> Timestamp {
 
 /// A window as it is written: `10 min`, `1 h`.
 pub fn window_text(seconds: i64) -> String {
-    if seconds < 3_600 { format!("{} min", seconds / 60) } else { format!("{} h", seconds / 3_600) }
+    if seconds < 3_600 { t!("{seconds} min", seconds = seconds / 60) } else { format!("{} h", seconds / 3_600) }
 }
 
 /// A rate as it is written: `0.5 s`, `10 s`.

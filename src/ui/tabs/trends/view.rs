@@ -1,5 +1,6 @@
 //! The view of the trends tab: title, chart, legend with figures; or the list of values.
 
+use crate::t;
 use jiff::{Timestamp, tz::TimeZone};
 use ratatui::{
     Frame,
@@ -57,7 +58,7 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         chart.cursor = cursor.map(|at| (at, readout(trends, cx, at, plan.plot.width)));
         chart.render(area, canvas.buffer());
         if trends.drawn(cx).is_empty() {
-            let words = "no pen is switched on: select one below, space switches it on";
+            let words = t!("no pen is switched on: select one below, space switches it on");
             canvas.text_centred(1 + area.height / 2, words, cx.theme.dim());
         }
     }
@@ -79,22 +80,37 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let mut x = canvas.text(1, 0, &name, theme.strong());
     let groups = def.trends.len() + usize::from(trends.picked.is_some());
     if groups > 1 && !brief {
-        x = canvas.text(x + 1, 0, &format!("group {}/{}", trends.group + 1, groups), theme.dim());
+        x = canvas.text(x + 1, 0, &t!("group {group}/{groups}", group = trends.group + 1, groups), theme.dim());
     }
     let since = trends.since.filter(|since| *since > midnight(cx.now, zone)).map(|since| since.to_zoned(zone.clone()));
     let window = match (trends.accumulate, since) {
-        (true, None) => "all since midnight".to_owned(),
-        (true, Some(since)) if brief => format!("all since {}", since.strftime("%H:%M")),
-        (true, Some(since)) => format!("all since {}, the first value today", since.strftime("%H:%M")),
-        (false, _) => format!("window {}", window_text(WINDOWS[trends.window])),
+        (true, None) => t!("all since midnight").to_owned(),
+        (true, Some(since)) if brief => t!("all since {strftime}", strftime = since.strftime("%H:%M")),
+        (true, Some(since)) => t!("all since {strftime}, the first value today", strftime = since.strftime("%H:%M")),
+        (false, _) => t!("window {window_text}", window_text = window_text(WINDOWS[trends.window])),
     };
     x = canvas.text(x + 3, 0, &window, theme.normal());
     if trends.end.is_some() {
-        x = canvas.text(x + 3, 0, &format!(" past {} ", stretch(view.from, view.to, cx.now, zone)), theme.focus());
+        x = canvas.text(
+            x + 3,
+            0,
+            &t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.now, zone)),
+            theme.focus(),
+        );
     } else {
-        x = canvas.text(x + 3, 0, if theme.glyphs == Glyphs::Braille { "live ●" } else { "live *" }, theme.normal());
+        x = canvas.text(
+            x + 3,
+            0,
+            if theme.glyphs == Glyphs::Braille { t!("live ●") } else { t!("live *") },
+            theme.normal(),
+        );
         if !brief {
-            x = canvas.text(x + 3, 0, &format!("update {}", rate_text(RATES[trends.rate])), theme.normal());
+            x = canvas.text(
+                x + 3,
+                0,
+                &t!("update {rate_text}", rate_text = rate_text(RATES[trends.rate])),
+                theme.normal(),
+            );
         }
     }
     if let Some(trouble) = trouble {
@@ -108,7 +124,7 @@ fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
     let periodics = [&trends.periodics.curves, &trends.periodics.hours];
     let slow =
         periodics.iter().filter_map(|periodic| periodic.waiting(cx.steady())).any(|time| time >= super::real(cx, 2.0));
-    trends.data.trouble.clone().or_else(|| slow.then(|| "waiting for the history".to_owned()))
+    trends.data.trouble.clone().or_else(|| slow.then(|| t!("waiting for the history").to_owned()))
 }
 
 fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
@@ -177,18 +193,18 @@ fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Opt
         return;
     }
     let cursor = trends.cursor(cx);
-    let now = cursor.map_or("now".to_owned(), |at| format!("at {}", clock(at, &cx.def().time_zone)));
-    canvas.text(4, 0, "pen", dim);
+    let now = cursor.map_or(t!("now").to_owned(), |at| t!("at {clock}", clock = clock(at, &cx.def().time_zone)));
+    canvas.text(4, 0, t!("pen"), dim);
     for (end, text) in [
         (columns.value, now.as_str()),
-        (columns.min, "min"),
-        (columns.mean, "mean"),
-        (columns.max, "max"),
-        (columns.good, "good"),
+        (columns.min, t!("min")),
+        (columns.mean, t!("mean")),
+        (columns.max, t!("max")),
+        (columns.good, t!("good")),
     ] {
         canvas.text_right(end, 0, text, dim);
     }
-    canvas.text(columns.hour, 0, "last hour", dim);
+    canvas.text(columns.hour, 0, t!("last hour"), dim);
     let pens = trends.pens(cx);
     let rows = usize::from(canvas.height() - 1);
     let first = (trends.selected + 1).saturating_sub(rows).min(pens.len().saturating_sub(rows));
@@ -231,18 +247,18 @@ fn draw_pen(
         }
         Some(at) => match at_cursor(trends, cx, pen.tag, at) {
             Some(text) => (format!("{text} {}", cx.snapshot.unit(pen.tag)), theme.normal()),
-            None => ("---- no data".to_owned(), theme.dim()),
+            None => (t!("---- no data").to_owned(), theme.dim()),
         },
     };
     row.text_right(columns.value, 0, text.trim_end(), style);
     if off {
-        row.text_right(columns.min, 0, "off", theme.dim());
+        row.text_right(columns.min, 0, t!("off"), theme.dim());
         return;
     }
     draw_figures(trends, cx, row, pen.tag);
     let mut x = columns.hour;
     if let Some((low, high)) = own {
-        let text = format!("scale {} … {}  ", number(low), number(high));
+        let text = t!("scale {number} … {number2}  ", number = number(low), number2 = number(high));
         x = row.text(x, 0, &text, theme.dim());
     }
     if let Some(series) = trends.data.hours.get(&pen.tag) {
@@ -272,20 +288,25 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
     let (theme, all) = (cx.theme, stored(cx));
     let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
     let last = (first + rows).min(all.len());
-    let x = canvas.text(1, 0, "All values", theme.strong());
-    canvas.text(x + 3, 0, &format!("{}–{} of {}", (first + 1).min(last), last, all.len()), theme.dim());
+    let x = canvas.text(1, 0, t!("All values"), theme.strong());
+    canvas.text(
+        x + 3,
+        0,
+        &t!("{min}–{last} of {count}", min = (first + 1).min(last), last, count = all.len()),
+        theme.dim(),
+    );
     let wide = canvas.width().saturating_sub(80);
     let name = 15 + wide / 5;
     let label = name + 18 + wide / 4;
     let (value, low, high) = (label + 15, label + 23, label + 31);
-    canvas.text(2, 1, "tag", theme.dim());
-    for (end, text) in [(value, "now"), (low, "1 h min"), (high, "1 h max")] {
+    canvas.text(2, 1, t!("tag"), theme.dim());
+    for (end, text) in [(value, t!("now")), (low, t!("1 h min")), (high, t!("1 h max"))] {
         canvas.text_right(end, 1, text, theme.dim());
     }
-    canvas.text(high + 2, 1, "last hour", theme.dim());
+    canvas.text(high + 2, 1, t!("last hour"), theme.dim());
     let (words, style) = match trouble(trends, cx) {
         Some(trouble) => (trouble, theme.trouble()),
-        None => (format!("{} curve   v back", theme.pick("⏎", "Enter")), theme.dim()),
+        None => (t!("{pick} curve   v back", pick = theme.pick("⏎", t!("Enter"))), theme.dim()),
     };
     canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&words, canvas.width().saturating_sub(30)), style);
     for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {

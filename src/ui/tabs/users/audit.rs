@@ -1,5 +1,6 @@
 //! The audit list: who did what, from where, when, and how it ended; newest first, with a search that the history does.
 
+use crate::t;
 use crossterm::event::KeyCode;
 use jiff::SignedDuration;
 use ratatui::{Frame, layout::Rect};
@@ -121,10 +122,14 @@ impl Audit {
             Action::Search(part) => {
                 self.asking = Some(part);
                 let (title, hint, text) = match part {
-                    Part::Words => ("search", "words of any column; empty for all", self.words.as_str()),
-                    Part::Who => ("only by", "name of a user, or a part of it; empty for all", self.who.as_str()),
-                    Part::Action => ("only this action", "write, acknowledge, login …; empty for all", &*self.action),
-                    Part::Time => ("time", period::FORMS, ""),
+                    Part::Words => (t!("search"), t!("words of any column; empty for all"), self.words.as_str()),
+                    Part::Who => {
+                        (t!("only by"), t!("name of a user, or a part of it; empty for all"), self.who.as_str())
+                    }
+                    Part::Action => {
+                        (t!("only this action"), t!("write, acknowledge, login …; empty for all"), &*self.action)
+                    }
+                    Part::Time => (t!("time"), period::FORMS, ""),
                 };
                 return vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, text)))];
             }
@@ -213,7 +218,7 @@ impl Audit {
         let theme = cx.theme;
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let columns = canvas.width();
-        let x = canvas.text(1, 0, "Audit list  ", theme.strong());
+        let x = canvas.text(1, 0, t!("Audit list  "), theme.strong());
         let room = columns.saturating_sub(x + 1);
         match &self.trouble {
             Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
@@ -221,7 +226,7 @@ impl Audit {
         };
         canvas.text(1, 1, &self.heading(columns), theme.dim());
         if self.rows.is_empty() {
-            let words = if self.answered { "Nothing of this is on record." } else { "collecting data" };
+            let words = if self.answered { t!("Nothing of this is on record.") } else { t!("collecting data") };
             canvas.text(2, 3, words, theme.dim());
             return;
         }
@@ -234,26 +239,27 @@ impl Audit {
 
     /// `last 7 days   by anna   more than 1000: choose a time`.
     fn summary(&self) -> String {
-        let time = self.period.as_ref().map_or("the last 7 days".to_owned(), |period| period.name.clone());
+        let time = self.period.as_ref().map_or(t!("the last 7 days").to_owned(), |period| period.name.clone());
         let part = |name: &str, text: &str| (!text.is_empty()).then(|| format!("{name} \"{text}\""));
-        let parts = [part("by", &self.who), part("action", &self.action), part("with", &self.words)];
+        let parts = [part(t!("by"), &self.who), part(t!("action"), &self.action), part(t!("with"), &self.words)];
         let count = match self.rows.len() {
-            ROWS.. => format!("the newest {ROWS}; choose a time for others"),
-            1 => "1 row".to_owned(),
-            n => format!("{n} rows"),
+            ROWS.. => t!("the newest {ROWS}; choose a time for others", ROWS),
+            1 => t!("1 row").to_owned(),
+            n => t!("{n} rows", n),
         };
         [Some(time), Some(count)].into_iter().chain(parts).flatten().collect::<Vec<_>>().join("   ")
     }
 
     fn heading(&self, columns: u16) -> String {
-        let from = if from_width(columns) > 0 { pad("from", from_width(columns)) } else { String::new() };
-        format!(
-            "{} {}{}{from}{}{}old → new, outcome",
-            pad_left("no", 5),
-            pad("time", 10),
-            pad("who", 10),
-            pad("action", 12),
-            pad("target", 12)
+        let from = if from_width(columns) > 0 { pad(t!("from"), from_width(columns)) } else { String::new() };
+        t!(
+            "{pad_left} {pad}{pad2}{from}{pad3}{pad4}old → new, outcome",
+            pad_left = pad_left(t!("no"), 5),
+            pad = pad(t!("time"), 10),
+            pad2 = pad(t!("who"), 10),
+            from,
+            pad3 = pad(t!("action"), 12),
+            pad4 = pad(t!("target"), 12)
         )
     }
 }

@@ -1,5 +1,6 @@
 //! The view of the list of users, and of the terminals that are attached.
 
+use crate::t;
 use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
@@ -27,10 +28,15 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
     let theme = cx.theme;
     let all = &cx.session.users;
     let name = (canvas.width() / 4).clamp(14, 34);
-    canvas.text(1, 0, &format!("{}role         state                      last login", pad("user", name)), theme.dim());
+    canvas.text(
+        1,
+        0,
+        &t!("{pad}role         state                      last login", pad = pad(t!("user"), name)),
+        theme.dim(),
+    );
     let rows = usize::from(canvas.height().saturating_sub(1)).max(1);
     for (y, n, row) in on_screen(all, first(place, all.len(), rows), rows) {
-        let last = row.last_login.map_or("never".to_owned(), |at| date(cx, at));
+        let last = row.last_login.map_or(t!("never").to_owned(), |at| date(cx, at));
         let mark = if n == place { theme.pick("▸", ">") } else { " " };
         let text = format!(
             "{mark}{}{}{}{last}",
@@ -47,7 +53,7 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
         canvas.text(0, y + 1, &pad(&fit(&text, width), width), style);
     }
     if all.is_empty() {
-        canvas.text(1, 2, "No users: a demonstration needs no login.", theme.dim());
+        canvas.text(1, 2, t!("No users: a demonstration needs no login."), theme.dim());
     }
 }
 
@@ -56,23 +62,24 @@ fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
     let all = &cx.session.sessions;
     let width = canvas.width();
     canvas.run(0, 0, width, '─', theme.dim());
-    canvas.text(1, 0, &format!(" terminals attached {} ", all.len()), theme.dim());
+    canvas.text(1, 0, &t!(" terminals attached {count} ", count = all.len()), theme.dim());
     let rows = usize::from(canvas.height().saturating_sub(1));
     let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
     for (y, row) in all.iter().take(shown).enumerate() {
         let user = row.user.as_deref().unwrap_or("–");
-        let locked = if row.locked { "  LOCKED" } else { "" };
-        let text = format!(
-            "{:>4}  {}since {}  {}{locked}",
-            row.terminal,
-            pad(&fit(user, 15), 16),
-            clock(row.since, &cx.def().time_zone),
-            row.from
+        let locked = if row.locked { t!("  LOCKED") } else { "" };
+        let text = t!(
+            "{terminal}  {pad}since {clock}  {from}{locked}",
+            terminal = format!("{:>4}", row.terminal),
+            pad = pad(&fit(user, 15), 16),
+            clock = clock(row.since, &cx.def().time_zone),
+            from = row.from,
+            locked
         );
         canvas.text(0, to_u16(y) + 1, &fit(&text, width), theme.normal());
     }
     if all.len() > shown {
-        canvas.text(1, to_u16(rows), &format!("… and {} more", all.len() - shown), theme.dim());
+        canvas.text(1, to_u16(rows), &t!("… and {count} more", count = all.len() - shown), theme.dim());
     }
 }
 

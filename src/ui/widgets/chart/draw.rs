@@ -1,6 +1,7 @@
 //! Drawing of a chart: grid, curves, marks, gaps, axes and cursor.
 
 use super::*;
+use crate::t;
 
 impl Chart<'_> {
     /// Faint points where round values meet round times, to lead the eye; not in ASCII, where a point is a value.
@@ -94,7 +95,7 @@ impl Chart<'_> {
             let end = (x..past).find(known).unwrap_or(past);
             let (first, last) = (to_u16(x.div_ceil(across)), to_u16(end / across));
             let length = span_text(span.mul_f64((end - x) as f64 / count as f64));
-            let texts = [format!("no data {length}"), format!("gap {length}"), length];
+            let texts = [t!("no data {length}", length), t!("gap {length}", length), length];
             let fits = |text: &String| first + to_u16(text.width()) + 2 <= last;
             if let Some(text) = texts.into_iter().find(fits).filter(|_| was_read(x + (end - x) / 2)) {
                 let start = plot.x + first + (last - first - to_u16(text.width())) / 2;

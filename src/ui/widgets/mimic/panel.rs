@@ -1,5 +1,6 @@
 //! Panels beside the mimic: a controller with its bar, and a sequence with its steps.
 
+use crate::t;
 use ratatui::style::Modifier;
 
 use super::{Bounds, alarm_mark, label_style, put_value, unit::states};
@@ -46,7 +47,7 @@ pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &De
     for tag in tags {
         let shown = value::show(cx, tag);
         if Some(tag) == faceplate.tune {
-            x = canvas.text(x, y + 1, "AT", theme.dim()) + 1;
+            x = canvas.text(x, y + 1, t!("AT"), theme.dim()) + 1;
         }
         let room = canvas.width().saturating_sub(x);
         x = canvas.text(x, y + 1, &shown.bare(room), shown.style) + 2;
@@ -57,7 +58,7 @@ pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &De
 pub fn set_apart(cx: &ViewContext, faceplate: &Faceplate) -> Option<String> {
     let value = |tag| cx.snapshot.sample(tag).good_value();
     let set = value(faceplate.sv).filter(|set| value(faceplate.aim()) != Some(*set))?;
-    Some(format!("set {}", cx.snapshot.format(faceplate.sv, set)))
+    Some(t!("set {format}", format = cx.snapshot.format(faceplate.sv, set)))
 }
 
 /// The ends of the range above the bar.
@@ -132,9 +133,9 @@ impl Sequence<'_> {
         if let Some(left) = self.remaining.filter(|left| !untimed(left)) {
             let text = match cx.snapshot.sample(left).good_value() {
                 Some(seconds) if seconds >= 0.0 => {
-                    format!("{} left", running(std::time::Duration::from_secs_f64(seconds.min(1e7))))
+                    t!("{running} left", running = running(std::time::Duration::from_secs_f64(seconds.min(1e7))))
                 }
-                Some(_) | None => format!("{} left", value::show(cx, left).text),
+                Some(_) | None => t!("{text} left", text = value::show(cx, left).text),
             };
             let room = canvas.width().saturating_sub(x + 1);
             let end = canvas.width();

@@ -1,5 +1,6 @@
 //! A vessel: its liquid follows the level, its agitator turns, its heater glows, and none of them without a good value.
 
+use crate::t;
 use ratatui::style::Style;
 
 use super::{Bounds, alarm_mark, label_style, put_value};
@@ -93,11 +94,11 @@ impl Tank<'_> {
                     shape_of_mark(cx, canvas, x + 1, y, heater);
                 }
                 Some(false) => {
-                    let x = canvas.text(1, y, theme.pick("─── off", "--- heater off"), theme.dim());
+                    let x = canvas.text(1, y, theme.pick(t!("─── off"), t!("--- heater off")), theme.dim());
                     shape_of_mark(cx, canvas, x + 1, y, heater);
                 }
                 None => {
-                    canvas.text(1, y, "heater ?", theme.trouble());
+                    canvas.text(1, y, t!("heater ?"), theme.trouble());
                 }
             }
         }

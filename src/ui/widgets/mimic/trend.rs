@@ -1,5 +1,6 @@
 //! A small trend of the last minutes: its curve, its name and its scale.
 
+use crate::t;
 use std::time::Duration;
 
 use ratatui::style::Style;
@@ -34,14 +35,14 @@ pub fn view(
     let span = if minutes.is_multiple_of(60) && minutes > 0 {
         format!("{} h", minutes / 60)
     } else {
-        format!("{minutes} min")
+        t!("{minutes} min", minutes)
     };
     let x = canvas.text(0, 0, &fit(&cx.def().tag(tag).name, at.width), label_style(cx, selected));
-    canvas.text(x + 1, 0, &format!("last {span}"), theme.dim());
+    canvas.text(x + 1, 0, &t!("last {span}", span), theme.dim());
     // A good value now will be a curve soon, whatever the past lacks.
     let soon = series.is_none() || cx.snapshot.sample(tag).good_value().is_some();
     let Some((series, (low, _, high))) = series.and_then(|series| Some((series, series.summary?))) else {
-        canvas.text(0, 1, if soon { "collecting data" } else { "no good value" }, theme.dim());
+        canvas.text(0, 1, if soon { t!("collecting data") } else { t!("no good value") }, theme.dim());
         return;
     };
     let label = |value| cx.snapshot.format(tag, value);

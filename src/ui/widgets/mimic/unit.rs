@@ -1,6 +1,7 @@
 //! Valves, pumps and single values: a shape that is filled while it works, a name and a word.
 
 use super::{Bounds, label_style, put_value};
+use crate::t;
 use crate::{
     plant::def::TagId,
     ui::{
@@ -24,7 +25,7 @@ pub fn valve(
 ) {
     let theme = cx.theme;
     let on = value::is_on(cx, tag);
-    let word = word(cx, tag, ("OPEN", "SHUT"));
+    let word = word(cx, tag, (t!("OPEN"), t!("SHUT")));
     let (shape, style) = match on {
         Some(true) => (theme.pick("▶◀", "><"), theme.running()),
         Some(false) => (theme.pick("▷◁", "||"), theme.normal()),
@@ -51,7 +52,7 @@ pub fn pump(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, tag:
         Some(false) => (theme.pick("○", "o"), theme.normal()),
         None => ("?", theme.trouble()),
     };
-    let word = word(cx, tag, ("RUN", "STOP"));
+    let word = word(cx, tag, (t!("RUN"), t!("STOP")));
     let y = at.y + at.height / 2;
     let beside = at.width >= width(label) + width(&word) + 5;
     let (open, close) = if at.width >= width(label) + 4 { ("(", ")") } else { ("", "") };

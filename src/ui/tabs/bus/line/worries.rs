@@ -1,23 +1,24 @@
 //! What is wrong on a line, in sentences, the worst first.
 
 use super::*;
+use crate::t;
 
 /// What is wrong and what to do about it, a sentence each.
 pub(super) fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
     let mut worries = Vec::new();
     if let Some(before) = &at.status.settings_before {
-        worries.push(format!("these settings are tried, not saved; before: {}", before.transport));
+        worries.push(t!("these settings are tried, not saved; before: {transport}", transport = before.transport));
     }
     let Some(report) = at.report else { return worries };
     if let Some(strain) = &report.strain {
-        worries.push(format!("{strain}. Poll less often, or raise the baud rate"));
+        worries.push(t!("{strain}. Poll less often, or raise the baud rate", strain));
     } else if !report.admission.verdict.fits() {
         worries.push(report.admission.verdict.to_string());
     }
     if report.strain.is_none() && missed_lately(report) {
-        worries.push(format!(
-            "the line is full: {} reads were skipped. Poll less often, or raise the baud rate",
-            grouped(report.counters.missed)
+        worries.push(t!(
+            "the line is full: {grouped} reads were skipped. Poll less often, or raise the baud rate",
+            grouped = grouped(report.counters.missed)
         ));
     }
     for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
@@ -28,8 +29,9 @@ pub(super) fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
     }
     let uart = report.counters.uart.unwrap_or_default();
     if 0 < uart.parity + uart.framing && DeviceStats::of(report).lately {
-        worries
-            .push("the port counts parity or framing errors: compare baud rate and parity with the devices".to_owned());
+        worries.push(
+            t!("the port counts parity or framing errors: compare baud rate and parity with the devices").to_owned(),
+        );
     }
     worries
 }
@@ -43,7 +45,11 @@ pub(super) fn of_device(
 ) -> Vec<String> {
     let mut worries = Vec::new();
     if let Some(p99) = near(stats, line.timeout) {
-        worries.push(format!("replies take {} of {} ms: raise the timeout", p99.as_millis(), line.timeout.as_millis()));
+        worries.push(t!(
+            "replies take {p99} of {timeout} ms: raise the timeout",
+            p99 = p99.as_millis(),
+            timeout = line.timeout.as_millis()
+        ));
     }
     let status = cx.snapshot.device(device.id);
     let (true, Some((when, fault))) = (0 < stats.recent().0 && is_ill(cx, device), status.last_fault) else {
@@ -52,21 +58,23 @@ pub(super) fn of_device(
     let when = clock(when, &cx.def().time_zone);
     let advice = match fault {
         Fault::Timeout => {
-            let cost =
-                report.admission.dead_cost(device.id).map(|cost| format!("; every probe costs the line {}", ms(cost)));
-            format!("look at its power, wiring and unit number{}", cost.unwrap_or_default())
+            let cost = report
+                .admission
+                .dead_cost(device.id)
+                .map(|cost| t!("; every probe costs the line {ms}", ms = ms(cost)));
+            t!("look at its power, wiring and unit number{cost}", cost = cost.unwrap_or_default())
         }
         Fault::Crc { .. } | Fault::Lrc { .. } | Fault::Truncated { .. } | Fault::NotHex(_) => {
-            "look at baud rate, parity, termination and shield of the line".to_owned()
+            t!("look at baud rate, parity, termination and shield of the line").to_owned()
         }
         Fault::Exception(code) => names::advice(code.0).to_owned(),
         Fault::WrongUnit { .. }
         | Fault::WrongFunction { .. }
         | Fault::WrongLength { .. }
         | Fault::WrongEcho
-        | Fault::OutOfSync => "is there another master, or a unit number twice?".to_owned(),
+        | Fault::OutOfSync => t!("is there another master, or a unit number twice?").to_owned(),
         Fault::NotANumber | Fault::NotConnected | Fault::BackedOff => String::new(),
     };
-    worries.push(format!("{fault} at {when}: {advice}").trim_end_matches(": ").to_owned());
+    worries.push(t!("{fault} at {when}: {advice}", fault, when, advice).trim_end_matches(": ").to_owned());
     worries
 }

@@ -1,25 +1,29 @@
 //! Fields of a request: numbers, registers, bits and addresses as they are typed.
 
 use super::*;
+use crate::t;
+use crate::text::translate;
 
 /// `123`, `-5`, `0x3EA`.
 pub(super) fn number(text: &str, what: &str, range: RangeInclusive<i64>) -> Result<i64, String> {
     let text = text.trim();
     let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
     let value = digits.map_or_else(|| text.parse(), |digits| i64::from_str_radix(digits, 16));
-    let expected = || format!("{what}: found `{text}`, expected {} to {}", range.start(), range.end());
+    let expected = || {
+        t!("{what}: found `{text}`, expected {start} to {end}", what, text, start = range.start(), end = range.end())
+    };
     value.ok().filter(|value| range.contains(value)).ok_or_else(expected)
 }
 
 pub(super) fn register(text: &str) -> Result<u16, String> {
-    number(text, "value", -32_768..=65_535).map(|value| to_u16(value.rem_euclid(0x1_0000)))
+    number(text, t!("value"), -32_768..=65_535).map(|value| to_u16(value.rem_euclid(0x1_0000)))
 }
 
 pub(super) fn bit(text: &str) -> Result<bool, String> {
     match text.trim().to_ascii_lowercase().as_str() {
         "1" | "on" => Ok(true),
         "0" | "off" => Ok(false),
-        other => Err(format!("value: found `{other}`, expected 1 or 0")),
+        other => Err(t!("value: found `{other}`, expected 1 or 0", other)),
     }
 }
 
@@ -30,12 +34,19 @@ pub fn address(text: &str, table: Table) -> Result<u16, String> {
     let modicon = matches!(digits.len(), 5 | 6) && digits.bytes().all(|byte| byte.is_ascii_digit());
     let named =
         TABLES.into_iter().find(|table| digits.starts_with(char::from(b'0' + table.digit()))).filter(|_| modicon);
-    let Some(named) = named else { return number(digits, "address", 0..=65_535).map(|address| to_u16(address)) };
+    let Some(named) = named else { return number(digits, t!("address"), 0..=65_535).map(|address| to_u16(address)) };
     if named != table {
-        return Err(format!("address: {digits} is of the table {}, this is {}", named.word(), table.word()));
+        return Err(t!(
+            "address: {digits} is of the table {named}, this is {table}",
+            digits,
+            named = translate(named.word()),
+            table = translate(table.word())
+        ));
     }
     let place = digits[1..].parse::<u32>().ok().and_then(|number| u16::try_from(number.checked_sub(1)?).ok());
-    place.ok_or_else(|| format!("address: {digits} does not exist, the first is {}", table.modicon(0)))
+    place.ok_or_else(|| {
+        t!("address: {digits} does not exist, the first is {modicon}", digits, modicon = table.modicon(0))
+    })
 }
 
 /// All settings that devices are found with; RTU needs eight data bits.

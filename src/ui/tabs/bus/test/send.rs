@@ -1,6 +1,7 @@
 //! The window that sends bytes as they are typed.
 
 use super::*;
+use crate::t;
 
 /// Bytes on their way onto a line.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,9 +54,9 @@ impl Send {
     }
 
     fn send(&self, cx: &ViewContext) -> Result<UiAction, String> {
-        let at = Place::of(cx, self.line).ok_or("this line has gone")?;
+        let at = Place::of(cx, self.line).ok_or(t!("this line has gone"))?;
         if self.text.missed() {
-            return Err("the text was cut; Ctrl-U clears the line".to_owned());
+            return Err(t!("the text was cut; Ctrl-U clears the line").to_owned());
         }
         start(&at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
     }
@@ -79,16 +80,19 @@ impl Send {
         let area = Rect { height: (TOP + 1).min(body.height), ..body };
         let mut outer = Canvas::new(screen.buffer_mut(), area);
         outer.clear();
-        outer.frame(&format!("send on {}, {}", at.settings.name, at.settings.transport), theme.strong());
+        outer.frame(
+            &t!("send on {name}, {transport}", name = at.settings.name, transport = at.settings.transport),
+            theme.strong(),
+        );
         let (width, height) = (area.width.saturating_sub(4), area.height.saturating_sub(2));
         let mut canvas = outer.part(2, 1, width, height);
-        let x = canvas.text(0, 0, "bytes ", theme.dim());
+        let x = canvas.text(0, 0, t!("bytes "), theme.dim());
         self.text.view(theme, &mut canvas, x, 0);
         let framing = at.settings.transport.framing();
         let rows = if self.text.text().trim().is_empty() {
             vec![
-                plain("such as 01 03 03 EA 00 01: unit, function, address, count; or a line of a log", theme.dim()),
-                plain("the check that the line needs is added", theme.dim()),
+                plain(t!("such as 01 03 03 EA 00 01: unit, function, address, count; or a line of a log"), theme.dim()),
+                plain(t!("the check that the line needs is added"), theme.dim()),
             ]
         } else {
             match self.ready(framing) {
@@ -102,7 +106,7 @@ impl Send {
             canvas.text_right(
                 width,
                 0,
-                &format!(" {} more lines: enlarge", rows.len() - usize::from(room)),
+                &t!(" {count} more lines: enlarge", count = rows.len() - usize::from(room)),
                 theme.strong(),
             );
         }
@@ -116,8 +120,8 @@ impl Send {
         if let Some(problem) = problem {
             canvas.text(0, last.saturating_sub(1), &fit(&format!("! {problem}"), width), theme.trouble());
         }
-        let check = if self.bare { "with its check" } else { "as typed, without check" };
-        canvas.text(0, last, &format!("⏎ send   Tab {check}   Esc close"), theme.strong());
+        let check = if self.bare { t!("with its check") } else { t!("as typed, without check") };
+        canvas.text(0, last, &t!("⏎ send   Tab {check}   Esc close", check), theme.strong());
     }
 }
 
@@ -125,8 +129,8 @@ impl Ready {
     fn rows(&self, cx: &ViewContext, bare: bool, width: u16) -> Vec<Row> {
         let theme = cx.theme;
         let added = match (bare, self.added.is_empty()) {
-            (true, _) => "as typed, nothing added".to_owned(),
-            (false, true) => "it has its check".to_owned(),
+            (true, _) => t!("as typed, nothing added").to_owned(),
+            (false, true) => t!("it has its check").to_owned(),
             (false, false) => self.added.clone(),
         };
         let mut rows = vec![plain(fit_words(&added, width), theme.normal())];
@@ -137,9 +141,10 @@ impl Ready {
         }
         if rows.len() < 4 {
             let bytes = broken(
-                &format!(
-                    "sent as {}",
-                    super::super::frames::bytes_text(self.dissection.framing.unwrap_or(Framing::Rtu), &self.frame)
+                &t!(
+                    "sent as {bytes_text}",
+                    bytes_text =
+                        super::super::frames::bytes_text(self.dissection.framing.unwrap_or(Framing::Rtu), &self.frame)
                 ),
                 width,
             );
@@ -157,17 +162,19 @@ fn dress(typed: &hex_input::ParsedInput, framing: Framing) -> (Vec<u8>, String) 
         Framing::Rtu => {
             let whole = frame::with_crc(bytes);
             let crc = hex(&whole[bytes.len()..]);
-            (whole, format!("+ CRC {crc}"))
+            (whole, t!("+ CRC {crc}", crc))
         }
         Framing::Ascii if typed.framing == Some(Framing::Ascii) => (bytes.clone(), String::new()),
-        Framing::Ascii => (ascii::encode(bytes), format!("+ LRC {:02X}, as : hex CR LF", ascii::lrc(bytes))),
+        Framing::Ascii => {
+            (ascii::encode(bytes), t!("+ LRC {lrc}, as : hex CR LF", lrc = format!("{:02X}", ascii::lrc(bytes))))
+        }
         Framing::Mbap if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) => {
             (bytes.clone(), String::new())
         }
         Framing::Mbap => {
             let whole = frame::with_mbap(TRANSACTION, bytes);
             let header = hex(&whole[..6]);
-            (whole, format!("+ header {header}"))
+            (whole, t!("+ header {header}", header))
         }
     }
 }
