@@ -14,7 +14,6 @@ mod window;
 #[cfg(test)]
 mod tests;
 
-use crate::t;
 use std::path::PathBuf;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -33,9 +32,11 @@ use crate::{
         event::LineState,
         line_minute::LineMinute,
         line_report::LineReport,
+        number::to_u16,
         role::Role,
         snapshot::{DeviceState, LineStatus, Snapshot},
     },
+    t,
     ui::{
         UiAction, ViewContext,
         keys::{Hint, Key, char, code, find, hints},
@@ -219,7 +220,7 @@ impl TabView for Bus {
             Page::Line => {
                 let rows = line::rows(cx, &at, width);
                 rows::draw(cx, &mut page, &rows, self.scroll.first(rows.len(), self.room(cx) - 1));
-                self.day(cx, &mut page, rows.len() as u16);
+                self.day(cx, &mut page, to_u16(rows.len()));
             }
             Page::Plan => self.plan.view(cx, &at, &mut page),
             Page::Frames => self.frames.view(cx, &at, &mut page),
@@ -253,7 +254,7 @@ impl Bus {
     /// So many lines on, around the end.
     fn choose_line(&mut self, cx: &ViewContext, by: isize) {
         let count = cx.def().lines.len().max(1) as isize;
-        self.line = LineId((self.line.index() as isize + by).rem_euclid(count) as u16);
+        self.line = LineId(to_u16((self.line.index() as isize + by).rem_euclid(count)));
         (self.scroll, self.plan) = (Scroll::default(), plan::Plan::default());
         self.frames.forget();
         self.test.first = None;

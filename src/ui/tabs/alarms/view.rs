@@ -1,15 +1,16 @@
 //! How the alarms tab looks: the views and what is in them, the list, what is suppressed, and the guidance below.
 
-use crate::t;
-use crate::text::translate;
 use ratatui::{Frame, layout::Rect};
 
 use super::{Alarms, Page, guidance, handover::suppressed_words, is_on, list::Row};
 use crate::{
     plant::{
         def::Subject,
+        number::to_u16,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
+    t,
+    text::translate,
     ui::{
         ViewContext,
         chrome::history_text,
@@ -46,9 +47,9 @@ pub(super) fn draw(tab: &Alarms, cx: &ViewContext, frame: &mut Frame, area: Rect
 fn history_trouble(cx: &ViewContext, canvas: &mut Canvas) -> u16 {
     let rows = trouble_rows(cx, canvas.width(), canvas.height());
     for (y, line) in rows.iter().enumerate() {
-        canvas.text(1, y as u16, line, cx.theme.trouble());
+        canvas.text(1, to_u16(y), line, cx.theme.trouble());
     }
-    rows.len() as u16
+    to_u16(rows.len())
 }
 
 fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<String> {
@@ -60,7 +61,7 @@ fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<String> {
 
 /// Rows of a list on a tab of this size.
 pub(super) fn room(cx: &ViewContext, width: u16, height: u16) -> usize {
-    let height = height.saturating_sub(trouble_rows(cx, width, height).len() as u16);
+    let height = height.saturating_sub(to_u16(trouble_rows(cx, width, height).len()));
     usize::from(height.saturating_sub(HEAD + guide(height))).max(1)
 }
 
@@ -148,7 +149,7 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         }
     }
     // Rows that the list leaves empty belong to the guidance, as far as it needs them.
-    let free = height.saturating_sub(2 + rows.len().min(room) as u16);
+    let free = height.saturating_sub(2 + to_u16(rows.len().min(room)));
     let needs = guidance::height(&guidance::rows(cx, rows[place].alarm), width);
     let guide = guide(height + 1).max(needs.min(free));
     let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);
@@ -226,7 +227,7 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         canvas.text_right(end, 0, &t!("{count} more below", count = all.len() - first - room), theme.strong());
     }
     let now = suppressed_words(cx, &all[place]);
-    let free = height.saturating_sub(1 + all.len().min(room) as u16);
+    let free = height.saturating_sub(1 + to_u16(all.len().min(room)));
     let needs = guidance::height(&guidance::rows_of_any(cx, all[place].id, now.clone()), width);
     let guide = guide.max(needs.min(free));
     let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);

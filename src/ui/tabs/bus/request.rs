@@ -202,7 +202,7 @@ impl Form {
         let top = if framing == Framing::Mbap { 255 } else { 247 };
         // Unit 0 of a serial line is everybody: it can be written to, and answers nothing.
         let least = if framing == Framing::Mbap || self.tried == Tried::Request { 0 } else { 1 };
-        let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(|unit| to_u8(unit));
+        let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(to_u8);
         match self.tried {
             Tried::Bytes | Tried::Request => {
                 let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;

@@ -34,7 +34,7 @@ pub fn address(text: &str, table: Table) -> Result<u16, String> {
     let modicon = matches!(digits.len(), 5 | 6) && digits.bytes().all(|byte| byte.is_ascii_digit());
     let named =
         TABLES.into_iter().find(|table| digits.starts_with(char::from(b'0' + table.digit()))).filter(|_| modicon);
-    let Some(named) = named else { return number(digits, t!("address"), 0..=65_535).map(|address| to_u16(address)) };
+    let Some(named) = named else { return number(digits, t!("address"), 0..=65_535).map(to_u16) };
     if named != table {
         return Err(t!(
             "address: {digits} is of the table {named}, this is {table}",
