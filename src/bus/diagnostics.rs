@@ -43,7 +43,7 @@ pub enum Ask {
 pub enum StepResult {
     /// The answer to a message, or why there is none, and both as they were on the wire.
     Answer(Result<Vec<u8>, Fault>, Arc<Exchange>),
-    /// All bytes that result back for raw ones.
+    /// Every byte that came back, after raw bytes were sent.
     Bytes(Vec<u8>, Option<Duration>),
 }
 
@@ -355,8 +355,8 @@ fn loopback_words(findings: &[Finding], sent: u32) -> String {
     let refused = findings.iter().any(|finding| matches!(finding, Finding::Failed { fault: Fault::Exception(_), .. }));
     match replies.len() {
         0 if refused => "the unit answers, but does not have loopbacks: line and unit work".to_owned(),
-        0 => format!("none of {sent} result back"),
-        back => format!("{back} of {sent} result back, {least:.1} to {most:.1} ms"),
+        0 => format!("none of {sent} came back"),
+        back => format!("{back} of {sent} came back, {least:.1} to {most:.1} ms"),
     }
 }
 

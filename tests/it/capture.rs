@@ -59,13 +59,13 @@ fn check(lines: &[String], expect: &[&[&str]]) {
 }
 
 const NAMED: [&[&str]; 8] = [
-    &["QueryRequest", "Read Holding Registers"],
+    &["Query", "Read Holding Registers"],
     &["Response", "Read Holding Registers"],
-    &["QueryRequest", "Write Single Register"],
+    &["Query", "Write Single Register"],
     &["Response", "Write Single Register"],
-    &["QueryRequest", "Write Multiple Registers"],
+    &["Query", "Write Multiple Registers"],
     &["Response", "Write Multiple Registers"],
-    &["QueryRequest", "Read Coils"],
+    &["Query", "Read Coils"],
     &["Response", "Read Coils", "Exception returned"],
 ];
 

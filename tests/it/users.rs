@@ -184,7 +184,7 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
         (None, "this tag requires a second user".to_owned()),
         (Some(("TOM", PASSWORD)), "the second user must be another user".to_owned()),
         (Some(("vera", PASSWORD)), "vera cannot approve this: it is for a technician".to_owned()),
-        (Some(("mia", PASSWORD)), "mia must first choose a password of his own".to_owned()),
+        (Some(("mia", PASSWORD)), "mia must choose a new password first".to_owned()),
         (Some(("sue", "wrong")), wait(1)),
         (Some(("nobody-here", PASSWORD)), wait(1)),
     ];

@@ -97,7 +97,7 @@ pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError
     timeout(WELCOME_MAX, opened).await.unwrap_or(Err(AttachError::Silent))
 }
 
-/// SessionStatus and snapshot, with which a session begins.
+/// The session status and the snapshot with which a session begins.
 async fn first(line: &mut Line) -> Result<(SessionStatus, Arc<Snapshot>), AttachError> {
     let mut status = SessionStatus::default();
     loop {

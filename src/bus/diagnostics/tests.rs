@@ -94,9 +94,9 @@ fn a_foreign_unit_that_chatters_is_not_every_unit() {
 fn loopbacks_are_counted() {
     let diagnostic = Diagnostic::Loopback { unit: 1, data: 0xA537, count: 3 };
     let all = run(diagnostic.clone(), |request| Ok(request.to_vec()));
-    assert_eq!(verdict(&all), "3 of 3 result back, 12.0 to 12.0 ms");
+    assert_eq!(verdict(&all), "3 of 3 came back, 12.0 to 12.0 ms");
     let none = run(diagnostic, |_| Err(Fault::Timeout));
-    assert_eq!(verdict(&none), "none of 3 result back");
+    assert_eq!(verdict(&none), "none of 3 came back");
     let diagnostic = Diagnostic::Loopback { unit: 1, data: 0, count: 3 };
     let without = run(diagnostic, |_| Err(Fault::Exception(ExceptionCode(1))));
     assert!(verdict(&without).starts_with("the unit answers"), "{}", verdict(&without));

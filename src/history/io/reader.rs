@@ -2,7 +2,7 @@
 //! never all places for one terminal.
 //!
 //! ```text
-//!   QueryRequest ──> queue ──> run ──┬── query, connection, time limit ──> answer
+//!   query ──> queue ──> run ──┬── query, connection, time limit ──> answer
 //!                             └── query, connection, time limit ──> answer
 //!   writer: a fresh store after every opening ──>   <── "commit first", "this cannot be read"
 //! ```

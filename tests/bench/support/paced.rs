@@ -105,15 +105,16 @@ fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 
         while let Some(request) = receiver.take() {
             let over = (began + character * request.len() as u32).max(now);
             began = over;
-            let heard = Some(&request[..request.len() - 2]).filter(|message| {
+            let received = Some(&request[..request.len() - 2]).filter(|message| {
                 let is_dead =
                     |unit: &u8| dead.load(Ordering::Relaxed) & 1u64.checked_shl((*unit).into()).unwrap_or(0) != 0;
                 !message.first().is_some_and(is_dead)
             });
-            let Some(answer) = heard.and_then(super::answer) else { continue };
+            let Some(answer) = received.and_then(super::answer) else { continue };
+            // Before its last byte: who has read it finds it counted.
+            served[usize::from(answer[0] % 64)].fetch_add(1, Ordering::Relaxed);
             let Ok(end) = say(&mut line, &with_crc(&answer), over + serial.silence(), character) else { return };
             quiet = end + serial.silence();
-            served[usize::from(answer[0] % 64)].fetch_add(1, Ordering::Relaxed);
         }
     }
 }
