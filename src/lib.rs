@@ -62,6 +62,33 @@
 //! 7. Every queue, list, wait and retry has a bound, and an overflow that an operator can see.
 //! 8. UTC microseconds are stored; local time is a matter of display and of reports.
 //!
+//! # Glossary
+//!
+//! | word | meaning here |
+//! |---|---|
+//! | plant, line, device, unit | what one plant file describes; a serial port or TCP endpoint; a controller or meter on it; its Modbus address |
+//! | tag, block | one value of a device by name; registers that one request reads |
+//! | sample, quality | value with quality and time; good, uncertain or bad (OPC UA) |
+//! | snapshot | everything that is true now, immutable, for terminals and the history |
+//! | source frame | the request and response that a sample was decoded from |
+//! | command | what an operator asks of the plant, with a status from pending to verified, refused, failed or not confirmed |
+//! | session request | what a user asks of access control: log in, log out, change users, lock |
+//! | expected value | what a write must still find, because its operator saw it |
+//! | condition, alarm, alarm event | what is evaluated; its state (ISA-18.2); a transition that the journal keeps |
+//! | suppressed | shelved, suppressed by design, or out of service |
+//! | first-out group | alarms raised within a window, shown under the first |
+//! | interlock, actuator | what must hold before a command; what a command moves, with its feedback |
+//! | mimic, faceplate, pen, trend | the picture of the process; a controller's values; a curve; its chart |
+//! | SV, PV, MV | setpoint, measured value and output, as the controllers print them |
+//! | poll class | critical, normal or background: which polls an overloaded line skips last |
+//! | backoff | a device that does not answer is asked at growing intervals |
+//! | outstanding reply | a response that may still come after its timeout; it is never taken for another |
+//! | gap registers | registers read only because they stand between two blocks |
+//! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
+//! | epoch | counts the steps of the clock, so that records of a doubled time can be told apart |
+//! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
+//! | scenario, fault, drill | a scripted plant for tests; what a trainer injects; a scenario that evaluates an operator |
+//!
 //! # Modules, in reading order
 //!
 //! They form a line, not a graph: a module uses only what stands above it. A test holds this and law 4.
