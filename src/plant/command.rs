@@ -330,7 +330,7 @@ pub struct WriteJob {
     pub unlock: Option<(TagId, f64)>,
     /// Read the value back afterwards.
     pub verify: bool,
-    /// It switches something off and goes before all that waits, see [`super::interlock::is_stop`].
+    /// It switches something off and goes before all that waits, see `super::interlock::is_stop`.
     pub urgent: bool,
 }
 

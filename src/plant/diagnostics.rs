@@ -58,7 +58,7 @@ pub enum Diagnostic {
 }
 
 impl Diagnostic {
-    /// Can a line carry it? `Err` says why not. A line is never busy with one step for longer than [`WAIT_MAX`].
+    /// Can a line carry it? `Err` says why not. A line is never busy with one step for longer than `WAIT_MAX`.
     pub fn check(&self) -> Result<(), String> {
         let within = |what: &str, found: usize, most: usize| match found {
             0 => Err(format!("{what}: none, expected 1 to {most}")),

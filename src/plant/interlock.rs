@@ -115,7 +115,7 @@ impl ControlLogic {
     }
 
     /// The interlock for which this command is certainly without effect and is not to be sent. What will be sent decides, not
-    /// what was typed: `value` is as the device will hold it, [`super::scale::held`].
+    /// what was typed: `value` is as the device will hold it, `super::scale::held`.
     pub fn refusal(&self, tag: TagId, value: f64, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
         let blocks = |lock: &&InterlockDef| lock.refuse && lock.status(sample(lock.of)) == InterlockStatus::Blocked;
         self.interlocks_of(tag, value).find(blocks)

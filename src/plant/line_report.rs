@@ -41,7 +41,7 @@ pub struct LineReport {
 }
 
 impl LineReport {
-    /// Was none of the latest answers of a device a value, as [`super::ne107::Reason::NoValues`] has it?
+    /// Was none of the latest answers of a device a value, as `super::ne107::Reason::NoValues` has it?
     pub fn gives_no_values(&self, device: DeviceId) -> bool {
         self.devices.iter().any(|(id, stats)| *id == device && stats.fails_since(super::ne107::NO_VALUES_AFTER))
     }

@@ -51,7 +51,7 @@ pub struct PeriodMetrics {
     pub most: u64,
     /// Time in flood, in whole seconds.
     pub flood: Duration,
-    /// The most frequent alarms, the most frequent first; at most [`TOP`].
+    /// The most frequent alarms, the most frequent first; at most `TOP`.
     pub top: Vec<Frequent>,
     /// Alarms that chattered: raised three times or more within 60 s.
     pub chattering: Vec<Named>,

@@ -95,7 +95,7 @@ impl AlarmMonitor {
         AlarmMonitor::new(Span::Running, second(at))
     }
 
-    /// Counts what lies from `from` until before `until`. It is fed from [`LEAD`] before `from` on.
+    /// Counts what lies from `from` until before `until`. It is fed from `LEAD` before `from` on.
     pub fn of_period(from: Timestamp, until: Timestamp) -> AlarmMonitor {
         let start = second(from) - LEAD.as_secs() as i64;
         let mut monitor = AlarmMonitor::new(Span::Period { from, until }, start);
