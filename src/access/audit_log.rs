@@ -17,7 +17,7 @@ use crate::plant::{
     visible::acts,
 };
 
-/// The start of the chain in version 1.
+/// The start of the chain in version 1, whose entries have the same format.
 const START_V1: [u8; 32] = *b"sightglass, the book of deeds, 1";
 /// The start of the chain: version 2 of the format.
 pub const START: ChainHash = ChainHash { number: 0, hash: *b"sightglass audit log, version 2." };
@@ -216,10 +216,9 @@ impl Check {
         if expected < entry.n {
             return Err(format!("found entry {}, expected {expected}: lines before it were cut out or moved", entry.n));
         }
-        if self.last == START && tied(START_V1, body.as_bytes()) == hash {
-            return Err("this audit log has the format of an earlier version: move it to another folder".to_owned());
-        }
-        if tied(self.last.hash, body.as_bytes()) != hash {
+        // A log that an earlier version began goes on in the same chain.
+        let is_first_of_v1 = || self.last == START && tied(START_V1, body.as_bytes()) == hash;
+        if tied(self.last.hash, body.as_bytes()) != hash && !is_first_of_v1() {
             return Err("the hash does not fit: this line was changed or put in".to_owned());
         }
         if self.head.is_some_and(|head| head.number == entry.n && head.hash != hash) {

@@ -52,6 +52,20 @@ fn an_unchanged_log_is_whole_and_readable() {
 }
 
 #[test]
+fn a_log_of_version_1_goes_on_in_its_chain() {
+    let start = ChainHash { number: 0, hash: START_V1 };
+    let (first, begun) = super::line(start, &record(1));
+    let (second, last) = super::line(begun, &record(2));
+    let lines = [&first, &second].map(|line| line.trim_end_matches('\n').to_owned());
+    assert_eq!(verify(&lines, Some(last), &[begun]).unwrap().last, last);
+    let moved = [lines[1].clone(), lines[0].clone()];
+    assert_eq!(verify(&moved, Some(last), &[]).unwrap_err().line, 1);
+    // The start of version 1 holds for the first entry only.
+    let forged = super::line(ChainHash { number: 1, ..start }, &record(2)).0.trim_end_matches('\n').to_owned();
+    assert_eq!(verify(&[lines[0].clone(), forged], Some(last), &[]).unwrap_err().line, 2);
+}
+
+#[test]
 fn a_rewritten_log_is_found_by_the_note_and_by_the_history() {
     let (lines, chain_hashes) = audit_log(5);
     let forged = ChainHash { number: 3, hash: [1; 32] };
