@@ -33,11 +33,13 @@ impl Found {
             self.texts.insert(text);
         }
     }
-    fn within_label(&mut self, name: &syn::Ident, visit: impl FnOnce(&mut Self)) {
-        let before = std::mem::replace(
-            &mut self.in_label,
-            ["label", "word", "words", "message", "advice", "mode"].iter().any(|label| name == label),
-        );
+    /// A label of a state is a `&'static str` that is translated where it is drawn.
+    fn within(&mut self, signature: &syn::Signature, visit: impl FnOnce(&mut Self)) {
+        let is_label =
+            ["label", "word", "words", "message", "advice", "mode"].iter().any(|name| signature.ident == name);
+        let is_text = matches!(&signature.output, syn::ReturnType::Type(_, of)
+            if matches!(&**of, syn::Type::Reference(text) if text.lifetime.as_ref().is_some_and(|of| of.ident == "static")));
+        let before = std::mem::replace(&mut self.in_label, is_label && is_text);
         visit(self);
         self.in_label = before;
     }
@@ -50,10 +52,17 @@ impl<'a> Visit<'a> for Found {
         }
     }
     fn visit_item_fn(&mut self, function: &'a ItemFn) {
-        self.within_label(&function.sig.ident, |found| visit::visit_item_fn(found, function));
+        self.within(&function.sig, |found| visit::visit_item_fn(found, function));
     }
     fn visit_impl_item_fn(&mut self, function: &'a ImplItemFn) {
-        self.within_label(&function.sig.ident, |found| visit::visit_impl_item_fn(found, function));
+        self.within(&function.sig, |found| visit::visit_impl_item_fn(found, function));
+    }
+    fn visit_attribute(&mut self, _: &'a Attribute) {}
+    fn visit_item_macro(&mut self, item: &'a syn::ItemMacro) {
+        if item.ident.as_ref().is_some_and(|name| name == "motions") {
+            literals(item.mac.tokens.clone()).into_iter().for_each(|text| self.add(text));
+        }
+        visit::visit_item_macro(self, item);
     }
     fn visit_lit_str(&mut self, text: &'a LitStr) {
         if self.in_label {
@@ -101,7 +110,7 @@ impl<'a> Visit<'a> for Found {
                 self.add(text.value());
             }
         }
-        if found.path.is_ident("tabs") || found.path.is_ident("motions") || found.path.is_ident("macro_rules") {
+        if found.path.is_ident("tabs") || found.path.is_ident("motions") {
             literals(tokens.clone()).into_iter().for_each(|text| self.add(text));
         }
         // Arguments of any macro may hold texts too.
