@@ -16,25 +16,16 @@ mod view;
 #[cfg(test)]
 mod tests;
 
-use crate::t;
-use crossterm::event::KeyEvent;
-use jiff::Timestamp;
-use ratatui::{Frame, layout::Rect};
-
-use super::TabView;
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError},
     plant::{
         alarm::AlarmState,
         def::{AlarmClass, AlarmId, Priority, Subject},
-        snapshot::{ActiveAlarm, Snapshot, SuppressedAlarm},
+        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
-        UiAction, ViewContext,
-        keys::{Hint, find},
-        last_frame::Rows,
-        modal::{Faceplate, Guidance, Modal, Prompt, Why, faceplate::device_text},
-        widgets::list::{Motion, Selected, first},
+        keys::find,
+        modal::{Guidance, faceplate::device_text},
     },
 };
 use filter::Filter;

@@ -16,37 +16,16 @@ mod tests;
 
 use std::path::PathBuf;
 
-use crossterm::event::{KeyCode, KeyEvent};
-use jiff::SignedDuration;
-use ratatui::{Frame, layout::Rect};
-
 pub use window::Window;
 
 use self::keys::{Action, table};
-use super::{Tab, TabView, periodic_query::PeriodicQuery};
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError},
-    plant::{
-        command::CommandKind,
-        def::{DeviceDef, LineDef, LineId},
-        event::LineState,
-        line_minute::LineMinute,
-        line_report::LineReport,
-        number::to_u16,
-        role::Role,
-        snapshot::{DeviceState, LineStatus, Snapshot},
-    },
-    t,
+    plant::{event::LineState, line_minute::LineMinute, line_report::LineReport, snapshot::LineStatus},
     ui::{
-        UiAction, ViewContext,
-        keys::{Hint, Key, char, code, find, hints},
-        last_frame::Rows,
-        modal::{Modal, Notice, Settings},
-        widgets::{
-            line_trend::{self, line_trend},
-            list::{Motion, Scroll, motions},
-            text::{Canvas, between, fit_words, running, width},
-        },
+        keys::{find, hints},
+        modal::Settings,
+        widgets::line_trend::{self, line_trend},
     },
 };
 use test::Tried;

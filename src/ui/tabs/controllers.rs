@@ -16,11 +16,6 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-use crate::t;
-use crossterm::event::KeyEvent;
-use jiff::SignedDuration;
-use ratatui::{Frame, layout::Rect};
-
 pub use device::signal_mark;
 pub use keys::Action;
 
@@ -32,26 +27,11 @@ use self::{
     sets::Source,
     table::Table,
 };
-use super::{Tab, TabView, periodic_query::PeriodicQuery};
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError, Query, Series},
-    plant::{
-        command::CommandKind,
-        def::{DeviceDef, DeviceId, ProgramDef, TagId},
-        number::to_u16,
-        parameter_set,
-        snapshot::Snapshot,
-    },
-    ui::{
-        UiAction, ViewContext,
-        keys::{Hint, find, hints},
-        last_frame::Rows,
-        modal::{Confirm, Faceplate, Modal, Prompt},
-        widgets::{
-            list::{Motion, Words},
-            text::Canvas,
-        },
-    },
+    history::Series,
+    plant::{def::ProgramDef, parameter_set},
+    ui::keys::{find, hints},
 };
 
 /// The small trend is asked for again after this time.

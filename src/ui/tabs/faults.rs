@@ -5,28 +5,19 @@ mod view;
 #[cfg(test)]
 mod tests;
 
-use crate::t;
-use crate::text::translate;
 use std::collections::BTreeMap;
 
-use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame, layout::Rect, style::Style};
-
-use super::TabView;
+use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::snapshot::Snapshot,
     sim::{
         drill::{Progress, SimCommand, Status},
         faults::{Fault, FaultTarget},
     },
     ui::{
-        Effect, UiAction, ViewContext,
+        Effect,
         extension::{self, Extension, ExtensionMessage},
-        keys::{self, Hint, Key, char, code},
-        last_frame::Rows,
         rights, session_lock,
         tabs::bus,
-        widgets::text::running,
     },
 };
 

@@ -2,22 +2,12 @@
 
 mod view;
 
-use crate::t;
 use std::sync::Arc;
 
-use crossterm::event::{KeyCode, KeyEvent};
-use jiff::Timestamp;
-use ratatui::{Frame, layout::Rect};
-
-use super::{Tab, TabView};
+use crate::ui::tabs::prelude::*;
 use crate::{
     access::{SessionRequest, SessionStatus, session_request::Secret},
-    plant::snapshot::Snapshot,
-    ui::{
-        UiAction, ViewContext,
-        keys::{self, Hint, Key, char},
-        modal::user_form::{Purpose, UserForm},
-    },
+    ui::modal::user_form::{Purpose, UserForm},
 };
 
 /// What a key means while a user is logged in.

@@ -1,27 +1,16 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
-use crate::t;
-use crossterm::event::{KeyCode, KeyEvent};
-use jiff::SignedDuration;
-use ratatui::{Frame, layout::Rect};
-
-use super::{Tab, TabView};
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError, Query, Series},
+    history::Series,
     plant::{
-        def::{MimicCommand, MimicItem, MimicRect, TagId},
+        def::{MimicCommand, MimicItem, MimicRect},
         number::to_u32,
-        role::Role,
-        snapshot::Snapshot,
     },
     ui::{
-        UiAction, ViewContext, interlock,
-        keys::{self, Hint, Key, char, code},
-        modal::{Choice, Confirm, Faceplate, Modal, Notice, Why},
-        widgets::{
-            mimic::{CanvasScale, list, panel, pipe, place, tags, tank::Tank, title, trend, unit},
-            text::{Canvas, fit},
-        },
+        interlock,
+        modal::Choice,
+        widgets::mimic::{CanvasScale, list, panel, pipe, place, tags, tank::Tank, title, trend, unit},
     },
 };
 

@@ -4,6 +4,7 @@ pub(crate) mod alarms;
 pub(crate) mod bus;
 pub(crate) mod controllers;
 mod periodic_query;
+mod prelude;
 pub(crate) mod faults;
 pub(crate) mod login;
 pub(crate) mod mimic;

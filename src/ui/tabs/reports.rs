@@ -6,24 +6,13 @@ mod view;
 #[cfg(test)]
 mod tests;
 
-use crate::t;
 use std::path::PathBuf;
 
-use crossterm::event::{KeyCode, KeyEvent};
-use jiff::{SignedDuration, Timestamp};
-use ratatui::{Frame, layout::Rect};
-
-use super::{Outgoing, Tab, TabView, periodic_query::PeriodicQuery};
+use super::Outgoing;
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError, Query},
-    plant::{def::CsvDialect, role::Role, snapshot::Snapshot},
+    plant::def::CsvDialect,
     report::{self, Period, ShiftReport},
-    ui::{
-        UiAction, ViewContext,
-        keys::{self, Hint, Key, char, code},
-        modal::{Modal, Prompt, Why},
-        widgets::list::{Motion, Scroll, motions},
-    },
 };
 
 /// What a key means here.

@@ -11,24 +11,17 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crossterm::event::KeyEvent;
-use jiff::{SignedDuration, Timestamp};
-use ratatui::{Frame, layout::Rect};
-
 pub use self::keys::{Action, KEYS};
 use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
-use super::{Tab, TabView, periodic_query::PeriodicQuery};
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError, Query, Series},
+    history::Series,
     plant::{
-        def::{Pen, TagId, TrendGroup},
+        def::{Pen, TrendGroup},
         record::{AlarmEvent, AlarmRecord},
-        snapshot::Snapshot,
     },
     ui::{
-        UiAction, ViewContext,
-        keys::{Hint, find, hints},
-        modal::Why,
+        keys::{find, hints},
         widgets::chart::{self, trace::Trace},
     },
 };

@@ -3,24 +3,14 @@
 mod audit;
 mod view;
 
-use crate::t;
-use crossterm::event::KeyEvent;
-use ratatui::{Frame, layout::Rect};
-
 use audit::{Action as AuditAction, Audit};
 
-use super::TabView;
+use crate::ui::tabs::prelude::*;
 use crate::{
     access::UserRow,
-    history::{Answer, HistoryError},
-    plant::{role::Role, snapshot::Snapshot},
     ui::{
-        UiAction, ViewContext,
-        keys::{self, Hint, Key, char},
-        last_frame::Rows,
-        modal::{Modal, Notice, UserForm, user_form::Purpose},
+        modal::{UserForm, user_form::Purpose},
         session_lock,
-        widgets::list::{Motion, Selected, motions},
     },
 };
 

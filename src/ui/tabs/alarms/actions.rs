@@ -1,21 +1,14 @@
 //! What an operator does with alarms: the windows that ask, and the commands that need no query.
 
-use crate::t;
-use std::time::Duration;
-
 use super::super::reports::period;
+use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         alarm::{AlarmCommand, AlarmState},
-        command::CommandKind,
         def::AlarmId,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
-    ui::{
-        UiAction, ViewContext,
-        modal::{Confirm, Modal, Notice, Reason, confirm::subject, reason::spelled},
-        widgets::text::{clock, running},
-    },
+    ui::modal::{Reason, confirm::subject, reason::spelled},
 };
 
 /// Times that are offered for the shelf, minutes.

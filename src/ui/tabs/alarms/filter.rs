@@ -1,15 +1,11 @@
 //! Which alarms of the audit log the list shows: by priority, state, area and words; pure.
 
-use crate::t;
-use crate::text::translate;
-use crate::{
-    plant::{
-        alarm::{AlarmState, manager::subject_name},
-        def::{AlarmDef, PlantDef, Priority},
-        snapshot::ActiveAlarm,
-    },
-    ui::{ViewContext, widgets::list::Words},
+use crate::plant::{
+    alarm::{AlarmState, manager::subject_name},
+    def::{AlarmDef, PlantDef, Priority},
+    snapshot::ActiveAlarm,
 };
+use crate::ui::tabs::prelude::*;
 
 /// What may be typed, for the entry window.
 pub const FORMS: &str = "words of tag, text, state or who acknowledged:  TIC-1 high   unack   anna";

@@ -1,27 +1,20 @@
 //! What to do about an alarm: cause, effect, action, the time there is left, and where to look.
 
-use crate::t;
-use ratatui::style::Style;
-
+use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         alarm::AlarmState,
         def::{AlarmDef, AlarmId, Subject},
-        number::to_u16,
         snapshot::ActiveAlarm,
         station::STATION,
     },
     ui::{
-        ViewContext,
         modal::{
             confirm::subject,
             faceplate::{device_text, line_state_text},
         },
         rights,
-        widgets::{
-            text::{self, Canvas, between, clock, fit_words, running, wrap},
-            value,
-        },
+        widgets::text::{self},
     },
 };
 

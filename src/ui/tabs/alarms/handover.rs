@@ -1,36 +1,18 @@
 //! The handover: what the next shift must know, as the plant stands and as the shift has left it, and who took it over.
 
-use crate::t;
-use crate::text::translate;
-use jiff::Timestamp;
-use ratatui::style::Style;
-
-use super::{
-    super::{Tab, periodic_query::PeriodicQuery, reports::period},
-    journal::action_text,
-    span,
-};
+use super::{super::reports::period, journal::action_text, span};
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError, Query},
     plant::{
         alarm::AlarmState,
         commands::{HAND_OVER, TAKE_OVER},
         event::LineState,
-        number::to_u16,
         record::ActionRecord,
         sample::Quality,
-        snapshot::{DeviceState, SuppressedAlarm},
+        snapshot::SuppressedAlarm,
     },
     report::Period,
-    ui::{
-        UiAction, ViewContext,
-        modal::{confirm::subject, faceplate::device_text},
-        widgets::{
-            list::{Motion, Scroll},
-            text::{Canvas, between, clock, fit_words, moment, running, wrap},
-            value,
-        },
-    },
+    ui::modal::{confirm::subject, faceplate::device_text},
 };
 
 /// Most actions that are read; the list says when there are more.

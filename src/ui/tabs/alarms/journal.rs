@@ -1,28 +1,10 @@
 //! The journal: steps of alarms and actions of operators in one list, searched by words and by time.
 
-use crate::t;
-use crate::text::translate;
-use jiff::{SignedDuration, Timestamp};
-use ratatui::style::Style;
-
-use super::{
-    super::{Tab, periodic_query::PeriodicQuery, reports::period},
-    span,
-};
+use super::{super::reports::period, span};
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError, Query},
-    plant::{
-        number::to_u16,
-        record::{ActionRecord, AlarmRecord},
-    },
+    plant::record::{ActionRecord, AlarmRecord},
     report::Period,
-    ui::{
-        UiAction, ViewContext,
-        widgets::{
-            list::{Motion, Scroll, Words},
-            text::{Canvas, fit_words, moment, pad},
-        },
-    },
 };
 
 /// Without a chosen period the journal reaches back so far.

@@ -1,16 +1,8 @@
 //! The keys of the alarms tab, page by page.
 
-use crate::t;
-use crossterm::event::KeyCode;
-
 use super::Page;
-use crate::{
-    plant::role::Role,
-    ui::{
-        keys::{Hint, Key, char, code, hints},
-        widgets::list::{Motion, motions},
-    },
-};
+use crate::ui::keys::hints;
+use crate::ui::tabs::prelude::*;
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

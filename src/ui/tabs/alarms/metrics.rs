@@ -1,33 +1,17 @@
 //! How good the alarm system is: every figure of the meter beside target and limit, and the alarms to look into.
 
-use crate::t;
-use crate::text::translate;
-use std::time::Duration;
-
-use ratatui::style::Style;
-
-use super::{
-    super::{Tab, periodic_query::PeriodicQuery},
-    span,
-};
+use super::span;
+use crate::ui::tabs::prelude::*;
 use crate::{
-    history::{Answer, HistoryError, Query},
-    plant::{
-        alarm::{
-            AlarmState, PeriodMetrics,
-            metrics::{METRIC_TARGETS, Verdict},
-        },
-        number::to_u16,
+    plant::alarm::{
+        AlarmState, PeriodMetrics,
+        metrics::{METRIC_TARGETS, Verdict},
     },
     report::{Period, alarm_metrics},
     ui::{
-        UiAction, ViewContext,
         modal::confirm::subject,
         theme::Theme,
-        widgets::{
-            list::{Motion, Scroll},
-            text::{self, Canvas, between, clock, fit_words, pad, pad_left, running},
-        },
+        widgets::text::{self},
     },
 };
 

@@ -1,9 +1,8 @@
 //! Which stretch of time a page is about: the present, or a shift that was chosen.
 
-use jiff::SignedDuration;
-
-use super::super::{periodic_query::PeriodicQuery, reports::period};
-use crate::{report::Period, ui::ViewContext};
+use super::super::reports::period;
+use crate::report::Period;
+use crate::ui::tabs::prelude::*;
 
 /// An answer that has not come after so long (real time) counts as lost: a query over weeks may take its time.
 const PATIENCE_S: f64 = 30.0;

@@ -1,26 +1,13 @@
 //! How the alarms tab looks: the views and what is in them, the list, what is suppressed, and the guidance below.
 
-use ratatui::{Frame, layout::Rect};
-
 use super::{Alarms, Page, guidance, handover::suppressed_words, is_on, list::Row};
+use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         def::Subject,
-        number::to_u16,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
-    t,
-    text::translate,
-    ui::{
-        ViewContext,
-        chrome::history_text,
-        modal::confirm::subject,
-        widgets::{
-            list::{first, on_screen},
-            text::{Canvas, between, fit, fit_words, moment, pad, pad_left, running, width, wrap},
-            value,
-        },
-    },
+    ui::{chrome::history_text, modal::confirm::subject},
 };
 
 /// Rows above the list: views, filter, headings.

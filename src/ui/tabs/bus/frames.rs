@@ -1,28 +1,21 @@
 //! Page Frames: what went over the line, newest at the bottom, in words; runs, or is held still.
 
-use crate::t;
 use std::{collections::VecDeque, path::PathBuf};
 
 use super::{
     Place, Window,
     window::{Shown, TextWindow},
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{capture, dissect, filter::Filter, frame::hex},
     plant::{
         def::Framing,
-        number::to_u16,
         traffic::{Frame, Frames},
     },
     ui::{
-        UiAction, ViewContext,
-        last_frame::Rows,
-        modal::{Modal, Prompt},
-        tabs::{Outgoing, Tab},
-        widgets::{
-            list::{self, Motion},
-            text::{Canvas, clock, fit, fit_words, pad, width},
-        },
+        tabs::Outgoing,
+        widgets::list::{self},
     },
 };
 

@@ -2,9 +2,6 @@
 
 mod worries;
 
-use crate::t;
-use crate::text::translate;
-use std::time::Duration;
 use worries::worries;
 
 use super::{
@@ -12,25 +9,16 @@ use super::{
     rows::{self, Flow, Row, bar, number, plain, words},
     state_text,
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::names,
     plant::{
-        def::{DeviceDef, LineDef},
         event::{Fault, LineState},
         line_report::LineReport,
         request_stats::RequestStats,
-        snapshot::DeviceState,
         tag::Poll,
     },
-    ui::{
-        ViewContext,
-        modal::faceplate::retry_text,
-        tabs::controllers::signal_mark,
-        widgets::{
-            spark,
-            text::{between, clock, running, wrap},
-        },
-    },
+    ui::{modal::faceplate::retry_text, tabs::controllers::signal_mark, widgets::spark},
 };
 
 /// A reply that takes this share of the timeout is near it.

@@ -1,31 +1,20 @@
 //! Page Plan: every block of the read plan with its addresses, its cost and how its reads end.
 
-use crate::t;
-use std::time::Duration;
-
 use super::{
     Place, Window,
     line::{grouped, ms, short_ms},
     rows::{self, number, plain, words},
     window::{Shown, TextWindow},
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::names,
     plant::{
         admission::Verdict,
         line_report::{LineReport, PollReport},
-        number::to_u16,
         tag::Poll,
     },
-    ui::{
-        UiAction, ViewContext,
-        last_frame::Rows,
-        modal::{Modal, Why},
-        widgets::{
-            list::{self, Motion},
-            text::{Canvas, between, fit_words, wrap},
-        },
-    },
+    ui::widgets::list::{self},
 };
 
 /// Rows below the table that tell of the selected block.

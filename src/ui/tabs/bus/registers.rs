@@ -1,29 +1,21 @@
 //! The register browser: every register in hex and as numbers, and the selected pair as 32 bits in all four orders.
 
-use crate::t;
-use crate::text::translate;
 use std::collections::BTreeMap;
 
-use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame as Screen, layout::Rect};
+use ratatui::Frame as Screen;
 
 use super::{Place, Window, test};
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::codec,
     plant::{
-        def::LineId,
         diagnostics::{Diagnostic, DiagnosticState, Finding},
-        number::{to_f32, to_u16},
+        number::to_f32,
         tag::{ByteOrder, DataType, Point, Table},
     },
     ui::{
-        UiAction, ViewContext,
-        keys::char,
-        modal::{Modal, Next, window},
-        widgets::{
-            list::{self, Motion},
-            text::{Canvas, fit_words},
-        },
+        modal::{Next, window},
+        widgets::list::{self},
     },
 };
 

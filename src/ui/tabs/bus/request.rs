@@ -2,19 +2,18 @@
 
 mod fields;
 
-use crate::t;
 pub use fields::address;
 use fields::{all_settings, bit, number, register};
-use std::{ops::RangeInclusive, time::Duration};
+use std::ops::RangeInclusive;
 
-use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame as Screen, layout::Rect};
+use ratatui::Frame as Screen;
 
 use super::{
     Place, Window,
     line::ms,
     test::{self, Bench, TRANSACTION, Tried},
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{
         dissect::{self, Direction},
@@ -22,16 +21,12 @@ use crate::{
         names, request_lint,
     },
     plant::{
-        def::{Framing, LineDef, LineId, Parity, Serial},
+        def::{Framing, Parity, Serial},
         diagnostics::{Diagnostic, Scan},
-        number::{to_u8, to_u16, to_u32, to_u64},
+        number::{to_u8, to_u32, to_u64},
         tag::Table,
     },
-    ui::{
-        UiAction, ViewContext, keys,
-        modal::{Next, line::Line, window},
-        widgets::text::{pad, width, wrap},
-    },
+    ui::modal::{Next, line::Line, window},
 };
 
 /// A test with its fields.

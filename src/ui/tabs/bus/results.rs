@@ -1,8 +1,5 @@
 //! What came of a test, in words.
 
-use crate::t;
-use jiff::SignedDuration;
-
 use super::{
     Place,
     frames::{broken, bytes_text},
@@ -10,13 +7,10 @@ use super::{
     rows::{Row, bar, plain},
     window::{dissection_rows, exchange_rows},
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::dissect::{self, Direction},
     plant::diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
-    ui::{
-        ViewContext,
-        widgets::text::{between, clock, wrap},
-    },
 };
 
 /// The last test of a line, or how to begin.

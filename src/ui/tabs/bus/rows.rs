@@ -1,15 +1,7 @@
 //! Rows of styled words that scroll, words that flow into rows, and tables that leave out columns where there is no room.
 
-use crate::t;
-use ratatui::style::Style;
-
-use crate::{
-    plant::number::{to_u16, to_usize},
-    ui::{
-        ViewContext,
-        widgets::text::{Canvas, fit_words, pad, pad_left, width},
-    },
-};
+use crate::plant::number::to_usize;
+use crate::ui::tabs::prelude::*;
 
 /// A row of the screen: words with their looks, one behind the other.
 pub type Row = Vec<(String, Style)>;

@@ -2,10 +2,7 @@
 
 mod send;
 
-use crate::t;
-use crate::text::translate;
-use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame as Screen, layout::Rect};
+use ratatui::Frame as Screen;
 pub use send::Send;
 
 use super::{
@@ -16,6 +13,7 @@ use super::{
     results,
     rows::{self, Row, plain},
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{
         ascii,
@@ -23,20 +21,10 @@ use crate::{
         frame::{self, Mbap, hex},
         hex_input, request_lint,
     },
-    plant::{
-        command::CommandKind,
-        def::{Framing, LineId},
-        diagnostics::Diagnostic,
-        event::LineState,
-        number::to_u16,
-    },
+    plant::{def::Framing, diagnostics::Diagnostic, event::LineState},
     ui::{
-        UiAction, ViewContext, keys,
-        modal::{Confirm, Modal, Next, Notice, line::Line},
-        widgets::{
-            list::{self, Motion},
-            text::{Canvas, fit, fit_words, pad, wrap},
-        },
+        modal::{Next, line::Line},
+        widgets::list::{self},
     },
 };
 

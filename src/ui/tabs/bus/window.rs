@@ -1,8 +1,6 @@
 //! Windows of this tab: sheets to read, and entries for tests.
 
-use crate::t;
-use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame as Screen, layout::Rect};
+use ratatui::Frame as Screen;
 
 use super::{
     frames::{broken, bytes_text},
@@ -12,24 +10,17 @@ use super::{
     rows::{self, Row, plain},
     test::Send,
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{dissect, frame::hex, names},
     plant::{
-        def::{DeviceId, LineId},
-        number::to_u16,
         tag::Table,
         traffic::{Exchange, Frame},
     },
     ui::{
-        ViewContext,
-        keys::Hint,
-        modal::{Modal, Next, window},
+        modal::{Next, window},
         tabs::Tabs,
-        widgets::{
-            list::Motion,
-            text::{age, fit, pad, width, wrap},
-            value,
-        },
+        widgets::text::age,
     },
 };
 

@@ -1,17 +1,10 @@
 //! What can be done with a device on any of its pages, and the windows that ask before it.
 
 use super::{Action, Controllers, Page};
-use crate::t;
+use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{
-        command::CommandKind,
-        def::{DeviceDef, LineId, TagId},
-        event::LineState,
-    },
-    ui::{
-        UiAction, ViewContext,
-        modal::{Choice, Confirm, Modal, Notice, Settings, Why},
-    },
+    plant::event::LineState,
+    ui::modal::{Choice, Settings},
 };
 
 impl Controllers {

@@ -1,23 +1,15 @@
 //! The query before a restore: what would be written, and what the profile wants said before any of it is.
 
-use crate::t;
 use std::sync::Arc;
 
 use super::sets::Source;
-use crate::{
-    plant::{
-        command::CommandKind,
-        def::{DeviceDef, PlantDef},
-        parameter_set::{Change, ParameterSet},
-        restore::RestoreRequest,
-        tag::{Confidence, TagDef},
-    },
-    ui::{
-        ViewContext,
-        modal::Confirm,
-        widgets::text::{fit_words, width, wrap},
-    },
+use crate::plant::{
+    def::PlantDef,
+    parameter_set::{Change, ParameterSet},
+    restore::RestoreRequest,
+    tag::{Confidence, TagDef},
 };
+use crate::ui::tabs::prelude::*;
 
 /// The narrowest window has room for so many cells.
 const ROOM: u16 = 68;

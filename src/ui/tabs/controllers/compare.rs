@@ -4,22 +4,13 @@ use super::{
     ask,
     sets::{Source, shown, shown_of_set, some_lines, trusted},
 };
-use crate::t;
+use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        def::DeviceDef,
         parameter_set::{self, Change, Compared, Problem},
         restore::{Restore, State},
     },
-    ui::{
-        ViewContext,
-        chrome::outcome_words,
-        modal::{Confirm, Notice},
-        widgets::{
-            list::{Motion, Scroll, on_screen},
-            text::{Canvas, fit, fit_words, moment, pad, pad_left},
-        },
-    },
+    ui::chrome::outcome_words,
 };
 
 /// The page.

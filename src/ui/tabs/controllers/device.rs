@@ -1,26 +1,16 @@
 //! The page of one device: heading, faceplate, parameter table, what the selected parameter means, the last write.
 
-use crate::t;
-use crate::text::translate;
-use ratatui::style::Style;
-
 use super::{
     faceplate,
     table::{Table, default_text, differs},
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::{
-        def::{DeviceDef, DeviceId},
-        ne107::{Reason, Signal},
-        number::to_u16,
-        snapshot::DeviceState,
-    },
+    plant::ne107::{Reason, Signal},
     ui::{
-        ViewContext,
         chrome::{command_label, outcome_words},
         modal::faceplate::{device_text, retry_text},
-        widgets::text::{Canvas, clock, fit_words, width, wrap},
     },
 };
 

@@ -1,25 +1,16 @@
 //! The faceplate of a controller: PV, SV and MV as bars on their ranges, its states, its alarms and a small trend.
 
-use crate::t;
-use crate::text::translate;
 use ratatui::style::Modifier;
 
 use super::list;
+use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::{
-        def::{DeviceDef, Faceplate, Subject, TagId},
-        number::to_u16,
+        def::{Faceplate, Subject},
         tuning::Tuning,
     },
-    ui::{
-        ViewContext,
-        widgets::{
-            mimic::{Bounds, panel::set_apart, trend},
-            text::{Canvas, clock, fit_words, pad, running, width},
-            value,
-        },
-    },
+    ui::widgets::mimic::{Bounds, panel::set_apart, trend},
 };
 
 /// How far back the small trend goes.

@@ -1,9 +1,6 @@
 //! What the words of a controller mean, and what to change when it does not do what it should: pages to read.
 
-use crate::{
-    plant::number::to_u16,
-    ui::{ViewContext, widgets::text::Canvas},
-};
+use crate::ui::tabs::prelude::*;
 
 /// A page: its heading and its lines, at most 16 of at most 76 columns.
 type Page = (&'static str, &'static [&'static str]);

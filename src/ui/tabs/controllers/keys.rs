@@ -1,15 +1,7 @@
 //! The keys of the controllers tab, page by page: footer, help and the check for clashes read these rows.
 
-use crossterm::event::KeyCode;
-
 use super::Page;
-use crate::{
-    plant::role::Role,
-    ui::{
-        keys::{Key, char, code},
-        widgets::list::{Motion, motions},
-    },
-};
+use crate::ui::tabs::prelude::*;
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

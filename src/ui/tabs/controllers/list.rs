@@ -1,24 +1,12 @@
 //! The first page: every device in one row, with how it stands and what it controls.
 
-use crate::t;
-use ratatui::style::Style;
-
 use super::device::{signal_mark, status_text};
-use crate::{
-    plant::{
-        def::{DeviceDef, DeviceId, Subject},
-        snapshot::{ActiveAlarm, DeviceState},
-        tag::{Access, Poll},
-    },
-    ui::{
-        ViewContext,
-        widgets::{
-            list::{first, on_screen},
-            text::{Canvas, fit, fit_words, pad_left, width},
-            value,
-        },
-    },
+use crate::plant::{
+    def::Subject,
+    snapshot::ActiveAlarm,
+    tag::{Access, Poll},
 };
+use crate::ui::tabs::prelude::*;
 
 /// Widths that depend on the plant and the screen.
 struct Columns {

@@ -1,24 +1,11 @@
 //! The ramp/soak program as a table and as a curve, with the place where it is now.
 
-use crate::t;
-use std::time::Duration;
-
 use super::device::signal_mark;
+use crate::ui::tabs::prelude::*;
 use crate::{
     history::{Bucket, Series},
-    plant::{
-        def::{DeviceDef, ProgramDef, TagId},
-        number::to_u16,
-        program::ProgramPosition,
-    },
-    ui::{
-        ViewContext,
-        widgets::{
-            mimic::trend,
-            text::{Canvas, fit_words, pad, pad_left, running, width},
-            value,
-        },
-    },
+    plant::{def::ProgramDef, program::ProgramPosition},
+    ui::widgets::mimic::trend,
 };
 
 /// The selected cell.

@@ -1,22 +1,9 @@
 //! Parameter sets of a device: those that the station keeps, and the other controllers of the same kind to copy from.
 
-use crate::t;
 use std::sync::Arc;
 
-use crate::{
-    plant::{
-        def::{DeviceDef, DeviceId, TagId},
-        parameter_set::{self, Compared, ParameterSet, StoredSet},
-    },
-    ui::{
-        ViewContext,
-        modal::Notice,
-        widgets::{
-            list::{first, on_screen},
-            text::{Canvas, fit, fit_words, moment, pad, pad_left, width, wrap},
-        },
-    },
-};
+use crate::plant::parameter_set::{self, Compared, ParameterSet, StoredSet};
+use crate::ui::tabs::prelude::*;
 
 /// Where the values to compare with come from.
 #[derive(Debug, Clone, PartialEq, Eq)]

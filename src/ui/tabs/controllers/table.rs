@@ -1,19 +1,11 @@
 //! The parameter table of a device: grouped as the maker groups them, with value, range, default, age and meaning.
 
-use crate::t;
+use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{
-        def::DeviceId,
-        tag::{Access, Poll, TagDef},
-    },
+    plant::tag::{Access, Poll, TagDef},
     ui::{
-        ViewContext,
         modal::number::range_text,
-        widgets::{
-            list::{Words, first, on_screen},
-            text::{Canvas, age, pad, pad_left, whole, width},
-            value,
-        },
+        widgets::text::{age, whole},
     },
 };
 

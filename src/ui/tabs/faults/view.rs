@@ -1,23 +1,15 @@
 //! Draws the faults: a list by target, the selected one described, and actual beside displayed values.
 
-use crate::t;
-use ratatui::{Frame, layout::Rect, style::Style};
-
 use super::{Faults, open, rows};
+use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{def::TagId, number::to_u16, tag::Poll},
+    plant::tag::Poll,
     sim::{
         drill::{Progress, Status},
         faults::{Fault, FaultTarget, target::device_at},
         scenario::judge::ExpectationStatus,
     },
-    ui::{
-        ViewContext,
-        widgets::{
-            text::{Canvas, between, fit, fit_words, pad, running, width, wrap},
-            value::show,
-        },
-    },
+    ui::widgets::value::show,
 };
 
 /// Columns of the list.

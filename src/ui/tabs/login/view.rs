@@ -1,17 +1,10 @@
 //! The view of the login page: the banner, the form or who is in, and the most urgent alarms, which never hide.
 
-use crate::t;
-use ratatui::{Frame, layout::Rect};
-
 use super::Login;
-use crate::{
-    plant::number::to_u16,
-    ui::{
-        ViewContext,
-        chrome::{alarm_words, counts},
-        rights,
-        widgets::text::{Canvas, clock, fit_words, running, wrap},
-    },
+use crate::ui::tabs::prelude::*;
+use crate::ui::{
+    chrome::{alarm_words, counts},
+    rights,
 };
 
 /// Widest text to be read.

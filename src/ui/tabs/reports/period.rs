@@ -1,8 +1,8 @@
 //! Which period a report is of: the shifts of the plant, days where it has none, or a typed period; pure.
 
-use crate::t;
-use jiff::{SignedDuration, Timestamp, ToSpan, civil};
+use jiff::{ToSpan, civil};
 
+use crate::ui::tabs::prelude::*;
 use crate::{
     plant::def::PlantDef,
     report::{Period, period_parser, shift},

@@ -1,29 +1,18 @@
 //! The view of the reports tab: which period, its figures, alarms and actions, and what the CSV will be.
 
-use crate::t;
-use crate::text::translate;
-use std::{collections::BTreeMap, time::Duration};
+use std::collections::BTreeMap;
 
-use jiff::{SignedDuration, Timestamp, tz::TimeZone};
-use ratatui::{
-    Frame,
-    layout::Rect,
-    style::Style,
-    text::{Line, Span},
-};
+use jiff::tz::TimeZone;
+use ratatui::text::{Line, Span};
 
 use super::{Export, Reports};
+use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         def::Priority,
-        number::to_u16,
         record::{ActionRecord, AlarmEvent, AlarmRecord},
     },
     report::{Period, ShiftReport, SuppressedSummary, TagFigures, raised, text::mean_or_difference},
-    ui::{
-        ViewContext,
-        widgets::text::{Canvas, fit, pad, pad_left, width},
-    },
 };
 
 /// Alarm steps and actions listed at most; the CSV has all of them.

@@ -1,8 +1,6 @@
 //! What the keys of the trends tab are and mean.
 
-use crossterm::event::KeyCode;
-
-use crate::ui::keys::{Key, char, code};
+use crate::ui::tabs::prelude::*;
 
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,9 +1,7 @@
 //! Which stretch of time the trends show: windows, zoom, pan and the grid of columns; pure arithmetic.
 
-use crate::t;
-use std::time::Duration;
-
-use jiff::{SignedDuration, Timestamp, tz::TimeZone};
+use crate::ui::tabs::prelude::*;
+use jiff::tz::TimeZone;
 
 /// The windows that zooming steps through, seconds: 1 min to 24 h.
 pub const WINDOWS: [i64; 12] = [60, 120, 300, 600, 900, 1_800, 3_600, 7_200, 14_400, 28_800, 43_200, 86_400];

@@ -1,10 +1,7 @@
 //! The view of the trends tab: title, chart, legend with figures; or the list of values.
 
-use crate::t;
-use jiff::{Timestamp, tz::TimeZone};
+use jiff::tz::TimeZone;
 use ratatui::{
-    Frame,
-    layout::Rect,
     text::{Line, Span},
     widgets::Widget,
 };
@@ -14,19 +11,14 @@ use super::{
     span::{RATES, WINDOWS, midnight, rate_text, window_text},
     stored,
 };
+use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{
-        def::{Pen, TagId},
-        number::to_u16,
-    },
+    plant::def::Pen,
     ui::{
-        ViewContext,
         theme::Glyphs,
         widgets::{
             chart::{Axis, Chart, Curve, Plan, mark, trace::Trace},
             spark::spark,
-            text::{Canvas, clock, fit, pad},
-            value,
         },
     },
 };

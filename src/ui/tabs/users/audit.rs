@@ -1,26 +1,8 @@
 //! The audit list: who did what, from where, when, and how it ended; newest first, with a search that the history does.
 
-use crate::t;
-use crossterm::event::KeyCode;
-use jiff::SignedDuration;
-use ratatui::{Frame, layout::Rect};
-
-use super::super::{Tab, periodic_query::PeriodicQuery, reports::period};
-use crate::{
-    history::{Answer, HistoryError, Query},
-    plant::record::ActionRecord,
-    report::Period,
-    ui::{
-        UiAction, ViewContext,
-        keys::{Key, char, code},
-        last_frame::Rows,
-        modal::{AuditEntryDialog, Modal, Prompt},
-        widgets::{
-            list::{Motion, first, motions, on_screen},
-            text::{Canvas, fit, moment, pad, pad_left, width},
-        },
-    },
-};
+use super::super::reports::period;
+use crate::ui::tabs::prelude::*;
+use crate::{plant::record::ActionRecord, report::Period, ui::modal::AuditEntryDialog};
 
 /// What a key means on the audit list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

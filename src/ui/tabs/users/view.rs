@@ -1,18 +1,8 @@
 //! The view of the list of users, and of the terminals that are attached.
 
-use crate::t;
-use jiff::Timestamp;
-use ratatui::{Frame, layout::Rect};
-
 use super::state;
-use crate::plant::number::to_u16;
-use crate::ui::{
-    ViewContext, rights,
-    widgets::{
-        list::{first, on_screen},
-        text::{Canvas, clock, fit, pad},
-    },
-};
+use crate::ui::rights;
+use crate::ui::tabs::prelude::*;
 
 /// Draws both lists; the terminals have the lower third at the most.
 pub(super) fn draw(cx: &ViewContext, place: usize, frame: &mut Frame, area: Rect) {

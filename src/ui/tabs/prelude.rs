@@ -1,0 +1,32 @@
+//! What almost every tab works with: what it is given, what it answers, how it draws, and the keys and lists of all tabs.
+
+pub(super) use std::time::Duration;
+
+pub(super) use crossterm::event::{KeyCode, KeyEvent};
+pub(super) use jiff::{SignedDuration, Timestamp};
+pub(super) use ratatui::{Frame, layout::Rect, style::Style};
+
+pub(super) use super::{Tab, TabView, periodic_query::PeriodicQuery};
+pub(super) use crate::{
+    history::{Answer, HistoryError, Query},
+    plant::{
+        command::CommandKind,
+        def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
+        number::to_u16,
+        role::Role,
+        snapshot::{DeviceState, Snapshot},
+    },
+    t,
+    text::translate,
+    ui::{
+        UiAction, ViewContext,
+        keys::{self, Hint, Key, char, code},
+        last_frame::Rows,
+        modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
+        widgets::{
+            list::{Motion, Scroll, Selected, Words, first, motions, on_screen},
+            text::{Canvas, between, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},
+            value,
+        },
+    },
+};
