@@ -32,7 +32,7 @@
 //!    mpsc,         │   │ watch<Arc<Snapshot>>   │
 //!    loss counted  ▼   ▼   latest only          │
 //!  book ──> history     session server ──── Session      one per terminal: channels, or the
-//!  thread   thread  <─── Query / Answer        │          socket of `attach` with deltas
+//!  thread   thread  <─── Query / Answer        │          socket of `attach`
 //!  (chain)  DuckDB       AccessControl      terminal (ui)
 //! ```
 //!

@@ -1,8 +1,8 @@
 //! The station's socket: terminals of other processes, each with what it may see and no more.
 
+pub(crate) mod assembly;
 pub mod callers;
 pub mod check;
-pub mod delta;
 pub mod protocol;
 pub mod redaction;
 pub mod command_id_map;

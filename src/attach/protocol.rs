@@ -7,20 +7,21 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use super::delta::Delta;
 use crate::{
     access::{Credentials, Durability, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
     plant::{
-        PlantDef,
+        PlantDef, Snapshot,
         command::{Command, CommandId},
+        def::LineId,
+        line_report::LineReport,
         number::to_u32,
         visible::acts,
     },
 };
 
 /// The number of this protocol; goes up with every change of a message.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Longest hello, bytes.
@@ -66,7 +67,7 @@ pub struct HandshakeReply {
     pub run: u64,
     /// The number of this terminal.
     pub terminal: u32,
-    /// The plant. Every delta is of this definition.
+    /// The plant. Every snapshot is of this definition.
     pub def: Arc<PlantDef>,
 }
 
@@ -97,10 +98,12 @@ pub enum ClientMessage {
 }
 
 /// What a station says.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum ServerMessage {
-    /// The plant has changed.
-    Delta(Box<Delta>),
+    /// The plant has changed. The definition is that of the handshake, and the line reports come by themselves.
+    Snapshot(Arc<Snapshot>),
+    /// A line has reported; the report is part of all snapshots that follow. `None` for one that may not be seen any more.
+    LineReport(LineId, Option<Arc<LineReport>>),
     /// The session status has changed.
     SessionStatus(Box<SessionStatus>),
     /// What the history says.

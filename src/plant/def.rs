@@ -54,6 +54,30 @@ pub struct PlantDef {
     pub simulation: Option<String>,
 }
 
+impl Default for PlantDef {
+    /// A plant that has nothing.
+    fn default() -> PlantDef {
+        PlantDef {
+            name: String::new(),
+            title: String::new(),
+            time_zone: TimeZone::UTC,
+            lines: Vec::new(),
+            devices: Vec::new(),
+            tags: Vec::new(),
+            alarms: Vec::new(),
+            access: AccessDef::default(),
+            alarm_rules: AlarmRules::default(),
+            logic: ControlLogic::default(),
+            mimic: MimicDef::default(),
+            trends: Vec::new(),
+            shifts: Vec::new(),
+            report: ReportDef::default(),
+            history: HistoryDef::default(),
+            simulation: None,
+        }
+    }
+}
+
 impl PlantDef {
     /// The line of an id. Ids come from this very definition, so they are always there.
     pub fn line(&self, id: LineId) -> &LineDef {
@@ -352,7 +376,7 @@ pub struct ShiftDef {
 }
 
 /// What reports contain and how their CSV is written.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReportDef {
     /// Where reports are written, relative to the working folder.
     pub folder: std::path::PathBuf,

@@ -1,5 +1,7 @@
 //! All that is true at one instant, as plain data: what screens draw and scripts print.
 
+mod encoding;
+
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
@@ -17,6 +19,7 @@ use super::{
     interlock::ActuatorTracker,
     line_report::LineReport,
     ne107,
+    number::to_u32,
     parameter_set::StoredSet,
     record::{ChainHash, FirstOut},
     restore::Restore,
@@ -37,15 +40,18 @@ pub struct Snapshot {
     pub run: u64,
     /// What the system clock was set by since the run began: without it, `at` is steady time.
     pub stepped: SignedDuration,
-    /// What never changes.
+    /// What never changes; not encoded, because who reads a snapshot already has it.
+    #[serde(skip)]
     pub def: Arc<PlantDef>,
     /// Samples, by [`TagId`].
+    #[serde(with = "encoding::samples")]
     pub samples: Vec<Sample>,
     /// What tags that hold text say, by [`TagId`]; `None` for all others and while the quality is bad.
     pub texts: Arc<Vec<Option<Arc<str>>>>,
     /// Decimals to show, by [`TagId`] (they may come from the device).
     pub decimals: Vec<u8>,
     /// The last request that was made for each tag, with its answer, by [`TagId`]: why a value is what it is.
+    #[serde(with = "encoding::source_frames")]
     pub source_frames: Arc<Vec<Option<Arc<Exchange>>>>,
     /// Lines, by [`LineId`].
     pub lines: Vec<LineStatus>,
@@ -205,7 +211,8 @@ pub struct LineStatus {
     pub state: LineState,
     /// Totals since the start.
     pub counters: LineCounters,
-    /// Settings, polls and frames; `None` until the line has reported.
+    /// Settings, polls and frames; `None` until the line has reported. Encoded by itself: it is large, and changes once a second.
+    #[serde(skip)]
     pub report: Option<Arc<LineReport>>,
     /// Settings as they were before others were tried.
     pub settings_before: Option<Arc<LineDef>>,

@@ -51,30 +51,6 @@ impl Frames {
         }
     }
 
-    /// Drops all frames before this number and appends newer ones, as the line itself has done it elsewhere.
-    pub fn follow(&mut self, number: u64, newer: Vec<Frame>) {
-        self.forget_before(number);
-        if !newer.is_empty() {
-            self.count += newer.len();
-            self.chunks.push_back(newer.into());
-        }
-    }
-
-    fn forget_before(&mut self, number: u64) {
-        while let Some(oldest) = self.chunks.pop_front() {
-            self.count -= oldest.len();
-            let kept: Arc<[Frame]> = match oldest.first() {
-                Some(first) if number <= first.number => oldest,
-                _ => oldest.iter().filter(|frame| number <= frame.number).cloned().collect(),
-            };
-            if !kept.is_empty() {
-                self.count += kept.len();
-                self.chunks.push_front(kept);
-                break;
-            }
-        }
-    }
-
     /// All of them, oldest first.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &Frame> {
         self.chunks.iter().flat_map(|chunk| chunk.iter())
@@ -156,10 +132,5 @@ mod tests {
             assert!(frames.len() < FRAMES_MAX + 30);
         }
         assert!(FRAMES_MAX <= frames.len());
-        frames.follow(1_017, vec![frame(1_500)]);
-        let numbers: Vec<u64> = frames.iter().map(|frame| frame.number).collect();
-        assert_eq!((numbers.first(), numbers.last(), numbers.len()), (Some(&1_017), Some(&1_500), frames.len()));
-        frames.follow(2_000, Vec::new());
-        assert!(frames.is_empty());
     }
 }

@@ -1,6 +1,7 @@
-//! What twenty terminals cost a station of 1,000 tags that all change every second; prints CPU, memory and bytes.
+//! What twenty terminals cost a station whose tags all change every second; prints CPU, memory, bytes and delays.
 //!
-//! `cargo bench --bench attach`: 35 seconds. Terminals are processes of their own, so the CPU is the station's alone.
+//! `cargo bench --bench attach -- 10000 4`: a minute, for 10,000 tags on 4 lines (1,000 on 1 without arguments). Terminals
+//! are processes of their own, so the CPU is the station's alone.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
@@ -17,14 +18,14 @@ use std::{
 use jiff::Timestamp;
 use rustix::time::{ClockId, clock_gettime};
 use sightglass::{
-    access::SessionStatus,
+    access::{Durability, SessionRequest, SessionStatus},
     attach::{
-        io::serve::listen,
+        io::{connect::connect, serve::listen},
         protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, Place},
     },
     plant::{
         Plant, PlantDef,
-        def::{DeviceDef, DeviceId, Framing, LineId, TagId},
+        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, TagId},
         event::{Event, LineState},
         line_report::{LineReport, PollReport},
         request_stats::RequestStats,
@@ -32,11 +33,10 @@ use sightglass::{
         traffic::{Exchange, Frame},
     },
     profile::{self, Search},
-    station::SessionAcceptor,
+    station::{Request, SessionAcceptor},
 };
 use tokio::{sync::watch, time::interval};
 
-const DEVICES: u16 = 10;
 const TAGS_EACH: u16 = 100;
 const TERMINALS: usize = 20;
 /// Seconds of each part.
@@ -44,10 +44,41 @@ const PART: u64 = 10;
 
 fn main() {
     let words: Vec<String> = std::env::args().collect();
-    match words.iter().position(|word| word == "terminal") {
-        Some(at) => terminal(Path::new(&words[at + 1])),
-        None => station(),
+    let after = |name: &str| words.iter().position(|word| word == name).map(|at| Path::new(&words[at + 1]));
+    let mut numbers = words.iter().filter_map(|word| word.parse::<u16>().ok());
+    match (after("terminal"), after("viewer")) {
+        (Some(path), _) => terminal(path),
+        (None, Some(path)) => runtime().block_on(viewer(path)),
+        (None, None) => station(numbers.next().unwrap_or(1_000) / TAGS_EACH, numbers.next().unwrap_or(1)),
     }
+}
+
+fn runtime() -> tokio::runtime::Runtime {
+    tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap()
+}
+
+/// A terminal without a screen: prints what the snapshots of ten seconds cost it, and how long things take.
+async fn viewer(path: &Path) {
+    let began = std::time::Instant::now();
+    let mut session = connect(path).await.unwrap();
+    println!("a terminal has its first snapshot after {:.1} ms", began.elapsed().as_secs_f64() * 1e3);
+    let (used, began, mut count, mut late, mut answers) = (cpu(), std::time::Instant::now(), 0, 0.0, Vec::new());
+    while began.elapsed() < Duration::from_secs(PART) {
+        session.snapshots.changed().await.unwrap();
+        late += Timestamp::now().duration_since(session.snapshots.borrow_and_update().at).as_secs_f64();
+        count += 1;
+        let asked = std::time::Instant::now();
+        session.request(SessionRequest::Logout).await.unwrap();
+        answers.push(asked.elapsed().as_secs_f64() * 1e3);
+    }
+    answers.sort_by(f64::total_cmp);
+    let each = (cpu() - used) / f64::from(count) * 1e3;
+    println!("  {each:.2} ms of CPU for each of {count} snapshots, {:.0} ms old", late / f64::from(count) * 1e3);
+    println!(
+        "  a request is answered in {:.2} ms, at worst {:.2} ms",
+        answers[count as usize / 2],
+        answers.last().unwrap()
+    );
 }
 
 /// Reads whatever comes and says how much that was, each second.
@@ -66,15 +97,14 @@ fn terminal(path: &Path) {
     }
 }
 
-fn station() {
+fn station(devices: u16, lines: u16) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bench.sock");
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
-    runtime.block_on(async {
-        let def = plant();
+    runtime().block_on(async {
+        let def = plant(devices, lines);
         let plant = Plant::new(def.clone(), Timestamp::now(), 1.0);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
-        let (acceptor, mut attach_requests, _requests) = SessionAcceptor::new(snapshots);
+        let (acceptor, mut attach_requests, mut requests) = SessionAcceptor::new(snapshots);
         let mut listener = listen(&path).unwrap();
         tokio::spawn(async move { listener.serve(&acceptor).await });
         tokio::spawn(async move {
@@ -84,15 +114,22 @@ fn station() {
                 there.push(request.status);
             }
         });
+        tokio::spawn(async move {
+            while let Some((_, request)) = requests.recv().await {
+                let Request::SessionRequest(_, reply) = request else { continue };
+                let _ = reply.send(Ok(Durability::Recorded));
+            }
+        });
         tokio::spawn(live(plant, def, publish));
         tokio::time::sleep(Duration::from_secs(2)).await;
         part("no terminal", &[]).await;
-        let mut terminals: Vec<Child> = (0..TERMINALS).map(|_| start(&path)).collect();
+        let mut terminals: Vec<Child> = (0..TERMINALS).map(|_| start("terminal", &path)).collect();
         tokio::time::sleep(Duration::from_secs(2)).await;
         let files: Vec<_> = terminals.iter().map(|child| path.with_extension(child.id().to_string())).collect();
         part("20 terminals", &files).await;
         signal(&terminals[0], "STOP");
         part("20 terminals, one of them stopped: the others", &files[1..]).await;
+        start("viewer", &path).wait().unwrap();
         for child in &mut terminals {
             signal(child, "KILL");
             child.wait().unwrap();
@@ -100,34 +137,45 @@ fn station() {
     });
 }
 
-/// A thousand tags, each with another value every second, a tenth of them at a time; a snapshot after each tenth.
+/// Each tag has another value every second, a tenth of the devices at a time; a snapshot after each tenth.
 async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<sightglass::plant::Snapshot>>) {
     let mut tick = interval(Duration::from_millis(100));
-    let mut report = LineReport::new(def.lines[0].clone());
-    report.polls = (0..DEVICES).map(|device| poll(DeviceId(device))).collect();
-    plant.on_event(Event::Line { at: Timestamp::now(), line: LineId(0), state: LineState::Connected });
+    let mut reports: Vec<LineReport> = def.lines.iter().map(|line| LineReport::new(line.clone())).collect();
+    for line in &def.lines {
+        let own = def.devices.iter().filter(|device| device.line == line.id);
+        reports[line.id.index()].polls = own.map(|device| poll(device.id)).collect();
+        plant.on_event(Event::Line { at: Timestamp::now(), line: line.id, state: LineState::Connected });
+    }
+    let mut number = 0;
     for round in 0u64.. {
         tick.tick().await;
-        let (at, device) = (Timestamp::now(), (round % u64::from(DEVICES)) as u16);
-        let (request, answer): (Arc<[u8]>, Arc<[u8]>) = ([1; 8].into(), [2; 205].into());
-        let values = tags_of(device).map(|tag| (tag, (round * 7 + u64::from(tag.0)) as f64 % 60_000.0)).collect();
-        let reply = Duration::from_millis(12);
-        let (framing, outcome, tries) = (Framing::Rtu, Ok(()), 1);
-        let (sent, got) = (request.clone(), answer.clone());
-        let exchange = Exchange { at, framing, request, answer, outcome, reply: Some(reply), tries };
-        let exchange = Some(Arc::new(exchange));
-        plant.on_event(Event::Read { at, device: DeviceId(device), values, texts: Vec::new(), reply, exchange });
-        let poll = &mut report.polls[usize::from(device)];
-        poll.stats.count(Ok(()), Some(reply + Duration::from_millis(round % 9)));
-        poll.next = Some(at + jiff::SignedDuration::from_secs(1));
-        let frame =
-            |bytes, sent, number| Frame { at, sent, bytes, framing, verdict: "ok".into(), unit: Some(1), number };
-        report.frames.extend(vec![frame(sent, true, 2 * round + 1), frame(got, false, 2 * round + 2)]);
-        if device == 0 {
-            report.counters.requests = round;
-            report.busy.push(0.5 + (round % 3) as f32);
-            report.busy.drain(..report.busy.len().saturating_sub(60));
-            plant.on_event(Event::Report { at, line: LineId(0), report: Arc::new(report.clone()) });
+        let at = Timestamp::now();
+        for device in def.devices.iter().filter(|device| u64::from(device.id.0) % 10 == round % 10) {
+            let (request, answer): (Arc<[u8]>, Arc<[u8]>) = ([1; 8].into(), [2; 205].into());
+            let values =
+                tags_of(device.id.0).map(|tag| (tag, (round * 7 + u64::from(tag.0)) as f64 % 60_000.0)).collect();
+            let reply = Duration::from_millis(12);
+            let (framing, outcome, tries) = (Framing::Rtu, Ok(()), 1);
+            let (sent, got) = (request.clone(), answer.clone());
+            let exchange = Exchange { at, framing, request, answer, outcome, reply: Some(reply), tries };
+            let exchange = Some(Arc::new(exchange));
+            plant.on_event(Event::Read { at, device: device.id, values, texts: Vec::new(), reply, exchange });
+            let report = &mut reports[device.line.index()];
+            let poll = report.polls.iter_mut().find(|poll| poll.device == device.id).unwrap();
+            poll.stats.count(Ok(()), Some(reply + Duration::from_millis(round % 9)));
+            poll.next = Some(at + jiff::SignedDuration::from_secs(1));
+            let frame =
+                |bytes, sent, number| Frame { at, sent, bytes, framing, verdict: "ok".into(), unit: Some(1), number };
+            number += 2;
+            report.frames.extend(vec![frame(sent, true, number - 1), frame(got, false, number)]);
+        }
+        if round % 10 == 0 {
+            for report in &mut reports {
+                report.counters.requests = round;
+                report.busy.push(0.5 + (round % 3) as f32);
+                report.busy.drain(..report.busy.len().saturating_sub(60));
+                plant.on_event(Event::Report { at, line: report.settings.id, report: Arc::new(report.clone()) });
+            }
             plant.on_tick(at);
         }
         publish.send_replace(Arc::new(plant.snapshot()));
@@ -149,9 +197,9 @@ async fn part(what: &str, files: &[std::path::PathBuf]) {
     }
 }
 
-fn start(path: &Path) -> Child {
+fn start(role: &str, path: &Path) -> Child {
     let program = std::env::current_exe().unwrap();
-    Command::new(program).arg("terminal").arg(path).stdin(Stdio::null()).spawn().unwrap()
+    Command::new(program).arg(role).arg(path).stdin(Stdio::null()).spawn().unwrap()
 }
 
 fn signal(child: &Child, name: &str) {
@@ -190,20 +238,22 @@ fn poll(device: DeviceId) -> PollReport {
     }
 }
 
-fn plant() -> Arc<PlantDef> {
+fn plant(devices: u16, lines: u16) -> Arc<PlantDef> {
     let base = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
     let mut def = PlantDef::clone(&base);
-    let device = def.devices[0].clone();
+    let (device, line) = (def.devices[0].clone(), def.lines[0].clone());
+    def.lines = (0..lines).map(|id| LineDef { id: LineId(id), name: format!("L{id}"), ..line.clone() }).collect();
     def.alarms.clear();
     def.devices.clear();
     def.tags.clear();
     def.trends.clear();
     (def.logic, def.mimic) = (Default::default(), Default::default());
-    for id in 0..DEVICES {
+    for id in 0..devices {
         let name = format!("D{id}");
         let (id, unit) = (DeviceId(id), id as u8 + 1);
         def.devices.push(DeviceDef {
             id,
+            line: LineId(id.0 % lines),
             name: name.clone(),
             unit,
             faceplate: None,

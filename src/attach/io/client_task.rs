@@ -15,6 +15,7 @@ use super::{
 use crate::{
     access::{Durability, SessionStatus},
     attach::{
+        assembly::Assembly,
         command_id_map::{CommandIdMap, GONE},
         protocol::{self, ClientMessage, HandshakeReply, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, ServerMessage},
     },
@@ -53,8 +54,8 @@ pub struct ClientTask {
     path: PathBuf,
     place: Place,
     id_map: CommandIdMap,
-    /// The latest snapshot as the station has it; what is published may differ by own commands.
-    latest: Arc<Snapshot>,
+    /// The plant as the station has it; what is published may differ by own commands.
+    assembly: Assembly,
     publish: watch::Sender<Arc<Snapshot>>,
     status_sender: watch::Sender<Arc<SessionStatus>>,
     waiting: HashMap<u64, Waiting>,
@@ -75,11 +76,11 @@ impl ClientTask {
         path: PathBuf,
         place: Place,
         id_map: CommandIdMap,
+        assembly: Assembly,
         publish: watch::Sender<Arc<Snapshot>>,
         status_sender: watch::Sender<Arc<SessionStatus>>,
     ) -> ClientTask {
-        let latest = publish.borrow().clone();
-        ClientTask { path, place, id_map, latest, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
+        ClientTask { path, place, id_map, assembly, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
     }
 
     /// Runs until all handles of the session are dropped.
@@ -135,8 +136,11 @@ impl ClientTask {
     /// Takes in what the station says.
     fn take(&mut self, told: ServerMessage) -> Result<(), String> {
         match told {
-            ServerMessage::Delta(delta) => {
-                delta.apply(Arc::make_mut(&mut self.latest)).map_err(|error| error.to_string())?;
+            ServerMessage::LineReport(line, report) => {
+                self.assembly.on_report(line, report).map_err(|error| error.to_string())?;
+            }
+            ServerMessage::Snapshot(snapshot) => {
+                self.assembly.on_snapshot(Arc::unwrap_or_clone(snapshot)).map_err(|error| error.to_string())?;
                 self.show();
             }
             ServerMessage::SessionStatus(status) => {
@@ -170,7 +174,7 @@ impl ClientTask {
 
     /// Publishes the latest snapshot, with what became of own commands.
     fn show(&mut self) {
-        let seen = self.id_map.see(&self.latest);
+        let seen = self.id_map.see(self.assembly.latest());
         self.publish.send_replace(seen);
     }
 
@@ -178,7 +182,7 @@ impl ClientTask {
     fn send(&mut self, request: Request, out: &mpsc::Sender<Vec<u8>>) {
         match request {
             Request::Command(command, credentials) => {
-                let (by, at) = (self.by(), self.latest.at);
+                let (by, at) = (self.by(), self.assembly.latest().at);
                 let command = self.id_map.send(command, by, at);
                 let id = command.id;
                 if let Err(why) = hand_over(&ClientMessage::Command(Box::new(command), credentials), out) {
@@ -263,7 +267,7 @@ impl ClientTask {
     fn refuse(&mut self, request: Request) {
         match request {
             Request::Command(command, _) => {
-                let (by, at) = (self.by(), self.latest.at);
+                let (by, at) = (self.by(), self.assembly.latest().at);
                 self.id_map.refuse(&command, by, at, GONE);
                 self.show();
             }
@@ -272,12 +276,12 @@ impl ClientTask {
         }
     }
 
-    /// The next delta is from nothing, of this definition; one that is equal stays the very same.
+    /// Nothing is known of the plant again. A definition that is equal stays the very same.
     fn begin_anew(&mut self, welcome: &HandshakeReply) {
         self.id_map.welcomed(welcome.run, welcome.terminal);
-        let def = &self.latest.def;
+        let def = &self.assembly.latest().def;
         let def = if is_equal(def, &welcome.def) { def.clone() } else { welcome.def.clone() };
-        self.latest = Arc::new(Snapshot::blank(def));
+        self.assembly = Assembly::new(def);
     }
 }
 
@@ -328,8 +332,8 @@ mod tests {
     async fn an_abandoned_query_is_cancelled_at_the_station() {
         let (publish, _snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
         let (status_sender, _standing) = watch::channel(Arc::new(SessionStatus::default()));
-        let mut task =
-            ClientTask::new(PathBuf::new(), Place::default(), CommandIdMap::new(1, 1), publish, status_sender);
+        let (id_map, assembly) = (CommandIdMap::new(1, 1), Assembly::new(fixture::shared()));
+        let mut task = ClientTask::new(PathBuf::new(), Place::default(), id_map, assembly, publish, status_sender);
         let (near, mut far) = UnixStream::pair().unwrap();
         let (read, write) = near.into_split();
         let (asks, mut requests) = mpsc::channel(4);

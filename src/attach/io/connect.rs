@@ -23,11 +23,10 @@ use super::{
 use crate::{
     access::SessionStatus,
     attach::{
+        assembly::{Assembly, OtherPlant},
         command_id_map::CommandIdMap,
-        delta::{Delta, DeltaMismatch},
         protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, NEWS_BYTES_MAX, Place, ServerMessage},
     },
-    plant::Snapshot,
     station::Session,
 };
 
@@ -58,7 +57,7 @@ pub enum AttachError {
     Wire(#[from] WireError),
     /// What it says first does not fit together.
     #[error("the station is not understood: {0}")]
-    DeltaMismatch(#[from] DeltaMismatch),
+    OtherPlant(#[from] OtherPlant),
 }
 
 /// A connection that was welcomed.
@@ -73,13 +72,15 @@ pub(super) struct Line {
 pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let place = here();
     let mut line = open(path, &place).await?;
-    let (status, snapshot) = timeout(WELCOME_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
+    let (status, assembly) = timeout(WELCOME_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
     let HandshakeReply { run, terminal, .. } = line.welcome;
-    let (publish, snapshots) = watch::channel(snapshot);
+    let (publish, snapshots) = watch::channel(assembly.latest().clone());
     let (status_sender, status) = watch::channel(Arc::new(status));
     let (requests, requested) = mpsc::channel(REQUESTS);
     let id_map = CommandIdMap::new(run, terminal);
-    tokio::spawn(ClientTask::new(path.to_owned(), place, id_map, publish, status_sender).run(line, requested));
+    tokio::spawn(
+        ClientTask::new(path.to_owned(), place, id_map, assembly, publish, status_sender).run(line, requested),
+    );
     Ok(Session { snapshots, status, requests, terminal })
 }
 
@@ -98,15 +99,15 @@ pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError
 }
 
 /// The session status and the snapshot with which a session begins.
-async fn first(line: &mut Line) -> Result<(SessionStatus, Arc<Snapshot>), AttachError> {
-    let mut status = SessionStatus::default();
+async fn first(line: &mut Line) -> Result<(SessionStatus, Assembly), AttachError> {
+    let (mut status, mut assembly) = (SessionStatus::default(), Assembly::new(line.welcome.def.clone()));
     loop {
         match next(&mut line.read).await? {
             ServerMessage::SessionStatus(told) => status = *told,
-            ServerMessage::Delta(delta) => {
-                let mut snapshot = Snapshot::blank(line.welcome.def.clone());
-                Delta::apply(*delta, &mut snapshot)?;
-                return Ok((status, Arc::new(snapshot)));
+            ServerMessage::LineReport(line, report) => assembly.on_report(line, report)?,
+            ServerMessage::Snapshot(snapshot) => {
+                assembly.on_snapshot(Arc::unwrap_or_clone(snapshot))?;
+                return Ok((status, assembly));
             }
             // Nothing was asked yet.
             ServerMessage::Answer { .. } | ServerMessage::RequestDone { .. } | ServerMessage::Undelivered { .. } => {}

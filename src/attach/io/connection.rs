@@ -9,30 +9,30 @@ use tokio::{
     time::{Instant, sleep, sleep_until, timeout},
 };
 
-use super::wire::{self, WireError};
+use super::{
+    shared::{SnapshotReceiver, is_same},
+    wire::{self, WireError},
+};
 use crate::{
     access::{Credentials, RateLimit, SessionRequest, SessionStatus},
     attach::{
         check,
-        delta::Delta,
         protocol::{
             self, ClientMessage, Handshake, HandshakeReply, NEWS_BYTES_MAX, ProtocolError, REQUEST_BYTES_MAX,
             ServerMessage,
         },
-        redaction,
     },
     history::{HistoryError, Query, io::QueryRequest},
     plant::{
         PlantDef, Snapshot,
         command::{Command, Outcome},
+        line_report::LineReport,
     },
     station::{Request, Session},
 };
 
 /// Messages of one terminal: as fast as a person, so that no terminal fills the queue of all.
 const REQUESTS: RateLimit = RateLimit::new(64, Duration::from_millis(20));
-/// Real time between two snapshots to one terminal.
-pub const SNAPSHOT_EVERY: Duration = Duration::from_millis(250);
 /// A terminal that takes nothing for so long is let go.
 pub const STUCK_MAX: Duration = Duration::from_secs(300);
 /// A terminal that does not take the answer to its own query is let go after so long: answers may be large.
@@ -48,18 +48,22 @@ const STATUS_WAIT_MAX: Duration = Duration::from_secs(2);
 type Reply = (ServerMessage, Vec<OwnedSemaphorePermit>);
 
 /// Serves a terminal until either side ends; says why it ended.
-pub async fn serve<R, W>(read: R, write: W, session: Session, run: u64) -> ConnectionEnd
+pub async fn serve<R, W>(read: R, write: W, session: Session, snapshots: SnapshotReceiver) -> ConnectionEnd
 where
     R: AsyncRead + Unpin,
     W: AsyncWrite + Unpin,
 {
-    let def = session.snapshots.borrow().def.clone();
+    let (def, run) = {
+        let first = &snapshots.latest.borrow().snapshot;
+        (first.def.clone(), first.run)
+    };
     let (replies, answered) = mpsc::channel(IN_FLIGHT_MAX);
     let in_flight = Arc::new(Semaphore::new(IN_FLIGHT_MAX));
     let asked = Arc::new(Semaphore::new(ANSWERS_MAX));
     let (queries, tickets) = (JoinSet::new(), HashMap::new());
     let inbound = Inbound { session: session.clone(), def: def.clone(), replies, in_flight, asked, queries, tickets };
-    let outbound = Outbound { write, session, def };
+    let sent_reports = vec![None; def.lines.len()];
+    let outbound = Outbound { write, session, snapshots, def, sent_reports };
     tokio::select! {
         Err(ended) = inbound.run(read) => ended,
         Err(ended) = outbound.run(run, answered) => ended,
@@ -182,7 +186,10 @@ impl Inbound {
 struct Outbound<W> {
     write: W,
     session: Session,
+    snapshots: SnapshotReceiver,
     def: Arc<PlantDef>,
+    /// The line reports that the terminal has, by line.
+    sent_reports: Vec<Option<Arc<LineReport>>>,
 }
 
 impl<W: AsyncWrite + Unpin> Outbound<W> {
@@ -212,14 +219,14 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
                     self.send_session_status().await?;
                     due = Some(Instant::now());
                 }
-                changed = self.session.snapshots.changed() => {
+                changed = self.snapshots.latest.changed() => {
                     changed.map_err(|_| ConnectionEnd::StationGone)?;
-                    let snapshot = self.session.snapshots.borrow_and_update().clone();
+                    let snapshot = self.snapshots.latest.borrow_and_update().snapshot.clone();
                     due = Some(if self.has_news_of_own(&sent, &snapshot) { Instant::now() } else { next });
                 }
                 () = sleep_until(due.unwrap_or(next)), if due.is_some() => {
-                    sent = self.send_snapshot(&sent).await?;
-                    (due, next) = (None, Instant::now() + SNAPSHOT_EVERY);
+                    sent = self.send_snapshot().await?;
+                    (due, next) = (None, self.snapshots.next_at());
                 }
             }
         }
@@ -235,16 +242,21 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         self.session.status.borrow().view && own(sent) != own(snapshot)
     }
 
-    /// Tells the latest snapshot, as far as the terminal may see it; gives it back as what was sent.
-    async fn send_snapshot(&mut self, sent: &Snapshot) -> Result<Arc<Snapshot>, ConnectionEnd> {
-        let snapshot = self.session.snapshots.borrow_and_update().clone();
-        if !Arc::ptr_eq(&snapshot.def, &self.def) {
+    /// Sends the latest snapshot, as far as the terminal may see it, after the line reports that are new.
+    async fn send_snapshot(&mut self) -> Result<Arc<Snapshot>, ConnectionEnd> {
+        let latest = self.snapshots.latest.borrow_and_update().clone();
+        if !Arc::ptr_eq(&latest.snapshot.def, &self.def) {
             return Err(ConnectionEnd::OtherPlant);
         }
         let view = self.session.status.borrow().view;
-        let seen = if view { snapshot } else { Arc::new(redaction::redact(&snapshot)) };
-        self.send(&ServerMessage::Delta(Box::new(Delta::between(sent, &seen)))).await?;
-        Ok(seen)
+        for (line, report) in latest.reports.iter().enumerate() {
+            if !is_same(self.sent_reports[line].as_ref(), report.visible(view)) {
+                self.write(&report.encoded(view).await.map_err(WireError::from)?, STUCK_MAX).await?;
+                self.sent_reports[line] = report.visible(view).cloned();
+            }
+        }
+        self.write(&latest.encoded(view).await.map_err(WireError::from)?, STUCK_MAX).await?;
+        Ok(latest.snapshot.clone())
     }
 
     async fn send_session_status(&mut self) -> Result<(), ConnectionEnd> {
@@ -281,18 +293,19 @@ mod tests {
     };
 
     use super::*;
-    use crate::{access::Peer, plant::fixture, station::SessionAcceptor};
+    use crate::{access::Peer, attach::io::shared::SnapshotSender, plant::fixture, station::SessionAcceptor};
 
     /// A terminal that is served: what it writes to, and what the station is asked.
     fn serving() -> (DuplexStream, mpsc::Receiver<(u32, Request)>, JoinHandle<ConnectionEnd>) {
         let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
+        let (sender, shared) = SnapshotSender::new(snapshots.borrow().clone());
         let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
         let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, own: false });
         let (near, far) = tokio::io::duplex(REQUEST_BYTES_MAX);
         let (read, write) = tokio::io::split(near);
         let served = tokio::spawn(async move {
-            let _station = (publish, attach_requests);
-            serve(read, write, session, 1).await
+            let _station = (publish, sender, attach_requests);
+            serve(read, write, session, shared).await
         });
         (far, requests, served)
     }

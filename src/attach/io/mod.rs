@@ -5,4 +5,5 @@ pub mod find;
 mod client_task;
 mod connection;
 pub mod serve;
+mod shared;
 mod wire;

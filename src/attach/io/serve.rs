@@ -20,6 +20,7 @@ use tokio::{
 
 use super::{
     connection,
+    shared::{SnapshotReceiver, SnapshotSender},
     wire::{self, WireError},
 };
 use crate::{
@@ -194,8 +195,7 @@ struct Left {
 /// All connections to one run of the station.
 struct Connections<'a> {
     acceptor: &'a SessionAcceptor,
-    /// Which run of the station: each counts its terminals from 1.
-    run: u64,
+    snapshots: SnapshotReceiver,
     began: Instant,
     callers: Callers,
     strangers: JoinSet<Greeted>,
@@ -213,11 +213,12 @@ impl Listener {
     /// Lets terminals in until the station behind this acceptor has ended. Can be called again with another station.
     pub async fn serve(&mut self, acceptor: &SessionAcceptor) {
         let mut snapshots = acceptor.snapshots.clone();
+        let (sender, receiver) = SnapshotSender::new(snapshots.borrow_and_update().clone());
         let mut check = interval(CHECK_EVERY);
         check.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let mut connections = Connections {
             acceptor,
-            run: snapshots.borrow().run,
+            snapshots: receiver,
             began: Instant::now(),
             callers: Callers::new(rustix::process::getuid().as_raw()),
             strangers: JoinSet::new(),
@@ -227,7 +228,10 @@ impl Listener {
         loop {
             tokio::select! {
                 biased;
-                ended = snapshots.changed() => if ended.is_err() { break },
+                changed = snapshots.changed() => match changed {
+                    Ok(()) => sender.publish(snapshots.borrow_and_update().clone()),
+                    Err(_) => break,
+                },
                 Some(parse_handshake) = connections.strangers.join_next() => if let Ok(parse_handshake) = parse_handshake { connections.on_greeted(parse_handshake) },
                 Some(left) = connections.serving.join_next() => if let Ok(left) = left { connections.on_left(left) },
                 _ = check.tick() => {
@@ -315,12 +319,12 @@ impl Connections<'_> {
             }
         };
         let session = self.acceptor.attach(peer);
-        let (terminal, run) = (session.terminal, self.run);
+        let (terminal, snapshots) = (session.terminal, self.snapshots.clone());
         if self.callers.may_log(user, now) {
             tracing::info!(terminal, %from, "a terminal has attached");
         }
         self.serving.spawn(async move {
-            let why = connection::serve(read, write, session, run).await;
+            let why = connection::serve(read, write, session, snapshots).await;
             Left { user, counted_as, terminal, from, why }
         });
     }
