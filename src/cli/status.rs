@@ -159,8 +159,8 @@ fn in_json(snapshot: &Snapshot) -> Value {
         let Sample { value, quality, at } = snapshot.sample(tag.id);
         let (word, cause) = match quality {
             Quality::Good => ("good", None),
-            Quality::Uncertain(cause) => ("uncertain", Some(cause.label())),
-            Quality::Bad(cause) => ("bad", Some(cause.label())),
+            Quality::Uncertain(cause) => ("uncertain", Some(cause.word())),
+            Quality::Bad(cause) => ("bad", Some(cause.word())),
         };
         json!({
             "name": tag.name, "value": value, "text": snapshot.text(tag.id), "unit": snapshot.unit(tag.id),

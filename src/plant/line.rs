@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::id::LineId;
+use super::{id::LineId, keyword::keyword_enum};
 
 /// One serial line or TCP endpoint. Serial parameters, mode and timeouts belong to the line, never to a device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -176,40 +176,33 @@ impl Serial {
 /// `9600 8N1`.
 impl std::fmt::Display for Serial {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {}{}{}", self.baud, self.data_bits, self.parity.letter(), self.stop_bits)
+        write!(f, "{} {}{}{}", self.baud, self.data_bits, self.parity.word(), self.stop_bits)
     }
 }
 
-/// Parity of a serial character.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Parity {
-    /// No parity bit.
-    None,
-    /// Even.
-    Even,
-    /// Odd.
-    Odd,
-}
-
-impl Parity {
-    /// `N`, `E`, `O`.
-    pub fn letter(self) -> char {
-        match self {
-            Parity::None => 'N',
-            Parity::Even => 'E',
-            Parity::Odd => 'O',
-        }
+keyword_enum! {
+    /// Parity of a serial character.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum Parity: "parity" {
+        /// No parity bit.
+        None => "N",
+        /// Even.
+        Even => "E",
+        /// Odd.
+        Odd => "O",
     }
 }
 
-/// Who switches the direction of an RS-485 driver on a serial port.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Rs485 {
-    /// None: RS-232, or an adapter that does it itself.
-    #[default]
-    Off,
-    /// The kernel, by RTS high while sending.
-    RtsHigh,
-    /// The kernel, by RTS low while sending.
-    RtsLow,
+keyword_enum! {
+    /// Who switches the direction of an RS-485 driver on a serial port.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+    pub enum Rs485: "RS-485 direction control" {
+        /// None: RS-232, or an adapter that does it itself.
+        #[default]
+        Off => "off",
+        /// The kernel, by RTS high while sending.
+        RtsHigh => "rts-high",
+        /// The kernel, by RTS low while sending.
+        RtsLow => "rts-low",
+    }
 }

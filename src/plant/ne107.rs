@@ -6,36 +6,29 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     event::{ExceptionCode, LineState},
+    keyword::keyword_enum,
     request_stats::RequestStats,
     snapshot::DeviceState,
 };
 
-/// The four status signals of NE 107. A device that is well has none.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Signal {
-    /// Its values are not valid.
-    Failure,
-    /// Its values are not valid for the moment, because it is being worked on.
-    FunctionCheck,
-    /// It works outside of what it is meant for: values are late or missing now and then.
-    OutOfSpecification,
-    /// Values are good, but something wears out: to be looked at before it fails.
-    Maintenance,
+keyword_enum! {
+    /// The four status signals of NE 107. A device that is well has none.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum Signal: "signal of NE 107" {
+        /// Its values are not valid.
+        Failure => "F",
+        /// Its values are not valid for the moment, because it is being worked on.
+        FunctionCheck => "C",
+        /// It works outside of what it is meant for: values are late or missing now and then.
+        OutOfSpecification => "S",
+        /// Values are good, but something wears out: to be looked at before it fails.
+        Maintenance => "M",
+    }
 }
 
 impl Signal {
-    /// `F`, `C`, `S`, `M`.
-    pub fn letter(self) -> char {
-        match self {
-            Signal::Failure => 'F',
-            Signal::FunctionCheck => 'C',
-            Signal::OutOfSpecification => 'S',
-            Signal::Maintenance => 'M',
-        }
-    }
-
     /// In the words of the recommendation.
-    pub fn word(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Signal::Failure => "failure",
             Signal::FunctionCheck => "function check",
@@ -221,7 +214,7 @@ mod tests {
     fn check(line: &LineState, device: DeviceState, settling: bool, lately: &RequestStats, expect: &str) {
         let timeout = Duration::from_millis(300);
         let reason = evaluate(DiagnosisInput { device, line, settling, lately, timeout });
-        let words = reason.map(|reason| format!("{} {reason}", reason.signal().letter()));
+        let words = reason.map(|reason| format!("{} {reason}", reason.signal().word()));
         assert_eq!(words.as_deref().unwrap_or(""), expect);
     }
 

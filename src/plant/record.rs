@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     def::{Priority, TagId},
+    keyword::keyword_enum,
     line_minute::LineMinute,
     sample::Sample,
 };
@@ -71,80 +72,43 @@ pub struct FirstOut {
     pub rank: u32,
 }
 
-/// What happens to an alarm. The words are what the history and CSV hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum AlarmEvent {
-    /// It became active and was annunciated.
-    Raised,
-    /// An operator acknowledged it.
-    Acknowledged,
-    /// The condition is gone.
-    ReturnedToNormal,
-    /// It became active while suppressed: not annunciated.
-    RaisedSuppressed,
-    /// Its condition cleared while suppressed.
-    ReturnedSuppressed,
-    /// Acknowledged long ago and still active: it waits for an acknowledgement again.
-    ReAlarmed,
-    /// An operator reset it after its condition was gone.
-    Reset,
-    /// An operator shelved it.
-    Shelved,
-    /// Its time on the shelf is over, or an operator took it back.
-    Unshelved,
-    /// What enables it became false.
-    SuppressedByDesign,
-    /// What enables it is no longer false.
-    Unsuppressed,
-    /// An operator took it out of service.
-    OutOfService,
-    /// An operator put it back.
-    InService,
+keyword_enum! {
+    /// What happens to an alarm. The words are what the history and CSV hold.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum AlarmEvent: "alarm event" {
+        /// It became active and was annunciated.
+        Raised => "raised",
+        /// An operator acknowledged it.
+        Acknowledged => "acknowledged",
+        /// The condition is gone.
+        ReturnedToNormal => "RTN",
+        /// It became active while suppressed: not annunciated.
+        RaisedSuppressed => "raised (suppressed)",
+        /// Its condition cleared while suppressed.
+        ReturnedSuppressed => "RTN (suppressed)",
+        /// Acknowledged long ago and still active: it waits for an acknowledgement again.
+        ReAlarmed => "re-alarmed",
+        /// An operator reset it after its condition was gone.
+        Reset => "reset",
+        /// An operator shelved it.
+        Shelved => "shelved",
+        /// Its time on the shelf is over, or an operator took it back.
+        Unshelved => "unshelved",
+        /// What enables it became false.
+        SuppressedByDesign => "suppressed by design",
+        /// What enables it is no longer false.
+        Unsuppressed => "unsuppressed",
+        /// An operator took it out of service.
+        OutOfService => "out of service",
+        /// An operator put it back.
+        InService => "in service",
+    }
 }
 
 impl AlarmEvent {
     /// Does it belong to an alarm that is not annunciated?
     pub fn is_suppressed(self) -> bool {
         matches!(self, AlarmEvent::RaisedSuppressed | AlarmEvent::ReturnedSuppressed)
-    }
-
-    /// Every event.
-    pub const ALL: [AlarmEvent; 13] = [
-        AlarmEvent::Raised,
-        AlarmEvent::Acknowledged,
-        AlarmEvent::ReturnedToNormal,
-        AlarmEvent::RaisedSuppressed,
-        AlarmEvent::ReturnedSuppressed,
-        AlarmEvent::ReAlarmed,
-        AlarmEvent::Reset,
-        AlarmEvent::Shelved,
-        AlarmEvent::Unshelved,
-        AlarmEvent::SuppressedByDesign,
-        AlarmEvent::Unsuppressed,
-        AlarmEvent::OutOfService,
-        AlarmEvent::InService,
-    ];
-    /// The word in SQL, CSV and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            AlarmEvent::Raised => "raised",
-            AlarmEvent::Acknowledged => "acknowledged",
-            AlarmEvent::ReturnedToNormal => "RTN",
-            AlarmEvent::RaisedSuppressed => "raised (suppressed)",
-            AlarmEvent::ReturnedSuppressed => "RTN (suppressed)",
-            AlarmEvent::ReAlarmed => "re-alarmed",
-            AlarmEvent::Reset => "reset",
-            AlarmEvent::Shelved => "shelved",
-            AlarmEvent::Unshelved => "unshelved",
-            AlarmEvent::SuppressedByDesign => "suppressed by design",
-            AlarmEvent::Unsuppressed => "unsuppressed",
-            AlarmEvent::OutOfService => "out of service",
-            AlarmEvent::InService => "in service",
-        }
-    }
-    /// The event of a stored word.
-    pub fn from_word(word: &str) -> Option<AlarmEvent> {
-        AlarmEvent::ALL.into_iter().find(|event| event.word() == word)
     }
 }
 

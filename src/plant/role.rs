@@ -4,42 +4,31 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// The level of a person. Each may do what those before it may.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Role {
-    /// Looks.
-    Viewer,
-    /// Controls the process and acknowledges alarms.
-    Technician,
-    /// Everything.
-    Supervisor,
-}
+use super::keyword::keyword_enum;
 
-impl Role {
-    /// Every role, the least first.
-    pub const ALL: [Role; 3] = [Role::Viewer, Role::Technician, Role::Supervisor];
-    /// The word in TOML, SQL, CSV and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            Role::Viewer => "viewer",
-            Role::Technician => "technician",
-            Role::Supervisor => "supervisor",
-        }
-    }
-    /// The role of a word.
-    pub fn from_word(word: &str) -> Option<Role> {
-        Role::ALL.into_iter().find(|role| role.word() == word)
+keyword_enum! {
+    /// The level of a person. Each may do what those before it may.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Role: "role" {
+        /// Looks.
+        Viewer => "viewer",
+        /// Controls the process and acknowledges alarms.
+        Technician => "technician",
+        /// Everything.
+        Supervisor => "supervisor",
     }
 }
 
-/// What must be entered again to write a tag.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Reauthentication {
-    /// The password of the user who writes.
-    Password,
-    /// Name and password of a second user with the right to write.
-    SecondUser,
+keyword_enum! {
+    /// What must be entered again to write a tag.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+    pub enum Reauthentication: "reauthenticate" {
+        /// The password of the user who writes.
+        Password => "password",
+        /// Name and password of a second user with the right to write.
+        SecondUser => "second user",
+    }
 }
 
 /// The rules for logging in: the table `[access]` of a plant file.

@@ -5,6 +5,8 @@ use std::fmt;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
+use super::keyword::keyword_enum;
+
 /// Quality of a value, as in OPC UA. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Quality {
@@ -16,36 +18,38 @@ pub enum Quality {
     Bad(Cause),
 }
 
-/// Why a value is not good. The discriminant is what the history stores: never renumber.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[repr(u8)]
-pub enum Cause {
-    /// Nothing has been read since the station started.
-    NotRead = 1,
-    /// The device did not answer the last request in time.
-    Timeout = 2,
-    /// The answer did not survive the line (CRC, length, wrong unit or function).
-    Corrupt = 3,
-    /// The device refused the request with an exception.
-    Exception = 4,
-    /// Older than three (uncertain) or ten (bad) poll periods.
-    Stale = 5,
-    /// The device has stopped answering.
-    DeviceDown = 6,
-    /// The port or connection is gone or was closed by the operator.
-    NotConnected = 7,
-    /// The device itself says that the measurement failed (status word, sentinel value).
-    SensorFault = 8,
-    /// A value that this one needs (decimals, unit, range) is not known.
-    Unscaled = 9,
-    /// Outside the range that the device can report.
-    OutOfRange = 10,
-    /// The station was not running.
-    StationOff = 11,
-    /// There is a value, but no user who may see it is logged in here. Never stored.
-    NotAuthorised = 12,
-    /// It was stored, but the file is damaged there. Never stored.
-    Unreadable = 13,
+keyword_enum! {
+    /// Why a value is not good. The discriminant is what the history stores: never renumber.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    #[repr(u8)]
+    pub enum Cause: "cause" {
+        /// Nothing has been read since the station started.
+        NotRead = 1 => "not read yet",
+        /// The device did not answer the last request in time.
+        Timeout = 2 => "no answer in time",
+        /// The answer did not survive the line (CRC, length, wrong unit or function).
+        Corrupt = 3 => "answer corrupt",
+        /// The device refused the request with an exception.
+        Exception = 4 => "refused by the device",
+        /// Older than three (uncertain) or ten (bad) poll periods.
+        Stale = 5 => "too old",
+        /// The device has stopped answering.
+        DeviceDown = 6 => "device not answering",
+        /// The port or connection is gone or was closed by the operator.
+        NotConnected = 7 => "line not connected",
+        /// The device itself says that the measurement failed (status word, sentinel value).
+        SensorFault = 8 => "sensor fault",
+        /// A value that this one needs (decimals, unit, range) is not known.
+        Unscaled = 9 => "scale not known",
+        /// Outside the range that the device can report.
+        OutOfRange = 10 => "out of range",
+        /// The station was not running.
+        StationOff = 11 => "station was off",
+        /// There is a value, but no user who may see it is logged in here. Never stored.
+        NotAuthorised = 12 => "not authorised: log in",
+        /// It was stored, but the file is damaged there. Never stored.
+        Unreadable = 13 => "history damaged",
+    }
 }
 
 /// `good`, `uncertain: too old`, `bad: no answer in time`.
@@ -53,46 +57,8 @@ impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Quality::Good => f.write_str("good"),
-            Quality::Uncertain(cause) => write!(f, "uncertain: {}", cause.label()),
-            Quality::Bad(cause) => write!(f, "bad: {}", cause.label()),
-        }
-    }
-}
-
-impl Cause {
-    /// Every cause, in the order of its number.
-    pub const ALL: [Cause; 13] = [
-        Cause::NotRead,
-        Cause::Timeout,
-        Cause::Corrupt,
-        Cause::Exception,
-        Cause::Stale,
-        Cause::DeviceDown,
-        Cause::NotConnected,
-        Cause::SensorFault,
-        Cause::Unscaled,
-        Cause::OutOfRange,
-        Cause::StationOff,
-        Cause::NotAuthorised,
-        Cause::Unreadable,
-    ];
-
-    /// A few words for the operator.
-    pub fn label(self) -> &'static str {
-        match self {
-            Cause::NotRead => "not read yet",
-            Cause::Timeout => "no answer in time",
-            Cause::Corrupt => "answer corrupt",
-            Cause::Exception => "refused by the device",
-            Cause::Stale => "too old",
-            Cause::DeviceDown => "device not answering",
-            Cause::NotConnected => "line not connected",
-            Cause::SensorFault => "sensor fault",
-            Cause::Unscaled => "scale not known",
-            Cause::OutOfRange => "out of range",
-            Cause::StationOff => "station was off",
-            Cause::NotAuthorised => "not authorised: log in",
-            Cause::Unreadable => "history damaged",
+            Quality::Uncertain(cause) => write!(f, "uncertain: {}", cause.word()),
+            Quality::Bad(cause) => write!(f, "bad: {}", cause.word()),
         }
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     alarm::def::{AlarmClass, AlarmDef, Condition, Guidance, Priority, Subject},
     id::AlarmId,
+    keyword::keyword_enum,
 };
 
 /// The name of the station as the subject of its alarms.
@@ -14,27 +15,29 @@ pub const STATION: &str = "station";
 /// Ticks for which a fault that has merely occurred is active.
 const OCCURRED_TICKS: u8 = 10;
 
-/// A fault of the station itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum StationFault {
-    /// The history takes no records; they wait in memory.
-    NotRecording,
-    /// Records were dropped.
-    RecordsLost,
-    /// A part of the history is damaged, missing or set aside.
-    HistoryDamaged,
-    /// The disk of the history is nearly full.
-    DiskSpace,
-    /// The audit log cannot be written or sealed, or is damaged.
-    AuditLog,
-    /// The alarm state cannot be saved.
-    AlarmState,
-    /// The users file is missing or cannot be read.
-    UsersFile,
-    /// The clock has stepped, or is behind the last record.
-    Clock,
-    /// The task of a line ended by itself and was started again.
-    LineTask,
+keyword_enum! {
+    /// A fault of the station itself.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum StationFault: "station fault" {
+        /// The history takes no records; they wait in memory.
+        NotRecording => "history not recording",
+        /// Records were dropped.
+        RecordsLost => "history records lost",
+        /// A part of the history is damaged, missing or set aside.
+        HistoryDamaged => "history damaged",
+        /// The disk of the history is nearly full.
+        DiskSpace => "disk nearly full",
+        /// The audit log cannot be written or sealed, or is damaged.
+        AuditLog => "audit log fault",
+        /// The alarm state cannot be saved.
+        AlarmState => "alarm state not saved",
+        /// The users file is missing or cannot be read.
+        UsersFile => "users file unusable",
+        /// The clock has stepped, or is behind the last record.
+        Clock => "clock wrong or stepped",
+        /// The task of a line ended by itself and was started again.
+        LineTask => "line task restarted",
+    }
 }
 
 /// What is known of a fault.
@@ -56,34 +59,6 @@ impl FaultState {
 }
 
 impl StationFault {
-    /// Every fault.
-    pub const ALL: [StationFault; 9] = [
-        StationFault::NotRecording,
-        StationFault::RecordsLost,
-        StationFault::HistoryDamaged,
-        StationFault::DiskSpace,
-        StationFault::AuditLog,
-        StationFault::AlarmState,
-        StationFault::UsersFile,
-        StationFault::Clock,
-        StationFault::LineTask,
-    ];
-
-    /// The message of its alarm.
-    pub fn message(self) -> &'static str {
-        match self {
-            StationFault::NotRecording => "history not recording",
-            StationFault::RecordsLost => "history records lost",
-            StationFault::HistoryDamaged => "history damaged",
-            StationFault::DiskSpace => "disk nearly full",
-            StationFault::AuditLog => "audit log fault",
-            StationFault::AlarmState => "alarm state not saved",
-            StationFault::UsersFile => "users file unusable",
-            StationFault::Clock => "clock wrong or stepped",
-            StationFault::LineTask => "line task restarted",
-        }
-    }
-
     fn priority(self) -> Priority {
         match self {
             StationFault::NotRecording
@@ -164,7 +139,7 @@ impl StationFault {
             class: AlarmClass::System,
             on_delay: self.on_delay(),
             guidance: Guidance { cause, effect, action, response_time: Some(Duration::from_secs(600)) },
-            ..AlarmDef::new(id, Subject::Station, Condition::Station(self), self.message())
+            ..AlarmDef::new(id, Subject::Station, Condition::Station(self), self.word())
         }
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 pub use super::data_type::{DataType, Encoding};
 use super::{
     id::{DeviceId, TagId},
+    keyword::keyword_enum,
     role::Reauthentication,
     sample::Sample,
     simulate::Simulate,
@@ -202,17 +203,19 @@ impl Point {
     }
 }
 
-/// The four tables of Modbus.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Table {
-    /// Read-write bits, FC 01 / 05 / 15.
-    Coil,
-    /// Read-only bits, FC 02.
-    Discrete,
-    /// Read-only registers, FC 04.
-    Input,
-    /// Read-write registers, FC 03 / 06 / 16.
-    Holding,
+keyword_enum! {
+    /// The four tables of Modbus.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum Table: "table" {
+        /// Read-write bits, FC 01 / 05 / 15.
+        Coil => "coil",
+        /// Read-only bits, FC 02.
+        Discrete => "discrete",
+        /// Read-only registers, FC 04.
+        Input => "input",
+        /// Read-write registers, FC 03 / 06 / 16.
+        Holding => "holding",
+    }
 }
 
 impl Table {
@@ -238,15 +241,6 @@ impl Table {
             Table::Holding => 4,
         }
     }
-    /// The word in TOML and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            Table::Coil => "coil",
-            Table::Discrete => "discrete",
-            Table::Input => "input",
-            Table::Holding => "holding",
-        }
-    }
     /// The Modicon number of a wire address: five digits up to address 9998, else six.
     pub fn modicon(self, address: u16) -> String {
         let number = u32::from(address) + 1;
@@ -254,18 +248,20 @@ impl Table {
     }
 }
 
-/// Sequence of the bytes A B C D (A most significant) on the wire.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-pub enum ByteOrder {
-    /// Big-endian, the default of the Modbus world.
-    #[default]
-    Abcd,
-    /// Low word first (DirectLOGIC).
-    Cdab,
-    /// Bytes swapped inside words.
-    Badc,
-    /// Little-endian.
-    Dcba,
+keyword_enum! {
+    /// Sequence of the bytes A B C D (A most significant) on the wire.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+    pub enum ByteOrder: "order" {
+        /// Big-endian, the default of the Modbus world.
+        #[default]
+        Abcd => "ABCD",
+        /// Low word first (DirectLOGIC).
+        Cdab => "CDAB",
+        /// Bytes swapped inside words.
+        Badc => "BADC",
+        /// Little-endian.
+        Dcba => "DCBA",
+    }
 }
 
 /// Decimals of a value.
@@ -286,15 +282,17 @@ pub enum Bound {
     From(TagId),
 }
 
-/// What may be done with a tag.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Access {
-    /// Read only.
-    Read,
-    /// Read and write.
-    ReadWrite,
-    /// Write only: it has no value of its own.
-    Write,
+keyword_enum! {
+    /// What may be done with a tag.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum Access: "access" {
+        /// Read only.
+        Read => "r",
+        /// Read and write.
+        ReadWrite => "rw",
+        /// Write only: it has no value of its own.
+        Write => "w",
+    }
 }
 
 /// How often a tag is read.
@@ -308,51 +306,32 @@ pub enum Poll {
     Never,
 }
 
-/// How important it is that a tag is read in time, the most important first. On an overloaded line background polls are
-/// shed, then the periods of normal polls are stretched; critical polls keep theirs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum PollClass {
-    /// An alarm is evaluated from it.
-    Critical,
-    /// A process value.
-    Normal,
-    /// Identification.
-    Background,
-}
-
-impl PollClass {
-    /// The word in TOML and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            PollClass::Critical => "critical",
-            PollClass::Normal => "normal",
-            PollClass::Background => "background",
-        }
+keyword_enum! {
+    /// How important it is that a tag is read in time, the most important first. On an overloaded line background polls are
+    /// shed, then the periods of normal polls are stretched; critical polls keep theirs.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum PollClass: "poll class" {
+        /// An alarm is evaluated from it.
+        Critical => "critical",
+        /// A process value.
+        Normal => "normal",
+        /// Identification.
+        Background => "background",
     }
 }
 
-/// How sure a row of a register map is (see the profile's sources).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Confidence {
-    /// Recorded on a real device or read in the maker's manual.
-    Proven,
-    /// Two independent sources agree.
-    High,
-    /// One source: a write is flagged "not verified".
-    Medium,
-    /// Inference: shown only with `--experimental`.
-    Low,
-}
-
-impl Confidence {
-    /// The word in TOML and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            Confidence::Proven => "proven",
-            Confidence::High => "high",
-            Confidence::Medium => "medium",
-            Confidence::Low => "low",
-        }
+keyword_enum! {
+    /// How sure a row of a register map is (see the profile's sources).
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum Confidence: "confidence" {
+        /// Recorded on a real device or read in the maker's manual.
+        Proven => "proven",
+        /// Two independent sources agree.
+        High => "high",
+        /// One source: a write is flagged "not verified".
+        Medium => "medium",
+        /// Inference: shown only with `--experimental`.
+        Low => "low",
     }
 }
 

@@ -114,8 +114,7 @@ pub(super) fn check_modicon(modicon: &At<Modicon>, table: Table, address: u16, p
 fn meaning(modicon: &str) -> Option<String> {
     let digit = modicon.get(..1)?.parse::<u8>().ok()?;
     let number = modicon.get(1..)?.parse::<u32>().ok()?.checked_sub(1)?;
-    let tables = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
-    let table = tables.into_iter().find(|table| table.digit() == digit)?;
+    let table = Table::ALL.into_iter().find(|table| table.digit() == digit)?;
     Some(format!("{} {number} (0x{number:04X})", table.word()))
 }
 

@@ -6,11 +6,12 @@ use super::{
     diagnostic::{Problems, Span},
     interlock::bits_of,
     names::{Defs, number_of},
-    reader::{At, Choice, keyword_enum, toml_table},
+    reader::{At, Choice, toml_table},
     tag::range_of,
 };
 use crate::plant::{
     def::{AlarmClass, Condition, Level, Priority, Subject},
+    keyword::keyword_enum,
     ne107::Signal,
     tag::{Bound, TagDef},
 };
@@ -59,30 +60,16 @@ toml_table!(
     }
 );
 
-/// Whether something must be written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Requirement {
-    /// It must.
-    Required,
-    /// It may.
-    Optional,
+keyword_enum! {
+    /// Whether something must be written.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub(super) enum Requirement: "need for a comment" {
+        /// It must.
+        Required => "required",
+        /// It may.
+        Optional => "optional",
+    }
 }
-
-keyword_enum!(Requirement, "need for a comment" {
-    "required" => Requirement::Required, "optional" => Requirement::Optional,
-});
-
-keyword_enum!(AlarmClass, "class of alarms" {
-    "process" => AlarmClass::Process, "system" => AlarmClass::System,
-});
-
-keyword_enum!(Signal, "signal of NE 107" {
-    "F" => Signal::Failure, "C" => Signal::FunctionCheck, "S" => Signal::OutOfSpecification, "M" => Signal::Maintenance,
-});
-
-keyword_enum!(Priority, "priority" {
-    "critical" => Priority::Critical, "high" => Priority::High, "medium" => Priority::Medium, "low" => Priority::Low,
-});
 
 /// Most changes that can be counted.
 const CHANGES_MAX: u32 = 100;

@@ -9,7 +9,7 @@ use super::{
     schema::PlantFile,
 };
 use crate::plant::{
-    def::{LineDef, Parity, Rs485, Transport},
+    def::{LineDef, Rs485, Transport},
     line_check::check_settings,
 };
 
@@ -79,24 +79,9 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
                 i64::from(serial.data_bits),
                 i64::from(line::usual_data_bits(*framing == crate::plant::def::Framing::Ascii)),
             ),
-            entry(
-                "parity",
-                match serial.parity {
-                    Parity::None => "N",
-                    Parity::Even => "E",
-                    Parity::Odd => "O",
-                },
-            ),
+            entry("parity", serial.parity.word()),
             or_usual("stop_bits", i64::from(serial.stop_bits), 1),
-            or_usual(
-                "rs485",
-                match rs485 {
-                    Rs485::Off => "off",
-                    Rs485::RtsHigh => "rts-high",
-                    Rs485::RtsLow => "rts-low",
-                },
-                "off",
-            ),
+            or_usual("rs485", rs485.word(), Rs485::Off.word()),
             or_usual("turnaround_ms", ms(settings.turnaround), ms(usual.turnaround)),
         ]),
         Transport::Tcp { host, port, framing: _ } => {

@@ -18,7 +18,7 @@ use super::{
     diagnostic::{Problems, Span},
     renamed,
 };
-use crate::plant::visible::first_hidden;
+use crate::plant::{keyword::Keyword, visible::first_hidden};
 
 /// Most unknown keys of one table that are reported.
 const UNKNOWN_MAX: usize = 40;
@@ -271,30 +271,18 @@ macro_rules! toml_table {
 }
 pub(crate) use toml_table;
 
-/// Lets a type of the vocabulary be written as one of a few words.
-macro_rules! keyword_enum {
-    ($type:ty, $what:literal { $($word:literal => $value:expr,)* }) => {
-        impl $crate::profile::reader::Value for $type {
-            fn read(
-                value: &$crate::profile::reader::Node,
-                at: $crate::profile::diagnostic::Span,
-                problems: &mut $crate::profile::diagnostic::Problems,
-            ) -> Option<Self> {
-                let word = <String as $crate::profile::reader::Value>::read(value, at, problems)?;
-                match word.as_str() {
-                    $($word => Some($value),)*
-                    _ => {
-                        let problem = problems.add(at, format!(concat!("unknown ", $what, " `{}`"), word))
-                            .label(concat!("not a ", $what));
-                        $crate::profile::renamed::offer(problem, $what, &word, &[$($word),*]);
-                        None
-                    }
-                }
-            }
+impl<T: Keyword> Value for T {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<T> {
+        let word = String::read(value, at, problems)?;
+        let found = T::from_word(&word);
+        if found.is_none() {
+            let problem = problems.add(at, format!("unknown {} `{word}`", T::WHAT));
+            let known: Vec<&str> = T::WORDS.iter().map(|(word, _)| *word).collect();
+            renamed::offer(problem.label(format!("not a {}", T::WHAT)), T::WHAT, &word, &known);
         }
-    };
+        found
+    }
 }
-pub(crate) use keyword_enum;
 
 /// A number that must lie in a range; the usual one where it does not or is not written.
 pub(crate) fn within<T: PartialOrd + Display + Copy>(

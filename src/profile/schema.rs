@@ -12,7 +12,7 @@ pub(super) use self::device::{
 };
 use super::{
     condition::AlarmTable,
-    reader::{Choice, Raw, keyword_enum, toml_table},
+    reader::{Choice, Raw, toml_table},
 };
 use crate::plant::def::{Parity, Role, Rs485};
 
@@ -238,11 +238,3 @@ toml_table!(
         opt "bom" bom: bool,
     }
 );
-
-keyword_enum!(Rs485, "RS-485 direction control" { "off" => Rs485::Off, "rts-high" => Rs485::RtsHigh, "rts-low" => Rs485::RtsLow, });
-
-keyword_enum!(Parity, "parity" { "N" => Parity::None, "E" => Parity::Even, "O" => Parity::Odd, });
-
-keyword_enum!(Role, "role" {
-    "viewer" => Role::Viewer, "technician" => Role::Technician, "supervisor" => Role::Supervisor,
-});

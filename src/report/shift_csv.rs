@@ -58,7 +58,7 @@ fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u
         }
     }
     table.section("alarm counts", &["priority", "raised", "raised while suppressed"]);
-    for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+    for priority in Priority::ALL {
         let suppressed = report.suppressed.iter().filter(|alarm| alarm.priority == priority);
         let suppressed: u64 = suppressed.map(|alarm| alarm.raised).sum();
         let raised = raised(&report.alarms, priority);

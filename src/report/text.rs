@@ -47,9 +47,7 @@ fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
     ));
     lines.extend(report.tags.iter().map(|tag| tag_line(tag, width)));
     lines.push(String::new());
-    let counts: Vec<_> = [Priority::Critical, Priority::High, Priority::Medium, Priority::Low]
-        .map(|priority| format!("{} {}", raised(&report.alarms, priority), priority.word()))
-        .to_vec();
+    let counts = Priority::ALL.map(|priority| format!("{} {}", raised(&report.alarms, priority), priority.word()));
     lines.push(format!("alarms raised: {}", counts.join(", ")));
     for alarm in &report.suppressed {
         let (subject, minutes) = (&alarm.subject, alarm.active.as_secs_f64() / 60.0);

@@ -16,6 +16,7 @@ use crate::plant::{
     Snapshot,
     command::CommandKind,
     def::{AlarmId, TagId},
+    keyword::keyword_enum,
     record::AlarmEvent,
     snapshot::ActiveAlarm,
 };
@@ -47,13 +48,15 @@ pub struct Scenario {
     pub expect: Vec<Expect>,
 }
 
-/// How the process stands at the start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Start {
-    /// In the middle of work.
-    #[default]
-    Running,
-    Rest,
+keyword_enum! {
+    /// How the process stands at the start.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub enum Start: "start" {
+        /// In the middle of work.
+        #[default]
+        Running => "running",
+        Rest => "rest",
+    }
 }
 
 /// A fault is injected or cleared.

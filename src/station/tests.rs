@@ -101,7 +101,7 @@ async fn without_users(history: &Path) -> (bool, Result<(), String>, Result<(), 
     let at = session.snapshots.borrow().at;
     let ticked = session.snapshots.wait_for(|snapshot| at < snapshot.at).await.unwrap().clone();
     let alarmed =
-        ticked.alarms.iter().any(|alarm| ticked.def.alarm(alarm.id).message == StationFault::UsersFile.message());
+        ticked.alarms.iter().any(|alarm| ticked.def.alarm(alarm.id).message == StationFault::UsersFile.word());
     drop(session);
     station.stop().await;
     (alarmed, login.map(drop), first.map(drop))

@@ -98,7 +98,7 @@ pub fn interlock_text(cx: &ViewContext, lock: &InterlockDef) -> Option<(String, 
             let words = t!(
                 "? unknown: {name} is not good ({cause}): {message}",
                 name,
-                cause = translate(cause.label()),
+                cause = translate(cause.word()),
                 message = lock.message
             );
             Some((words, cx.theme.trouble()))

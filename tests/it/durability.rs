@@ -147,7 +147,7 @@ fn station_on(disk: &SmallDisk, port: &str, log: &[&str]) -> Process {
 /// all that waited is stored. Returns when it ended, and the devices that answer now.
 fn survive(station: &mut Process, sim: Process, port: &str, disk: &SmallDisk, outage: &Outage) -> (Timestamp, Process) {
     station.expect(outage.words);
-    outage.faults.iter().for_each(|fault| station.expect(&format!("RAISED: station {}", fault.message())));
+    outage.faults.iter().for_each(|fault| station.expect(&format!("RAISED: station {}", fault.word())));
     station.expect("TIC-1 (unit 1): answers");
     drop(sim);
     station.wait_for("line L1: not connected");
@@ -169,7 +169,7 @@ fn recorded(disk: &SmallDisk, from: Timestamp, to: Timestamp) -> (u64, u64, u64)
     let within =
         format!("utc BETWEEN make_timestamp({}) AND make_timestamp({})", from.as_microsecond(), to.as_microsecond());
     let count = |sql: &str| db.query_row(sql, [], |row| row.get(0)).unwrap();
-    let (raised, station) = (AlarmEvent::Raised.word(), StationFault::NotRecording.message());
+    let (raised, station) = (AlarmEvent::Raised.word(), StationFault::NotRecording.word());
     let samples = count(&format!("SELECT count(*) FROM sample WHERE {within}"));
     let steps = count(&format!(
         "SELECT count(*) FROM alarm_journal WHERE {within} AND event = '{raised}' AND message = '{station}'"

@@ -62,6 +62,9 @@ impl<'a> Visit<'a> for Found {
         if item.ident.as_ref().is_some_and(|name| name == "motions") {
             literals(item.mac.tokens.clone()).into_iter().for_each(|text| self.add(text));
         }
+        if item.mac.path.is_ident("keyword_enum") {
+            words_of_variants(item.mac.tokens.clone()).into_iter().for_each(|text| self.add(text));
+        }
         visit::visit_item_macro(self, item);
     }
     fn visit_lit_str(&mut self, text: &'a LitStr) {
@@ -134,6 +137,20 @@ fn literals(tokens: proc_macro2::TokenStream) -> Vec<String> {
         _ => Vec::new(),
     };
     tokens.into_iter().flat_map(texts).collect()
+}
+
+/// The words after the arrows of an enum with keywords, not its docs.
+fn words_of_variants(tokens: proc_macro2::TokenStream) -> Vec<String> {
+    let (mut words, mut after_arrow) = (Vec::new(), false);
+    for token in tokens {
+        match &token {
+            proc_macro2::TokenTree::Group(group) => words.append(&mut words_of_variants(group.stream())),
+            proc_macro2::TokenTree::Literal(_) if after_arrow => words.append(&mut literals(token.clone().into())),
+            _ => {}
+        }
+        after_arrow = matches!(&token, proc_macro2::TokenTree::Punct(punct) if punct.as_char() == '>');
+    }
+    words
 }
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

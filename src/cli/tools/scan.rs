@@ -78,7 +78,7 @@ fn serials(args: &Args, usual: Serial) -> Result<Vec<Serial>, CliError> {
             .collect::<Result<_, _>>()?,
     };
     let parities: Vec<String> = match args.parities.as_deref() {
-        None => vec![usual.parity.letter().to_string()],
+        None => vec![usual.parity.word().to_string()],
         Some("all") => vec!["N".into(), "E".into(), "O".into()],
         Some(list) => list.split(',').map(|word| word.trim().to_ascii_uppercase()).collect(),
     };

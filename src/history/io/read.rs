@@ -17,6 +17,7 @@ use crate::{
     },
     plant::{
         def::{Priority, TagId},
+        keyword::Keyword,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut},
     },

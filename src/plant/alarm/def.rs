@@ -8,6 +8,7 @@ pub use super::condition::{Condition, Level};
 use crate::plant::{
     expr::Expr,
     id::{AlarmId, DeviceId, LineId, TagId},
+    keyword::keyword_enum,
 };
 
 /// An alarm: a condition on a tag, device or line, with what the operator should know and do.
@@ -81,22 +82,14 @@ impl Default for AlarmRules {
     }
 }
 
-/// What an alarm is about. System alarms are listed apart, so that they do not flood the process list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum AlarmClass {
-    /// The process.
-    Process,
-    /// What watches it: devices, lines.
-    System,
-}
-
-impl AlarmClass {
-    /// The word in TOML and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            AlarmClass::Process => "process",
-            AlarmClass::System => "system",
-        }
+keyword_enum! {
+    /// What an alarm is about. System alarms are listed apart, so that they do not flood the process list.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum AlarmClass: "class of alarms" {
+        /// The process.
+        Process => "process",
+        /// What watches it: devices, lines.
+        System => "system",
     }
 }
 
@@ -113,37 +106,25 @@ pub enum Subject {
     Station,
 }
 
-/// Priority of an alarm, the most urgent first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Priority {
-    /// `[1]!`
-    Critical,
-    /// `‹2›!`
-    High,
-    /// `(3)`
-    Medium,
-    /// ` 4 `
-    Low,
+keyword_enum! {
+    /// Priority of an alarm, the most urgent first.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum Priority: "priority" {
+        /// `[1]!`
+        Critical = 1 => "critical",
+        /// `‹2›!`
+        High = 2 => "high",
+        /// `(3)`
+        Medium = 3 => "medium",
+        /// ` 4 `
+        Low = 4 => "low",
+    }
 }
 
 impl Priority {
     /// 1 (critical) to 4 (low).
     pub fn number(self) -> u8 {
-        match self {
-            Priority::Critical => 1,
-            Priority::High => 2,
-            Priority::Medium => 3,
-            Priority::Low => 4,
-        }
-    }
-    /// The word in TOML, SQL, CSV and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            Priority::Critical => "critical",
-            Priority::High => "high",
-            Priority::Medium => "medium",
-            Priority::Low => "low",
-        }
+        self as u8
     }
 }
 

@@ -8,7 +8,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::def::Priority;
+use crate::plant::{def::Priority, keyword::keyword_enum};
 
 /// How many of the most frequent alarms are named.
 pub const TOP: usize = 10;
@@ -190,31 +190,20 @@ pub const METRIC_TARGETS: [MetricTarget; 14] = {
     ]
 };
 
-/// How a figure stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Verdict {
-    /// As it should be.
-    Good,
-    /// Beyond the target.
-    Beyond,
-    /// Beyond the limit.
-    Over,
-    /// There is too little to evaluate.
-    TooFew,
-    /// A station ran for too little time, see [`WATCHED_MIN`].
-    TooShort,
-}
-
-impl Verdict {
-    /// The word in CSV and on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            Verdict::Good => "good",
-            Verdict::Beyond => "beyond target",
-            Verdict::Over => "over limit",
-            Verdict::TooFew => "too few",
-            Verdict::TooShort => "watched < 1 h",
-        }
+keyword_enum! {
+    /// How a figure stands.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum Verdict: "verdict" {
+        /// As it should be.
+        Good => "good",
+        /// Beyond the target.
+        Beyond => "beyond target",
+        /// Beyond the limit.
+        Over => "over limit",
+        /// There is too little to evaluate.
+        TooFew => "too few",
+        /// A station ran for too little time, see [`WATCHED_MIN`].
+        TooShort => "watched < 1 h",
     }
 }
 
@@ -334,11 +323,11 @@ mod tests {
     #[test]
     fn the_split_is_judged_from_a_handful_of_alarms_up() {
         let split = figures([0, 5, 15, 80]);
-        for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+        for priority in Priority::ALL {
             assert_eq!(verdict(&split, Metric::Share(priority)), Verdict::Good, "{}", priority.word());
         }
         let urgent = figures([2, 10, 10, 10]);
-        for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {
+        for priority in Priority::ALL {
             assert_eq!(verdict(&urgent, Metric::Share(priority)), Verdict::Beyond, "{}", priority.word());
         }
         assert_eq!(verdict(&figures([0, 19, 0, 0]), Metric::Share(Priority::High)), Verdict::TooFew);

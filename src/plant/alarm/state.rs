@@ -5,60 +5,38 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::record::{AlarmEvent, AlarmRecord, FirstOut};
+use crate::plant::{
+    keyword::keyword_enum,
+    record::{AlarmEvent, AlarmRecord, FirstOut},
+};
 
-/// State of an alarm as an operator sees it, derived from the memories.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-pub enum AlarmState {
-    /// Nothing to see.
-    #[default]
-    Normal,
-    /// Active and unacknowledged.
-    Unacknowledged,
-    /// Active and acknowledged.
-    Acknowledged,
-    /// No longer active, but unacknowledged.
-    ReturnedToNormal,
-    /// No longer active, not acknowledged, and it waits for a reset.
-    LatchedUnacknowledged,
-    /// No longer active, acknowledged, and it waits for a reset.
-    LatchedAcknowledged,
-    /// Suppressed by an operator for a limited time.
-    Shelved,
-    /// Suppressed by design: its enabling condition is false.
-    SuppressedByDesign,
-    /// Suppressed by an operator until put back in service.
-    OutOfService,
+keyword_enum! {
+    /// State of an alarm as an operator sees it, derived from the memories.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+    pub enum AlarmState: "alarm state" {
+        /// Nothing to see.
+        #[default]
+        Normal => "normal",
+        /// Active and unacknowledged.
+        Unacknowledged => "UNACK",
+        /// Active and acknowledged.
+        Acknowledged => "acked",
+        /// No longer active, but unacknowledged.
+        ReturnedToNormal => "RTN",
+        /// No longer active, not acknowledged, and it waits for a reset.
+        LatchedUnacknowledged => "LATCHED",
+        /// No longer active, acknowledged, and it waits for a reset.
+        LatchedAcknowledged => "latched",
+        /// Suppressed by an operator for a limited time.
+        Shelved => "shelved",
+        /// Suppressed by design: its enabling condition is false.
+        SuppressedByDesign => "suppressed by design",
+        /// Suppressed by an operator until put back in service.
+        OutOfService => "out of service",
+    }
 }
 
 impl AlarmState {
-    /// Every state.
-    pub const ALL: [AlarmState; 9] = [
-        AlarmState::Normal,
-        AlarmState::Unacknowledged,
-        AlarmState::Acknowledged,
-        AlarmState::ReturnedToNormal,
-        AlarmState::LatchedUnacknowledged,
-        AlarmState::LatchedAcknowledged,
-        AlarmState::Shelved,
-        AlarmState::SuppressedByDesign,
-        AlarmState::OutOfService,
-    ];
-
-    /// The word on screen.
-    pub fn word(self) -> &'static str {
-        match self {
-            AlarmState::Normal => "normal",
-            AlarmState::Unacknowledged => "UNACK",
-            AlarmState::Acknowledged => "acked",
-            AlarmState::ReturnedToNormal => "RTN",
-            AlarmState::LatchedUnacknowledged => "LATCHED",
-            AlarmState::LatchedAcknowledged => "latched",
-            AlarmState::Shelved => "shelved",
-            AlarmState::SuppressedByDesign => "suppressed by design",
-            AlarmState::OutOfService => "out of service",
-        }
-    }
     /// Waits for an acknowledgement.
     pub fn needs_acknowledgement(self) -> bool {
         match self {

@@ -97,7 +97,7 @@ fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
     if step.event != AlarmEvent::Raised || &*step.subject != STATION {
         return;
     }
-    let fault = StationFault::ALL.into_iter().find(|fault| fault.message() == &*step.message);
+    let fault = StationFault::ALL.into_iter().find(|fault| fault.word() == &*step.message);
     step.reason = fault.and_then(|fault| faults.details().get(&fault).cloned());
 }
 

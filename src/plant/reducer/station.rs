@@ -102,7 +102,7 @@ mod tests {
         let behind = HistoryStatus { clock: Some("the clock is behind".into()), ..HistoryStatus::default() };
         plant.on_history(behind.clone());
         let raised = tick(&mut plant, 1);
-        assert_eq!((raised.len(), &*raised[0].message), (1, StationFault::Clock.message()));
+        assert_eq!((raised.len(), &*raised[0].message), (1, StationFault::Clock.word()));
         plant.on_history(behind);
         assert_eq!(tick(&mut plant, 2), [], "once");
     }

@@ -5,12 +5,13 @@ use std::time::Duration;
 use crate::{
     plant::{
         def::Reauthentication,
+        keyword::keyword_enum,
         tag::{Access, ByteOrder, Confidence, DataType, PollClass, Table},
     },
     profile::{
         address::{Location, Modicon},
         diagnostic::{Problems, Span},
-        reader::{Choice, Node, Numbered, Raw, Value, keyword_enum, toml_table},
+        reader::{Choice, Node, Numbered, Raw, Value, toml_table},
         simulate::Choices,
     },
 };
@@ -215,59 +216,39 @@ toml_table!(
     }
 );
 
-keyword_enum!(Table, "table" {
-    "coil" => Table::Coil, "discrete" => Table::Discrete, "input" => Table::Input, "holding" => Table::Holding,
-});
-
-keyword_enum!(ByteOrder, "order" {
-    "ABCD" => ByteOrder::Abcd, "CDAB" => ByteOrder::Cdab, "BADC" => ByteOrder::Badc, "DCBA" => ByteOrder::Dcba,
-});
-
-keyword_enum!(Access, "access" { "r" => Access::Read, "rw" => Access::ReadWrite, "w" => Access::Write, });
-
-keyword_enum!(Confidence, "confidence" {
-    "proven" => Confidence::Proven, "high" => Confidence::High, "medium" => Confidence::Medium, "low" => Confidence::Low,
-});
-
-keyword_enum!(PollClass, "poll class" { "critical" => PollClass::Critical, "normal" => PollClass::Normal, "background" => PollClass::Background, });
-
-keyword_enum!(Reauthentication, "reauthenticate" { "password" => Reauthentication::Password, "second user" => Reauthentication::SecondUser, });
-
-/// How addresses are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Scheme {
-    /// 0-based numbers, as sent.
-    #[default]
-    Modbus,
-    /// Octal `V40500`, `Y17`, `X23`, `C54` of KOYO and AutomationDirect.
-    DirectLogic,
+keyword_enum! {
+    /// How addresses are written.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub(crate) enum Scheme: "scheme" {
+        /// 0-based numbers, as sent.
+        #[default]
+        Modbus => "modbus",
+        /// Octal `V40500`, `Y17`, `X23`, `C54` of KOYO and AutomationDirect.
+        DirectLogic => "directlogic",
+    }
 }
-keyword_enum!(Scheme, "scheme" { "modbus" => Scheme::Modbus, "directlogic" => Scheme::DirectLogic, });
-
-/// How well a register map is known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Status {
-    /// Tried on the device.
-    Verified,
-    /// Taken from the maker's manual.
-    Manual,
-    /// Parts are known.
-    Partial,
+keyword_enum! {
+    /// How well a register map is known.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub(crate) enum Status: "status" {
+        /// Tried on the device.
+        Verified => "verified",
+        /// Taken from the maker's manual.
+        Manual => "manual",
+        /// Parts are known.
+        Partial => "partial",
+    }
 }
-keyword_enum!(Status, "status" { "verified" => Status::Verified, "manual" => Status::Manual, "partial" => Status::Partial, });
-
-/// How often a tag is read; the device says what fast and slow are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PollWord {
-    Fast,
-    Slow,
-    Once,
-    Never,
+keyword_enum! {
+    /// How often a tag is read; the device says what fast and slow are.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub(crate) enum PollWord: "poll" {
+        Fast => "fast",
+        Slow => "slow",
+        Once => "once",
+        Never => "never",
+    }
 }
-keyword_enum!(PollWord, "poll" {
-    "fast" => PollWord::Fast, "slow" => PollWord::Slow, "once" => PollWord::Once, "never" => PollWord::Never,
-});
-
 /// The type of a raw value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TypeName(pub DataType);

@@ -14,7 +14,7 @@ use crate::{
     profile::{
         self, Errors, Search,
         diagnostic::{Problems, Span},
-        reader::{self, At, Choice, Node, Value, keyword_enum, text, toml_table},
+        reader::{self, At, Choice, Node, Value, text, toml_table},
         renamed,
     },
     sim::faults::{Fault, FaultTarget, why_not_applicable},
@@ -86,27 +86,6 @@ toml_table!(
         opt "tolerance" tolerance: f64,
     }
 );
-
-keyword_enum!(Start, "start" {
-    "running" => Start::Running,
-    "rest" => Start::Rest,
-});
-
-keyword_enum!(AlarmEvent, "alarm event" {
-    "raised" => AlarmEvent::Raised,
-    "acknowledged" => AlarmEvent::Acknowledged,
-    "RTN" => AlarmEvent::ReturnedToNormal,
-    "raised (suppressed)" => AlarmEvent::RaisedSuppressed,
-    "RTN (suppressed)" => AlarmEvent::ReturnedSuppressed,
-    "re-alarmed" => AlarmEvent::ReAlarmed,
-    "reset" => AlarmEvent::Reset,
-    "shelved" => AlarmEvent::Shelved,
-    "unshelved" => AlarmEvent::Unshelved,
-    "suppressed by design" => AlarmEvent::SuppressedByDesign,
-    "unsuppressed" => AlarmEvent::Unsuppressed,
-    "out of service" => AlarmEvent::OutOfService,
-    "in service" => AlarmEvent::InService,
-});
 
 impl Value for Fault {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Fault> {

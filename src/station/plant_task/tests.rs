@@ -175,7 +175,7 @@ async fn a_clock_step_is_followed_recorded_and_alarmed() {
     let wrong = clock.utc();
     let mut station = Station::start_with(&history, clock).await;
     let stepped = |snapshot: &Arc<Snapshot>| {
-        snapshot.alarms.iter().any(|alarm| snapshot.def.alarm(alarm.id).message == StationFault::Clock.message())
+        snapshot.alarms.iter().any(|alarm| snapshot.def.alarm(alarm.id).message == StationFault::Clock.word())
     };
     let snapshot = station.snapshots.wait_for(stepped).await.unwrap().clone();
     let right = jiff::Timestamp::now();

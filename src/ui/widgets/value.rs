@@ -51,7 +51,7 @@ pub fn show(cx: &ViewContext, tag: TagId) -> Shown {
         (Quality::Uncertain(_), Some(text)) => {
             Shown { text: format!("{text}?"), unit, note: text::age(cx.age(tag)), number, style }
         }
-        (quality, _) => nothing("----", translate(quality.cause().unwrap_or(Cause::NotRead).label()), style),
+        (quality, _) => nothing("----", translate(quality.cause().unwrap_or(Cause::NotRead).word()), style),
     }
 }
 

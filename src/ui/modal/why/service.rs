@@ -40,7 +40,7 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     let mut rows = vec![row("device", text, if well { theme.normal() } else { theme.trouble() })];
     rows.extend(status.diagnosis.map(|reason| {
         let signal = reason.signal();
-        row("", format!("{} {}: {reason}", signal.letter(), signal.word()), theme.trouble())
+        row("", format!("{} {}: {reason}", signal.word(), signal.label()), theme.trouble())
     }));
     // What stands above already is not said again.
     let told = cx.snapshot.sample(def.id).quality.cause() == Some(Cause::NotConnected);

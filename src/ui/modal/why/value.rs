@@ -45,12 +45,12 @@ pub(super) fn value_rows(
         Quality::Uncertain(cause) => {
             t!(
                 "uncertain: {cause}; read {age} ago at {at}",
-                cause = translate(cause.label()),
+                cause = translate(cause.word()),
                 age = age(cx.age(def.id)),
                 at
             )
         }
-        Quality::Bad(cause) => t!("bad: {cause}, since {at}", cause = translate(cause.label()), at),
+        Quality::Bad(cause) => t!("bad: {cause}, since {at}", cause = translate(cause.word()), at),
     };
     let mut rows = vec![row("value", format!("{}  {quality}", shown.with_unit()), shown.style)];
     let Some(cause) = sample.quality.cause().filter(|_| def.access != Access::Write) else { return rows };

@@ -276,7 +276,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
             (DeviceState::Down { .. }, _) => device_text(cx, device.id),
             (DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_), reason) => {
                 let signal = reason?.signal();
-                format!("{} {}", signal.letter(), translate(signal.word()))
+                format!("{} {}", signal.word(), translate(signal.label()))
             }
         };
         Some(format!("{} {words}", device.name))

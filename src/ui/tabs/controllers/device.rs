@@ -100,7 +100,7 @@ pub fn status_text(cx: &ViewContext, device: DeviceId) -> (String, Style) {
         (Some(reason), _) => {
             let signal = reason.signal();
             let retry = if reason == Reason::Down { retry_text(cx, device) } else { String::new() };
-            (format!("{} {}: {reason}{retry}", signal_mark(signal), translate(signal.word())), theme.trouble())
+            (format!("{} {}: {reason}{retry}", signal_mark(signal), translate(signal.label())), theme.trouble())
         }
         (None, DeviceState::Answering) => (format!("✓ {}", device_text(cx, device)), theme.normal()),
         (None, DeviceState::Unknown) => (format!("? {}", device_text(cx, device)), theme.dim()),
@@ -118,7 +118,7 @@ pub fn signal_mark(signal: Signal) -> String {
         Signal::OutOfSpecification => '?',
         Signal::Maintenance => '◆',
     };
-    format!("{shape}{}", signal.letter())
+    format!("{shape}{}", signal.word())
 }
 
 /// The latest write to this device and its outcome, and whether that is a worry.
