@@ -9,34 +9,11 @@ pub const TIMEOUT_MIN: Duration = Duration::from_millis(10);
 /// Longest time that anything on a line may wait: for so long nothing else goes over it.
 pub const WAIT_MAX: Duration = Duration::from_secs(10);
 
-/// A setting of a line, in error messages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Key {
-    /// Path of a serial port.
-    Port,
-    Baud,
-    /// Bits of a character.
-    DataBits,
-    StopBits,
-    /// Host name or address.
-    Host,
-    TcpPort,
-    /// Longest wait for an answer.
-    Timeout,
-    /// Extra silence before a request.
-    Gap,
-    /// Silence that ends an answer.
-    Idle,
-    /// Time after a broadcast.
-    Turnaround,
-    /// Framing that the transport does not have.
-    Mode,
-}
-
 /// What is wrong with a setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SettingError {
-    pub key: Key,
+    /// As the plant file calls it: `baud`.
+    pub key: &'static str,
     /// `9601 is not a usual baud rate`.
     pub what: String,
     /// `expected 1 or 2`.
@@ -54,7 +31,7 @@ pub fn valid(line: &LineDef) -> Result<(), String> {
 /// Everything that is wrong with a line: the first error is the one to show where there is room for one.
 pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
     let mut all = Vec::new();
-    let mut check = |wrong: bool, key: Key, what: String, expected: &'static str| {
+    let mut check = |wrong: bool, key: &'static str, what: String, expected: &'static str| {
         if wrong {
             all.push(SettingError { key, what, expected });
         }
@@ -67,37 +44,40 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
                 Framing::Rtu | Framing::Mbap => ("Modbus RTU sends 8", "expected 8"),
             };
             let fits = data_bits == 8 || (data_bits == 7 && *framing == Framing::Ascii);
-            check(port.trim().is_empty(), Key::Port, "a serial line needs a port".into(), "expected /dev/…");
+            check(port.trim().is_empty(), "port", "a serial line needs a port".into(), "expected /dev/…");
             let unusual = format!("{baud} is not a usual baud rate");
             let usual = "expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …";
-            check(!BAUDS.contains(&baud), Key::Baud, unusual, usual);
-            check(!fits, Key::DataBits, format!("{who} data bits"), expected);
+            check(!BAUDS.contains(&baud), "baud", unusual, usual);
+            check(!fits, "data_bits", format!("{who} data bits"), expected);
             let wrong = !matches!(stop_bits, 1 | 2);
-            check(wrong, Key::StopBits, format!("{stop_bits} stop bits do not exist"), "expected 1 or 2");
+            check(wrong, "stop_bits", format!("{stop_bits} stop bits do not exist"), "expected 1 or 2");
         }
         Transport::Tcp { host, port, framing: _ } => {
             let named = !host.trim().is_empty();
-            check(!named, Key::Host, "a TCP line needs a host".into(), "expected a name or an address");
+            check(!named, "host", "a TCP line needs a host".into(), "expected a name or an address");
             // More than one colon is an address of IPv6.
             let with_port = host.matches(':').count() == 1;
-            check(with_port, Key::Host, format!("`{host}` is no host"), "expected it alone, the port is tcp_port");
-            check(*port == 0, Key::TcpPort, "there is no TCP port 0".into(), "expected 1 to 65535, usually 502");
+            check(with_port, "host", format!("`{host}` is no host"), "expected it alone, the port is tcp_port");
+            check(*port == 0, "tcp_port", "there is no TCP port 0".into(), "expected 1 to 65535, usually 502");
         }
     }
     let known = match &line.transport {
         Transport::Serial { framing, .. } => *framing != Framing::Mbap,
         Transport::Tcp { framing, .. } => *framing != Framing::Ascii,
     };
-    check(!known, Key::Mode, format!("{} is no mode of a line", line.transport.mode()), "expected RTU, ASCII or TCP");
+    check(!known, "mode", format!("{} is no mode of a line", line.transport.mode()), "expected RTU, ASCII or TCP");
     let short = "no device answers within so little time";
-    check(line.timeout < TIMEOUT_MIN, Key::Timeout, short.into(), "expected at least 10 ms");
-    for (key, span) in
-        [(Key::Timeout, line.timeout), (Key::Gap, line.gap), (Key::Idle, line.idle), (Key::Turnaround, line.turnaround)]
-    {
+    check(line.timeout < TIMEOUT_MIN, "timeout_ms", short.into(), "expected at least 10 ms");
+    for (key, span) in [
+        ("timeout_ms", line.timeout),
+        ("request_gap_ms", line.gap),
+        ("frame_timeout_ms", line.idle),
+        ("turnaround_ms", line.turnaround),
+    ] {
         check(WAIT_MAX < span, key, "too long: nothing else is sent meanwhile".into(), "expected at most 10000 ms");
     }
     let short = "answers come in pieces further apart than this";
-    check(line.idle < Duration::from_millis(2), Key::Idle, short.into(), "expected at least 2 ms");
+    check(line.idle < Duration::from_millis(2), "frame_timeout_ms", short.into(), "expected at least 2 ms");
     all
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
-    interlock::bits_of,
+    interlock::check_bit,
     names::{Defs, number_of},
     reader::{At, Choice, toml_table},
     tag::range_of,
@@ -121,22 +121,13 @@ fn no_condition(table: &AlarmTable, what: &str, means: &str, problems: &mut Prob
     }
 }
 
+/// The keys that are conditions.
+const CONDITIONS: [&str; 11] =
+    ["high_high", "high", "low", "low_low", "deviation", "is", "bit", "rate", "no_change", "no_update", "changes"];
+
 /// The conditions that an alarm table has; exactly one is right.
 pub(super) fn conditions_of(table: &AlarmTable) -> Vec<(Span, &'static str)> {
-    let places = [
-        (table.high_high.map(|key| key.at), "high_high"),
-        (table.high.map(|key| key.at), "high"),
-        (table.low.map(|key| key.at), "low"),
-        (table.low_low.map(|key| key.at), "low_low"),
-        (table.deviation.map(|key| key.at), "deviation"),
-        (table.is.as_ref().map(|key| key.at), "is"),
-        (table.bit.map(|key| key.at), "bit"),
-        (table.rate.map(|key| key.at), "rate"),
-        (table.no_change.map(|key| key.at), "no_change"),
-        (table.no_update.map(|key| key.at), "no_update"),
-        (table.changes.map(|key| key.at), "changes"),
-    ];
-    places.into_iter().filter_map(|(at, word)| Some((at?, word))).collect()
+    CONDITIONS.into_iter().filter_map(|word| Some((table.span_of(word)?, word))).collect()
 }
 
 fn condition(table: &AlarmTable, tag: &TagDef, defs: &Defs, problems: &mut Problems) -> Option<Condition> {
@@ -202,13 +193,8 @@ fn condition(table: &AlarmTable, tag: &TagDef, defs: &Defs, problems: &mut Probl
 
 /// Keys that mean something only beside another one.
 fn check_companions(table: &AlarmTable, word: &str, problems: &mut Problems) {
-    let companions = [
-        (table.over.map(|key| key.at), "over", "rate"),
-        (table.within.map(|key| key.at), "within", "changes"),
-        (table.from.as_ref().map(|key| key.at), "from", "deviation"),
-    ];
-    for (at, key, of) in companions {
-        if let Some(at) = at.filter(|_| word != of) {
+    for (key, of) in [("over", "rate"), ("within", "changes"), ("from", "deviation")] {
+        if let Some(at) = table.span_of(key).filter(|_| word != of) {
             problems.add(at, format!("`{key}` belongs to `{of}`")).label(format!("means nothing with `{word}`"));
         }
     }
@@ -249,17 +235,6 @@ fn some_time(time: At<Duration>, problems: &mut Problems) -> Duration {
         problems.add(time.at, "this time is too short").label("expected at least \"1s\"");
     }
     time.value
-}
-
-fn check_bit(bit: At<u8>, tag: &TagDef, problems: &mut Problems) {
-    let bits = bits_of(tag);
-    if u16::from(bit.value) >= bits {
-        let problem = problems.add(bit.at, format!("{} has no bit {}", tag.name, bit.value));
-        problem.label(match bits {
-            0 => "expected a tag of a whole binary number that is not scaled".to_owned(),
-            bits => format!("expected 0 to {}", bits - 1),
-        });
-    }
 }
 
 fn deadband(table: &AlarmTable, condition: Span, problems: &mut Problems) -> Option<f64> {

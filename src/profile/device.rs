@@ -4,15 +4,15 @@ use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Names, Unique, held_number_of, number_of},
+    names::{Names, Scope, Unique, check_number, held_number_of, number_of},
     reader::{At, Node, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
-    simulate::{Scope, simulate},
+    simulate::simulate,
     tag::Defined,
     units,
 };
 use crate::plant::{
-    def::{ActionDef, Faceplate, Limits, TagId},
+    def::{ActionDef, Faceplate, Limits},
     tag::{Access, Point, Poll, TagDef},
 };
 
@@ -154,7 +154,7 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
                 problems.add(need.at, format!("{} gives no unit: {found}", target.name)).label("unit_from");
             }
             if target.is_text() {
-                problems.add(need.at, format!("{} is a text", target.name)).label("expected a tag that holds a number");
+                check_number(need.at, target, problems);
             } else if target.id == tag.id {
                 problems.add(need.at, format!("{} needs itself", tag.name)).label("expected another tag");
             } else if tag.poll != Poll::Never && (target.poll == Poll::Never || target.access == Access::Write) {
@@ -186,56 +186,30 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
 }
 
 /// The tags that the controller is operated by.
-pub(super) fn faceplate(
-    table: &FaceplateTable,
-    device: &str,
-    names: &Names,
-    tags: &[TagDef],
-    problems: &mut Problems,
-) -> Option<Faceplate> {
+pub(super) fn faceplate(table: &FaceplateTable, scope: &Scope, problems: &mut Problems) -> Option<Faceplate> {
     let mut find = |name: &Option<At<String>>| {
         let name = name.as_ref()?;
-        let tag = &tags[names.near(name, device, problems)?.index()];
-        if tag.is_text() {
-            problems.add(name.at, format!("{} is a text", tag.name)).label("expected a tag that holds a number");
-        }
+        let tag = scope.tag(name, problems)?;
+        check_number(name.at, tag, problems);
         Some(tag.id)
     };
-    let (pv, sv) = (find(&table.pv), find(&table.sv));
-    let sv_used = find(&table.sv_used);
-    let (mv, run, mode, tune) = (find(&table.mv), find(&table.run), find(&table.mode), find(&table.tune));
-    let (pv, sv): (TagId, TagId) = (pv?, sv?);
-    if let Some(name) = table.sv.as_ref().filter(|_| !tags[sv.index()].writable()) {
-        problems
-            .add(name.at, format!("the set value {} cannot be written", tags[sv.index()].name))
-            .label("expected access = \"rw\"");
-    }
-    let tunes = table.tunes.iter().filter_map(|name| names.near(name, device, problems)).collect();
-    Some(Faceplate { pv, sv, sv_used, mv, run, mode, tune, tunes })
+    let (pv, sv_used, mv) = (find(&table.pv), find(&table.sv_used), find(&table.mv));
+    let (run, mode, tune) = (find(&table.run), find(&table.mode), find(&table.tune));
+    let sv = find(&table.sv).and_then(|_| scope.writable(&table.sv, problems));
+    let tunes = table.tunes.iter().filter_map(|name| Some(scope.tag(name, problems)?.id)).collect();
+    Some(Faceplate { pv: pv?, sv: sv?.id, sv_used, mv, run, mode, tune, tunes })
 }
 
 /// The actions of a device.
-pub(super) fn actions(
-    tables: &[At<ActionTable>],
-    device: &str,
-    names: &Names,
-    tags: &[TagDef],
-    problems: &mut Problems,
-) -> Vec<ActionDef> {
+pub(super) fn actions(tables: &[At<ActionTable>], scope: &Scope, problems: &mut Problems) -> Vec<ActionDef> {
     let mut found = Vec::new();
     for action in tables.iter().map(|table| &table.value) {
-        let (Some(name), Some(tag_name), Some(choice)) = (&action.name, &action.tag, &action.value) else { continue };
-        let Some(tag) = names.near(tag_name, device, problems) else { continue };
-        let target = &tags[tag.index()];
-        if !target.writable() {
-            problems
-                .add(tag_name.at, format!("{} cannot be written", target.name))
-                .label("expected access = \"w\" or \"rw\"");
-        }
+        let (Some(name), Some(_), Some(choice)) = (&action.name, &action.tag, &action.value) else { continue };
+        let Some(target) = scope.writable(&action.tag, problems) else { continue };
         let Some(value) = held_number_of(choice, target, problems) else { continue };
         found.push(ActionDef {
             name: name.value.clone(),
-            tag,
+            tag: target.id,
             value,
             settle: Duration::from_millis(action.settle_ms.map_or(0, |ms| u64::from(ms.value))),
             confirm: text(&action.confirm),

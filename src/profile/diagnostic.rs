@@ -4,6 +4,7 @@ use std::fmt;
 
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report, Severity};
 
+use super::reader::At;
 use crate::plant::visible::{same_length, visible};
 
 /// Most problems that are drawn at once; the rest are counted.
@@ -241,6 +242,16 @@ impl Problems {
     /// Adds a problem at a place.
     pub fn add(&mut self, at: Span, message: impl Into<String>) -> &mut Problem {
         push(&mut self.list, at, message.into())
+    }
+    /// Reports two keys of which only one may stand, at the first.
+    pub fn exclusive(&mut self, (first, at): (&str, Span), (second, other): (&str, Span)) {
+        let problem = self.add(at, format!("`{first}` and `{second}` exclude each other"));
+        problem.label("keep one of them").also(other, "the other");
+    }
+    /// Reports a name that stands for none of the known ones.
+    pub fn unknown<'a>(&mut self, what: &str, name: &At<String>, known: impl IntoIterator<Item = &'a str>) {
+        let problem = self.add(name.at, format!("unknown {what} `{}`", name.value));
+        problem.label(format!("no such {what}")).suggest(&name.value, known);
     }
     /// Adds a warning at a place: the file can be used, but it could be better.
     pub fn warn(&mut self, at: Span, message: impl Into<String>) -> &mut Problem {

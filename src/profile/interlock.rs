@@ -2,7 +2,7 @@
 
 use super::{
     diagnostic::Problems,
-    names::{Defs, Unique, held_number_of, number_of},
+    names::{Defs, Unique, check_writable, held_number_of, number_of},
     reader::{At, text},
     schema::{ActuatorTable, InterlockTable, NeedTable, PlantFile, SequenceTable},
 };
@@ -54,14 +54,7 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
     found.extend(table.is.as_ref().map(|is| (is.at, number_of(is, of, problems).map(InterlockCondition::Is))));
     found.extend(table.bit.map(|bit| (bit.at, Some(InterlockCondition::Bit(bit.value)))));
     if let Some(bit) = table.bit {
-        let bits = bits_of(of);
-        if u16::from(bit.value) >= bits {
-            let problem = problems.add(bit.at, format!("{} has no bit {}", of.name, bit.value));
-            problem.label(match bits {
-                0 => "expected a tag of a whole binary number that is not scaled".to_owned(),
-                bits => format!("expected 0 to {}", bits - 1),
-            });
-        }
+        check_bit(bit, of, problems);
     }
     match found.as_slice() {
         [(_, one)] => *one,
@@ -77,13 +70,25 @@ fn blocking(table: &InterlockTable, of: &TagDef, problems: &mut Problems) -> Opt
 }
 
 /// The bits that the value of a tag has; none where it is not the raw number, or no binary one.
-pub(super) fn bits_of(of: &TagDef) -> u16 {
+fn bits_of(of: &TagDef) -> u16 {
     let is_raw = of.scale == 1.0 && of.offset == 0.0 && matches!(of.decimals, Decimals::Fixed(_));
     let is_binary = of.point.kind.is_binary() && !of.point.table.is_bits();
     match of.point.field {
         _ if !is_raw || !is_binary => 0,
         Some((_, bits)) => u16::from(bits),
         None => of.point.len() * 16,
+    }
+}
+
+/// Reports a bit that the register of a tag does not have.
+pub(super) fn check_bit(bit: At<u8>, tag: &TagDef, problems: &mut Problems) {
+    let bits = bits_of(tag);
+    if u16::from(bit.value) >= bits {
+        let problem = problems.add(bit.at, format!("{} has no bit {}", tag.name, bit.value));
+        problem.label(match bits {
+            0 => "expected a tag of a whole binary number that is not scaled".to_owned(),
+            bits => format!("expected 0 to {}", bits - 1),
+        });
     }
 }
 
@@ -125,8 +130,6 @@ fn state(need: &NeedTable, defs: &Defs, problems: &mut Problems) -> Option<(crat
 /// A tag that can be written.
 fn commanded<'a>(name: &At<String>, defs: &'a Defs, problems: &mut Problems) -> Option<&'a TagDef> {
     let tag = defs.tag(name, problems)?;
-    if !tag.writable() {
-        problems.add(name.at, format!("{} cannot be commanded", tag.name)).label("expected access = \"rw\" or \"w\"");
-    }
+    check_writable(name, tag, problems);
     Some(tag)
 }

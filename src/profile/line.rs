@@ -10,7 +10,7 @@ use super::{
 };
 use crate::plant::{
     def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
-    line_check::{Key, SettingError, check_settings},
+    line_check::{SettingError, check_settings},
     number::to_u16,
 };
 
@@ -22,12 +22,8 @@ pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef>
         let raw = table.value.clone();
         let Some(mode) = mode(&raw, problems) else { continue };
         let id = LineId(to_u16(index));
-        let written = if mode.tcp { tcp(raw, mode, id, problems) } else { serial(raw, mode, id, problems) };
-        let Some(written) = written else { continue };
-        let name = &written.name;
-        check_name(name, "line", problems);
-        seen.insert(&name.value, name.at, format!("duplicate line `{}`", name.value), problems);
-        lines.push(written.line(problems));
+        let read = if mode.tcp { tcp } else { serial };
+        lines.extend(read(raw, mode.framing, id, &mut seen, problems));
     }
     lines
 }
@@ -63,39 +59,9 @@ fn mode(raw: &Raw, problems: &mut Problems) -> Option<Mode> {
     found
 }
 
-/// The line that a table describes, with the places of its keys.
-struct Written {
-    line: LineDef,
-    name: At<String>,
-    spans: Vec<(Key, Span)>,
-}
-
-impl Written {
-    /// The line, after every error about a key that is written was added.
-    fn line(self, problems: &mut Problems) -> LineDef {
-        for SettingError { key, what, expected } in check_settings(&self.line) {
-            // What is not written has its usual value, or was reported as missing.
-            if let Some((_, at)) = self.spans.iter().find(|(known, _)| *known == key) {
-                problems.add(*at, what).label(expected);
-            }
-        }
-        self.line
-    }
-}
-
-fn serial(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<Written> {
+fn serial(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut Problems) -> Option<LineDef> {
     let table = SerialTable::of(&[raw], problems);
-    let ascii = mode.framing == Framing::Ascii;
-    let spans = [
-        (Key::Port, table.port.as_ref().map(|port| port.at)),
-        (Key::Baud, table.baud.map(|baud| baud.at)),
-        (Key::DataBits, table.data_bits.map(|bits| bits.at)),
-        (Key::StopBits, table.stop_bits.map(|bits| bits.at)),
-        (Key::Timeout, table.timeout_ms.map(|time| time.at)),
-        (Key::Gap, table.request_gap_ms.map(|time| time.at)),
-        (Key::Idle, table.frame_timeout_ms.map(|time| time.at)),
-        (Key::Turnaround, table.turnaround_ms.map(|time| time.at)),
-    ];
+    let ascii = framing == Framing::Ascii;
     let serial = Serial {
         baud: table.baud.map_or(Serial::USUAL.baud, |baud| baud.value),
         data_bits: table.data_bits.map_or(usual_data_bits(ascii), |bits| bits.value),
@@ -105,11 +71,11 @@ fn serial(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<W
     let transport = Transport::Serial {
         port: text(&table.port),
         serial,
-        framing: mode.framing,
+        framing,
         rs485: table.rs485.map_or(Rs485::Off, |rs485| rs485.value),
     };
-    let name = table.name?;
-    let usual = LineDef::new(id, &name.value, transport);
+    let name = checked_name(&table.name, seen, problems)?;
+    let usual = LineDef::new(id, &name, transport);
     let line = LineDef {
         timeout: millis(table.timeout_ms, usual.timeout),
         gap: millis(table.request_gap_ms, usual.gap),
@@ -117,36 +83,43 @@ fn serial(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<W
         turnaround: millis(table.turnaround_ms, usual.turnaround),
         ..usual
     };
-    Some(Written { line, name, spans: known(spans) })
+    report_wrong(&line, |key| table.span_of(key), problems);
+    Some(line)
 }
 
-fn tcp(raw: Raw, mode: Mode, id: LineId, problems: &mut Problems) -> Option<Written> {
+fn tcp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut Problems) -> Option<LineDef> {
     let table = TcpTable::of(&[raw], problems);
-    let spans = [
-        (Key::Host, table.host.as_ref().map(|host| host.at)),
-        (Key::TcpPort, table.tcp_port.map(|port| port.at)),
-        (Key::Timeout, table.timeout_ms.map(|time| time.at)),
-        (Key::Gap, table.request_gap_ms.map(|time| time.at)),
-        (Key::Idle, table.frame_timeout_ms.map(|time| time.at)),
-    ];
     let (host, port) = (text(&table.host), table.tcp_port.map_or(TCP_PORT, |port| port.value));
-    let name = table.name?;
-    let usual = LineDef::new(id, &name.value, Transport::Tcp { host, port, framing: mode.framing });
+    let name = checked_name(&table.name, seen, problems)?;
+    let usual = LineDef::new(id, &name, Transport::Tcp { host, port, framing });
     let line = LineDef {
         timeout: millis(table.timeout_ms, usual.timeout),
         gap: millis(table.request_gap_ms, usual.gap),
         idle: millis(table.frame_timeout_ms, usual.idle),
         ..usual
     };
-    Some(Written { line, name, spans: known(spans) })
+    report_wrong(&line, |key| table.span_of(key), problems);
+    Some(line)
+}
+
+fn checked_name(name: &Option<At<String>>, seen: &mut Unique, problems: &mut Problems) -> Option<String> {
+    let name = name.as_ref()?;
+    check_name(name, "line", problems);
+    seen.insert(&name.value, name.at, format!("duplicate line `{}`", name.value), problems);
+    Some(name.value.clone())
+}
+
+/// Reports what is wrong with the keys that are written: the others have their usual values, or were reported as missing.
+fn report_wrong(line: &LineDef, span_of: impl Fn(&str) -> Option<Span>, problems: &mut Problems) {
+    for SettingError { key, what, expected } in check_settings(line) {
+        if let Some(at) = span_of(key) {
+            problems.add(at, what).label(expected);
+        }
+    }
 }
 
 fn millis(written: Option<At<u16>>, usual: Duration) -> Duration {
     written.map_or(usual, |value| Duration::from_millis(u64::from(value.value)))
-}
-
-fn known<const N: usize>(spans: [(Key, Option<Span>); N]) -> Vec<(Key, Span)> {
-    spans.into_iter().filter_map(|(key, span)| Some((key, span?))).collect()
 }
 
 /// The port of Modbus TCP.

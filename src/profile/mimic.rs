@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Defs, Unique, number_of},
+    names::{Defs, Unique, check_writable, number_of},
     reader::{At, Raw, Value, text, toml_table},
     schema::{CommandTable, MimicTable, TrendTable},
 };
@@ -232,9 +232,7 @@ fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut 
     }
     keys.insert(&key.value, key.at, format!("duplicate key `{}`", key.value), problems);
     let tag = defs.tag(name, problems)?;
-    if !tag.writable() {
-        problems.add(name.at, format!("{} cannot be written", tag.name)).label("expected a tag with access = \"rw\"");
-    }
+    check_writable(name, tag, problems);
     let value = match &table.value {
         Some(choice) => Some(number_of(choice, tag, problems)?),
         None => None,

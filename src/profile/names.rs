@@ -65,9 +65,7 @@ impl Defs<'_> {
     /// A tag that holds a number, by its full name.
     pub fn tag(&self, name: &At<String>, problems: &mut Problems) -> Option<&TagDef> {
         let tag = self.names.full(name, problems).map(|id| &self.tags[id.index()])?;
-        if tag.is_text() {
-            problems.add(name.at, format!("{} is a text", tag.name)).label("expected a tag that holds a number");
-        }
+        check_number(name.at, tag, problems);
         Some(tag)
     }
     /// The id of a tag that holds a number and may be left out.
@@ -78,8 +76,7 @@ impl Defs<'_> {
     pub fn line(&self, name: &At<String>, problems: &mut Problems) -> Option<LineId> {
         let found = self.lines.iter().find(|line| line.name == name.value).map(|line| line.id);
         if found.is_none() {
-            let problem = problems.add(name.at, format!("unknown line `{}`", name.value));
-            problem.label("no such line").suggest(&name.value, self.lines.iter().map(|line| line.name.as_str()));
+            problems.unknown("line", name, self.lines.iter().map(|line| line.name.as_str()));
         }
         found
     }
@@ -87,10 +84,48 @@ impl Defs<'_> {
     pub fn device(&self, name: &At<String>, problems: &mut Problems) -> Option<DeviceId> {
         let found = self.devices.iter().find(|device| device.name == name.value).map(|device| device.id);
         if found.is_none() && !self.names.unread.contains(&name.value) {
-            let problem = problems.add(name.at, format!("unknown device `{}`", name.value));
-            problem.label("no such device").suggest(&name.value, self.devices.iter().map(|d| d.name.as_str()));
+            problems.unknown("device", name, self.devices.iter().map(|device| device.name.as_str()));
         }
         found
+    }
+}
+
+/// Where the names of one device are looked up.
+pub(super) struct Scope<'a> {
+    pub names: &'a Names,
+    pub tags: &'a [TagDef],
+    pub device: &'a str,
+}
+
+impl<'a> Scope<'a> {
+    /// A tag of the device, or of another one by its full name.
+    pub fn tag(&self, name: &At<String>, problems: &mut Problems) -> Option<&'a TagDef> {
+        self.names.near(name, self.device, problems).map(|id| &self.tags[id.index()])
+    }
+    /// The same for a key that may be left out.
+    pub fn tag_id(&self, name: &Option<At<String>>, problems: &mut Problems) -> Option<TagId> {
+        self.tag(name.as_ref()?, problems).map(|tag| tag.id)
+    }
+    /// The same for a tag that is written.
+    pub fn writable(&self, name: &Option<At<String>>, problems: &mut Problems) -> Option<&'a TagDef> {
+        let name = name.as_ref()?;
+        let tag = self.tag(name, problems)?;
+        check_writable(name, tag, problems);
+        Some(tag)
+    }
+}
+
+/// Reports a tag that is named where one is written, and cannot be.
+pub(super) fn check_writable(name: &At<String>, tag: &TagDef, problems: &mut Problems) {
+    if !tag.writable() {
+        problems.add(name.at, format!("{} cannot be written", tag.name)).label("expected access = \"rw\" or \"w\"");
+    }
+}
+
+/// Reports a text that is named where a number is needed.
+pub(super) fn check_number(name: Span, tag: &TagDef, problems: &mut Problems) {
+    if tag.is_text() {
+        problems.add(name, format!("{} is a text", tag.name)).label("expected a tag that holds a number");
     }
 }
 

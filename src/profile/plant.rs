@@ -8,7 +8,7 @@ use super::{
     access, alarm, device,
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
-    names::{Defs, Names, Unique, check_name},
+    names::{Defs, Names, Scope, Unique, check_name},
     program, reader,
     reader::{At, Node, Raw, text},
     report,
@@ -170,11 +170,12 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let mut tags = device::link(defined, &names, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);
     for (def, device) in devices.iter_mut().zip(&known) {
+        let scope = Scope { names: &names, tags: &tags, device: device.name };
         let face = device.profile.faceplate.as_ref().map(|face| &face.value);
-        def.faceplate = face.and_then(|face| device::faceplate(face, device.name, &names, &tags, problems));
-        def.actions = device::actions(&device.profile.actions, device.name, &names, &tags, problems);
+        def.faceplate = face.and_then(|face| device::faceplate(face, &scope, problems));
+        def.actions = device::actions(&device.profile.actions, &scope, problems);
         let program = device.profile.program.as_ref().map(|program| &program.value);
-        def.program = program.and_then(|table| program::program(table, device.name, &names, &tags, problems));
+        def.program = program.and_then(|table| program::program(table, &scope, problems));
     }
     sets::mark(&devices, &mut tags, &written, problems);
     Some(Devices { devices, tags, names, classes })
@@ -301,8 +302,7 @@ fn check_devices(file: &PlantFile, lines: &[LineDef], problems: &mut Problems) {
         }
         let Some(line) = &device.line else { continue };
         if !known_lines.contains(&line.value) {
-            let problem = problems.add(line.at, format!("unknown line `{}`", line.value));
-            problem.label("no such line").suggest(&line.value, known_lines.iter().map(String::as_str));
+            problems.unknown("line", line, known_lines.iter().map(String::as_str));
         }
         let (Some(unit), Some(id)) = (device.unit, line_of(device, lines)) else { continue };
         let Some(def) = lines.iter().find(|line| line.id == id) else { continue };
@@ -345,8 +345,7 @@ fn profile(
             Rc::new(file)
         }),
         Ok(None) => {
-            let problem = problems.add(name.at, format!("unknown profile `{}`", name.value));
-            problem.label("no such profile").suggest(&name.value, library.names.iter().map(String::as_str));
+            problems.unknown("profile", name, library.names.iter().map(String::as_str));
             None
         }
         Err(why) => {

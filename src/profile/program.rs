@@ -2,58 +2,30 @@
 
 use super::{
     diagnostic::Problems,
-    names::{Names, number_of},
+    names::{Scope, number_of},
     reader::At,
     schema::{ProgramTable, StepTable},
 };
-use crate::plant::{
-    def::{ProgramDef, ProgramStep, TagId},
-    tag::TagDef,
-};
+use crate::plant::def::{ProgramDef, ProgramStep};
 
 /// The program of a device.
-pub(super) fn program(
-    table: &ProgramTable,
-    device: &str,
-    names: &Names,
-    tags: &[TagDef],
-    problems: &mut Problems,
-) -> Option<ProgramDef> {
-    let mut find = |name: &Option<At<String>>| name.as_ref().and_then(|name| names.near(name, device, problems));
-    let (position, command) = (find(&table.position), find(&table.command));
-    let (pattern, mode) = (find(&table.pattern), find(&table.mode));
+pub(super) fn program(table: &ProgramTable, scope: &Scope, problems: &mut Problems) -> Option<ProgramDef> {
+    let mut find = |name: &Option<At<String>>| scope.tag_id(name, problems);
+    let (position, pattern, mode) = (find(&table.position), find(&table.pattern), find(&table.mode));
+    let command = scope.writable(&table.command, problems);
     if table.steps.is_empty() {
         problems.add(table.at, "a program needs `steps`").label("expected steps = [{ sv = …, ramp = …, soak = … }]");
     }
-    let steps: Vec<_> =
-        table.steps.iter().filter_map(|step| step_of(&step.value, device, names, tags, problems)).collect();
+    let steps: Vec<_> = table.steps.iter().filter_map(|step| step_of(&step.value, scope, problems)).collect();
     let patterns = patterns(table, steps.len(), problems);
     let (position, command) = (position?, command?);
-    let target = &tags[command.index()];
-    if let Some(name) = table.command.as_ref().filter(|_| !target.writable()) {
-        problems.add(name.at, format!("{} cannot be written", target.name)).label("expected access = \"rw\"");
-    }
-    let mut value = |choice: &Option<_>| choice.as_ref().and_then(|choice| number_of(choice, target, problems));
+    let mut value = |choice: &Option<_>| choice.as_ref().and_then(|choice| number_of(choice, command, problems));
     let (run, halt, off) = (value(&table.run), value(&table.halt), value(&table.off));
-    Some(ProgramDef { position, command, run: run?, halt, off: off?, pattern, patterns, mode, steps })
+    Some(ProgramDef { position, command: command.id, run: run?, halt, off: off?, pattern, patterns, mode, steps })
 }
 
-fn step_of(
-    step: &StepTable,
-    device: &str,
-    names: &Names,
-    tags: &[TagDef],
-    problems: &mut Problems,
-) -> Option<ProgramStep> {
-    let mut find = |name: &Option<At<String>>| -> Option<TagId> {
-        let name = name.as_ref()?;
-        let id = names.near(name, device, problems)?;
-        if !tags[id.index()].writable() {
-            let problem = problems.add(name.at, format!("{} cannot be written", tags[id.index()].name));
-            problem.label("expected access = \"rw\"");
-        }
-        Some(id)
-    };
+fn step_of(step: &StepTable, scope: &Scope, problems: &mut Problems) -> Option<ProgramStep> {
+    let mut find = |name| scope.writable(name, problems).map(|tag| tag.id);
     let (sv, ramp, soak) = (find(&step.sv), find(&step.ramp), find(&step.soak));
     Some(ProgramStep { sv: sv?, ramp: ramp?, soak: soak? })
 }

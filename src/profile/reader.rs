@@ -222,10 +222,7 @@ pub(crate) fn either(layers: &mut [Raw], first: &str, second: &str, problems: &m
     };
     let layer = &layers[top];
     if let (Some((a, _)), Some((b, _))) = (layer.table.get(first), layer.table.get(second)) {
-        problems
-            .add(*a, format!("`{first}` and `{second}` exclude each other"))
-            .label("keep one of them")
-            .also(*b, "the other");
+        problems.exclusive((first, *a), (second, *b));
     }
     for below in &mut layers[top + 1..] {
         below.table.remove(first);
@@ -255,6 +252,15 @@ macro_rules! toml_table {
                 let fields = $crate::profile::reader::Fields::new(layers, $what, &[$($key),*], problems);
                 $(let $field = fields.$mode::<$type>($key, problems);)*
                 $name { at: fields.at(), valid: problems.count() == before, $($field,)* }
+            }
+
+            /// Where the value of a key stands, if it is written and has the right type.
+            #[allow(dead_code, reason = "not every table is asked for")]
+            pub fn span_of(&self, key: &str) -> Option<$crate::profile::diagnostic::Span> {
+                match key {
+                    $($key => self.$field.iter().next().map(|value| value.at),)*
+                    _ => None,
+                }
             }
         }
         impl $crate::profile::reader::Value for $name {

@@ -5,13 +5,12 @@ use std::time::Duration;
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Names, number_of},
+    names::{Scope, number_of},
     reader::{At, Choice, Value},
     schema::{CheckTable, SimulateTable},
     tag::field_of,
 };
 use crate::plant::{
-    def::TagId,
     simulate::{Case, Check, Motion, Operation, Pace, Simulate, Source, Test},
     tag::TagDef,
 };
@@ -32,13 +31,6 @@ impl Value for Choices {
             _ => one(value, at, problems).map(|choice| Choices(vec![choice])),
         }
     }
-}
-
-/// What a `simulate` table may refer to.
-pub(super) struct Scope<'a> {
-    pub names: &'a Names,
-    pub tags: &'a [TagDef],
-    pub device: &'a str,
 }
 
 /// The simulation of a tag.
@@ -77,21 +69,21 @@ fn motion(table: &SimulateTable, scope: &Scope, problems: &mut Problems) -> Opti
     ];
     let mut sources: Vec<(Span, Option<Source>)> = Vec::new();
     for (list, operation) in lists.into_iter().filter(|(list, _)| !list.is_empty()) {
-        let tags: Vec<TagId> = list.iter().filter_map(|name| scope.names.near(name, scope.device, problems)).collect();
+        let tags = list.iter().filter_map(|name| Some(scope.tag(name, problems)?.id)).collect();
         sources.push((list[0].at, Some(Source::Of(operation, tags))));
     }
     for (name, operation) in [(&table.follow, Operation::Sum), (&table.angle, Operation::Angle)] {
         let Some(name) = name else { continue };
-        let tag = scope.names.near(name, scope.device, problems);
-        sources.push((name.at, tag.map(|tag| Source::Of(operation, vec![tag]))));
+        let tag = scope.tag(name, problems);
+        sources.push((name.at, tag.map(|tag| Source::Of(operation, vec![tag.id]))));
     }
     if let Some(name) = &table.integrate {
         let time_base = table
             .time_base
             .and_then(|time_base| lasting(time_base, "time_base", problems))
             .unwrap_or(Duration::from_secs(1));
-        let of = scope.names.near(name, scope.device, problems);
-        sources.push((name.at, of.map(|of| Source::Integral { of, time_base })));
+        let of = scope.tag(name, problems);
+        sources.push((name.at, of.map(|of| Source::Integral { of: of.id, time_base })));
     }
     if let Some(oscillate) = table.oscillate {
         let period = table.period.and_then(|period| lasting(period, "period", problems));
@@ -118,27 +110,21 @@ fn motion(table: &SimulateTable, scope: &Scope, problems: &mut Problems) -> Opti
 
 /// Words that say nothing without another one.
 fn stray(table: &SimulateTable, moves: bool, problems: &mut Problems) {
-    let mut needs = |at: Option<Span>, word: &str, other: &str, there: bool| {
-        if let Some(at) = at.filter(|_| !there) {
-            problems.add(at, format!("`{word}` says nothing without {other}")).label("not used");
+    const SOURCE: &str = "a source such as `follow` or `oscillate`";
+    let of_motion = ["gain", "offset", "rate", "idle", "lag", "when"].map(|key| (key, SOURCE, moves));
+    let others =
+        [("period", "`oscillate`", table.oscillate.is_some()), ("time_base", "`integrate`", table.integrate.is_some())];
+    for (key, other, _) in others.into_iter().chain(of_motion).filter(|(.., is_there)| !is_there) {
+        if let Some(at) = table.span_of(key) {
+            problems.add(at, format!("`{key}` says nothing without {other}")).label("not used");
         }
-    };
-    needs(table.period.map(|at| at.at), "period", "`oscillate`", table.oscillate.is_some());
-    needs(table.time_base.map(|at| at.at), "time_base", "`integrate`", table.integrate.is_some());
-    for (word, at) in [("gain", table.gain), ("offset", table.offset), ("rate", table.rate), ("idle", table.idle)] {
-        needs(at.map(|at| at.at), word, "a source such as `follow` or `oscillate`", moves);
     }
-    needs(table.lag.map(|at| at.at), "lag", "a source such as `follow` or `oscillate`", moves);
-    needs(table.when.as_ref().map(|at| at.at), "when", "a source such as `follow` or `oscillate`", moves);
 }
 
 fn pace(table: &SimulateTable, problems: &mut Problems) -> Pace {
     match (table.rate, table.lag) {
         (Some(rate), Some(lag)) => {
-            problems
-                .add(lag.at, "`rate` and `lag` exclude each other")
-                .label("keep one of them")
-                .also(rate.at, "the other");
+            problems.exclusive(("lag", lag.at), ("rate", rate.at));
             Pace::AtOnce
         }
         (Some(rate), None) if rate.value <= 0.0 => {
@@ -165,8 +151,7 @@ fn checks(tables: &[CheckTable], scope: &Scope, problems: &mut Problems) -> Opti
 
 fn check(table: &CheckTable, scope: &Scope, problems: &mut Problems) -> Option<Check> {
     let name = table.tag.as_ref()?;
-    let tag = scope.names.near(name, scope.device, problems)?;
-    let target = &scope.tags[tag.index()];
+    let target = scope.tag(name, problems)?;
     let field = match &table.field {
         Some(field) => Some(field_of(field, target.point, problems)?),
         None => None,
@@ -187,7 +172,7 @@ fn check(table: &CheckTable, scope: &Scope, problems: &mut Problems) -> Option<C
         problems.add(second, "one query at a time").label("put it into `and`").also(first, "the other");
     }
     let test = tests.into_iter().next().map_or(Test::On, |(_, test)| test);
-    Some(Check { tag, field, test })
+    Some(Check { tag: target.id, field, test })
 }
 
 fn rising(range: At<[f64; 2]>, word: &str, problems: &mut Problems) -> Option<[f64; 2]> {

@@ -312,27 +312,16 @@ fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
     kind.whole_range()
 }
 
+/// Keys that a text does not have.
+#[rustfmt::skip]
+const FOR_NUMBERS: [&str; 15] = [
+    "scale", "offset", "decimals", "decimals_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
+    "bad_if", "quality_from", "deadband",
+];
+
 /// Words have no scale, no limits and no names of numbers, and are neither written nor kept in the history.
 fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
-    let key = |at: Option<Span>, key: &'static str| at.map(|at| (at, key));
-    let for_numbers = [
-        key(row.scale.map(|key| key.at), "scale"),
-        key(row.offset.map(|key| key.at), "offset"),
-        key(row.decimals.map(|key| key.at), "decimals"),
-        key(row.decimals_from.as_ref().map(|key| key.at), "decimals_from"),
-        key(row.unit.as_ref().map(|key| key.at), "unit"),
-        key(row.unit_from.as_ref().map(|key| key.at), "unit_from"),
-        key(row.min.map(|key| key.at), "min"),
-        key(row.max.map(|key| key.at), "max"),
-        key(row.min_from.as_ref().map(|key| key.at), "min_from"),
-        key(row.max_from.as_ref().map(|key| key.at), "max_from"),
-        key(row.labels.as_ref().map(|key| key.at), "enum"),
-        key(row.bits.as_ref().map(|key| key.at), "bits"),
-        key(row.bad_if.first().map(|key| key.at), "bad_if"),
-        key(row.quality_from.as_ref().map(|key| key.at), "quality_from"),
-        key(row.deadband.map(|key| key.at), "deadband"),
-    ];
-    for (at, key) in for_numbers.into_iter().flatten() {
+    for (key, at) in FOR_NUMBERS.into_iter().filter_map(|key| Some((key, row.span_of(key)?))) {
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
     }
     if let Some(order) = row.order.filter(|order| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba)) {

@@ -22,7 +22,7 @@ fn an_interlock_says_what_blocks_which_value() {
         ("above = 80", "above = 80\nbelow = 3", "an interlock has one condition"),
         ("above = 80", "bit = 16", "D1.T has no bit 16"),
         ("of = \"D1.T\"", "of = \"D1.X\"", "unknown tag `D1.X`"),
-        ("tag = \"D1.MODE\"", "tag = \"D1.T\"", "D1.T cannot be commanded"),
+        ("tag = \"D1.MODE\"", "tag = \"D1.T\"", "D1.T cannot be written"),
         ("message = \"too hot\"", "", "an interlock needs `message`"),
     ] {
         let text = interlocked(&lock.replace(from, to)).expect_err(to).to_string();
@@ -80,5 +80,5 @@ fn an_actuator_has_one_command_and_one_output() {
     let text = interlocked(&format!("{table}{table}")).expect_err("twice").to_string();
     assert!(text.contains("PLC.OUT belongs to another actuator"), "{text}");
     let text = interlocked(&table.replace("D1.MODE", "D1.T")).expect_err("read only").to_string();
-    assert!(text.contains("D1.T cannot be commanded"), "{text}");
+    assert!(text.contains("D1.T cannot be written"), "{text}");
 }
