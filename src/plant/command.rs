@@ -109,19 +109,7 @@ impl CommandKind {
     pub fn written(&self) -> Option<(TagId, f64)> {
         match self {
             CommandKind::Write { tag, value } => Some((*tag, *value)),
-            CommandKind::Alarm(_)
-            | CommandKind::Refresh(_)
-            | CommandKind::Connect(..)
-            | CommandKind::Configure(_)
-            | CommandKind::SaveSettings(_)
-            | CommandKind::Test(..)
-            | CommandKind::StopTest(_)
-            | CommandKind::ReadSets
-            | CommandKind::SaveSet { .. }
-            | CommandKind::Restore(_)
-            | CommandKind::StopRestore(_)
-            | CommandKind::HandOver
-            | CommandKind::TakeOver => None,
+            _ => None,
         }
     }
 }

@@ -110,6 +110,18 @@ impl AlarmEvent {
     pub fn is_suppressed(self) -> bool {
         matches!(self, AlarmEvent::RaisedSuppressed | AlarmEvent::ReturnedSuppressed)
     }
+
+    /// An active alarm is annunciated no longer: its condition cleared, or it was suppressed.
+    pub fn ends_annunciation(self) -> bool {
+        matches!(
+            self,
+            AlarmEvent::ReturnedToNormal
+                | AlarmEvent::ReturnedSuppressed
+                | AlarmEvent::Shelved
+                | AlarmEvent::SuppressedByDesign
+                | AlarmEvent::OutOfService
+        )
+    }
 }
 
 /// An operator action, written when its outcome is known.

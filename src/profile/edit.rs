@@ -161,7 +161,7 @@ mod tests {
 
     use super::*;
     use crate::plant::{
-        def::{Framing, LineId, Serial},
+        def::{Framing, LineId, Parity, Serial},
         line_check::BAUDS,
     };
 

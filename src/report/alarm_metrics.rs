@@ -6,7 +6,7 @@ use super::{Period, csv::iso};
 use crate::plant::{
     alarm::{
         PeriodMetrics,
-        metrics::{METRIC_TARGETS, Metric, MetricTarget, Named},
+        metrics::{METRIC_TARGETS, MetricKind, MetricTarget, Named},
     },
     def::PlantDef,
 };
@@ -143,16 +143,7 @@ fn gaps(figures: &PeriodMetrics) -> String {
 }
 
 fn row(goal: &MetricTarget, figures: &PeriodMetrics) -> Row {
-    let decimals = match goal.measure {
-        Metric::Most | Metric::Chattering | Metric::Fleeting | Metric::Stale => 0,
-        Metric::PerDay
-        | Metric::PerHour
-        | Metric::PerWindow
-        | Metric::WindowsOver
-        | Metric::Flood
-        | Metric::Top
-        | Metric::Share(_) => 1,
-    };
+    let decimals = if goal.measure.kind() == MetricKind::Count { 0 } else { 1 };
     Row {
         measure: goal.words,
         value: figures.value(goal.measure),

@@ -140,15 +140,7 @@ pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Tim
             AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
                 active.remove(&*step.message);
             }
-            AlarmEvent::Acknowledged
-            | AlarmEvent::ReAlarmed
-            | AlarmEvent::Reset
-            | AlarmEvent::Shelved
-            | AlarmEvent::Unshelved
-            | AlarmEvent::SuppressedByDesign
-            | AlarmEvent::Unsuppressed
-            | AlarmEvent::OutOfService
-            | AlarmEvent::InService => {}
+            _ => {}
         }
     }
     if !active.is_empty() {

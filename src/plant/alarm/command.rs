@@ -5,7 +5,10 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{AlarmManager, state::AlarmState};
+use super::{
+    AlarmManager,
+    state::{AlarmState, OperatorNote},
+};
 use crate::plant::{
     def::{AlarmDef, AlarmId},
     record::{AlarmEvent, AlarmRecord},
@@ -102,9 +105,7 @@ impl AlarmManager {
         &mut self,
         id: AlarmId,
         seen: Timestamp,
-        note: Option<&Arc<str>>,
-        at: Timestamp,
-        by: &Arc<str>,
+        note: &OperatorNote,
     ) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
         let machine = self.machine(id);
@@ -114,127 +115,83 @@ impl AlarmManager {
         if machine.annunciated_at.is_some_and(|annunciated| annunciated != seen) {
             return Err(AlarmRefusal::RaisedSince);
         }
-        let note = note.filter(|note| !note.trim().is_empty());
-        if alarm.ack_comment && note.is_none() {
+        let reason = note.reason.clone().filter(|reason| !reason.trim().is_empty());
+        if alarm.ack_comment && reason.is_none() {
             return Err(AlarmRefusal::NoteNeeded);
         }
-        check_note(note)?;
+        check_note(reason.as_ref())?;
         let value = machine.value;
-        Ok(self.record_action(&alarm, AlarmEvent::Acknowledged, at, value, by, note))
+        Ok(self.record_action(&alarm, AlarmEvent::Acknowledged, value, reason, note))
     }
 
     /// Resets a latched alarm whose condition has cleared.
-    pub fn reset(&mut self, id: AlarmId, at: Timestamp, by: &Arc<str>) -> Result<AlarmRecord, AlarmRefusal> {
+    pub fn reset(&mut self, id: AlarmId, note: &OperatorNote) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
-        let (machine, state) = (self.machine(id), self.machine(id).state());
-        match state {
-            AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {}
-            AlarmState::Unacknowledged | AlarmState::Acknowledged if machine.is_latched() => {
-                return Err(AlarmRefusal::CauseLasts);
+        let machine = self.machine(id);
+        match machine.state() {
+            AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
+                Ok(self.record_action(&alarm, AlarmEvent::Reset, None, None, note))
             }
-            AlarmState::Normal
-            | AlarmState::Unacknowledged
-            | AlarmState::Acknowledged
-            | AlarmState::ReturnedToNormal
-            | AlarmState::Shelved
-            | AlarmState::SuppressedByDesign
-            | AlarmState::OutOfService => return Err(AlarmRefusal::NothingToReset),
+            AlarmState::Unacknowledged | AlarmState::Acknowledged if machine.latched => Err(AlarmRefusal::CauseLasts),
+            _ => Err(AlarmRefusal::NothingToReset),
         }
-        Ok(self.record_action(&alarm, AlarmEvent::Reset, at, None, by, None))
     }
 
-    /// Puts an alarm on the shelf, or one that lies there for another time.
-    pub fn shelve(
-        &mut self,
-        id: AlarmId,
-        lasts: Duration,
-        reason: Option<&Arc<str>>,
-        at: Timestamp,
-        by: &Arc<str>,
-    ) -> Result<AlarmRecord, AlarmRefusal> {
+    /// Shelves an alarm, or shelves a shelved one for another time.
+    pub fn shelve(&mut self, id: AlarmId, lasts: Duration, note: &OperatorNote) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
-        let reason = needed(reason)?;
+        let reason = needed(note)?;
         let max = self.def.alarm_rules.shelve_max;
-        let until = at.checked_add(lasts).ok().filter(|_| !lasts.is_zero() && lasts <= max);
+        let until = note.at.checked_add(lasts).ok().filter(|_| !lasts.is_zero() && lasts <= max);
         let until = until.ok_or(AlarmRefusal::ShelveTime { max })?;
-        if self.machine(id).out_of_service().is_some() {
+        if self.machine(id).out_of_service.is_some() {
             return Err(AlarmRefusal::OutOfService);
         }
-        let record = self.record(&alarm, AlarmEvent::Shelved, at, None);
-        let (by, reason) = (Some(by.clone()), Some(reason.clone()));
-        Ok(self.take(id, AlarmRecord { by, reason, until: Some(until), ..record }))
-    }
-
-    /// Takes an alarm back from the shelf; if it is active it is raised again with its present `value`.
-    pub fn unshelve(
-        &mut self,
-        id: AlarmId,
-        value: Option<f64>,
-        at: Timestamp,
-        by: &Arc<str>,
-    ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
-        self.put_back(id, AlarmEvent::Unshelved, value, at, by)
+        let record = self.record(&alarm, AlarmEvent::Shelved, note.at, None);
+        Ok(self.take(id, AlarmRecord { by: note.by.clone(), reason: Some(reason), until: Some(until), ..record }))
     }
 
     /// Takes an alarm out of service.
-    pub fn out_of_service(
-        &mut self,
-        id: AlarmId,
-        reason: Option<&Arc<str>>,
-        at: Timestamp,
-        by: &Arc<str>,
-    ) -> Result<AlarmRecord, AlarmRefusal> {
+    pub fn out_of_service(&mut self, id: AlarmId, note: &OperatorNote) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
-        let reason = needed(reason)?;
-        if self.machine(id).out_of_service().is_some() {
+        let reason = needed(note)?;
+        if self.machine(id).out_of_service.is_some() {
             return Err(AlarmRefusal::OutOfService);
         }
-        Ok(self.record_action(&alarm, AlarmEvent::OutOfService, at, None, by, Some(reason)))
+        Ok(self.record_action(&alarm, AlarmEvent::OutOfService, None, Some(reason), note))
     }
 
-    /// Puts an alarm back in service; if it is active it is raised again with its present `value`.
-    pub fn in_service(
-        &mut self,
-        id: AlarmId,
-        value: Option<f64>,
-        at: Timestamp,
-        by: &Arc<str>,
-    ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
-        self.put_back(id, AlarmEvent::InService, value, at, by)
-    }
-
-    fn put_back(
+    /// Ends shelving (`Unshelved`) or puts the alarm back in service; an active one is raised again with its present `value`.
+    pub fn reinstate(
         &mut self,
         id: AlarmId,
         event: AlarmEvent,
         value: Option<f64>,
-        at: Timestamp,
-        by: &Arc<str>,
+        note: &OperatorNote,
     ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
         let alarm = self.alarm(id)?;
         let machine = self.machine(id);
         let (is_away, refusal) = match event {
-            AlarmEvent::Unshelved => (machine.shelved().is_some(), AlarmRefusal::NotShelved),
-            _ => (machine.out_of_service().is_some(), AlarmRefusal::InService),
+            AlarmEvent::Unshelved => (machine.shelved.is_some(), AlarmRefusal::NotShelved),
+            _ => (machine.out_of_service.is_some(), AlarmRefusal::InService),
         };
         if !is_away {
             return Err(refusal);
         }
-        let back = self.record_action(&alarm, event, at, value, by, None);
-        Ok([Some(back), self.raise_again(&alarm, at, value)].into_iter().flatten().collect())
+        let back = self.record_action(&alarm, event, value, None, note);
+        Ok(std::iter::once(back).chain(self.raise_again(&alarm, note.at, value)).collect())
     }
 
     fn record_action(
         &mut self,
         alarm: &AlarmDef,
         event: AlarmEvent,
-        at: Timestamp,
         value: Option<f64>,
-        by: &Arc<str>,
-        reason: Option<&Arc<str>>,
+        reason: Option<Arc<str>>,
+        note: &OperatorNote,
     ) -> AlarmRecord {
-        let record = self.record(alarm, event, at, value);
-        self.take(alarm.id, AlarmRecord { by: Some(by.clone()), reason: reason.cloned(), ..record })
+        let record = self.record(alarm, event, note.at, value);
+        self.take(alarm.id, AlarmRecord { by: note.by.clone(), reason, ..record })
     }
 
     /// An id may come over the socket from another plant's terminal: it is checked.
@@ -243,9 +200,9 @@ impl AlarmManager {
     }
 }
 
-fn needed(reason: Option<&Arc<str>>) -> Result<&Arc<str>, AlarmRefusal> {
-    let reason = reason.filter(|reason| !reason.trim().is_empty()).ok_or(AlarmRefusal::ReasonNeeded)?;
-    check_note(Some(reason))?;
+fn needed(note: &OperatorNote) -> Result<Arc<str>, AlarmRefusal> {
+    let reason = note.reason.clone().filter(|reason| !reason.trim().is_empty()).ok_or(AlarmRefusal::ReasonNeeded)?;
+    check_note(Some(&reason))?;
     Ok(reason)
 }
 

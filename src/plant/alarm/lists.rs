@@ -47,19 +47,11 @@ impl AlarmManager {
         let (mut active, mut suppressed, mut sound) = (Vec::new(), Vec::new(), false);
         for (alarm, machine) in self.def.alarms.iter().zip(&self.machines) {
             let state = machine.state();
-            match state {
-                AlarmState::Normal => {}
-                AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService => {
-                    suppressed.extend(suppressed_alarm(alarm.id, machine));
-                }
-                AlarmState::Unacknowledged
-                | AlarmState::Acknowledged
-                | AlarmState::ReturnedToNormal
-                | AlarmState::LatchedUnacknowledged
-                | AlarmState::LatchedAcknowledged => {
-                    sound |= state == AlarmState::Unacknowledged && self.silenced < machine.edge;
-                    active.push(shown(alarm.id, machine));
-                }
+            if state.is_suppressed() {
+                suppressed.extend(suppressed_alarm(alarm.id, machine));
+            } else if state != AlarmState::Normal {
+                sound |= state == AlarmState::Unacknowledged && self.silenced < machine.edge;
+                active.push(shown(alarm.id, machine));
             }
         }
         active.sort_by_key(|alarm: &ActiveAlarm| {
@@ -87,20 +79,11 @@ fn shown(id: AlarmId, machine: &AlarmStateMachine) -> ActiveAlarm {
 }
 
 fn suppressed_alarm(id: AlarmId, machine: &AlarmStateMachine) -> Option<SuppressedAlarm> {
-    let state = machine.state();
-    let shelf = machine.shelved().filter(|_| state == AlarmState::Shelved);
-    let note = match state {
-        AlarmState::OutOfService => machine.out_of_service()?.clone(),
-        AlarmState::Shelved => machine.shelved()?.note.clone(),
-        AlarmState::SuppressedByDesign => {
-            OperatorNote { at: machine.suppressed()?, by: None, reason: None, recorded: true }
-        }
-        AlarmState::Normal
-        | AlarmState::Unacknowledged
-        | AlarmState::Acknowledged
-        | AlarmState::ReturnedToNormal
-        | AlarmState::LatchedUnacknowledged
-        | AlarmState::LatchedAcknowledged => return None,
+    let by_design = |at| OperatorNote { at, by: None, reason: None, recorded: true };
+    let (note, until) = match (&machine.out_of_service, &machine.shelved) {
+        (Some(note), _) => (note.clone(), None),
+        (None, Some(shelving)) => (shelving.note.clone(), Some(shelving.until)),
+        (None, None) => (machine.suppressed.map(by_design)?, None),
     };
-    Some(SuppressedAlarm { id, state, note, until: shelf.map(|shelving| shelving.until), active: machine.is_active() })
+    Some(SuppressedAlarm { id, state: machine.state(), note, until, active: machine.active })
 }

@@ -102,14 +102,14 @@ impl AlarmManager {
     /// acknowledged. One that was annunciated, or waits for a reset, never leaves the list by itself. While the condition is
     /// unknown, nothing is suppressed.
     fn suppress(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
-        if !is_disabled(alarm, facts) || self.machine(alarm.id).suppressed().is_some() {
+        if !is_disabled(alarm, facts) || self.machine(alarm.id).suppressed.is_some() {
             return;
         }
-        if self.machine(alarm.id).is_active() && !self.machine(alarm.id).state().is_suppressed() {
+        if self.machine(alarm.id).active && !self.machine(alarm.id).state().is_suppressed() {
             records.push(self.event(alarm, AlarmEvent::ReturnedToNormal, at, facts.value));
         }
         let machine = self.machine(alarm.id);
-        if machine.state() == AlarmState::Normal || machine.state().is_suppressed() && !machine.is_latched() {
+        if machine.state() == AlarmState::Normal || machine.state().is_suppressed() && !machine.latched {
             records.push(self.event(alarm, AlarmEvent::SuppressedByDesign, at, facts.value));
         }
     }
@@ -117,15 +117,15 @@ impl AlarmManager {
     fn evaluate_condition(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
         let (machine, memory) = (&mut self.machines[alarm.id.index()], &mut self.memories[alarm.id.index()]);
         // What is not known to be enabled again is still not evaluated by what it remembers.
-        let disabled = is_disabled(alarm, facts) || machine.suppressed().is_some() && facts.enabled != Some(true);
+        let disabled = is_disabled(alarm, facts) || machine.suppressed.is_some() && facts.enabled != Some(true);
         let starts_over = disabled && alarm.condition.looks_back();
-        let returned = is_disabled(alarm, facts) && machine.suppressed().is_none();
+        let returned = is_disabled(alarm, facts) && machine.suppressed.is_none();
         let event = if starts_over {
             // What looks back starts when the alarm is enabled: a value may stand still while nothing is heated.
             memory.clear();
             machine.evaluate(Some(false), self.ran, AlarmDelays::default())
         } else {
-            let holds = holds(alarm.condition, facts, machine.is_active(), memory, self.ran);
+            let holds = holds(alarm.condition, facts, machine.active, memory, self.ran);
             machine.evaluate(if returned { Some(false) } else { holds }, self.ran, delays(alarm))
         };
         if let Some(event) = event {
@@ -136,13 +136,13 @@ impl AlarmManager {
     /// The suppression ends: what holds then begins its on-delay, because a pump that has just started has its time to bring
     /// the flow up. Without a delay it is raised again.
     fn release(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
-        if self.machine(alarm.id).suppressed().is_none() || !self.is_released(alarm, facts) {
+        if self.machine(alarm.id).suppressed.is_none() || !self.is_released(alarm, facts) {
             return;
         }
         records.push(self.event(alarm, AlarmEvent::Unsuppressed, at, facts.value));
         let machine = self.machine(alarm.id);
-        let holds = machine.is_active() || machine.is_pending();
-        if machine.is_active() {
+        let holds = machine.active || machine.pending_since.is_some();
+        if machine.active {
             let raised =
                 if machine.state().is_suppressed() { AlarmEvent::RaisedSuppressed } else { AlarmEvent::Raised };
             let event = if alarm.on_delay.is_zero() { raised } else { AlarmEvent::ReturnedSuppressed };
@@ -155,7 +155,7 @@ impl AlarmManager {
 
     /// The time on the shelf ends by itself.
     fn end_shelving(&mut self, alarm: &AlarmDef, facts: Facts, at: Timestamp, records: &mut Vec<AlarmRecord>) {
-        let Some(shelving) = self.machine(alarm.id).shelved() else { return };
+        let Some(shelving) = self.machine(alarm.id).shelved.as_ref() else { return };
         if shelving.until <= at {
             records.push(self.event(alarm, AlarmEvent::Unshelved, at, facts.value));
             records.extend(self.raise_again(alarm, at, facts.value));
@@ -189,7 +189,7 @@ impl AlarmManager {
     /// An alarm that is active when its suppression ends is raised again.
     pub(super) fn raise_again(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<f64>) -> Option<AlarmRecord> {
         let machine = self.machine(alarm.id);
-        let due = machine.is_active() && !machine.state().is_suppressed();
+        let due = machine.active && !machine.state().is_suppressed();
         due.then(|| self.event(alarm, AlarmEvent::Raised, at, value))
     }
 

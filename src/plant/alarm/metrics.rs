@@ -33,7 +33,7 @@ pub struct AlarmMetrics {
 
 /// The figures of a span of time. Windows are 10 minutes of the UTC clock, those without an alarm included, but not those in
 /// which no station ran; one that lies only partly in the span counts with what is in it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PeriodMetrics {
     /// From, inclusive.
     pub from: Timestamp,
@@ -81,27 +81,6 @@ pub struct Frequent {
     pub raised: u64,
 }
 
-impl Default for PeriodMetrics {
-    fn default() -> PeriodMetrics {
-        let (from, until) = (Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
-        PeriodMetrics {
-            from,
-            until,
-            by_priority: [0; 4],
-            windows: 0,
-            watched: Duration::ZERO,
-            windows_over: 0,
-            most: 0,
-            flood: Duration::ZERO,
-            top: Vec::new(),
-            chattering: Vec::new(),
-            fleeting: Vec::new(),
-            stale: 0,
-            suppressed: 0,
-        }
-    }
-}
-
 /// What is measured, in the order of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Metric {
@@ -129,14 +108,24 @@ pub enum Metric {
     Share(Priority),
 }
 
-impl Metric {
+/// How a figure comes from the activations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MetricKind {
     /// So much in a time.
-    fn is_rate(self) -> bool {
+    Rate,
+    /// A part of all activations.
+    Share,
+    Count,
+}
+
+impl Metric {
+    pub fn kind(self) -> MetricKind {
         match self {
-            Metric::PerDay | Metric::PerHour | Metric::PerWindow | Metric::WindowsOver | Metric::Flood => true,
-            Metric::Most | Metric::Top | Metric::Chattering | Metric::Fleeting | Metric::Stale | Metric::Share(_) => {
-                false
+            Metric::PerDay | Metric::PerHour | Metric::PerWindow | Metric::WindowsOver | Metric::Flood => {
+                MetricKind::Rate
             }
+            Metric::Top | Metric::Share(_) => MetricKind::Share,
+            Metric::Most | Metric::Chattering | Metric::Fleeting | Metric::Stale => MetricKind::Count,
         }
     }
 }
@@ -231,12 +220,11 @@ impl std::fmt::Display for Bound {
 impl MetricTarget {
     /// How a figure stands against it; `None` is a figure that could not be formed.
     pub fn verdict(&self, figures: &PeriodMetrics) -> Verdict {
-        if self.measure.is_rate() && figures.watched < WATCHED_MIN {
+        if self.measure.kind() == MetricKind::Rate && figures.watched < WATCHED_MIN {
             return Verdict::TooShort;
         }
         let Some(value) = figures.value(self.measure) else { return Verdict::TooFew };
-        let share = matches!(self.measure, Metric::Top | Metric::Share(_));
-        if share && figures.annunciated() < SHARED_MIN {
+        if self.measure.kind() == MetricKind::Share && figures.annunciated() < SHARED_MIN {
             Verdict::TooFew
         } else if self.target.holds(value) {
             Verdict::Good

@@ -126,17 +126,8 @@ impl AlarmMonitor {
         match event.event {
             AlarmEvent::Raised => (history.active, history.acknowledged) = (Some(event.at), false),
             AlarmEvent::Acknowledged => history.acknowledged = true,
-            AlarmEvent::ReturnedToNormal
-            | AlarmEvent::ReturnedSuppressed
-            | AlarmEvent::Shelved
-            | AlarmEvent::SuppressedByDesign
-            | AlarmEvent::OutOfService => history.active = None,
-            AlarmEvent::RaisedSuppressed
-            | AlarmEvent::ReAlarmed
-            | AlarmEvent::Reset
-            | AlarmEvent::Unshelved
-            | AlarmEvent::Unsuppressed
-            | AlarmEvent::InService => {}
+            ended if ended.ends_annunciation() => history.active = None,
+            _ => {}
         }
     }
 
@@ -148,10 +139,7 @@ impl AlarmMonitor {
             AlarmEvent::Acknowledged => self.alarms.entry(named(event)).or_default().acknowledged = true,
             AlarmEvent::ReturnedToNormal => self.returned(event),
             // A suppressed alarm burdens no operator: it is neither stale nor fleeting.
-            AlarmEvent::ReturnedSuppressed
-            | AlarmEvent::Shelved
-            | AlarmEvent::SuppressedByDesign
-            | AlarmEvent::OutOfService => {
+            ended if ended.ends_annunciation() => {
                 self.alarms.entry(named(event)).or_default().acknowledged = true;
                 self.returned(event);
             }
@@ -160,11 +148,7 @@ impl AlarmMonitor {
                     sum.suppressed += 1;
                 }
             }
-            AlarmEvent::ReAlarmed
-            | AlarmEvent::Reset
-            | AlarmEvent::Unshelved
-            | AlarmEvent::Unsuppressed
-            | AlarmEvent::InService => {}
+            _ => {}
         }
     }
 

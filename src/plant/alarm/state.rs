@@ -39,27 +39,11 @@ keyword_enum! {
 impl AlarmState {
     /// Waits for an acknowledgement.
     pub fn needs_acknowledgement(self) -> bool {
-        match self {
-            AlarmState::Unacknowledged | AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged => true,
-            AlarmState::Normal
-            | AlarmState::Acknowledged
-            | AlarmState::LatchedAcknowledged
-            | AlarmState::Shelved
-            | AlarmState::SuppressedByDesign
-            | AlarmState::OutOfService => false,
-        }
+        matches!(self, AlarmState::Unacknowledged | AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged)
     }
     /// Shelved, suppressed by design or out of service: evaluated and journaled, not annunciated.
     pub fn is_suppressed(self) -> bool {
-        match self {
-            AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService => true,
-            AlarmState::Normal
-            | AlarmState::Unacknowledged
-            | AlarmState::Acknowledged
-            | AlarmState::ReturnedToNormal
-            | AlarmState::LatchedUnacknowledged
-            | AlarmState::LatchedAcknowledged => false,
-        }
+        matches!(self, AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService)
     }
 }
 
@@ -104,14 +88,14 @@ pub struct AlarmDelays {
 /// The memory of one alarm.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AlarmStateMachine {
-    active: bool,
-    unacknowledged: bool,
-    latched: bool,
-    suppressed: Option<Timestamp>,
-    shelved: Option<Shelving>,
-    out_of_service: Option<OperatorNote>,
+    pub active: bool,
+    pub unacknowledged: bool,
+    pub latched: bool,
+    pub suppressed: Option<Timestamp>,
+    pub shelved: Option<Shelving>,
+    pub out_of_service: Option<OperatorNote>,
     /// Since when the condition differs from `active`: the delay runs. An instant of the manager's own clock.
-    pending_since: Option<Duration>,
+    pub pending_since: Option<Duration>,
     /// The last activation that was annunciated.
     pub raised_at: Option<Timestamp>,
     /// When it was last annunciated: raised or re-alarmed.
@@ -154,31 +138,6 @@ impl AlarmStateMachine {
         }
     }
 
-    /// Is the condition established (delays included)?
-    pub fn is_active(&self) -> bool {
-        self.active
-    }
-    /// Shelved until when, by whom and why; also while it is out of service.
-    pub fn shelved(&self) -> Option<&Shelving> {
-        self.shelved.as_ref()
-    }
-    /// Since when it is out of service, by whom and why.
-    pub fn out_of_service(&self) -> Option<&OperatorNote> {
-        self.out_of_service.as_ref()
-    }
-    /// Since when it is suppressed by design.
-    pub fn suppressed(&self) -> Option<Timestamp> {
-        self.suppressed
-    }
-    /// Waits for a reset once its condition is gone.
-    pub fn is_latched(&self) -> bool {
-        self.latched
-    }
-
-    /// The condition differs from what is established: a delay runs.
-    pub fn is_pending(&self) -> bool {
-        self.pending_since.is_some()
-    }
     /// The condition holds, and its on-delay begins now, unless it is established already.
     pub fn begin_on_delay(&mut self, now: Duration) {
         if !self.active {

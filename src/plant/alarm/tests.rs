@@ -8,7 +8,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use proptest::prelude::*;
 
-use super::{AlarmManager, AlarmRefusal, AlarmState, condition::Facts};
+use super::{AlarmManager, AlarmRefusal, AlarmState, condition::Facts, state::OperatorNote};
 use crate::plant::{
     def::{AlarmDef, AlarmId, Condition, Level, PlantDef, Subject},
     fixture::{self, HIGH, PV, SILENT},
@@ -23,8 +23,9 @@ fn facts(value: f64, answering: bool) -> impl Fn(&AlarmDef) -> Facts {
     move |_| Facts { value: Some(value), ill: Some(!answering), ..Facts::default() }
 }
 
-fn by() -> Arc<str> {
-    "anna".into()
+/// What anna says at an instant.
+fn note(at: Timestamp, reason: Option<&Arc<str>>) -> OperatorNote {
+    OperatorNote { at, by: Some("anna".into()), reason: reason.cloned(), recorded: true }
 }
 
 fn why() -> Arc<str> {
@@ -57,11 +58,11 @@ fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
     let mut again = AlarmManager::new(fixture::shared());
     again.restore(&events);
     assert_eq!(again.lists(), manager.lists());
-    let ack = again.acknowledge(HIGH, at(2), Some(&why()), at(3), &by()).expect("it waits for an acknowledgement");
-    assert_eq!((ack.by, ack.reason), (Some(by()), Some(why())));
-    assert_eq!(again.acknowledge(HIGH, at(2), None, at(3), &by()), Err(AlarmRefusal::NothingToAcknowledge));
+    let ack = again.acknowledge(HIGH, at(2), &note(at(3), Some(&why()))).expect("it waits for an acknowledgement");
+    assert_eq!((ack.by, ack.reason), (Some("anna".into()), Some(why())));
+    assert_eq!(again.acknowledge(HIGH, at(2), &note(at(3), None)), Err(AlarmRefusal::NothingToAcknowledge));
     assert_eq!(again.active()[0].state, AlarmState::Acknowledged);
-    assert_eq!(again.active()[0].acknowledged.as_ref().and_then(|note| note.by.clone()), Some(by()));
+    assert_eq!(again.active()[0].acknowledged.as_ref().and_then(|note| note.by.clone()), Some("anna".into()));
 }
 
 #[test]
@@ -70,7 +71,7 @@ fn the_list_puts_what_waits_before_what_is_known() {
     manager.evaluate(at(0), facts(80.0, false));
     manager.evaluate(at(2), facts(80.0, false));
     assert_eq!(manager.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [HIGH, SILENT], "latest first");
-    manager.acknowledge(HIGH, at(2), None, at(3), &by()).expect("it waits");
+    manager.acknowledge(HIGH, at(2), &note(at(3), None)).expect("it waits");
     assert_eq!(manager.active().iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT, HIGH]);
 }
 
@@ -82,9 +83,9 @@ fn what_was_raised_after_the_operator_looked_stays_unacknowledged() {
     let seen = manager.active()[0].raised_at;
     manager.evaluate(at(1), facts(70.0, true));
     manager.evaluate(at(2), facts(80.0, true));
-    assert_eq!(manager.acknowledge(HIGH, seen, None, at(3), &by()), Err(AlarmRefusal::RaisedSince));
+    assert_eq!(manager.acknowledge(HIGH, seen, &note(at(3), None)), Err(AlarmRefusal::RaisedSince));
     assert_eq!(state(&manager), AlarmState::Unacknowledged);
-    assert!(manager.acknowledge(HIGH, at(2), None, at(3), &by()).is_ok());
+    assert!(manager.acknowledge(HIGH, at(2), &note(at(3), None)).is_ok());
 }
 
 #[test]
@@ -92,12 +93,12 @@ fn a_note_is_asked_for_where_the_plant_wants_one() {
     let def = with(|alarm| (alarm.on_delay, alarm.ack_comment) = (Duration::ZERO, true));
     let mut manager = AlarmManager::new(def);
     manager.evaluate(at(0), facts(80.0, true));
-    for note in [None, Some("".into()), Some("  ".into())] {
-        assert_eq!(manager.acknowledge(HIGH, at(0), note.as_ref(), at(1), &by()), Err(AlarmRefusal::NoteNeeded));
+    for reason in [None, Some("".into()), Some("  ".into())] {
+        assert_eq!(manager.acknowledge(HIGH, at(0), &note(at(1), reason.as_ref())), Err(AlarmRefusal::NoteNeeded));
     }
     let long: Arc<str> = "x".repeat(501).into();
-    assert_eq!(manager.acknowledge(HIGH, at(0), Some(&long), at(1), &by()), Err(AlarmRefusal::TooLong));
-    assert!(manager.acknowledge(HIGH, at(0), Some(&why()), at(1), &by()).is_ok());
+    assert_eq!(manager.acknowledge(HIGH, at(0), &note(at(1), Some(&long))), Err(AlarmRefusal::TooLong));
+    assert!(manager.acknowledge(HIGH, at(0), &note(at(1), Some(&why()))).is_ok());
 }
 
 #[test]
@@ -119,14 +120,14 @@ fn silence_ends_what_sounds_and_a_return_never_sounds() {
 #[test]
 fn a_reset_does_nothing_while_the_cause_lasts() {
     let mut manager = AlarmManager::new(with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true)));
-    assert_eq!(manager.reset(HIGH, at(0), &by()), Err(AlarmRefusal::NothingToReset));
+    assert_eq!(manager.reset(HIGH, &note(at(0), None)), Err(AlarmRefusal::NothingToReset));
     manager.evaluate(at(0), facts(80.0, true));
-    assert_eq!(manager.reset(HIGH, at(1), &by()), Err(AlarmRefusal::CauseLasts));
+    assert_eq!(manager.reset(HIGH, &note(at(1), None)), Err(AlarmRefusal::CauseLasts));
     manager.evaluate(at(2), facts(70.0, true));
     assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
-    manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
+    manager.acknowledge(HIGH, at(0), &note(at(3), None)).expect("it waits");
     assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
-    manager.reset(HIGH, at(4), &by()).expect("the cause has gone");
+    manager.reset(HIGH, &note(at(4), None)).expect("the cause has gone");
     assert_eq!(state(&manager), AlarmState::Normal);
 }
 
@@ -140,9 +141,9 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
         (Duration::ZERO, "leak", AlarmRefusal::ShelveTime { max }),
         (max + minute, "leak", AlarmRefusal::ShelveTime { max }),
     ] {
-        assert_eq!(manager.shelve(HIGH, lasts, Some(&reason.into()), at(0), &by()), Err(refusal));
+        assert_eq!(manager.shelve(HIGH, lasts, &note(at(0), Some(&reason.into()))), Err(refusal));
     }
-    manager.shelve(HIGH, minute, Some(&why()), at(0), &by()).expect("a minute, with a reason");
+    manager.shelve(HIGH, minute, &note(at(0), Some(&why()))).expect("a minute, with a reason");
     assert_eq!(events(&manager.evaluate(at(10), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
     assert!(!manager.lists().sound && manager.active().is_empty());
     let suppressed = manager.lists().suppressed[0].clone();
@@ -150,11 +151,17 @@ fn a_shelved_alarm_is_judged_quietly_and_comes_back_by_itself() {
     assert_eq!(events(&manager.evaluate(at(59), facts(80.0, true))), []);
     assert_eq!(events(&manager.evaluate(at(60), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
     assert_eq!((state(&manager), manager.active()[0].raised_at), (AlarmState::Unacknowledged, at(60)));
-    manager.shelve(HIGH, minute, Some(&why()), at(70), &by()).expect("again");
+    manager.shelve(HIGH, minute, &note(at(70), Some(&why()))).expect("again");
     assert_eq!(events(&manager.evaluate(at(71), facts(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
-    assert_eq!(events(&manager.unshelve(HIGH, None, at(72), &by()).expect("it is shelved")), [AlarmEvent::Unshelved]);
+    assert_eq!(
+        events(&manager.reinstate(HIGH, AlarmEvent::Unshelved, None, &note(at(72), None)).expect("it is shelved")),
+        [AlarmEvent::Unshelved]
+    );
     assert_eq!(state(&manager), AlarmState::Normal);
-    assert_eq!(manager.unshelve(HIGH, None, at(73), &by()), Err(AlarmRefusal::NotShelved));
+    assert_eq!(
+        manager.reinstate(HIGH, AlarmEvent::Unshelved, None, &note(at(73), None)),
+        Err(AlarmRefusal::NotShelved)
+    );
 }
 
 #[test]
@@ -164,7 +171,7 @@ fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
     manager.evaluate(at(10_006), facts(80.0, true));
     manager.evaluate(at(100), facts(80.0, true));
     assert_eq!(events(&manager.evaluate(at(104), facts(80.0, true))), [AlarmEvent::Raised], "6 s and 4 s");
-    manager.shelve(HIGH, Duration::from_secs(600), Some(&why()), at(5_000), &by()).expect("ten minutes");
+    manager.shelve(HIGH, Duration::from_secs(600), &note(at(5_000), Some(&why()))).expect("ten minutes");
     assert_eq!(events(&manager.evaluate(at(200), facts(80.0, true))), [AlarmEvent::Shelved]);
     assert_eq!(manager.lists().suppressed[0].until, Some(at(800)));
     assert_eq!(events(&manager.evaluate(at(800), facts(80.0, true))), [AlarmEvent::Unshelved, AlarmEvent::Raised]);
@@ -173,16 +180,18 @@ fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
 #[test]
 fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
     let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
-    assert_eq!(manager.out_of_service(HIGH, Some(&" ".into()), at(0), &by()), Err(AlarmRefusal::ReasonNeeded));
-    assert_eq!(manager.in_service(HIGH, None, at(0), &by()), Err(AlarmRefusal::InService));
-    manager.out_of_service(HIGH, Some(&why()), at(0), &by()).expect("with a reason");
+    assert_eq!(manager.out_of_service(HIGH, &note(at(0), Some(&" ".into()))), Err(AlarmRefusal::ReasonNeeded));
+    assert_eq!(manager.reinstate(HIGH, AlarmEvent::InService, None, &note(at(0), None)), Err(AlarmRefusal::InService));
+    manager.out_of_service(HIGH, &note(at(0), Some(&why()))).expect("with a reason");
     assert_eq!(
-        manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()),
+        manager.shelve(HIGH, Duration::from_secs(60), &note(at(1), Some(&why()))),
         Err(AlarmRefusal::OutOfService)
     );
     assert_eq!(events(&manager.evaluate(at(100_000), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
     assert_eq!(manager.lists().suppressed[0].state, AlarmState::OutOfService);
-    let back = manager.in_service(HIGH, Some(80.0), at(100_001), &by()).expect("it is out of service");
+    let back = manager
+        .reinstate(HIGH, AlarmEvent::InService, Some(80.0), &note(at(100_001), None))
+        .expect("it is out of service");
     assert_eq!(events(&back), [AlarmEvent::InService, AlarmEvent::Raised]);
     assert_eq!(back[1].value, Some(80.0));
 }
@@ -194,7 +203,7 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
     };
     let mut manager = AlarmManager::new(with(remind));
     let mut journal = manager.evaluate(at(0), facts(80.0, true));
-    journal.push(manager.acknowledge(HIGH, at(0), None, at(10), &by()).expect("it waits"));
+    journal.push(manager.acknowledge(HIGH, at(0), &note(at(10), None)).expect("it waits"));
     manager.silence();
     assert_eq!(events(&manager.evaluate(at(1_809), facts(80.0, true))), []);
     let mut again = AlarmManager::new(with(remind));
@@ -207,10 +216,10 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
     assert_eq!(events(&manager.evaluate(at(1_810), facts(80.0, true))), [AlarmEvent::ReAlarmed]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::Unacknowledged, true));
     assert_eq!(manager.active()[0].raised_at, at(0), "it is the same activation");
-    let early = manager.acknowledge(HIGH, at(0), None, at(1_811), &by());
+    let early = manager.acknowledge(HIGH, at(0), &note(at(1_811), None));
     assert_eq!(early, Err(AlarmRefusal::RaisedSince), "a window from before the reminder acknowledges nothing");
     let seen = manager.active()[0].annunciated_at;
-    assert!(manager.acknowledge(HIGH, seen, None, at(1_812), &by()).is_ok());
+    assert!(manager.acknowledge(HIGH, seen, &note(at(1_812), None)).is_ok());
 }
 
 /// The fixture whose alarm "high" is enabled while the facts say so.

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{Effects, Plant};
 use crate::plant::{
-    alarm::{AlarmCommand, AlarmRefusal, condition::Facts},
+    alarm::{AlarmCommand, AlarmRefusal, condition::Facts, state::OperatorNote},
     command::{CommandStatus, NotConfirmed, Outcome, Refusal},
     def::{AlarmDef, AlarmId, Condition, Subject},
     event::LineState,
@@ -29,30 +29,29 @@ impl Plant {
         at: Timestamp,
         effects: &mut Effects,
     ) -> ActionRecord {
-        // The events of one alarm never go back in time, whatever the clock does.
-        let now = self.at.max(at);
-        let (manager, by, note) = (&mut self.alarm_manager, &status.by, status.command.note.as_ref());
+        let note = OperatorNote {
+            at: self.at.max(at),
+            by: Some(status.by.clone()),
+            reason: status.command.note.clone(),
+            recorded: true,
+        };
+        let value = |alarm| value_of(&self.def, &self.image, alarm);
+        let manager = &mut self.alarm_manager;
+        let one = |record: Result<AlarmRecord, AlarmRefusal>| record.map(|record| vec![record]);
         let done = match alarm_command {
-            AlarmCommand::Acknowledge { alarm, seen } => {
-                manager.acknowledge(alarm, seen, note, now, by).map(|step| vec![step])
-            }
+            AlarmCommand::Acknowledge { alarm, seen } => one(manager.acknowledge(alarm, seen, &note)),
             AlarmCommand::AcknowledgeAll { seen } => {
-                let each = seen.iter().map(|(alarm, seen)| manager.acknowledge(*alarm, *seen, note, now, by));
+                let each = seen.iter().map(|(alarm, seen)| manager.acknowledge(*alarm, *seen, &note));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
                 return self.commands.finish(status, outcome, &self.image);
             }
-            AlarmCommand::Silence => match manager.silence() {
-                true => Ok(Vec::new()),
-                false => Err(AlarmRefusal::NothingSounds),
-            },
-            AlarmCommand::Reset(alarm) => manager.reset(alarm, now, by).map(|step| vec![step]),
-            AlarmCommand::Shelve { alarm, lasts } => manager.shelve(alarm, lasts, note, now, by).map(|step| vec![step]),
-            AlarmCommand::Unshelve(alarm) => manager.unshelve(alarm, value_of(&self.def, &self.image, alarm), now, by),
-            AlarmCommand::OutOfService(alarm) => manager.out_of_service(alarm, note, now, by).map(|step| vec![step]),
-            AlarmCommand::InService(alarm) => {
-                manager.in_service(alarm, value_of(&self.def, &self.image, alarm), now, by)
-            }
+            AlarmCommand::Silence => manager.silence().then(Vec::new).ok_or(AlarmRefusal::NothingSounds),
+            AlarmCommand::Reset(alarm) => one(manager.reset(alarm, &note)),
+            AlarmCommand::Shelve { alarm, lasts } => one(manager.shelve(alarm, lasts, &note)),
+            AlarmCommand::Unshelve(alarm) => manager.reinstate(alarm, AlarmEvent::Unshelved, value(alarm), &note),
+            AlarmCommand::OutOfService(alarm) => one(manager.out_of_service(alarm, &note)),
+            AlarmCommand::InService(alarm) => manager.reinstate(alarm, AlarmEvent::InService, value(alarm), &note),
         };
         let outcome = match done {
             Ok(steps) => {

@@ -79,7 +79,7 @@ fn lasting(manager: &AlarmManager) -> impl PartialEq + std::fmt::Debug {
     let active =
         manager.lists().active.iter().map(|alarm| crate::plant::snapshot::ActiveAlarm { times: 0, ..alarm.clone() });
     let machine = manager.machine(HIGH);
-    let kept = (machine.is_active(), machine.is_latched(), machine.suppressed(), machine.shelved().cloned());
+    let kept = (machine.active, machine.latched, machine.suppressed, machine.shelved.clone());
     (active.collect::<Vec<_>>(), manager.lists().suppressed.clone(), kept)
 }
 
@@ -101,29 +101,28 @@ proptest! {
         let mut journal: Vec<AlarmRecord> = Vec::new();
         for test_event in test_events {
             let (before, sounded, known) = (manager.machine(HIGH).clone(), manager.lists().sound, journal.len());
-            let by = by();
             match test_event.clone() {
                 TestEvent::Passes(seconds) => now = (now + seconds).max(0),
                 TestEvent::Value(next) => value = next,
                 TestEvent::Enabled(next) => enabled = next,
                 TestEvent::Acknowledge => {
                     let seen = before.annunciated_at.unwrap_or(at(0));
-                    let done = manager.acknowledge(HIGH, seen, None, at(now), &by);
+                    let done = manager.acknowledge(HIGH, seen, &note(at(now), None));
                     prop_assert_eq!(done.is_ok(), before.state().needs_acknowledgement());
                     journal.extend(done);
                 }
                 TestEvent::Silence => { manager.silence(); }
                 TestEvent::Reset => {
-                    let done = manager.reset(HIGH, at(now), &by);
-                    prop_assert!(done.is_err() || !before.is_active(), "a reset while the cause lasts");
+                    let done = manager.reset(HIGH, &note(at(now), None));
+                    prop_assert!(done.is_err() || !before.active, "a reset while the cause lasts");
                     journal.extend(done);
                 }
                 TestEvent::Shelve(seconds) => {
-                    journal.extend(manager.shelve(HIGH, Duration::from_secs(seconds), Some(&why()), at(now), &by));
+                    journal.extend(manager.shelve(HIGH, Duration::from_secs(seconds), &note(at(now), Some(&why()))));
                 }
-                TestEvent::Unshelve => journal.extend(manager.unshelve(HIGH, value, at(now), &by).into_iter().flatten()),
-                TestEvent::OutOfService => journal.extend(manager.out_of_service(HIGH, Some(&why()), at(now), &by)),
-                TestEvent::InService => journal.extend(manager.in_service(HIGH, value, at(now), &by).into_iter().flatten()),
+                TestEvent::Unshelve => journal.extend(manager.reinstate(HIGH, AlarmEvent::Unshelved, value, &note(at(now), None)).into_iter().flatten()),
+                TestEvent::OutOfService => journal.extend(manager.out_of_service(HIGH, &note(at(now), Some(&why())))),
+                TestEvent::InService => journal.extend(manager.reinstate(HIGH, AlarmEvent::InService, value, &note(at(now), None)).into_iter().flatten()),
                 TestEvent::Restart => {
                     let mut again = AlarmManager::new(def.clone());
                     again.restore(&remembered(&journal));
@@ -161,9 +160,9 @@ proptest! {
             if raised && !new.iter().any(|event| event.event == AlarmEvent::ReAlarmed) {
                 prop_assert_eq!(machine.state(), AlarmState::Unacknowledged, "nobody has seen it");
             }
-            prop_assert!(!latch || !machine.is_latched() || machine.state() != AlarmState::Normal);
+            prop_assert!(!latch || !machine.latched || machine.state() != AlarmState::Normal);
             // Shelved for no longer than it was given for.
-            if let Some(shelving) = machine.shelved() {
+            if let Some(shelving) = machine.shelved.as_ref() {
                 prop_assert!(at(now) < shelving.until);
                 prop_assert!(shelving.until.duration_since(at(now)).as_secs() <= 2_000);
             }

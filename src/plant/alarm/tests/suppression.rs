@@ -27,7 +27,7 @@ fn a_latching_alarm_that_came_and_went_while_suppressed_is_normal_on_release() {
 fn a_latching_alarm_released_while_shelved_comes_back_latched() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
     manager.evaluate(at(0), enabled_with(80.0, false));
-    manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(1), &by()).expect("a minute, with a reason");
+    manager.shelve(HIGH, Duration::from_secs(60), &note(at(1), Some(&why()))).expect("a minute, with a reason");
     let quietly = [AlarmEvent::Unsuppressed, AlarmEvent::RaisedSuppressed];
     assert_eq!(events(&manager.evaluate(at(2), enabled_with(80.0, true))), quietly);
     assert_eq!(events(&manager.evaluate(at(3), enabled_with(70.0, true))), [AlarmEvent::ReturnedSuppressed]);
@@ -70,18 +70,18 @@ fn shelving_and_out_of_service_acknowledge_no_latched_alarm() {
         journal.extend(manager.evaluate(at(1), facts(70.0, true)));
         assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
         let back = if shelved {
-            journal.extend(manager.shelve(HIGH, Duration::from_secs(60), Some(&why()), at(2), &by()));
-            manager.unshelve(HIGH, None, at(3), &by())
+            journal.extend(manager.shelve(HIGH, Duration::from_secs(60), &note(at(2), Some(&why()))));
+            manager.reinstate(HIGH, AlarmEvent::Unshelved, None, &note(at(3), None))
         } else {
-            journal.extend(manager.out_of_service(HIGH, Some(&why()), at(2), &by()));
-            manager.in_service(HIGH, None, at(3), &by())
+            journal.extend(manager.out_of_service(HIGH, &note(at(2), Some(&why()))));
+            manager.reinstate(HIGH, AlarmEvent::InService, None, &note(at(3), None))
         };
         journal.extend(back.expect("it is suppressed"));
         assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged, "shelved: {shelved}");
         let mut again = AlarmManager::new(manager.def.clone());
         again.restore(&journal);
         assert_eq!(again.lists(), manager.lists());
-        manager.acknowledge(HIGH, at(0), None, at(4), &by()).expect("it waits");
+        manager.acknowledge(HIGH, at(0), &note(at(4), None)).expect("it waits");
     }
 }
 
@@ -136,7 +136,7 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
     let mut free = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     free.restore(&journal);
     assert_eq!(events(&free.evaluate(at(1), facts(70.0, true)))[0], AlarmEvent::ReturnedSuppressed);
-    assert!(free.machine(HIGH).suppressed().is_none(), "the plant file enables it by nothing any more");
+    assert!(free.machine(HIGH).suppressed.is_none(), "the plant file enables it by nothing any more");
 }
 
 #[test]
@@ -150,10 +150,10 @@ fn what_was_annunciated_stays_until_somebody_has_answered_to_it_though_its_enabl
     assert_eq!(events(&manager.evaluate(at(1), when(false))), [AlarmEvent::ReturnedToNormal]);
     assert_eq!((state(&manager), manager.lists().sound), (AlarmState::LatchedUnacknowledged, false));
     assert_eq!(events(&manager.evaluate(at(2), when(false))), [], "it is neither raised again nor taken away");
-    manager.acknowledge(HIGH, at(0), None, at(3), &by()).expect("it waits");
+    manager.acknowledge(HIGH, at(0), &note(at(3), None)).expect("it waits");
     assert_eq!(events(&manager.evaluate(at(4), when(false))), []);
     assert_eq!(state(&manager), AlarmState::LatchedAcknowledged);
-    manager.reset(HIGH, at(5), &by()).expect("its cause is gone");
+    manager.reset(HIGH, &note(at(5), None)).expect("its cause is gone");
     assert_eq!(events(&manager.evaluate(at(6), when(false)))[0], AlarmEvent::SuppressedByDesign);
     assert_eq!(state(&manager), AlarmState::SuppressedByDesign);
 }
