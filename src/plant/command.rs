@@ -177,6 +177,12 @@ impl Outcome {
     }
 }
 
+impl From<Result<(), Refusal>> for Outcome {
+    fn from(done: Result<(), Refusal>) -> Outcome {
+        done.map_or_else(Outcome::Refused, |()| Outcome::Verified)
+    }
+}
+
 /// The label with the reason: `refused: read only`.
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -16,7 +16,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_note},
-    command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId},
+    command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::CommandTracker,
     def::{LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
@@ -46,6 +46,20 @@ pub struct Effects {
     pub save: Option<(CommandId, LineDef)>,
     /// Work with the folder of parameter sets.
     pub sets: Option<SetWork>,
+}
+
+impl Effects {
+    /// Only the records of operator actions.
+    fn of(actions: impl IntoIterator<Item = ActionRecord>) -> Effects {
+        Effects { records: actions.into_iter().map(Record::Action).collect(), ..Effects::default() }
+    }
+    /// Sends a write that is permitted, or records the one that is not.
+    fn write(&mut self, line: LineId, checked: Result<WriteJob, Box<ActionRecord>>) {
+        match checked {
+            Ok(job) => self.bus.push((line, BusRequest::Write(job))),
+            Err(action) => self.records.push(Record::Action(*action)),
+        }
+    }
 }
 
 /// The state of the plant. The plant task owns it; everything else sees [`Snapshot`]s.
@@ -175,31 +189,23 @@ impl Plant {
             self.at = self.at.max(at);
             return effects;
         }
-        let action = match status.command.kind.clone() {
-            CommandKind::Write { tag, value } => match self.commands.write(&self.image, &status, tag, value) {
-                Ok(job) => {
-                    effects.bus.push((self.line_of(tag), BusRequest::Write(job)));
-                    None
-                }
-                Err(action) => Some(*action),
-            },
-            CommandKind::Alarm(alarm_command) => Some(self.alarm_command(&status, alarm_command, at, &mut effects)),
+        let outcome = match status.command.kind.clone() {
+            CommandKind::Write { tag, value } => {
+                effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
+                return self.after_command(effects, at);
+            }
+            CommandKind::Alarm(alarm_command) => Some(self.alarm_command(&status, alarm_command, &mut effects)),
             CommandKind::Refresh(device) => {
                 let request = BusRequest::Refresh { device, command: Some(status.command.id) };
                 effects.bus.push((self.def.device(device).line, request));
-                // A read is not an operator action: it is shown, but not recorded.
-                self.commands.accept(&CommandStatus { outcome: Outcome::Verified, ..status });
-                None
+                Some(Outcome::Verified)
             }
             CommandKind::Connect(line, open) => {
                 let is_open = self.lines[line.index()].state != LineState::Disconnected;
-                if is_open == open {
-                    Some(self.commands.finish(&status, Outcome::Unchanged, &self.image))
-                } else {
-                    self.commands.accept(&status);
+                if is_open != open {
                     effects.bus.push((line, BusRequest::Connect(open)));
-                    None
                 }
+                (is_open == open).then_some(Outcome::Unchanged)
             }
             CommandKind::Configure(_)
             | CommandKind::SaveSettings(_)
@@ -208,16 +214,24 @@ impl Plant {
             CommandKind::ReadSets
             | CommandKind::SaveSet { .. }
             | CommandKind::Restore(_)
-            | CommandKind::StopRestore(_) => self.set_command(&status, at, &mut effects),
+            | CommandKind::StopRestore(_) => self.set_command(&status, &mut effects),
             CommandKind::HandOver | CommandKind::TakeOver => {
-                let outcome = match check_note(status.command.note.as_ref()) {
-                    Ok(()) => Outcome::Verified,
-                    Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
-                };
-                Some(self.commands.finish(&status, outcome, &self.image))
+                Some(check_note(status.command.note.as_ref()).map_err(Refusal::Alarm).into())
             }
         };
-        effects.records.extend(action.map(Record::Action));
+        // A read is not an operator action: it is shown, but not recorded.
+        let is_recorded = !matches!(status.command.kind, CommandKind::Refresh(_) | CommandKind::ReadSets);
+        match outcome {
+            None => self.commands.accept(&status),
+            Some(outcome) => {
+                let action = self.commands.finish(&status, outcome, &self.image);
+                effects.records.extend(Some(Record::Action(action)).filter(|_| is_recorded));
+            }
+        }
+        self.after_command(effects, at)
+    }
+
+    fn after_command(&mut self, mut effects: Effects, at: Timestamp) -> Effects {
         self.advance_restores(at, &mut effects);
         self.at = self.at.max(at);
         self.measure(&effects.records);
@@ -226,8 +240,7 @@ impl Plant {
 
     /// A line accepted a request.
     pub fn on_delivered(&mut self, line: LineId, request: &BusRequest) -> Effects {
-        let action = self.commands.delivered(line, request, &self.image);
-        Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
+        Effects::of(self.commands.delivered(line, request, &self.image))
     }
 
     /// The record that a write is about to be sent; none for other requests.
@@ -237,8 +250,7 @@ impl Plant {
 
     /// The station stops: ends all pending commands.
     pub fn on_stop(&mut self) -> Effects {
-        let ended = self.commands.stop(&self.image);
-        Effects { records: ended.into_iter().map(Record::Action).collect(), ..Effects::default() }
+        Effects::of(self.commands.stop(&self.image))
     }
 
     /// The queue to a line was full: the request was not sent.
@@ -247,7 +259,7 @@ impl Plant {
             true => None,
             false => self.commands.undeliverable(line, request, &self.image),
         };
-        let mut effects = Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() };
+        let mut effects = Effects::of(action);
         self.advance_restores(self.at, &mut effects);
         effects
     }

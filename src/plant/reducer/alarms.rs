@@ -1,7 +1,5 @@
 //! Alarms in the plant: the facts that they are evaluated by, the commands of operators, and the state after a restart.
 
-use jiff::Timestamp;
-
 use super::{Effects, Plant};
 use crate::plant::{
     alarm::{AlarmCommand, AlarmRefusal, condition::Facts, state::OperatorNote},
@@ -10,7 +8,7 @@ use crate::plant::{
     event::LineState,
     ne107::Signal,
     process_image::ProcessImage,
-    record::{ActionRecord, AlarmEvent, AlarmRecord, Record},
+    record::{AlarmEvent, AlarmRecord, Record},
     snapshot::{DeviceState, DeviceStatus, LineStatus},
     station::{STATION, StationFault, StationFaults},
 };
@@ -26,11 +24,10 @@ impl Plant {
         &mut self,
         status: &CommandStatus,
         alarm_command: AlarmCommand,
-        at: Timestamp,
         effects: &mut Effects,
-    ) -> ActionRecord {
+    ) -> Outcome {
         let note = OperatorNote {
-            at: self.at.max(at),
+            at: self.at.max(status.at),
             by: Some(status.by.clone()),
             reason: status.command.note.clone(),
             recorded: true,
@@ -44,7 +41,7 @@ impl Plant {
                 let each = seen.iter().map(|(alarm, seen)| manager.acknowledge(*alarm, *seen, &note));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
-                return self.commands.finish(status, outcome, &self.image);
+                return outcome;
             }
             AlarmCommand::Silence => manager.silence().then(Vec::new).ok_or(AlarmRefusal::NothingSounds),
             AlarmCommand::Reset(alarm) => one(manager.reset(alarm, &note)),
@@ -53,14 +50,8 @@ impl Plant {
             AlarmCommand::OutOfService(alarm) => one(manager.out_of_service(alarm, &note)),
             AlarmCommand::InService(alarm) => manager.reinstate(alarm, AlarmEvent::InService, value(alarm), &note),
         };
-        let outcome = match done {
-            Ok(steps) => {
-                effects.records.extend(steps.into_iter().map(Record::Alarm));
-                Outcome::Verified
-            }
-            Err(refusal) => Outcome::Refused(Refusal::Alarm(refusal)),
-        };
-        self.commands.finish(status, outcome, &self.image)
+        let done = done.map(|steps| effects.records.extend(steps.into_iter().map(Record::Alarm)));
+        done.map_err(Refusal::Alarm).into()
     }
 
     /// Evaluates every alarm.

@@ -13,7 +13,7 @@ use crate::plant::{
     def::{DeviceId, LineId, TagId},
     parameter_set::{self, Problem, StoredSet},
     process_image::ProcessImage,
-    record::{ActionRecord, Record},
+    record::Record,
     restore::{READ_MAX, Restore, RestoreRequest, State, Step},
 };
 
@@ -37,47 +37,33 @@ pub enum SetWork {
 }
 
 impl Plant {
-    /// Accepts a command about parameter sets.
-    pub(super) fn set_command(
-        &mut self,
-        status: &CommandStatus,
-        at: Timestamp,
-        effects: &mut Effects,
-    ) -> Option<ActionRecord> {
+    /// Accepts a command about parameter sets. `None`: it is pending.
+    pub(super) fn set_command(&mut self, status: &CommandStatus, effects: &mut Effects) -> Option<Outcome> {
         match &status.command.kind {
             CommandKind::ReadSets => {
                 effects.sets = Some(SetWork::Read);
-                // A read is not an operator action.
-                self.commands.accept(&CommandStatus { outcome: Outcome::Verified, ..status.clone() });
-                None
+                Some(Outcome::Verified)
             }
             CommandKind::SaveSet { device, name, replace } => {
                 let trusted = trusted(&self.image);
-                let set = parameter_set::capture(&self.def, *device, name, status.by.clone(), at, &trusted);
-                let problem = match parameter_set::check_name(name) {
-                    Err(why) => Some(why),
-                    Ok(()) if set.values.is_empty() => Some("no setting of the device is known now".to_owned()),
-                    Ok(()) => None,
-                };
-                if let Some(why) = problem {
-                    return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotSaved(why)), &self.image));
+                let set = parameter_set::capture(&self.def, *device, name, status.by.clone(), status.at, &trusted);
+                if let Err(why) = parameter_set::check_name(name) {
+                    return Some(Outcome::Refused(Refusal::NotSaved(why)));
                 }
-                self.commands.accept(status);
+                if set.values.is_empty() {
+                    let why = "no setting of the device is known now".to_owned();
+                    return Some(Outcome::Refused(Refusal::NotSaved(why)));
+                }
                 effects.sets =
                     Some(SetWork::Write { command: status.command.id, set: Box::new(set), replace: *replace });
                 None
             }
-            CommandKind::Restore(request) => self.begin_restore(status, request, at, effects),
+            CommandKind::Restore(request) => self.begin_restore(status, request, effects),
             CommandKind::StopRestore(device) => {
-                let running = self.restores.iter_mut().find(|run| run.device == *device && run.at_work());
-                let outcome = match running {
-                    Some(run) => {
-                        Arc::make_mut(run).stopping = true;
-                        Outcome::Verified
-                    }
-                    None => Outcome::Unchanged,
-                };
-                Some(self.commands.finish(status, outcome, &self.image))
+                let mut running = self.restores.iter_mut().filter(|run| run.device == *device && run.at_work());
+                let Some(run) = running.next() else { return Some(Outcome::Unchanged) };
+                Arc::make_mut(run).stopping = true;
+                Some(Outcome::Verified)
             }
             _ => None,
         }
@@ -90,12 +76,7 @@ impl Plant {
 
     /// A set was written into the folder, or `Err` says why not.
     pub fn on_set_written(&mut self, command: CommandId, result: Result<(), String>) -> Effects {
-        let outcome = match result {
-            Ok(()) => Outcome::Verified,
-            Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
-        };
-        let action = self.commands.end(command, outcome, &self.image);
-        Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
+        Effects::of(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image))
     }
 
     /// Begins a restore by reading the device: the value of a tag that is polled seldom may be hours old.
@@ -103,21 +84,19 @@ impl Plant {
         &mut self,
         status: &CommandStatus,
         request: &RestoreRequest,
-        at: Timestamp,
         effects: &mut Effects,
-    ) -> Option<ActionRecord> {
+    ) -> Option<Outcome> {
         if self.restores.iter().any(|run| run.device == request.device && run.at_work()) {
-            return Some(self.commands.finish(status, Outcome::Refused(Refusal::UnderWay), &self.image));
+            return Some(Outcome::Refused(Refusal::UnderWay));
         }
         if let Some(why) = self.mismatch(request.device, &request.set, &request.changes) {
-            return Some(self.commands.finish(status, Outcome::Refused(why), &self.image));
+            return Some(Outcome::Refused(why));
         }
         if request.changes.is_empty() {
-            return Some(self.commands.finish(status, Outcome::Unchanged, &self.image));
+            return Some(Outcome::Unchanged);
         }
-        self.commands.accept(status);
         self.restores.retain(|run| run.device != request.device);
-        self.restores.push(Arc::new(Restore::new(status.command.id, status.by.clone(), request, at)));
+        self.restores.push(Arc::new(Restore::new(status.command.id, status.by.clone(), request, status.at)));
         let look = BusRequest::Refresh { device: request.device, command: Some(status.command.id) };
         effects.bus.push((self.def.device(request.device).line, look));
         None
@@ -198,10 +177,7 @@ impl Plant {
                 effects.records.push(Record::Action(refused));
                 continue;
             }
-            match self.commands.write(&self.image, &status, tag, value) {
-                Ok(job) => effects.bus.push((self.line_of(tag), BusRequest::Write(job))),
-                Err(action) => effects.records.push(Record::Action(*action)),
-            }
+            effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
         }
         if let Some(outcome) = run.outcome(&self.def) {
             let action = self.commands.end(run.id, outcome, &self.image);

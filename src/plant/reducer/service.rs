@@ -7,67 +7,47 @@ use crate::plant::{
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
     def::{LineDef, LineId},
     line_check::valid,
-    record::{ActionRecord, Record},
 };
 
 impl Plant {
-    /// Accepts a command for a line: settings and diagnostics.
-    pub(super) fn line_command(&mut self, status: &CommandStatus, effects: &mut Effects) -> Option<ActionRecord> {
+    /// Accepts a command for a line: settings and diagnostics. `None`: it is pending.
+    pub(super) fn line_command(&mut self, status: &CommandStatus, effects: &mut Effects) -> Option<Outcome> {
+        let refused = |refusal| Some(Outcome::Refused(refusal));
         match &status.command.kind {
-            CommandKind::Configure(settings)
-                if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) =>
-            {
-                return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotALine), &self.image));
-            }
-            CommandKind::Configure(settings) if let Err(why) = valid(settings) => {
-                return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotValid(why)), &self.image));
-            }
-            CommandKind::Test(_, diagnostic) if let Err(why) = diagnostic.check() => {
-                return Some(self.commands.finish(status, Outcome::Refused(Refusal::NotValid(why)), &self.image));
-            }
             CommandKind::Configure(settings) => {
+                if self.def.lines.get(settings.id.index()).is_none_or(|line| line.name != settings.name) {
+                    return refused(Refusal::NotALine);
+                }
+                if let Err(why) = valid(settings) {
+                    return refused(Refusal::NotValid(why));
+                }
                 self.remember_settings(settings);
                 self.mark_restores_line_changed(settings.id);
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
             }
             CommandKind::Test(line, diagnostic) => {
-                let request =
-                    BusRequest::Test { id: status.command.id, by: status.by.clone(), diagnostic: diagnostic.clone() };
-                effects.bus.push((*line, request));
+                if let Err(why) = diagnostic.check() {
+                    return refused(Refusal::NotValid(why));
+                }
+                let (id, by, diagnostic) = (status.command.id, status.by.clone(), diagnostic.clone());
+                effects.bus.push((*line, BusRequest::Test { id, by, diagnostic }));
             }
             CommandKind::StopTest(line) => effects.bus.push((*line, BusRequest::StopTest)),
             CommandKind::SaveSettings(line) => {
                 effects.save = Some((status.command.id, self.settings(*line).clone()));
-                self.commands.accept(status);
-                return None;
             }
-            CommandKind::Write { .. }
-            | CommandKind::Alarm(_)
-            | CommandKind::Refresh(_)
-            | CommandKind::Connect(..)
-            | CommandKind::ReadSets
-            | CommandKind::SaveSet { .. }
-            | CommandKind::Restore(_)
-            | CommandKind::StopRestore(_)
-            | CommandKind::HandOver
-            | CommandKind::TakeOver => return None,
+            _ => {}
         }
-        self.commands.accept(status);
         None
     }
 
     /// The plant file was written, or `Err` says why not.
     pub fn on_saved(&mut self, command: CommandId, saved: &LineDef, result: Result<(), String>) -> Effects {
-        let outcome = match result {
-            Ok(()) => {
-                let tried_since = self.settings(saved.id) != saved;
-                self.lines[saved.id.index()].settings_before = tried_since.then(|| Arc::new(saved.clone()));
-                Outcome::Verified
-            }
-            Err(why) => Outcome::Refused(Refusal::NotSaved(why)),
-        };
-        let action = self.commands.end(command, outcome, &self.image);
-        Effects { records: action.map(Record::Action).into_iter().collect(), ..Effects::default() }
+        if result.is_ok() {
+            let tried_since = self.settings(saved.id) != saved;
+            self.lines[saved.id.index()].settings_before = tried_since.then(|| Arc::new(saved.clone()));
+        }
+        Effects::of(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image))
     }
 
     /// The settings in use.
@@ -97,6 +77,7 @@ mod tests {
         event::Event,
         fixture,
         line_report::LineReport,
+        record::Record,
     };
 
     const L1: LineId = LineId(0);
