@@ -73,11 +73,6 @@ impl RequestStats {
         self.check + self.length + self.foreign
     }
 
-    /// Exception answers of all codes.
-    pub fn exceptions_total(&self) -> u64 {
-        self.exceptions.iter().map(|(_, count)| count).sum()
-    }
-
     /// Failures among the latest 64 requests, and how many requests that were.
     pub fn recent(&self) -> (u32, u32) {
         (self.recent.count_ones(), self.requests.min(64) as u32)
@@ -231,7 +226,8 @@ mod tests {
             stats.count(Err(Fault::Exception(ExceptionCode(2))), None);
         }
         stats.count(Err(Fault::BackedOff), None);
-        let sum = stats.ok + stats.timeouts + stats.corrupt() + stats.exceptions_total();
+        let sum =
+            stats.ok + stats.timeouts + stats.corrupt() + stats.exceptions.iter().map(|(_, count)| count).sum::<u64>();
         assert_eq!((stats.requests, sum), (7, 7));
         assert_eq!(stats.exceptions, [(ExceptionCode(2), 2)]);
         assert!(stats.failed_last());

@@ -124,7 +124,7 @@ fn stray(table: &SimulateTable, moves: bool, problems: &mut Problems) {
 fn pace(table: &SimulateTable, problems: &mut Problems) -> Pace {
     match (table.rate, table.lag) {
         (Some(rate), Some(lag)) => {
-            problems.exclusive(("lag", lag.at), ("rate", rate.at));
+            problems.exclusive(("rate", rate.at), ("lag", lag.at));
             Pace::AtOnce
         }
         (Some(rate), None) if rate.value <= 0.0 => {
