@@ -41,6 +41,14 @@ impl AlarmState {
     pub fn needs_acknowledgement(self) -> bool {
         matches!(self, AlarmState::Unacknowledged | AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged)
     }
+    /// Is it annunciated, and does its condition still hold?
+    pub(crate) fn is_active(self) -> bool {
+        matches!(self, AlarmState::Unacknowledged | AlarmState::Acknowledged)
+    }
+    /// Does it wait for a reset?
+    pub(crate) fn is_latched(self) -> bool {
+        matches!(self, AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged)
+    }
     /// Shelved, suppressed by design or out of service: evaluated and journaled, not annunciated.
     pub fn is_suppressed(self) -> bool {
         matches!(self, AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService)

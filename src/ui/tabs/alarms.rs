@@ -136,9 +136,7 @@ impl TabView for Alarms {
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let alarm = self.selected(cx);
         let can = |label: &str| match label {
-            "reset" => alarm.is_some_and(|alarm| {
-                matches!(alarm.state, AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged)
-            }),
+            "reset" => alarm.is_some_and(|alarm| alarm.state.is_latched()),
             "unfold" => alarm.is_some_and(|alarm| alarm.first_out.is_some()),
             "put back" => self
                 .suppressed(cx)
@@ -196,19 +194,22 @@ impl TabView for Alarms {
         match self.page {
             Page::Active | Page::Suppressed | Page::System => Vec::new(),
             Page::Journal => self.journal.ask(cx, &mut self.asked),
-            Page::Metrics => self.metrics.ask(cx, &mut self.asked),
-            Page::Handover => self.handover.ask(cx, &mut self.asked),
+            Page::Metrics => self.metrics.ask(cx, &mut self.asked).into_iter().collect(),
+            Page::Handover => self.handover.ask(cx, &mut self.asked).into_iter().collect(),
         }
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.journal.awaits(number) || self.metrics.awaits(number) || self.handover.awaits(number)
+        let Journal { alarms, actions, .. } = &self.journal;
+        let queries = [&alarms.query, &actions.query, &self.metrics.figures.query, &self.handover.actions.query];
+        queries.iter().any(|query| query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        self.journal.on_answer(cx, number, &answer);
-        self.metrics.on_answer(cx, number, &answer);
-        self.handover.on_answer(cx, number, &answer);
+        self.journal.alarms.on_answer(cx, number, &answer);
+        self.journal.actions.on_answer(cx, number, &answer);
+        self.metrics.figures.on_answer(cx, number, &answer);
+        self.handover.actions.on_answer(cx, number, &answer);
         Vec::new()
     }
 

@@ -74,8 +74,7 @@ pub struct Bus {
     /// The bench of tests.
     pub(super) test: test::Bench,
     /// How the line did over the last day, and the query for it.
-    minutes: Vec<LineMinute>,
-    periodic: PeriodicQuery,
+    minutes: Answered<Vec<LineMinute>>,
     asked: u32,
 }
 
@@ -88,8 +87,7 @@ impl TabView for Bus {
             plan: plan::Plan::default(),
             frames: frames::Ring::default(),
             test: test::Bench::default(),
-            minutes: Vec::new(),
-            periodic: PeriodicQuery::default(),
+            minutes: Answered::default(),
             asked: 0,
         }
     }
@@ -154,22 +152,19 @@ impl TabView for Bus {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
-        if self.page != Page::Line || !self.periodic.due(cx.steady(), ASK_EVERY, PATIENCE) {
+        if self.page != Page::Line {
             return Vec::new();
         }
-        self.asked = self.asked.wrapping_add(1);
-        self.periodic.asked(self.asked, cx.steady());
-        vec![UiAction::query(Tab::Bus, self.asked, line_trend::query(self.line, cx.now))]
+        let (number, query) = ((Tab::Bus, &mut self.asked), line_trend::query(self.line, cx.now));
+        self.minutes.query.ask(cx, number, ASK_EVERY, PATIENCE, query).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number)
+        self.minutes.query.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if let (Some(_), Ok(Answer::LineMinutes(minutes))) = (self.periodic.answered(number, cx.steady()), answer) {
-            self.minutes = minutes;
-        }
+        self.minutes.on_answer(cx, number, &answer);
         Vec::new()
     }
 
@@ -227,7 +222,7 @@ impl Bus {
         }
         let below = (rows + 1).min(height - DAY_HEIGHT);
         let mut day = page.part(1, below, width.saturating_sub(2), DAY_HEIGHT);
-        line_trend(cx, &mut day, &self.minutes);
+        line_trend(cx, &mut day, self.minutes.value.as_deref().unwrap_or_default());
     }
 
     /// So many lines on, around the end.
@@ -237,8 +232,7 @@ impl Bus {
         (self.scroll, self.plan) = (Scroll::default(), plan::Plan::default());
         self.frames.forget();
         self.test.first = None;
-        self.minutes.clear();
-        self.periodic = PeriodicQuery::default();
+        self.minutes = Answered::default();
     }
 
     fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion) {

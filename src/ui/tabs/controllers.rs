@@ -75,25 +75,14 @@ pub struct Controllers {
     set: usize,
     asked_for: Asked,
     /// The small trend, of which tag, and the query for it.
-    trend: Option<Series>,
-    periodic: PeriodicQuery,
+    trend: Answered<Vec<Series>>,
     asked: u32,
 }
 
 impl TabView for Controllers {
     fn new(snapshot: &Snapshot) -> Controllers {
         let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
-        Controllers {
-            page,
-            device: DeviceId(0),
-            table: Table::default(),
-            cell: Cell::default(),
-            set: 0,
-            asked_for: Asked::Filter,
-            trend: None,
-            periodic: PeriodicQuery::default(),
-            asked: 0,
-        }
+        Controllers::at(page, DeviceId(0), Table::default())
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
@@ -240,24 +229,18 @@ impl TabView for Controllers {
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
         let Some(faceplate) = faceplate.filter(|_| self.page == Page::Device) else { return Vec::new() };
-        if !self.periodic.due(cx.steady(), TREND_EVERY, PATIENCE) {
-            return Vec::new();
-        }
-        self.asked = self.asked.wrapping_add(1);
-        self.periodic.asked(self.asked, cx.steady());
         let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
         let query = Query::Series { tags: vec![faceplate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
-        vec![UiAction::query(Tab::Controllers, self.asked, query)]
+        let number = (Tab::Controllers, &mut self.asked);
+        self.trend.query.ask(cx, number, TREND_EVERY, PATIENCE, query).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number)
+        self.trend.query.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if let (Some(_), Ok(Answer::Series(series))) = (self.periodic.answered(number, cx.steady()), answer) {
-            self.trend = series.into_iter().next();
-        }
+        self.trend.on_answer(cx, number, &answer);
         Vec::new()
     }
 
@@ -295,7 +278,8 @@ impl TabView for Controllers {
             (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
             (Page::Device | Page::Program, _) => {
-                device::view(cx, &mut canvas, device, &self.table, self.trend.as_ref())
+                let trend = self.trend.value.as_ref().and_then(|series| series.first());
+                device::view(cx, &mut canvas, device, &self.table, trend)
             }
             (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
             (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
@@ -310,20 +294,15 @@ impl TabView for Controllers {
 }
 
 impl Controllers {
+    fn at(page: Page, device: DeviceId, table: Table) -> Controllers {
+        let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
+        Controllers { page, device, table, cell, set: 0, asked_for, trend, asked: 0 }
+    }
+
     /// Shows a device.
     pub fn show(&mut self, device: DeviceId) {
-        let defaults = self.table.defaults;
-        *self = Controllers {
-            page: Page::Device,
-            device,
-            table: Table { defaults, ..Table::default() },
-            cell: Cell::default(),
-            set: 0,
-            asked_for: Asked::Filter,
-            trend: None,
-            periodic: PeriodicQuery::default(),
-            asked: self.asked,
-        };
+        let table = Table { defaults: self.table.defaults, ..Table::default() };
+        *self = Controllers { asked: self.asked, ..Controllers::at(Page::Device, device, table) };
     }
 
     /// Shows the device of a tag with the tag selected.

@@ -110,15 +110,7 @@ impl TabView for Mimic {
         if let Some((_, series)) = self.trends.get_mut(place) {
             *series = match answer {
                 Ok(Answer::Series(all)) => all.into_iter().next(),
-                Ok(
-                    Answer::Journal(_)
-                    | Answer::Actions(_)
-                    | Answer::LineMinutes(_)
-                    | Answer::Report(_)
-                    | Answer::AlarmMetrics(_)
-                    | Answer::Values(_),
-                )
-                | Err(_) => None,
+                Ok(_) | Err(_) => None,
             };
         }
         Vec::new()

@@ -1,6 +1,18 @@
-//! A query that is asked again and again: one at a time is on its way, and only its answer counts.
+//! A query that is sent again and again: one at a time is on its way, and only its answer counts.
 
 use jiff::{SignedDuration, Timestamp};
+
+use super::Tab;
+use crate::{
+    history::{Answer, HistoryError, Query, Series},
+    plant::{
+        alarm::PeriodMetrics,
+        line_minute::LineMinute,
+        record::{ActionRecord, AlarmRecord},
+    },
+    report::ShiftReport,
+    ui::{UiAction, ViewContext},
+};
 
 /// Between two queries passes at least so many times as long as the last answer took.
 const REST: i32 = 4;
@@ -35,6 +47,22 @@ impl PeriodicQuery {
         }
     }
 
+    /// The query, if it is due. It is numbered behind the other queries of the tab.
+    pub fn ask(
+        &mut self,
+        cx: &ViewContext,
+        (tab, number): (Tab, &mut u32),
+        every: SignedDuration,
+        patience: SignedDuration,
+        query: Query,
+    ) -> Option<UiAction> {
+        self.due(cx.steady(), every, patience).then(|| {
+            *number = number.wrapping_add(1);
+            self.asked(*number, cx.steady());
+            UiAction::query(tab, *number, query)
+        })
+    }
+
     /// What is shown has changed: ask as soon as possible.
     pub fn want(&mut self) {
         self.wanted = true;
@@ -66,6 +94,66 @@ impl PeriodicQuery {
     pub fn waiting(&self, now: Timestamp) -> Option<SignedDuration> {
         self.on_way.map(|(_, at)| now.duration_since(at))
     }
+}
+
+/// What the history answered last to a periodic query, or why it could not.
+#[derive(Debug)]
+pub struct Answered<T> {
+    /// The query.
+    pub query: PeriodicQuery,
+    /// The last good answer.
+    pub value: Option<T>,
+    /// Why the last query failed.
+    pub trouble: Option<String>,
+}
+
+impl<T> Default for Answered<T> {
+    fn default() -> Answered<T> {
+        Answered { query: PeriodicQuery::default(), value: None, trouble: None }
+    }
+}
+
+impl<T: FromAnswer> Answered<T> {
+    /// Takes the answer to query `number` if it is waited for.
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        if self.query.answered(number, cx.steady()).is_none() {
+            return;
+        }
+        match answer {
+            Ok(answer) => (self.value, self.trouble) = (T::from_answer(answer), None),
+            Err(error) => self.trouble = Some(error.to_string()),
+        }
+    }
+}
+
+/// What a query of one kind is answered with.
+pub trait FromAnswer: Sized {
+    /// `None` for the answer to a query of another kind.
+    fn from_answer(answer: &Answer) -> Option<Self>;
+}
+
+macro_rules! from_answer {
+    ($($kind:ident: $value:ty;)+) => {$(
+        impl FromAnswer for $value {
+            fn from_answer(answer: &Answer) -> Option<$value> {
+                if let Answer::$kind(value) = answer { Some(value.clone()) } else { None }
+            }
+        }
+    )+};
+}
+
+from_answer! {
+    Series: Vec<Series>;
+    Journal: Vec<AlarmRecord>;
+    Actions: Vec<ActionRecord>;
+    LineMinutes: Vec<LineMinute>;
+    Report: Box<ShiftReport>;
+    AlarmMetrics: Box<PeriodMetrics>;
+}
+
+/// Seconds of the operator as plant time, which runs faster in demonstrations.
+pub fn real(cx: &ViewContext, seconds: f64) -> SignedDuration {
+    SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6))
 }
 
 #[cfg(test)]

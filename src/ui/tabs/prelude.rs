@@ -6,7 +6,11 @@ pub(super) use crossterm::event::{KeyCode, KeyEvent};
 pub(super) use jiff::{SignedDuration, Timestamp};
 pub(super) use ratatui::{Frame, layout::Rect, style::Style};
 
-pub(super) use super::{Tab, TabView, periodic_query::PeriodicQuery};
+pub(super) use super::{
+    Tab, TabView,
+    periodic_query::{Answered, PeriodicQuery, real},
+    reports::period,
+};
 pub(super) use crate::{
     history::{Answer, HistoryError, Query},
     plant::{

@@ -67,14 +67,12 @@ pub struct Reports {
     /// No period is chosen: the running shift is shown.
     follow: bool,
     /// The report of that very period.
-    report: Option<Box<ShiftReport>>,
-    trouble: Option<String>,
+    report: Answered<Box<ShiftReport>>,
     dialect: CsvDialect,
     export: Export,
     /// The CSV that waits for the station's word.
     outgoing: Option<Outgoing>,
     scroll: Scroll,
-    periodic: PeriodicQuery,
     number: u32,
 }
 
@@ -96,13 +94,11 @@ impl TabView for Reports {
         Reports {
             period: period::at(&snapshot.def, snapshot.at),
             follow: true,
-            report: None,
-            trouble: None,
+            report: Answered::default(),
             dialect: snapshot.def.report.csv,
             export: Export::Not,
             outgoing: None,
             scroll: Scroll::default(),
-            periodic: PeriodicQuery::default(),
             number: 0,
         }
     }
@@ -118,23 +114,11 @@ impl TabView for Reports {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number)
+        self.report.query.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if self.periodic.answered(number, cx.steady()).is_none() {
-            return Vec::new();
-        }
-        match answer {
-            Ok(Answer::Report(report)) if Some(&report.period) == self.period.as_ref() => {
-                (self.report, self.trouble) = (Some(report), None);
-            }
-            Ok(_) => {}
-            Err(error) => {
-                self.trouble = Some(error.to_string());
-                return Vec::new();
-            }
-        }
+        self.report.on_answer(cx, number, &answer);
         self.ask(cx)
     }
 
@@ -201,9 +185,9 @@ impl Reports {
                 self.dialect = self.dialect.toggled(cx.def().report.csv);
                 self.export = Export::Not;
             }
-            Action::Refresh => self.periodic.want(),
+            Action::Refresh => self.report.query.want(),
             Action::Why => {
-                let rows = self.report.iter().flat_map(|report| &report.tags);
+                let rows = self.report.value.iter().flat_map(|report| &report.tags);
                 return Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()));
             }
         }
@@ -221,9 +205,8 @@ impl Reports {
 impl Reports {
     /// Shows another period; figures of the old one must not stand under its name.
     fn show(&mut self, period: Option<Period>) {
-        (self.period, self.follow, self.report, self.scroll) = (period, false, None, Scroll::default());
-        (self.export, self.trouble) = (Export::Not, None);
-        self.periodic.want();
+        (self.period, self.follow, self.scroll) = (period, false, Scroll::default());
+        (self.export, self.report) = (Export::Not, Answered::default());
     }
 
     fn step(&mut self, cx: &ViewContext, to: impl Fn(&crate::plant::def::PlantDef, &Period) -> Option<Period>) {
@@ -234,7 +217,7 @@ impl Reports {
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
-        let lines = self.report.as_ref().map_or(0, |report| view::lines(cx, report).len());
+        let lines = self.report.value.as_ref().map_or(0, |report| view::lines(cx, report).len());
         self.scroll.on(motion, lines, rows);
     }
 
@@ -243,23 +226,18 @@ impl Reports {
     }
 
     fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
-        let settled = self.report.as_ref().is_some_and(|report| report.until >= report.period.to);
-        let every = if settled && !self.is_running(cx.now) { SignedDuration::MAX } else { real(EVERY_S) };
-        match &self.period {
-            Some(period) if self.periodic.due(cx.steady(), every, real(PATIENCE_S)) => {
-                self.number = self.number.wrapping_add(1);
-                self.periodic.asked(self.number, cx.steady());
-                vec![UiAction::query(Tab::Reports, self.number, Query::Report { period: period.clone() })]
-            }
-            Some(_) | None => Vec::new(),
-        }
+        let settled = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
+        let every = if settled && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
+        let Some(period) = self.period.clone() else { return Vec::new() };
+        let number = (Tab::Reports, &mut self.number);
+        let query = self.report.query.ask(cx, number, every, real(cx, PATIENCE_S), Query::Report { period });
+        query.into_iter().collect()
     }
 
     /// Writes exactly the figures that are shown.
     fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let Some(report) = &self.report else {
+        let Some(report) = &self.report.value else {
             self.export = Export::Failed(t!("nothing to write yet").to_owned());
             return Vec::new();
         };

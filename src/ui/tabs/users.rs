@@ -94,18 +94,16 @@ impl TabView for Users {
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(audit) = &mut self.audit else { return Vec::new() };
-        let acts = audit.ask(cx);
-        self.asked = audit.asked();
-        acts
+        audit.ask(cx, &mut self.asked).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.audit.as_ref().is_some_and(|audit| audit.awaits(number))
+        self.audit.as_ref().is_some_and(|audit| audit.rows.query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         if let Some(audit) = &mut self.audit {
-            audit.on_answer(cx, number, answer);
+            audit.on_answer(cx, number, &answer);
         }
         Vec::new()
     }
@@ -150,7 +148,7 @@ impl Users {
                 None
             }
             (Action::Audit, _) => {
-                self.audit = Some(Audit::new(self.asked));
+                self.audit = Some(Audit::default());
                 return self.on_snapshot(cx);
             }
             // Only a Supervisor sees this page: a station with users has at least one.

@@ -1,6 +1,5 @@
 //! What an operator does with alarms: the windows that ask, and the commands that need no query.
 
-use super::super::reports::period;
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -97,21 +96,13 @@ pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
 
 /// Asks whether to reset a latched alarm.
 pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
-    let why = match alarm.state {
-        AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
-            let kind = CommandKind::Alarm(AlarmCommand::Reset(alarm.id));
-            return open(Modal::Confirm(Confirm::command(t!("reset a latched alarm"), name(cx, alarm.id), kind)));
-        }
-        AlarmState::Unacknowledged | AlarmState::Acknowledged if cx.def().alarm(alarm.id).latch => {
-            t!("Its cause lasts: it can be reset once that is gone.")
-        }
-        AlarmState::Normal
-        | AlarmState::Unacknowledged
-        | AlarmState::Acknowledged
-        | AlarmState::ReturnedToNormal
-        | AlarmState::Shelved
-        | AlarmState::SuppressedByDesign
-        | AlarmState::OutOfService => t!("It does not latch: there is nothing to reset."),
+    if alarm.state.is_latched() {
+        let kind = CommandKind::Alarm(AlarmCommand::Reset(alarm.id));
+        return open(Modal::Confirm(Confirm::command(t!("reset a latched alarm"), name(cx, alarm.id), kind)));
+    }
+    let why = match alarm.state.is_active() && cx.def().alarm(alarm.id).latch {
+        true => t!("Its cause lasts: it can be reset once that is gone."),
+        false => t!("It does not latch: there is nothing to reset."),
     };
     open(Modal::Notice(Notice::new(t!("reset"), vec![name(cx, alarm.id), why.to_owned()])))
 }

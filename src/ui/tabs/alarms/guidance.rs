@@ -3,7 +3,6 @@
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        alarm::AlarmState,
         def::{AlarmDef, AlarmId, Subject},
         snapshot::ActiveAlarm,
         station::STATION,
@@ -165,18 +164,12 @@ pub fn respond_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Op
     let respond = def.guidance.response_time?;
     let within = t!("respond within {div_ceil} min", div_ceil = respond.as_secs().div_ceil(60));
     let gone = between(alarm.raised_at, cx.now);
-    Some(match alarm.state {
-        AlarmState::Unacknowledged | AlarmState::Acknowledged => match respond.checked_sub(gone) {
-            Some(left) => (t!("{within}, {running} left", within, running = running(left)), false),
-            None => (t!("{within}, OVERDUE by {running}", within, running = running(gone - respond)), true),
-        },
-        AlarmState::Normal
-        | AlarmState::ReturnedToNormal
-        | AlarmState::LatchedUnacknowledged
-        | AlarmState::LatchedAcknowledged
-        | AlarmState::Shelved
-        | AlarmState::SuppressedByDesign
-        | AlarmState::OutOfService => (within, false),
+    if !alarm.state.is_active() {
+        return Some((within, false));
+    }
+    Some(match respond.checked_sub(gone) {
+        Some(left) => (t!("{within}, {running} left", within, running = running(left)), false),
+        None => (t!("{within}, OVERDUE by {running}", within, running = running(gone - respond)), true),
     })
 }
 

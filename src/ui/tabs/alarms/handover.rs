@@ -1,14 +1,12 @@
 //! The handover: what the next shift must know, as the plant stands and as the shift has left it, and who took it over.
 
-use super::{super::reports::period, journal::action_text, span};
+use super::{journal::action_text, metrics::stale, span};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        alarm::AlarmState,
         commands::{HAND_OVER, TAKE_OVER},
         event::LineState,
         record::ActionRecord,
-        sample::Quality,
         snapshot::SuppressedAlarm,
     },
     report::Period,
@@ -41,25 +39,15 @@ pub struct Handover {
     /// The chosen shift; `None` is the running one.
     period: Option<Period>,
     /// Actions of it and of the shift before, newest first.
-    actions: Vec<ActionRecord>,
-    answered: bool,
-    trouble: Option<String>,
+    pub actions: Answered<Vec<ActionRecord>>,
     scroll: Scroll,
-    periodic: PeriodicQuery,
 }
 
 impl Handover {
     /// So many shifts later; `0` is the running one.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
-        let shown = self.period(cx);
-        let chosen = match by {
-            0 => None,
-            by if by < 0 => span::earlier(cx, shown.as_ref()),
-            _ => span::later(cx, shown.as_ref()),
-        };
-        self.period = chosen.filter(|chosen| chosen.to <= cx.now);
-        (self.actions, self.answered, self.trouble, self.scroll) = (Vec::new(), false, None, Scroll::default());
-        self.periodic = PeriodicQuery::default();
+        let chosen = span::step(cx, self.period(cx).as_ref(), by);
+        *self = Handover { period: chosen.filter(|chosen| chosen.to <= cx.now), ..Handover::default() };
     }
 
     /// Scrolls.
@@ -69,7 +57,7 @@ impl Handover {
 
     /// An action was done: queries at once what it changed.
     pub fn want(&mut self) {
-        self.periodic.want();
+        self.actions.query.want();
     }
 
     fn period(&self, cx: &ViewContext) -> Option<Period> {
@@ -77,42 +65,12 @@ impl Handover {
     }
 
     /// Asks the history if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
-        let Some(shown) = self.period(cx) else { return Vec::new() };
-        if !span::due(cx, &self.periodic, EVERY_S, Some(&shown)) {
-            return Vec::new();
-        }
-        *number = number.wrapping_add(1);
-        self.periodic.asked(*number, cx.steady());
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
+        let shown = self.period(cx)?;
         // What the shift before wrote down is for this one.
         let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
-        vec![UiAction::query(Tab::Alarms, *number, Query::Actions { from, to: shown.to, limit: ROWS })]
-    }
-
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number)
-    }
-
-    /// The history answered.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.periodic.answered(number, cx.steady()).is_none() {
-            return;
-        }
-        match answer {
-            Ok(Answer::Actions(rows)) => {
-                (self.actions, self.answered, self.trouble) = (rows.clone(), true, None);
-            }
-            Ok(
-                Answer::Series(_)
-                | Answer::Journal(_)
-                | Answer::AlarmMetrics(_)
-                | Answer::Values(_)
-                | Answer::LineMinutes(_)
-                | Answer::Report(_),
-            ) => {}
-            Err(error) => self.trouble = Some(error.to_string()),
-        }
+        let query = Query::Actions { from, to: shown.to, limit: ROWS };
+        span::ask(cx, &mut self.actions.query, number, EVERY_S, Some(&shown), query)
     }
 
     /// Draws it.
@@ -124,18 +82,13 @@ impl Handover {
             Some(shown) => canvas.text(x, 0, &span::words(cx, &shown), theme.normal()),
             None => x,
         };
-        match &self.trouble {
+        match &self.actions.trouble {
             Some(trouble) => canvas.text(x + 2, 0, trouble, theme.trouble()),
-            None if !self.answered => canvas.text(x + 2, 0, t!("collecting data"), theme.dim()),
+            None if self.actions.value.is_none() => canvas.text(x + 2, 0, t!("collecting data"), theme.dim()),
             None => x,
         };
-        let lines = self.lines(cx, width);
-        let room = usize::from(height.saturating_sub(1));
-        let first = self.scroll.first(lines.len(), room);
-        for (y, (text, style)) in lines.iter().skip(first).take(room).enumerate() {
-            canvas.text(1, to_u16(y) + 1, text, *style);
-        }
-        let more = lines.len().saturating_sub(first + room);
+        let mut below = canvas.part(0, 1, width, height.saturating_sub(1));
+        let more = span::draw_lines(&mut below, &self.lines(cx, width), self.scroll);
         if more > 0 {
             canvas.text_right(width.saturating_sub(1), 0, &t!("{more} more below", more), theme.strong());
         }
@@ -159,15 +112,15 @@ impl Handover {
         );
         section(t!("abnormal: manual, disabled, under test"), unusual(cx), true);
         section(t!("bad or uncertain values"), doubtful(cx), true);
-        if self.answered {
+        if let Some(actions) = &self.actions.value {
             let from = self.period(cx).map_or(Timestamp::MIN, |shown| shown.from);
             let of = |keep: fn(&ActionRecord) -> bool| {
-                let rows = self.actions.iter().filter(|row| from <= row.at && keep(row));
+                let rows = actions.iter().filter(|row| from <= row.at && keep(row));
                 folded(cx, rows.map(|row| (row.at, action_text(cx, row).trim_start().to_owned())))
             };
             section(t!("failed in this shift"), of(|row| is_failed(row) && is_change(row)), true);
             section(t!("changed in this shift"), of(|row| !is_failed(row) && is_change(row)), false);
-            if self.actions.len() >= ROWS {
+            if actions.len() >= ROWS {
                 section(t!("the oldest actions are left out"), Vec::new(), true);
             }
         }
@@ -178,15 +131,17 @@ impl Handover {
     fn note_lines(&self, cx: &ViewContext, room: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let when = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
-        let note = self.actions.iter().position(|row| &*row.action == HAND_OVER && !is_failed(row));
-        let Some((n, note)) = note.and_then(|n| Some((n, self.actions.get(n)?))) else {
-            let words = if self.answered { t!("No handover recorded for this shift or the one before.") } else { "" };
+        let actions = self.actions.value.as_deref().unwrap_or_default();
+        let note = actions.iter().enumerate().find(|(_, row)| &*row.action == HAND_OVER && !is_failed(row));
+        let Some((n, note)) = note else {
+            let answered = self.actions.value.is_some();
+            let words = if answered { t!("No handover recorded for this shift or the one before.") } else { "" };
             return vec![(words.to_owned(), theme.normal())];
         };
         let mut lines = vec![(t!("handed over {when} by {by}", when = when(note), by = note.by), theme.strong())];
         let text = note.note.as_deref().unwrap_or(t!("without a note"));
         lines.extend(wrap(text, room).into_iter().map(|line| (format!("  {line}"), theme.normal())));
-        let taken = self.actions[..n].iter().rev().find(|row| &*row.action == TAKE_OVER && !is_failed(row));
+        let taken = actions[..n].iter().rev().find(|row| &*row.action == TAKE_OVER && !is_failed(row));
         lines.push(match taken {
             Some(row) => (t!("taken over {when} by {by}", when = when(row), by = row.by), theme.strong()),
             None if is_own(cx, note) => {
@@ -200,7 +155,8 @@ impl Handover {
     /// Did the current user hand over, with no take-over since?
     pub fn is_own(&self, cx: &ViewContext) -> bool {
         let last = |row: &&ActionRecord| [HAND_OVER, TAKE_OVER].contains(&&*row.action) && !is_failed(row);
-        self.actions.iter().find(last).is_some_and(|row| &*row.action == HAND_OVER && is_own(cx, row))
+        let actions = self.actions.value.as_deref().unwrap_or_default();
+        actions.iter().find(last).is_some_and(|row| &*row.action == HAND_OVER && is_own(cx, row))
     }
 }
 
@@ -297,18 +253,11 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
 fn doubtful(cx: &ViewContext) -> Vec<String> {
     let polled = cx.def().tags.iter().filter(|tag| tag.store);
     let bad: Vec<String> = polled
-        .filter(|tag| match cx.snapshot.sample(tag.id).quality {
-            Quality::Good => false,
-            Quality::Uncertain(_) | Quality::Bad(_) => true,
-        })
+        .filter(|tag| !cx.snapshot.sample(tag.id).quality.is_good())
         .map(|tag| format!("{} {}", tag.name, value::show(cx, tag.id).whole()))
         .collect();
     let more = bad.len().saturating_sub(NAMED);
-    let stale = cx.snapshot.alarms.iter().filter(|alarm| {
-        matches!(alarm.state, AlarmState::Acknowledged | AlarmState::Unacknowledged)
-            && 24 * 3_600 < between(alarm.raised_at, cx.now).as_secs()
-    });
-    let stale = stale.map(|alarm| {
+    let stale = stale(cx).map(|alarm| {
         let lasts = running(between(alarm.raised_at, cx.now));
         t!(
             "{subject} {message} active for {lasts}",

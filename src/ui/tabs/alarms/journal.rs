@@ -1,6 +1,6 @@
 //! The journal: steps of alarms and actions of operators in one list, searched by words and by time.
 
-use super::{super::reports::period, span};
+use super::span;
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::record::{ActionRecord, AlarmRecord},
@@ -21,17 +21,13 @@ pub const FORMS: &str = "words of tag, text, user; a time or a day:  TIC-1 anna 
 /// State of the page.
 #[derive(Debug, Default)]
 pub struct Journal {
-    alarms: Vec<AlarmRecord>,
-    actions: Vec<ActionRecord>,
-    answered: bool,
-    trouble: Option<String>,
+    pub alarms: Answered<Vec<AlarmRecord>>,
+    pub actions: Answered<Vec<ActionRecord>>,
     scroll: Scroll,
     /// Words that must all be found in a row.
     words: Words,
     /// The chosen period; `None` is the last 24 hours.
     period: Option<Period>,
-    steps: PeriodicQuery,
-    actions_query: PeriodicQuery,
 }
 
 impl Journal {
@@ -64,13 +60,7 @@ impl Journal {
         if by == 0 {
             self.words = Words::default();
         }
-        let shown = self.period.as_ref();
-        let period = match by {
-            0 => None,
-            by if by < 0 => span::earlier(cx, shown),
-            _ => span::later(cx, shown),
-        };
-        self.show(period);
+        self.show(span::step(cx, self.period.as_ref(), by));
     }
 
     /// Scrolls.
@@ -80,9 +70,7 @@ impl Journal {
 
     /// Other rows are wanted; those of before must not stand under their heading.
     fn show(&mut self, period: Option<Period>) {
-        (self.scroll, self.answered, self.period) = (Scroll::default(), false, period);
-        (self.alarms, self.actions) = (Vec::new(), Vec::new());
-        (self.steps, self.actions_query) = (PeriodicQuery::default(), PeriodicQuery::default());
+        *self = Journal { words: std::mem::take(&mut self.words), period, ..Journal::default() };
     }
 
     fn limit(&self) -> usize {
@@ -94,48 +82,10 @@ impl Journal {
         let to = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
         let limit = self.limit();
-        let mut acts = Vec::new();
-        let mut due = |periodic: &mut PeriodicQuery, query| {
-            if span::due(cx, periodic, EVERY_S, self.period.as_ref()) {
-                *number = number.wrapping_add(1);
-                periodic.asked(*number, cx.steady());
-                acts.push(UiAction::query(Tab::Alarms, *number, query));
-            }
-        };
-        due(&mut self.steps, Query::Journal { from, to, limit });
-        due(&mut self.actions_query, Query::Actions { from, to, limit });
-        acts
-    }
-
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.steps.awaits(number) || self.actions_query.awaits(number)
-    }
-
-    /// The history answered.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self
-            .steps
-            .answered(number, cx.steady())
-            .or_else(|| self.actions_query.answered(number, cx.steady()))
-            .is_none()
-        {
-            return;
-        }
-        self.answered = true;
-        self.trouble = None;
-        match answer {
-            Ok(Answer::Journal(rows)) => self.alarms.clone_from(rows),
-            Ok(Answer::Actions(rows)) => self.actions.clone_from(rows),
-            Ok(
-                Answer::Series(_)
-                | Answer::LineMinutes(_)
-                | Answer::Report(_)
-                | Answer::AlarmMetrics(_)
-                | Answer::Values(_),
-            ) => {}
-            Err(error) => self.trouble = Some(error.to_string()),
-        }
+        let mut ask = |periodic, query| span::ask(cx, periodic, number, EVERY_S, self.period.as_ref(), query);
+        let alarms = ask(&mut self.alarms.query, Query::Journal { from, to, limit });
+        let actions = ask(&mut self.actions.query, Query::Actions { from, to, limit });
+        alarms.into_iter().chain(actions).collect()
     }
 
     /// Draws it.
@@ -143,13 +93,14 @@ impl Journal {
         let theme = cx.theme;
         let x = canvas.text(1, 0, t!("Journal  "), theme.strong());
         let rows = self.rows(cx);
-        let all = self.alarms.len() + self.actions.len();
+        let (alarms, actions) = self.records();
+        let all = alarms.len() + actions.len();
         let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| span::words(cx, period));
         let mut what = vec![period];
         if !self.words.is_empty() {
             what.push(t!("\"{typed}\": {count} of {all}, / changes it", typed = self.typed(), count = rows.len(), all));
         }
-        if self.alarms.len() >= self.limit() || self.actions.len() >= self.limit() {
+        if alarms.len() >= self.limit() || actions.len() >= self.limit() {
             what.push(t!("the oldest left out").to_owned());
         }
         if let times @ 1.. = cx.snapshot.history.epoch {
@@ -157,11 +108,12 @@ impl Journal {
             what.push(t!("clock set {often} (epoch {times})", often, times));
         }
         let x = canvas.text(x, 0, &what.join(", "), theme.normal());
-        if let Some(trouble) = &self.trouble {
+        if let Some(trouble) = self.alarms.trouble.as_ref().or(self.actions.trouble.as_ref()) {
             canvas.text(x + 2, 0, trouble, theme.trouble());
         }
         if rows.is_empty() {
-            let words = match (self.answered, self.words.is_empty()) {
+            let answered = self.alarms.value.is_some() || self.actions.value.is_some();
+            let words = match (answered, self.words.is_empty()) {
                 (false, _) => t!("collecting data"),
                 (true, true) => t!("Nothing happened."),
                 (true, false) => t!("Nothing found."),
@@ -171,17 +123,21 @@ impl Journal {
         }
         let (width, room) = (canvas.width(), usize::from(canvas.height().saturating_sub(1)));
         let first = self.scroll.first(rows.len(), room);
-        for (y, (at, text, style)) in rows.iter().skip(first).take(room).enumerate() {
-            let y = to_u16(y) + 1;
-            let x = canvas.text(1, y, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
-            canvas.text(x, y, &fit_words(text, width.saturating_sub(x + 1)), *style);
+        for (y, _, (at, text, style)) in on_screen(&rows, first, room) {
+            let x = canvas.text(1, y + 1, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
+            canvas.text(x, y + 1, &fit_words(text, width.saturating_sub(x + 1)), *style);
         }
+    }
+
+    fn records(&self) -> (&[AlarmRecord], &[ActionRecord]) {
+        (self.alarms.value.as_deref().unwrap_or_default(), self.actions.value.as_deref().unwrap_or_default())
     }
 
     /// Alarms and operator actions in one list, newest first.
     fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
-        let alarms = self.alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
-        let actions = self.actions.iter().map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
+        let (alarms, actions) = self.records();
+        let alarms = alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
+        let actions = actions.iter().map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
         let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.words.fit(text)).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.0));
         rows

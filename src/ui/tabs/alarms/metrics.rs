@@ -3,9 +3,12 @@
 use super::span;
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::alarm::{
-        AlarmState, PeriodMetrics,
-        metrics::{METRIC_TARGETS, Verdict},
+    plant::{
+        alarm::{
+            PeriodMetrics,
+            metrics::{METRIC_TARGETS, Verdict},
+        },
+        snapshot::ActiveAlarm,
     },
     report::{Period, alarm_metrics},
     ui::{
@@ -27,23 +30,16 @@ const TABLE: u16 = 76;
 pub struct Metrics {
     /// The chosen shift; `None` is now: the last 24 hours, from the snapshot.
     period: Option<Period>,
-    figures: Option<Box<PeriodMetrics>>,
-    trouble: Option<String>,
+    /// Its figures.
+    pub figures: Answered<Box<PeriodMetrics>>,
     scroll: Scroll,
-    periodic: PeriodicQuery,
 }
 
 impl Metrics {
     /// So many shifts later; `0` is the present.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
-        self.period = match by {
-            0 => None,
-            by if by < 0 => span::earlier(cx, self.period.as_ref()),
-            _ => span::later(cx, self.period.as_ref()),
-        };
-        // PeriodMetrics of one period must not stand under the name of another.
-        (self.figures, self.trouble, self.scroll, self.periodic) =
-            (None, None, Scroll::default(), PeriodicQuery::default());
+        // Figures of one period must not stand under the name of another.
+        *self = Metrics { period: span::step(cx, self.period.as_ref(), by), ..Metrics::default() };
     }
 
     /// Scrolls.
@@ -52,44 +48,16 @@ impl Metrics {
     }
 
     /// Asks the history for a chosen shift if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
-        let Some(period) = &self.period else { return Vec::new() };
-        if !span::due(cx, &self.periodic, EVERY_S, Some(period)) {
-            return Vec::new();
-        }
-        *number = number.wrapping_add(1);
-        self.periodic.asked(*number, cx.steady());
-        vec![UiAction::query(Tab::Alarms, *number, Query::AlarmMetrics { from: period.from, to: period.to })]
-    }
-
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number)
-    }
-
-    /// The history answered.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.periodic.answered(number, cx.steady()).is_none() {
-            return;
-        }
-        match answer {
-            Ok(Answer::AlarmMetrics(figures)) => (self.figures, self.trouble) = (Some(figures.clone()), None),
-            Ok(
-                Answer::Series(_)
-                | Answer::Journal(_)
-                | Answer::Actions(_)
-                | Answer::LineMinutes(_)
-                | Answer::Report(_)
-                | Answer::Values(_),
-            ) => {}
-            Err(error) => self.trouble = Some(error.to_string()),
-        }
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
+        let period = self.period.as_ref()?;
+        let query = Query::AlarmMetrics { from: period.from, to: period.to };
+        span::ask(cx, &mut self.figures.query, number, EVERY_S, Some(period), query)
     }
 
     /// The figures shown: of the chosen shift, or of the last 24 hours.
     fn figures<'a>(&'a self, cx: &ViewContext<'a>) -> Option<&'a PeriodMetrics> {
         match self.period {
-            Some(_) => self.figures.as_deref(),
+            Some(_) => self.figures.value.as_deref(),
             None => Some(&cx.snapshot.alarm_metrics.day),
         }
     }
@@ -109,24 +77,17 @@ impl Metrics {
             1 => t!(": 1 alarm{quiet}", quiet = alarm_metrics::quiet(figures)),
             many => t!(": {many} alarms{quiet}", many, quiet = alarm_metrics::quiet(figures)),
         });
-        let wait = if self.trouble.is_none() { t!(": collecting data") } else { "" };
+        let wait = if self.figures.trouble.is_none() { t!(": collecting data") } else { "" };
         let x = canvas.text(1, 1, &format!("{what}{}", count.as_deref().unwrap_or(wait)), theme.strong());
-        if let Some(trouble) = &self.trouble {
+        if let Some(trouble) = &self.figures.trouble {
             canvas.text(x + 2, 1, trouble, theme.trouble());
         }
-        let lines = self.lines(cx, width);
-        let room = usize::from(height.saturating_sub(3));
-        let first = self.scroll.first(lines.len(), room);
-        for (y, (text, style)) in lines.iter().skip(first).take(room).enumerate() {
-            canvas.text(1, to_u16(y) + 2, text, *style);
-        }
+        let mut table = canvas.part(0, 2, width, height.saturating_sub(3));
+        let more = span::draw_lines(&mut table, &self.lines(cx, width), self.scroll);
         if 2 * TABLE <= width {
-            let mut side = canvas.part(TABLE + 1, 2, width - TABLE - 1, height.saturating_sub(3));
-            for (y, (text, style)) in self.bad_actors(cx).iter().enumerate() {
-                side.text(0, to_u16(y), text, *style);
-            }
+            let mut side = canvas.part(TABLE, 2, width - TABLE, height.saturating_sub(3));
+            span::draw_lines(&mut side, &self.bad_actors(cx), Scroll::default());
         }
-        let more = lines.len().saturating_sub(first + room);
         let last = height.saturating_sub(1);
         let words = t!("ISA-18.2, one operator, meant for 30 days or more");
         let more = if more > 0 { t!("{more} more below", more) } else { String::new() };
@@ -172,17 +133,7 @@ impl Metrics {
             lines.push((fit_words(&text, TABLE), style));
         }
         if self.period.is_none() {
-            let stale = cx.snapshot.alarms.iter().filter(|alarm| match alarm.state {
-                AlarmState::Unacknowledged | AlarmState::Acknowledged => STALE < between(alarm.raised_at, cx.now),
-                AlarmState::Normal
-                | AlarmState::ReturnedToNormal
-                | AlarmState::LatchedUnacknowledged
-                | AlarmState::LatchedAcknowledged
-                | AlarmState::Shelved
-                | AlarmState::SuppressedByDesign
-                | AlarmState::OutOfService => false,
-            });
-            lines.extend(stale.map(|alarm| {
+            lines.extend(stale(cx).map(|alarm| {
                 let (since, name) = (running(between(alarm.raised_at, cx.now)), subject(cx, alarm.id));
                 let text = format!("{} {since:11}  {name}  {}", pad(t!("stale"), 10), cx.def().alarm(alarm.id).message);
                 (fit_words(&text, TABLE), style)
@@ -193,6 +144,12 @@ impl Metrics {
         }
         lines
     }
+}
+
+/// Alarms that have been active for a day.
+pub fn stale<'a>(cx: &ViewContext<'a>) -> impl Iterator<Item = &'a ActiveAlarm> {
+    let (now, alarms) = (cx.now, &cx.snapshot.alarms);
+    alarms.iter().filter(move |alarm| alarm.state.is_active() && STALE < between(alarm.raised_at, now))
 }
 
 /// The rates of this moment, and whether there is a flood.

@@ -1,35 +1,48 @@
-//! Which stretch of time a page is about: the present, or a shift that was chosen.
+//! What the pages that the history fills have in common: the present or a chosen shift, the query, and lines that scroll.
 
-use super::super::reports::period;
 use crate::report::Period;
 use crate::ui::tabs::prelude::*;
 
 /// An answer that has not come after so long (real time) counts as lost: a query over weeks may take its time.
 const PATIENCE_S: f64 = 30.0;
 
-/// The shift before the one shown; from the present it is the running one.
-pub fn earlier(cx: &ViewContext, shown: Option<&Period>) -> Option<Period> {
-    match shown {
-        None => period::at(cx.def(), cx.now),
-        Some(shown) => period::before(cx.def(), shown).or_else(|| Some(shown.clone())),
+/// The shift so many further on than the one shown; `None` is the present, where `by` is 0 and after the running shift.
+pub fn step(cx: &ViewContext, shown: Option<&Period>, by: isize) -> Option<Period> {
+    match (by, shown) {
+        (..0, None) => period::at(cx.def(), cx.now),
+        (..0, Some(shown)) => period::before(cx.def(), shown).or_else(|| Some(shown.clone())),
+        (1.., Some(shown)) => period::after(cx.def(), shown, cx.now),
+        (0, _) | (1.., None) => None,
     }
 }
 
-/// The shift after the one shown; after the running one comes the present.
-pub fn later(cx: &ViewContext, shown: Option<&Period>) -> Option<Period> {
-    shown.and_then(|shown| period::after(cx.def(), shown, cx.now))
+/// The query, if it is due: every `seconds` for what is still going on, once in a while for the past.
+pub fn ask(
+    cx: &ViewContext,
+    periodic: &mut PeriodicQuery,
+    number: &mut u32,
+    seconds: f64,
+    shown: Option<&Period>,
+    query: Query,
+) -> Option<UiAction> {
+    let past = shown.is_some_and(|shown| shown.to <= cx.now);
+    let every = real(cx, if past { 20.0 * seconds } else { seconds });
+    periodic.ask(cx, (Tab::Alarms, number), every, real(cx, PATIENCE_S), query)
 }
 
-/// Is it time to ask? What is still going on is asked every `seconds`, the past once in a while.
-pub fn due(cx: &ViewContext, periodic: &PeriodicQuery, seconds: f64, shown: Option<&Period>) -> bool {
-    let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
-    let past = shown.is_some_and(|shown| shown.to <= cx.now);
-    periodic.due(cx.steady(), real(if past { 20.0 * seconds } else { seconds }), real(PATIENCE_S))
+/// Draws lines as far as they are scrolled; returns how many more there are below.
+pub fn draw_lines(canvas: &mut Canvas, lines: &[(String, Style)], scroll: Scroll) -> usize {
+    let room = usize::from(canvas.height());
+    let first = scroll.first(lines.len(), room);
+    for (y, _, (text, style)) in on_screen(lines, first, room) {
+        canvas.text(1, y, text, *style);
+    }
+    lines.len().saturating_sub(first + room)
 }
 
 /// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.
 pub fn words(cx: &ViewContext, shown: &Period) -> String {
-    let local = |at: jiff::Timestamp| at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M").to_string();
+    let local = |at: Timestamp| at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M").to_string();
     match shown.name.contains(':') {
         true => shown.name.clone(),
         false => format!("{} {}–{}", shown.name, local(shown.from), local(shown.to)),

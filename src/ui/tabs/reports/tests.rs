@@ -202,7 +202,7 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     let (path, bytes) = stand.saved.pop().expect("the key writes");
     assert_eq!(path, PathBuf::from("reports/2026-11-21-afternoon-until-1402.csv"));
     let Stand { model, .. } = &stand;
-    let shown = model.tabs.reports.report.as_ref().expect("a report is shown");
+    let shown = model.tabs.reports.report.value.as_ref().expect("a report is shown");
     assert_eq!(bytes, report::FORMATS[0].render(shown, &model.snapshot.def, CsvDialect::default()));
     stand.send(Msg::Saved(Tab::Reports, Ok(path)));
     assert!(stand.screen().contains("✓ written reports/2026-11-21-afternoon-until-1402.csv"));

@@ -25,7 +25,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
     let Some(period) = &reports.period else { return };
     draw_title(reports, cx, period, &mut canvas);
     let rows = height.saturating_sub(3);
-    match &reports.report {
+    match &reports.report.value {
         Some(report) => {
             let lines = lines(cx, report);
             let first = reports.scroll.first(lines.len(), usize::from(rows));
@@ -44,8 +44,8 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         None => {
-            let words = reports.trouble.as_deref().unwrap_or(t!("collecting data"));
-            let style = if reports.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
+            let words = reports.report.trouble.as_deref().unwrap_or(t!("collecting data"));
+            let style = if reports.report.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
             canvas.text_centred(height / 2, words, style);
         }
     }
@@ -58,8 +58,8 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     let x = canvas.text(x, 0, &period.name, theme.strong());
     let x = canvas.text(x + 3, 0, &span(period, zone), theme.normal());
     let running = reports.is_running(cx.now);
-    let until = reports.report.as_ref().map_or(cx.now, |report| report.until);
-    let state = match (running, &reports.report) {
+    let until = reports.report.value.as_ref().map_or(cx.now, |report| report.until);
+    let state = match (running, &reports.report.value) {
         (true, _) => t!("RUNNING, until now {local}", local = local(until, zone, "%H:%M:%S")),
         (false, Some(report)) if report.until < report.period.to => {
             t!("figures until {local} only", local = local(until, zone, "%H:%M:%S"))
@@ -67,11 +67,14 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
         (false, _) => t!("closed").to_owned(),
     };
     let x = canvas.text(x + 3, 0, &state, if running { theme.strong() } else { theme.normal() });
-    let slow =
-        reports.periodic.waiting(cx.steady()).is_some_and(|waiting| waiting.as_secs_f64() > 2.0 * cx.snapshot.speed);
-    if reports.report.is_some() {
+    let slow = reports
+        .report
+        .query
+        .waiting(cx.steady())
+        .is_some_and(|waiting| waiting.as_secs_f64() > 2.0 * cx.snapshot.speed);
+    if reports.report.value.is_some() {
         let right = canvas.width().saturating_sub(1);
-        match &reports.trouble {
+        match &reports.report.trouble {
             Some(trouble) => canvas.text_right(right, 0, &fit(trouble, right.saturating_sub(x + 2)), theme.trouble()),
             None if slow => canvas.text_right(right, 0, &fit(t!("reading"), right.saturating_sub(x + 2)), theme.dim()),
             None => {}

@@ -1,6 +1,5 @@
 //! The audit list: who did what, from where, when, and how it ended; newest first, with a search that the history does.
 
-use super::super::reports::period;
 use crate::ui::tabs::prelude::*;
 use crate::{plant::record::ActionRecord, report::Period, ui::modal::AuditEntryDialog};
 
@@ -59,9 +58,7 @@ const PATIENCE_S: f64 = 20.0;
 /// State of the list.
 #[derive(Debug, Default)]
 pub struct Audit {
-    rows: Vec<ActionRecord>,
-    answered: bool,
-    trouble: Option<String>,
+    pub rows: Answered<Vec<ActionRecord>>,
     selected: usize,
     /// What is searched; empty for anything.
     words: String,
@@ -70,36 +67,28 @@ pub struct Audit {
     period: Option<Period>,
     /// What the open window asks for.
     asking: Option<Part>,
-    periodic: PeriodicQuery,
-    number: u32,
 }
 
 impl Audit {
-    /// The last week; queries are counted on from `asked`, so that no older answer fits.
-    pub fn new(asked: u32) -> Audit {
-        Audit { number: asked, ..Audit::default() }
-    }
-
-    /// Queries asked so far.
-    pub fn asked(&self) -> u32 {
-        self.number
+    fn rows(&self) -> &[ActionRecord] {
+        self.rows.value.as_deref().unwrap_or_default()
     }
 
     /// The list that keys act on.
     pub fn drawn_rows(&self) -> Rows {
-        Rows::of(self.rows.iter().map(|row| (row.at, &row.by, &row.action, &row.target)), self.selected)
+        Rows::of(self.rows().iter().map(|row| (row.at, &row.by, &row.action, &row.target)), self.selected)
     }
 
     /// A key of [`KEYS`].
     pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         match action {
-            Action::Move(motion) => self.selected = motion.to(self.selected, self.rows.len(), rows_on(cx.area.height)),
+            Action::Move(motion) => {
+                self.selected = motion.to(self.selected, self.rows().len(), rows_on(cx.area.height))
+            }
             Action::Open => {
-                let entry = self.rows.get(self.selected).cloned();
-                return entry
-                    .map(|entry| UiAction::Open(Modal::AuditEntry(Box::new(AuditEntryDialog(entry)))))
-                    .into_iter()
-                    .collect();
+                let entry = self.rows().get(self.selected).cloned();
+                let window = entry.map(|entry| Modal::AuditEntry(Box::new(AuditEntryDialog(entry))));
+                return window.map(UiAction::Open).into_iter().collect();
             }
             Action::Search(part) => {
                 self.asking = Some(part);
@@ -116,11 +105,7 @@ impl Audit {
                 return vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, text)))];
             }
             Action::Everything => {
-                for part in [&mut self.words, &mut self.who, &mut self.action] {
-                    part.clear();
-                }
-                self.period = None;
-                self.restart();
+                *self = Audit::default();
             }
             Action::Back => {}
         }
@@ -145,54 +130,23 @@ impl Audit {
 
     /// Rows of another search must not stand under this one.
     fn restart(&mut self) {
-        (self.rows, self.answered, self.selected) = (Vec::new(), false, 0);
-        self.periodic.want();
+        (self.rows, self.selected) = (Answered::default(), 0);
     }
 
     /// Asks the history when it is time to.
-    pub fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let real = |seconds: f64| SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6));
-        if !self.periodic.due(cx.steady(), real(EVERY_S), real(PATIENCE_S)) {
-            return Vec::new();
-        }
-        self.number = self.number.wrapping_add(1);
-        self.periodic.asked(self.number, cx.steady());
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
         let until = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
         let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
-        vec![UiAction::query(Tab::Users, self.number, Query::Audit { from, to, words, by, action, limit: ROWS })]
+        let query = Query::Audit { from, to, words, by, action, limit: ROWS };
+        self.rows.query.ask(cx, (Tab::Users, number), real(cx, EVERY_S), real(cx, PATIENCE_S), query)
     }
 
-    /// Is the answer to query `number` waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.periodic.awaits(number) && !self.periodic.is_wanted()
-    }
-
-    /// The history answered query `number`.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) {
-        // An answer to a search that is no longer meant is not shown.
-        if self.periodic.answered(number, cx.steady()).is_none() || self.periodic.is_wanted() {
-            return;
-        }
-        self.answered = true;
-        self.trouble = None;
-        match answer {
-            Ok(Answer::Actions(rows)) => {
-                let selected = self.rows.get(self.selected).cloned();
-                let place = selected.and_then(|entry| rows.iter().position(|row| *row == entry));
-                self.selected = if self.selected == 0 { 0 } else { place.unwrap_or(0) };
-                self.rows = rows;
-            }
-            Ok(
-                Answer::Series(_)
-                | Answer::Journal(_)
-                | Answer::LineMinutes(_)
-                | Answer::Report(_)
-                | Answer::AlarmMetrics(_)
-                | Answer::Values(_),
-            ) => {}
-            Err(error) => self.trouble = Some(error.to_string()),
-        }
+    /// The history answered query `number`; the selected entry stays selected, but at the top the newest one is.
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        let selected = self.rows().get(self.selected).cloned().filter(|_| 0 < self.selected);
+        self.rows.on_answer(cx, number, answer);
+        self.selected = selected.and_then(|entry| self.rows().iter().position(|row| *row == entry)).unwrap_or(0);
     }
 
     /// Draws it.
@@ -202,18 +156,19 @@ impl Audit {
         let columns = canvas.width();
         let x = canvas.text(1, 0, t!("Audit list  "), theme.strong());
         let room = columns.saturating_sub(x + 1);
-        match &self.trouble {
+        match &self.rows.trouble {
             Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
             None => canvas.text(x, 0, &fit(&self.summary(), room), theme.normal()),
         };
         canvas.text(1, 1, &self.heading(columns), theme.dim());
-        if self.rows.is_empty() {
-            let words = if self.answered { t!("Nothing of this is on record.") } else { t!("collecting data") };
+        if self.rows().is_empty() {
+            let words =
+                if self.rows.value.is_some() { t!("Nothing of this is on record.") } else { t!("collecting data") };
             canvas.text(2, 3, words, theme.dim());
             return;
         }
         let rows = rows_on(canvas.height());
-        for (y, n, entry) in on_screen(&self.rows, first(self.selected, self.rows.len(), rows), rows) {
+        for (y, n, entry) in on_screen(self.rows(), first(self.selected, self.rows().len(), rows), rows) {
             let style = if n == self.selected { theme.focus() } else { theme.normal() };
             canvas.text(0, y + 2, &pad(&row(cx, entry, columns), columns), style);
         }
@@ -224,7 +179,7 @@ impl Audit {
         let time = self.period.as_ref().map_or(t!("the last 7 days").to_owned(), |period| period.name.clone());
         let part = |name: &str, text: &str| (!text.is_empty()).then(|| format!("{name} \"{text}\""));
         let parts = [part(t!("by"), &self.who), part(t!("action"), &self.action), part(t!("with"), &self.words)];
-        let count = match self.rows.len() {
+        let count = match self.rows().len() {
             ROWS.. => t!("the newest {ROWS}; choose a time for others", ROWS),
             1 => t!("1 row").to_owned(),
             n => t!("{n} rows", n),
