@@ -307,8 +307,7 @@ impl Alarms {
     }
 
     fn turn(&mut self, by: isize) {
-        let place = Page::ALL.iter().position(|page| *page == self.page).unwrap_or(0) as isize;
-        self.page = Page::ALL[(place + by).rem_euclid(Page::ALL.len() as isize) as usize];
+        self.page = Page::ALL[around(self.page as usize, by, Page::ALL.len())];
     }
 
     /// Shows what is folded under the selected alarm, or folds the first-out group that it belongs to.

@@ -98,8 +98,7 @@ impl TabView for Bus {
         self.frames.dismiss();
         match action {
             Action::Turn(by) => {
-                let place = Page::ALL.iter().position(|page| *page == self.page).unwrap_or(0) as isize;
-                self.page = Page::ALL[(place + by).rem_euclid(Page::ALL.len() as isize) as usize];
+                self.page = Page::ALL[around(self.page as usize, by, Page::ALL.len())];
             }
             Action::Show(page) => self.page = page,
             Action::NextLine => self.choose_line(cx, 1),
@@ -227,8 +226,7 @@ impl Bus {
 
     /// So many lines on, around the end.
     fn choose_line(&mut self, cx: &ViewContext, by: isize) {
-        let count = cx.def().lines.len().max(1) as isize;
-        self.line = LineId(to_u16((self.line.index() as isize + by).rem_euclid(count)));
+        self.line = LineId(to_u16(around(self.line.index(), by, cx.def().lines.len())));
         (self.scroll, self.plan) = (Scroll::default(), plan::Plan::default());
         self.frames.forget();
         self.test.first = None;

@@ -96,7 +96,7 @@ impl TabView for Controllers {
             }
             Action::Turn(by) => {
                 if let Page::Guide(page, _) = &mut self.page {
-                    *page = page.saturating_add_signed(by).min(guide::PAGES.len() - 1);
+                    *page = page.saturating_add_signed(by).min(guide::count() - 1);
                 }
                 Vec::new()
             }

@@ -80,22 +80,12 @@ impl TabView for Mimic {
         self.asked_at = Some(cx.phase);
         self.asked = self.asked.wrapping_add(1);
         let count = to_u32(self.trends.len());
-        let asks = self.trends.iter().enumerate().filter_map(|(n, (item, _))| match &cx.def().mimic.items[*item] {
-            MimicItem::Trend { tag, window, place } => {
-                let from = cx.now - SignedDuration::try_from(*window).ok()?;
-                let width = scale(cx, cx.area).place(*place).width;
-                let query =
-                    Query::Series { tags: vec![*tag], from, to: cx.now, buckets: usize::from(width.max(1)) * 2 };
-                Some(UiAction::query(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(to_u32(n)), query))
-            }
-            MimicItem::Tank { .. }
-            | MimicItem::Valve { .. }
-            | MimicItem::Pump { .. }
-            | MimicItem::Pipe { .. }
-            | MimicItem::Value { .. }
-            | MimicItem::Controller { .. }
-            | MimicItem::Sequence { .. }
-            | MimicItem::Text { .. } => None,
+        let asks = self.trends.iter().enumerate().filter_map(|(n, (item, _))| {
+            let MimicItem::Trend { tag, window, place } = &cx.def().mimic.items[*item] else { return None };
+            let from = cx.now - SignedDuration::try_from(*window).ok()?;
+            let buckets = usize::from(scale(cx, cx.area).place(*place).width.max(1)) * 2;
+            let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
+            Some(UiAction::query(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(to_u32(n)), query))
         });
         asks.collect()
     }
@@ -157,7 +147,7 @@ impl TabView for Mimic {
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         match keys::find(KEYS, event) {
             Some(action) => self.act(cx, action),
-            None => command_of(cx, event).map(UiAction::Open).into_iter().collect(),
+            None => open(command_of(cx, event)),
         }
     }
 
@@ -178,8 +168,7 @@ impl Mimic {
             Action::Motion => self.motion = !self.motion,
             Action::Actuators => {
                 let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
-                let faceplate = Faceplate::new(t!("commands"), outputs);
-                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
+                return open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate));
             }
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
@@ -189,7 +178,7 @@ impl Mimic {
             Action::Open => {
                 let item = self.selected.and_then(|n| items.get(n));
                 let faceplate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
-                return faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect();
+                return open(faceplate.map(Modal::Faceplate));
             }
         }
         Vec::new()

@@ -3,6 +3,7 @@
 pub(crate) mod alarms;
 pub(crate) mod bus;
 pub(crate) mod controllers;
+mod draw;
 mod periodic_query;
 mod prelude;
 pub(crate) mod faults;
@@ -211,8 +212,8 @@ impl Tab {
 
     /// The tab so many further on among those that are offered, around the end.
     pub fn step(self, offered: &[Tab], by: isize) -> Tab {
-        let place = offered.iter().position(|tab| *tab == self).unwrap_or(0) as isize;
-        offered[(place + by).rem_euclid(offered.len() as isize) as usize]
+        let place = offered.iter().position(|tab| *tab == self).unwrap_or(0);
+        offered[draw::around(place, by, offered.len())]
     }
 }
 

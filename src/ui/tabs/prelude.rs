@@ -8,6 +8,7 @@ pub(super) use ratatui::{Frame, layout::Rect, style::Style};
 
 pub(super) use super::{
     Tab, TabView,
+    draw::{self, around, open, row_style},
     periodic_query::{Answered, PeriodicQuery, real},
     reports::period,
 };

@@ -176,8 +176,7 @@ impl Reports {
                 self.follow = true;
             }
             Action::Free => {
-                let prompt = Prompt::new(t!("report of a period"), period::FORMS, "");
-                return vec![UiAction::Open(Modal::Prompt(prompt))];
+                return open(Modal::Prompt(Prompt::new(t!("report of a period"), period::FORMS, "")));
             }
             Action::Move(motion) => self.scroll(cx, motion),
             Action::Export => return self.export(cx),

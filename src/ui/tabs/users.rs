@@ -158,7 +158,7 @@ impl Users {
                     t!("A demonstration needs no login; a station started with `sightglass run` has users."),
                 ];
                 let notice = Notice::new(t!("add a user"), words.map(str::to_owned).to_vec());
-                return vec![UiAction::Open(Modal::Notice(notice))];
+                return open(Modal::Notice(notice));
             }
             (Action::Add, Some(_)) => Some(UserForm::new(Purpose::Add)),
             (Action::Role, Some(row)) => Some(UserForm::role_of(row)),
@@ -171,7 +171,7 @@ impl Users {
             (Action::Delete, Some(row)) => Some(UserForm::new(Purpose::Delete(row.user.clone()))),
             (Action::Role | Action::Disable | Action::Reset | Action::Delete, None) => None,
         };
-        form.map(|form| UiAction::Open(Modal::UserForm(Box::new(form)))).into_iter().collect()
+        open(form.map(|form| Modal::UserForm(Box::new(form))))
     }
 
     /// The place of the selected user.

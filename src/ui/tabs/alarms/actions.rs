@@ -149,10 +149,6 @@ pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     open(Modal::Confirm(Confirm::command(t!("take over"), words, CommandKind::TakeOver)))
 }
 
-fn open(modal: Modal) -> Vec<UiAction> {
-    vec![UiAction::Open(modal)]
-}
-
 /// The same with the mark as wide as all others, for lists.
 fn marked(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);

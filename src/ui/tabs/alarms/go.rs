@@ -11,7 +11,7 @@ impl Alarms {
                 Prompt::new(t!("show only alarms with"), filter::FORMS, &self.filter.typed())
             }
         };
-        vec![UiAction::Open(Modal::Prompt(prompt))]
+        open(Modal::Prompt(prompt))
     }
 
     /// Leads to what the alarm watches.
@@ -28,9 +28,7 @@ impl Alarms {
             (Subject::Device(device), Action::Controller) => vec![UiAction::ShowDevice(device)],
             (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),
             (Subject::Device(device), Action::Why) => Why::open(Why::of_device(cx, device)),
-            (subject, Action::Open) => {
-                vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate(cx, subject)))))]
-            }
+            (subject, Action::Open) => open(Modal::Guidance(Box::new(Guidance::new(id, faceplate(cx, subject))))),
             (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => Vec::new(),
         }
     }

@@ -88,7 +88,7 @@ impl Handover {
             None => x,
         };
         let mut below = canvas.part(0, 1, width, height.saturating_sub(1));
-        let more = span::draw_lines(&mut below, &self.lines(cx, width), self.scroll);
+        let more = draw::lines(&mut below, &self.lines(cx, width), self.scroll);
         if more > 0 {
             canvas.text_right(width.saturating_sub(1), 0, &t!("{more} more below", more), theme.strong());
         }

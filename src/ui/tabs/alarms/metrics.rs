@@ -83,10 +83,10 @@ impl Metrics {
             canvas.text(x + 2, 1, trouble, theme.trouble());
         }
         let mut table = canvas.part(0, 2, width, height.saturating_sub(3));
-        let more = span::draw_lines(&mut table, &self.lines(cx, width), self.scroll);
+        let more = draw::lines(&mut table, &self.lines(cx, width), self.scroll);
         if 2 * TABLE <= width {
             let mut side = canvas.part(TABLE, 2, width - TABLE, height.saturating_sub(3));
-            span::draw_lines(&mut side, &self.bad_actors(cx), Scroll::default());
+            draw::lines(&mut side, &self.bad_actors(cx), Scroll::default());
         }
         let last = height.saturating_sub(1);
         let words = t!("ISA-18.2, one operator, meant for 30 days or more");
@@ -173,5 +173,5 @@ fn line(theme: &Theme, [measure, figure, target, limit, verdict]: [&str; 5]) -> 
         let bound = bound.replace("at most", theme.pick("≤", "<=")).replace("at least", theme.pick("≥", ">="));
         pad(&bound.replace("below", "<"), 8)
     };
-    format!("{} {}  {} {} {verdict}", pad(measure, 35), pad_left(figure, 8), sign(target), sign(limit))
+    format!("{}  {} {} {verdict}", draw::columns([35, -8], [measure, figure]), sign(target), sign(limit))
 }

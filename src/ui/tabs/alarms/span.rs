@@ -1,4 +1,4 @@
-//! What the pages that the history fills have in common: the present or a chosen shift, the query, and lines that scroll.
+//! What the pages that the history fills have in common: the present or a chosen shift, and the query.
 
 use crate::report::Period;
 use crate::ui::tabs::prelude::*;
@@ -28,16 +28,6 @@ pub fn ask(
     let past = shown.is_some_and(|shown| shown.to <= cx.now);
     let every = real(cx, if past { 20.0 * seconds } else { seconds });
     periodic.ask(cx, (Tab::Alarms, number), every, real(cx, PATIENCE_S), query)
-}
-
-/// Draws lines as far as they are scrolled; returns how many more there are below.
-pub fn draw_lines(canvas: &mut Canvas, lines: &[(String, Style)], scroll: Scroll) -> usize {
-    let room = usize::from(canvas.height());
-    let first = scroll.first(lines.len(), room);
-    for (y, _, (text, style)) in on_screen(lines, first, room) {
-        canvas.text(1, y, text, *style);
-    }
-    lines.len().saturating_sub(first + room)
 }
 
 /// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.

@@ -53,11 +53,7 @@ fn lines(cx: &ViewContext, at: &Place) -> Vec<Row> {
         let place = Place::of(cx, line.id)?;
         let busy = f64::from(place.status.counters.utilisation) * 100.0;
         let words = format!("{:8} {}  {busy:.0} %  {}", line.name, place.settings.transport, state_text(cx, &place));
-        let style = match (chosen, place.status.state == LineState::Connected) {
-            (true, _) => cx.theme.focus(),
-            (false, true) => cx.theme.normal(),
-            (false, false) => cx.theme.trouble(),
-        };
+        let style = row_style(cx, chosen, place.status.state != LineState::Connected);
         Some(plain(format!("{} {words}", if chosen { "▸" } else { " " }), style))
     };
     lines.iter().filter_map(row).chain([Row::new()]).collect()

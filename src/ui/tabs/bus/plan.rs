@@ -73,12 +73,7 @@ impl Plan {
         let selected = self.selected.min(lines.len() - 1);
         let first = list::first(selected, lines.len(), room);
         for (y, n) in (first..lines.len()).take(room).enumerate() {
-            let style = match (n == selected, ill(&report.polls[n])) {
-                (true, _) => theme.focus(),
-                (false, true) => theme.trouble(),
-                (false, false) => theme.normal(),
-            };
-            canvas.text(1, 2 + to_u16(y), &lines[n], style);
+            canvas.text(1, 2 + to_u16(y), &lines[n], row_style(cx, n == selected, ill(&report.polls[n])));
         }
         let below = lines.len().saturating_sub(first + room);
         if 0 < below {

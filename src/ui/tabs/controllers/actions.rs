@@ -21,20 +21,18 @@ impl Controllers {
             }
             Action::Refresh => vec![UiAction::Command(CommandKind::Refresh(device.id))],
             Action::Actions => {
-                let actions = Choice::actions(cx, device.id).map(Modal::Choice);
-                let window = actions.map(|list| Notice::unreachable(cx, device.id).map_or(list, Modal::Notice));
-                window.map_or_else(
-                    || notice(device, t!("this device has no actions")),
-                    |window| vec![UiAction::Open(window)],
-                )
+                let Some(list) = Choice::actions(cx, device.id) else {
+                    return notice(device, t!("this device has no actions"));
+                };
+                open(Notice::unreachable(cx, device.id).map_or(Modal::Choice(list), Modal::Notice))
             }
             Action::Tune => tune(cx, device),
             Action::Run => match device.faceplate.as_ref().and_then(|faceplate| faceplate.run) {
                 Some(run) => write(cx, Some(run)),
                 None => notice(device, t!("this device cannot be put in standby from here")),
             },
-            Action::Settings => vec![UiAction::Open(Modal::Settings(Box::new(Settings::new(cx, device.line))))],
-            Action::Line => vec![UiAction::Open(Modal::Confirm(connect(cx, device.line)))],
+            Action::Settings => open(Modal::Settings(Box::new(Settings::new(cx, device.line)))),
+            Action::Line => open(Modal::Confirm(connect(cx, device.line))),
             _ => Vec::new(),
         }
     }
@@ -42,14 +40,13 @@ impl Controllers {
 
 /// The window that writes a tag.
 pub(super) fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
-    tag.and_then(|tag| Modal::write(cx, tag)).map(UiAction::Open).into_iter().collect()
+    open(tag.and_then(|tag| Modal::write(cx, tag)))
 }
 
 /// The query whether to write this value, unless nothing can be written now.
 pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction> {
     let device = cx.def().tag(tag).device;
-    let query = || Modal::Confirm(Confirm::write(cx, tag, value));
-    vec![UiAction::Open(Notice::unreachable(cx, device).map_or_else(query, Modal::Notice))]
+    open(Notice::unreachable(cx, device).map_or_else(|| Modal::Confirm(Confirm::write(cx, tag, value)), Modal::Notice))
 }
 
 /// Auto-tuning at work is stopped, else the window asks which kind is wanted.
@@ -62,7 +59,7 @@ fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
 }
 
 pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<UiAction> {
-    vec![UiAction::Open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))]
+    open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))
 }
 
 /// Closing a line is asked with what it means for everything on it.

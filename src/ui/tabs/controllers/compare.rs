@@ -172,14 +172,8 @@ impl Compare {
 
 fn columns([short, label, set, device, note]: [&str; 5], end: u16) -> String {
     let room = end.saturating_sub(9 + 19 + 14 + 14 + 6);
-    format!(
-        "{} {} {} {}  {}",
-        pad(short, 9),
-        pad(label, 19),
-        pad_left(set, 14),
-        pad_left(device, 14),
-        fit(note, room.max(10))
-    )
+    let cells = draw::columns([9, 19, -14, -14], [short, label, set, device]);
+    format!("{cells}  {}", fit(note, room.max(10)))
 }
 
 /// How a restore goes, or how it ended.

@@ -5,9 +5,7 @@ use crate::t;
 
 impl Controllers {
     pub(super) fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
-        let count = cx.def().devices.len() as isize;
-        let next = DeviceId(to_u16((self.device.0 as isize + by).rem_euclid(count)));
-        self.show(next);
+        self.show(DeviceId(to_u16(around(self.device.index(), by, cx.def().devices.len()))));
         self.on_snapshot(cx)
     }
 
@@ -37,25 +35,19 @@ impl Controllers {
             }
             Page::Device => match self.table.tag(cx, device.id) {
                 Some(tag) if tag.writable() => write(cx, Some(tag.id)),
-                Some(tag) => Faceplate::new(tag.label.clone(), vec![tag.id])
-                    .map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate)))
-                    .into_iter()
-                    .collect(),
+                Some(tag) => open(Faceplate::new(tag.label.clone(), vec![tag.id]).map(Modal::Faceplate)),
                 None => Vec::new(),
             },
             Page::Program => write(cx, device.program.as_ref().and_then(|program| self.cell.tag(program))),
             Page::Sets => {
                 let Some(source) = sets::sources(cx, device).into_iter().nth(self.set) else { return Vec::new() };
                 if let Some(notice) = sets::problems(cx, &source) {
-                    return vec![UiAction::Open(Modal::Notice(notice))];
+                    return open(Modal::Notice(notice));
                 }
                 self.page = Page::Compare(Compare::new(source));
                 Vec::new()
             }
-            Page::Compare(compare) => {
-                let window = compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm);
-                vec![UiAction::Open(window)]
-            }
+            Page::Compare(compare) => open(compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm)),
             Page::Guide(..) => Vec::new(),
         }
     }

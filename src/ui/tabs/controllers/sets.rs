@@ -74,12 +74,8 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
     let words = t!("parameter sets of {model}, {settings} settings", model = device.model, settings);
     canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 2)), theme.normal());
     let all = sources(cx, device);
-    canvas.text(
-        1,
-        2,
-        &columns(["", t!("set or controller"), t!("from"), t!("saved"), t!("by"), t!("values"), t!("differ")]),
-        theme.dim(),
-    );
+    let names = ["", t!("set or controller"), t!("from"), t!("saved"), t!("by"), t!("values"), t!("differ")];
+    canvas.text(1, 2, &draw::columns(COLUMNS, names), theme.dim());
     if all.is_empty() {
         let words = match settings {
             0 => t!("this device has no settings that a set could hold"),
@@ -89,31 +85,15 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
     }
     let room = usize::from(bottom.saturating_sub(4)).max(1);
     for (y, n, source) in on_screen(&all, first(selected, all.len(), room), room) {
-        let here = n == selected;
-        let (text, trouble) = row(cx, device, source, here);
-        let style = match (here, trouble) {
-            (true, _) => theme.focus(),
-            (false, true) => theme.trouble(),
-            (false, false) => theme.normal(),
-        };
-        canvas.text(1, y + 3, &fit(&text, end), style);
+        let (text, trouble) = row(cx, device, source, n == selected);
+        canvas.text(1, y + 3, &fit(&text, end), row_style(cx, n == selected, trouble));
     }
     let words = t!("Sets are files of the station, in the folder sets beside its history; u refreshes the list.");
     canvas.text(1, bottom, &fit_words(words, end), theme.dim());
 }
 
-fn columns([mark, name, from, saved, by, values, differ]: [&str; 7]) -> String {
-    format!(
-        "{} {} {} {} {} {} {}",
-        pad(mark, 2),
-        pad(name, 24),
-        pad(from, 10),
-        pad(saved, 10),
-        pad(by, 10),
-        pad_left(values, 6),
-        pad_left(differ, 8)
-    )
-}
+/// Mark, name, from, saved, by, values, how many differ.
+const COLUMNS: [i16; 7] = [2, 24, 10, 10, 10, -6, -8];
 
 fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) -> (String, bool) {
     let mark = if selected { cx.theme.pick("▸", ">") } else { "" };
@@ -128,7 +108,7 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
                 Some(Ok(set)) => {
                     let saved = moment(set.saved, cx.now, &cx.def().time_zone);
                     let (values, differ) = counts(set);
-                    (columns([mark, name, &set.device, &saved, &set.by, &values, &differ]), false)
+                    (draw::columns(COLUMNS, [mark, name, &set.device, &saved, &set.by, &values, &differ]), false)
                 }
                 Some(Err(problems)) => {
                     let why = problems.first().map_or("", String::as_str);
@@ -141,7 +121,8 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
             let Some(set) = source.set(cx) else { return (String::new(), false) };
             let (values, differ) = counts(&set);
             let name = &cx.def().device(*other).name;
-            (columns([mark, &t!("{name} as it is now", name), name, "", "", &values, &differ]), false)
+            let cells = [mark, &t!("{name} as it is now", name), name, "", "", &values, &differ];
+            (draw::columns(COLUMNS, cells), false)
         }
     }
 }

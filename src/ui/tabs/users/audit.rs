@@ -88,7 +88,7 @@ impl Audit {
             Action::Open => {
                 let entry = self.rows().get(self.selected).cloned();
                 let window = entry.map(|entry| Modal::AuditEntry(Box::new(AuditEntryDialog(entry))));
-                return window.map(UiAction::Open).into_iter().collect();
+                return open(window);
             }
             Action::Search(part) => {
                 self.asking = Some(part);
@@ -102,7 +102,7 @@ impl Audit {
                     }
                     Part::Time => (t!("time"), period::FORMS, ""),
                 };
-                return vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, text)))];
+                return open(Modal::Prompt(Prompt::new(title, hint, text)));
             }
             Action::Everything => {
                 *self = Audit::default();

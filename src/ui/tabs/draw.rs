@@ -1,0 +1,42 @@
+//! What several tabs draw and open alike.
+
+use super::prelude::*;
+
+/// Opens a window, if there is one.
+pub fn open(window: impl Into<Option<Modal>>) -> Vec<UiAction> {
+    window.into().map(UiAction::Open).into_iter().collect()
+}
+
+/// The place so many further on among so many, around the end.
+pub fn around(place: usize, by: isize, count: usize) -> usize {
+    let count = count.max(1).cast_signed();
+    (place.cast_signed() + by).rem_euclid(count).cast_unsigned()
+}
+
+/// How a row of a list looks.
+pub fn row_style(cx: &ViewContext, selected: bool, trouble: bool) -> Style {
+    match (selected, trouble) {
+        (true, _) => cx.theme.focus(),
+        (false, true) => cx.theme.trouble(),
+        (false, false) => cx.theme.normal(),
+    }
+}
+
+/// Texts in columns with a blank between them; a negative width fills from the left.
+pub fn columns<const N: usize>(widths: [i16; N], cells: [&str; N]) -> String {
+    let cell = |(text, width): (&str, i16)| match width {
+        ..0 => pad_left(text, width.unsigned_abs()),
+        0.. => pad(text, width.unsigned_abs()),
+    };
+    cells.into_iter().zip(widths).map(cell).collect::<Vec<_>>().join(" ")
+}
+
+/// Draws lines from the scrolled one on; returns how many more there are below.
+pub fn lines(canvas: &mut Canvas, lines: &[(String, Style)], scroll: Scroll) -> usize {
+    let room = usize::from(canvas.height());
+    let first = scroll.first(lines.len(), room);
+    for (y, _, (text, style)) in on_screen(lines, first, room) {
+        canvas.text(1, y, text, *style);
+    }
+    lines.len().saturating_sub(first + room)
+}
