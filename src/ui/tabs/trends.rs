@@ -18,7 +18,7 @@ use crate::{
     history::Series,
     plant::{
         def::{Pen, TrendGroup},
-        record::{AlarmEvent, AlarmRecord},
+        record::AlarmRecord,
     },
     ui::{
         keys::{find, hints},
@@ -38,7 +38,7 @@ const HOUR_COLUMNS: usize = 60;
 const MARKS_MAX: usize = 200;
 
 /// State of this tab.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Trends {
     /// Groups of the plant, and behind them the tag that was picked in the list of values.
     group: usize,
@@ -58,105 +58,55 @@ pub struct Trends {
     cursor: Option<Timestamp>,
     /// The list of values instead of the curves: first row shown, row selected.
     values: Option<(usize, usize)>,
-    data: Data,
-    periodics: PeriodicQueries,
-}
-
-/// What the history and the snapshots have told.
-#[derive(Debug, Default)]
-struct Data {
+    /// When the tab last heard of the plant.
+    seen: Option<Timestamp>,
     traces: BTreeMap<TagId, Trace>,
     /// Figures of the view up to now, by tag: (min, mean, max) and the share of good time.
     figures: BTreeMap<TagId, Figures>,
-    hours: BTreeMap<TagId, Series>,
-    raised: Vec<AlarmRecord>,
+    /// The query for curves, and why the last one failed.
+    curves: PeriodicQuery,
     trouble: Option<String>,
-    /// When the tab last heard of the plant.
-    seen: Option<Timestamp>,
+    hours: Answered<Vec<Series>>,
+    raised: Answered<Vec<AlarmRecord>>,
+    /// Queries asked so far.
+    asked: u32,
 }
 
 type Figures = (Option<(f64, f64, f64)>, f64);
 
-/// The queries of this tab.
-#[derive(Debug, Default)]
-struct PeriodicQueries {
-    curves: PeriodicQuery,
-    hours: PeriodicQuery,
-    raised: PeriodicQuery,
-    number: u32,
-}
-
 impl TabView for Trends {
     fn new(_snapshot: &Snapshot) -> Trends {
-        Trends {
-            group: 0,
-            picked: None,
-            off: Vec::new(),
-            selected: 0,
-            window: WINDOWS.iter().position(|window| *window == 600).unwrap_or(0),
-            rate: 1,
-            accumulate: false,
-            since: None,
-            end: None,
-            cursor: None,
-            values: None,
-            data: Data::default(),
-            periodics: PeriodicQueries::default(),
-        }
+        let window = WINDOWS.iter().position(|window| *window == 600).unwrap_or(0);
+        Trends { window, rate: 1, ..Trends::default() }
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         // Either way: the time of a snapshot may lie a little before what was guessed until it came.
         let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
-        let unseen = self.data.seen.is_none_or(away);
+        let unseen = self.seen.is_none_or(away);
         if unseen {
-            self.data.traces.clear();
+            self.traces.clear();
             self.moved();
-            self.periodics.hours.want();
+            self.hours.query.want();
         }
-        self.data.seen = Some(cx.now);
+        self.seen = Some(cx.now);
         self.push_live(cx);
         self.ask(cx)
     }
 
     fn awaits(&self, number: u32) -> bool {
-        let PeriodicQueries { curves, hours, raised, number: _ } = &self.periodics;
-        [curves, hours, raised].iter().any(|periodic| periodic.awaits(number))
+        [&self.curves, &self.hours.query, &self.raised.query].iter().any(|query| query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        let (periodics, steady) = (&mut self.periodics, cx.steady());
-        let curves = periodics.curves.answered(number, steady);
-        let (hours, raised) = (periodics.hours.answered(number, steady), periodics.raised.answered(number, steady));
-        let answer = match answer {
-            Ok(answer) => answer,
-            Err(error) => {
-                if curves.or(hours).or(raised).is_some() {
-                    self.data.trouble = Some(error.to_string());
-                }
-                return Vec::new();
+        self.hours.on_answer(cx, number, &answer);
+        self.raised.on_answer(cx, number, &answer);
+        if let Some(asked) = self.curves.answered(number, cx.steady()) {
+            self.trouble = answer.as_ref().err().map(HistoryError::to_string);
+            if let Ok(Answer::Series(series)) = answer {
+                // Asked at a steady time, about times in UTC.
+                self.accept_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
             }
-        };
-        match answer {
-            Answer::Series(series) => {
-                if let Some(asked) = curves {
-                    self.data.trouble = None;
-                    // Asked at a steady time, about times in UTC.
-                    self.accept_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
-                } else if hours.is_some() {
-                    self.data.trouble = None;
-                    self.data.hours = series.into_iter().map(|series| (series.tag, series)).collect();
-                }
-            }
-            Answer::Journal(records) if raised.is_some() => {
-                self.data.raised = records.into_iter().filter(|record| record.event == AlarmEvent::Raised).collect();
-            }
-            Answer::Journal(_)
-            | Answer::Actions(_)
-            | Answer::LineMinutes(_)
-            | Answer::Report(_)
-            | Answer::AlarmMetrics(_)
-            | Answer::Values(_) => {}
         }
         self.ask(cx)
     }
@@ -182,11 +132,12 @@ impl TabView for Trends {
 impl Trends {
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         match (self.values, action) {
-            (Some(_), Action::Up) => self.select_value(cx, -1),
-            (Some(_), Action::Down) => self.select_value(cx, 1),
-            (Some(_), Action::PageBack) => self.select_value(cx, -(self.rows(cx) as isize)),
-            (Some(_), Action::PageOn) => self.select_value(cx, self.rows(cx) as isize),
-            (Some((_, row)), Action::Open) => self.open(cx, row),
+            (Some((first, row)), Action::Move(motion)) => self.select_value(cx, first, row, motion),
+            (Some((_, row)), Action::Open) => {
+                if let Some(tag) = stored(cx).get(row) {
+                    self.open_tag(cx, *tag);
+                }
+            }
             (Some((_, row)), Action::Why) => return Why::open(Why::new(stored(cx), row)),
             (None, Action::Why) => {
                 let pens = self.pens(cx).into_iter().map(|pen| pen.tag).collect();
@@ -194,19 +145,15 @@ impl Trends {
             }
             (_, Action::Values) => {
                 self.values = if self.values.is_some() { None } else { Some((0, 0)) };
-                self.periodics.hours.want();
+                self.hours.query.want();
             }
             (Some(_), _) => {}
-            (None, Action::Left) => self.step(cx, -1),
-            (None, Action::Right) => self.step(cx, 1),
-            (None, Action::PageBack) => self.pan(cx, -4),
-            (None, Action::PageOn) => self.pan(cx, 4),
-            (None, Action::Up) => self.selected = self.selected.saturating_sub(1),
-            (None, Action::Down) => self.selected = (self.selected + 1).min(self.pens(cx).len().saturating_sub(1)),
+            (None, Action::Side(by)) => self.step(cx, by),
+            (None, Action::Move(Motion::Pages(by))) => self.pan(cx, 4 * by),
+            (None, Action::Move(motion)) => self.selected = motion.to(self.selected, self.pens(cx).len(), 1),
             (None, Action::Toggle) => self.toggle(cx),
             (None, Action::Open) => {}
-            (None, Action::ZoomIn) => self.zoom(cx, -1),
-            (None, Action::ZoomOut) => self.zoom(cx, 1),
+            (None, Action::Zoom(by)) => self.zoom(cx, by),
             (None, Action::Group) => self.next_group(cx),
             (None, Action::Mode) => {
                 (self.accumulate, self.since, self.end) = (!self.accumulate, None, None);
@@ -265,11 +212,11 @@ impl Trends {
     }
 
     /// A step to the side: of the cursor by one cell, or of the view by a quarter.
-    fn step(&mut self, cx: &ViewContext, by: i32) {
+    fn step(&mut self, cx: &ViewContext, by: isize) {
         let Some(at) = self.cursor(cx) else { return self.pan(cx, by) };
         let view = self.span(cx);
         let cell = view.width() / i32::from(cx.area.width.saturating_sub(12).max(10));
-        let to = at.checked_add(cell * by).unwrap_or(at);
+        let to = at.checked_add(cell * i32::try_from(by).unwrap_or_default()).unwrap_or(at);
         if to < view.from || (to >= view.to && self.end.is_some()) {
             self.pan(cx, by);
         }
@@ -278,13 +225,13 @@ impl Trends {
     }
 
     /// Moves the view by quarters; a view of the whole day becomes a window.
-    fn pan(&mut self, cx: &ViewContext, quarters: i32) {
+    fn pan(&mut self, cx: &ViewContext, quarters: isize) {
         let end = self.end.unwrap_or(cx.now);
         if self.accumulate {
             self.window = nearest(self.span(cx).width());
             self.accumulate = false;
         }
-        let by = SignedDuration::from_secs(WINDOWS[self.window]) / 4 * quarters;
+        let by = SignedDuration::from_secs(WINDOWS[self.window]) / 4 * i32::try_from(quarters).unwrap_or_default();
         self.end = pan(end, by, cx.now);
         self.moved();
     }
@@ -305,7 +252,7 @@ impl Trends {
             Some(place) => drop(self.off.remove(place)),
             None => self.off.push(pen.tag),
         }
-        self.periodics.curves.want();
+        self.curves.want();
     }
 
     fn next_group(&mut self, cx: &ViewContext) {
@@ -316,41 +263,30 @@ impl Trends {
     fn show_group(&mut self, cx: &ViewContext, group: usize, selected: usize) {
         (self.group, self.selected, self.since) = (group, selected, None);
         let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
-        self.data.traces.retain(|tag, _| tags.contains(tag));
+        self.traces.retain(|tag, _| tags.contains(tag));
         self.moved();
-        self.periodics.hours.want();
+        self.hours.query.want();
         self.push_live(cx);
     }
 
     /// The chart shows another stretch of time or other pens; figures of the old one must not stand beside it.
     fn moved(&mut self) {
-        self.data.figures.clear();
-        self.periodics.curves.want();
-        self.periodics.raised.want();
+        self.figures.clear();
+        self.curves.want();
+        self.raised.query.want();
     }
 
-    /// Rows that the list of values has room for.
-    fn rows(&self, cx: &ViewContext) -> usize {
-        usize::from(cx.area.height.saturating_sub(2)).max(1)
-    }
-
-    fn select_value(&mut self, cx: &ViewContext, by: isize) {
-        let Some((first, row)) = self.values else { return };
-        let row = row.saturating_add_signed(by).min(stored(cx).len().saturating_sub(1));
-        let first_now = first.clamp((row + 1).saturating_sub(self.rows(cx)), row);
+    fn select_value(&mut self, cx: &ViewContext, first: usize, row: usize, motion: Motion) {
+        let rows = usize::from(cx.area.height.saturating_sub(2)).max(1);
+        let row = motion.to(row, stored(cx).len(), rows);
+        let first_now = first.clamp((row + 1).saturating_sub(rows), row);
         if first_now != first {
-            self.periodics.hours.want();
+            self.hours.query.want();
         }
         self.values = Some((first_now, row));
     }
 
-    /// Shows the curve of a value: in the group of the plant that has it, or alone.
-    fn open(&mut self, cx: &ViewContext, row: usize) {
-        if let Some(tag) = stored(cx).get(row).copied() {
-            self.open_tag(cx, tag);
-        }
-    }
-
+    /// Shows the curve of a tag: in the group of the plant that has it, or alone.
     fn open_tag(&mut self, cx: &ViewContext, tag: TagId) {
         let groups = &cx.def().trends;
         let place = |group: &TrendGroup| group.pens.iter().take(8).position(|pen| pen.tag == tag);
@@ -368,9 +304,4 @@ impl Trends {
 /// All stored tags, in the order of the plant.
 fn stored(cx: &ViewContext) -> Vec<TagId> {
     cx.def().tags.iter().filter(|tag| tag.store).map(|tag| tag.id).collect()
-}
-
-/// Seconds of the operator's time as plant time, which runs faster in demonstrations.
-fn real(cx: &ViewContext, seconds: f64) -> SignedDuration {
-    SignedDuration::from_secs_f64(seconds * cx.snapshot.speed.clamp(0.01, 1e6))
 }

@@ -9,15 +9,15 @@ impl Trends {
             let sample = cx.snapshot.sample(pen.tag);
             let value = sample.good_value();
             let at = if value.is_some() { sample.at } else { cx.now };
-            self.data.traces.entry(pen.tag).or_default().push(at, value);
+            self.traces.entry(pen.tag).or_default().push(at, value);
         }
     }
 
     /// Takes curves of the history in. Figures, and where the day's data begin, are taken only from an answer for what
     /// is shown now; a curve carries its own times and is right in any view.
     pub(super) fn accept_curves(&mut self, cx: &ViewContext, series: Vec<Series>, asked: Timestamp) {
-        if !self.periodics.curves.is_wanted() {
-            self.data.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
+        if !self.curves.is_wanted() {
+            self.figures = series.iter().map(|series| (series.tag, figures(series, asked))).collect();
             if self.accumulate && self.end.is_none() {
                 self.begin_with(self.span(cx), series.iter().filter_map(first_value).min());
             }
@@ -25,7 +25,7 @@ impl Trends {
         let sure = asked.checked_sub(real(cx, COMMIT_LAG_S)).unwrap_or(asked);
         let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         for series in series.into_iter().filter(|series| tags.contains(&series.tag)) {
-            self.data.traces.entry(series.tag).or_default().set_past(series, sure);
+            self.traces.entry(series.tag).or_default().set_past(series, sure);
         }
     }
 
@@ -52,18 +52,16 @@ impl Trends {
         let to = view.to.min(now);
         let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
-        let PeriodicQueries { curves, hours, raised, number } = &mut self.periodics;
-        let steady = cx.steady();
-        let mut due = |periodic: &mut PeriodicQuery, every, query: Query| {
-            if periodic.due(steady, every, patience) {
-                *number = number.wrapping_add(1);
-                periodic.asked(*number, steady);
-                acts.push(UiAction::query(Tab::Trends, *number, query));
-            }
+        let mut due = |periodic: &mut PeriodicQuery, every, query| {
+            acts.extend(periodic.ask(cx, (Tab::Trends, &mut self.asked), every, patience, query));
         };
         if self.values.is_none() && !group.is_empty() {
-            due(curves, often, series(&group, view.from, view.to, view.columns));
-            due(raised, often.max(real(cx, 10.0)), Query::Journal { from: view.from, to, limit: MARKS_MAX });
+            due(&mut self.curves, often, series(&group, view.from, view.to, view.columns));
+            due(
+                &mut self.raised.query,
+                often.max(real(cx, 10.0)),
+                Query::Journal { from: view.from, to, limit: MARKS_MAX },
+            );
         }
         let tags = match self.values {
             Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
@@ -71,7 +69,7 @@ impl Trends {
         };
         let hour = View::ending(now, 3_600, HOUR_COLUMNS);
         if !tags.is_empty() {
-            due(hours, real(cx, 20.0), series(&tags, hour.from, hour.to, HOUR_COLUMNS));
+            due(&mut self.hours.query, real(cx, 20.0), series(&tags, hour.from, hour.to, HOUR_COLUMNS));
         }
         acts
     }

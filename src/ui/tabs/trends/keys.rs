@@ -5,26 +5,16 @@ use crate::ui::tabs::prelude::*;
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Earlier, or the cursor to the left.
-    Left,
-    /// Later, or the cursor to the right.
-    Right,
-    /// A whole window earlier; a page up in the list of values.
-    PageBack,
-    /// A whole window later; a page down in the list of values.
-    PageOn,
-    /// The pen or value above.
-    Up,
-    /// The pen or value below.
-    Down,
+    /// So many steps later, or the cursor to the right.
+    Side(isize),
+    /// Another pen or value; a page is a whole window where curves are shown.
+    Move(Motion),
     /// Switch the selected pen on or off.
     Toggle,
     /// Show the curve of the selected value.
     Open,
-    /// Shorter window.
-    ZoomIn,
-    /// Longer window.
-    ZoomOut,
+    /// A window so many steps longer.
+    Zoom(isize),
     /// Next group of pens.
     Group,
     /// Moving window, or everything since the start of the day.
@@ -43,16 +33,16 @@ pub enum Action {
 
 /// Keys of this tab.
 pub const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", Action::Left),
-    Key::new(code(KeyCode::Right), "", "later (with the cursor on: cursor to the right)", Action::Right),
-    Key::new(code(KeyCode::PageUp), "", "a whole window earlier; a page up", Action::PageBack),
-    Key::new(code(KeyCode::PageDown), "", "a whole window later; a page down", Action::PageOn),
-    Key::new(code(KeyCode::Up), "", "select the pen above", Action::Up),
-    Key::new(code(KeyCode::Down), "", "select the pen below", Action::Down),
+    Key::new(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", Action::Side(-1)),
+    Key::new(code(KeyCode::Right), "", "later (with the cursor on: cursor to the right)", Action::Side(1)),
+    Key::new(code(KeyCode::PageUp), "", "a whole window earlier; a page up", Action::Move(Motion::Pages(-1))),
+    Key::new(code(KeyCode::PageDown), "", "a whole window later; a page down", Action::Move(Motion::Pages(1))),
+    Key::new(code(KeyCode::Up), "", "select the pen above", Action::Move(Motion::Rows(-1))),
+    Key::new(code(KeyCode::Down), "", "select the pen below", Action::Move(Motion::Rows(1))),
     Key::new(char('l'), "live", "back to the present", Action::Live),
-    Key::new(char('+'), "zoom", "shorter window", Action::ZoomIn),
-    Key::new(char('='), "", "shorter window", Action::ZoomIn),
-    Key::new(char('-'), "", "longer window", Action::ZoomOut),
+    Key::new(char('+'), "zoom", "shorter window", Action::Zoom(-1)),
+    Key::new(char('='), "", "shorter window", Action::Zoom(-1)),
+    Key::new(char('-'), "", "longer window", Action::Zoom(1)),
     Key::new(char('c'), "cursor", "cursor on or off: reads every pen at one time", Action::Cursor),
     Key::new(char('g'), "group", "next group of pens", Action::Group),
     Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),

@@ -13,7 +13,8 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::def::Pen,
+    history::Series,
+    plant::{def::Pen, record::AlarmEvent},
     ui::{
         theme::Glyphs,
         widgets::{
@@ -82,28 +83,15 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         (false, _) => t!("window {window_text}", window_text = window_text(WINDOWS[trends.window])),
     };
     x = canvas.text(x + 3, 0, &window, theme.normal());
-    if trends.end.is_some() {
-        x = canvas.text(
-            x + 3,
-            0,
-            &t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.now, zone)),
-            theme.focus(),
-        );
-    } else {
-        x = canvas.text(
-            x + 3,
-            0,
-            if theme.glyphs == Glyphs::Braille { t!("live ●") } else { t!("live *") },
-            theme.normal(),
-        );
-        if !brief {
-            x = canvas.text(
-                x + 3,
-                0,
-                &t!("update {rate_text}", rate_text = rate_text(RATES[trends.rate])),
-                theme.normal(),
-            );
-        }
+    let (time, style) = match trends.end {
+        Some(_) => (t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.now, zone)), theme.focus()),
+        None if theme.glyphs == Glyphs::Braille => (t!("live ●").to_owned(), theme.normal()),
+        None => (t!("live *").to_owned(), theme.normal()),
+    };
+    x = canvas.text(x + 3, 0, &time, style);
+    if trends.end.is_none() && !brief {
+        let rate = t!("update {rate_text}", rate_text = rate_text(RATES[trends.rate]));
+        x = canvas.text(x + 3, 0, &rate, theme.normal());
     }
     if let Some(trouble) = trouble {
         let room = canvas.width().saturating_sub(x + 3);
@@ -113,16 +101,16 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
 
 /// What is wrong with the history, or that it keeps us waiting.
 fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
-    let periodics = [&trends.periodics.curves, &trends.periodics.hours];
-    let slow =
-        periodics.iter().filter_map(|periodic| periodic.waiting(cx.steady())).any(|time| time >= super::real(cx, 2.0));
-    trends.data.trouble.clone().or_else(|| slow.then(|| t!("waiting for the history").to_owned()))
+    let mut waiting = [&trends.curves, &trends.hours.query].into_iter().filter_map(|query| query.waiting(cx.steady()));
+    let slow = waiting.any(|time| time >= real(cx, 2.0));
+    let failed = [&trends.trouble, &trends.hours.trouble, &trends.raised.trouble].into_iter().flatten().next();
+    failed.cloned().or_else(|| slow.then(|| t!("waiting for the history").to_owned()))
 }
 
 fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
     let view = trends.span(cx);
     let curve = |(n, pen): (usize, Pen)| Curve {
-        trace: trends.data.traces.get(&pen.tag).unwrap_or(&NO_TRACE),
+        trace: trends.traces.get(&pen.tag).unwrap_or(&NO_TRACE),
         pen: n,
         unit: cx.snapshot.unit(pen.tag),
         fixed: pen.scale,
@@ -130,7 +118,8 @@ fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
         dashed: is_set_value(cx, pen.tag),
     };
     let names: Vec<&str> = trends.drawn(cx).iter().map(|(_, pen)| cx.def().tag(pen.tag).name.as_str()).collect();
-    let marks = trends.data.raised.iter().filter(|record| names.contains(&&*record.subject));
+    let raised = trends.raised.value.iter().flatten().filter(|record| record.event == AlarmEvent::Raised);
+    let marks = raised.filter(|record| names.contains(&&*record.subject));
     Chart {
         theme: cx.theme,
         zone: &cx.def().time_zone,
@@ -156,7 +145,7 @@ fn readout<'a>(trends: &Trends, cx: &ViewContext, at: Timestamp, room: u16) -> L
 }
 
 fn at_cursor(trends: &Trends, cx: &ViewContext, tag: TagId, at: Timestamp) -> Option<String> {
-    let value = trends.data.traces.get(&tag)?.value_at(at)?;
+    let value = trends.traces.get(&tag)?.value_at(at)?;
     Some(cx.snapshot.format(tag, value))
 }
 
@@ -253,7 +242,7 @@ fn draw_pen(
         let text = t!("scale {number} … {number2}  ", number = number(low), number2 = number(high));
         x = row.text(x, 0, &text, theme.dim());
     }
-    if let Some(series) = trends.data.hours.get(&pen.tag) {
+    if let Some(series) = hour(trends, pen.tag) {
         let cells = usize::from(row.width().saturating_sub(x + 1)).min(series.buckets.len());
         row.text(x, 0, &spark(series, cells, resolution(cx, pen.tag), theme.glyphs), pen_style);
     }
@@ -263,7 +252,7 @@ fn draw_pen(
 /// arithmetic with the numbers of an enumeration.
 fn draw_figures(trends: &Trends, cx: &ViewContext, row: &mut Canvas, tag: TagId) {
     let (columns, style) = (Columns::of(row.width()), cx.theme.normal());
-    let Some((summary, good)) = trends.data.figures.get(&tag) else { return };
+    let Some((summary, good)) = trends.figures.get(&tag) else { return };
     if cx.def().tag(tag).labels.is_empty() {
         for (end, value) in [columns.min, columns.mean, columns.max]
             .into_iter()
@@ -281,12 +270,8 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
     let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
     let last = (first + rows).min(all.len());
     let x = canvas.text(1, 0, t!("All values"), theme.strong());
-    canvas.text(
-        x + 3,
-        0,
-        &t!("{min}–{last} of {count}", min = (first + 1).min(last), last, count = all.len()),
-        theme.dim(),
-    );
+    let range = t!("{min}–{last} of {count}", min = (first + 1).min(last), last, count = all.len());
+    canvas.text(x + 3, 0, &range, theme.dim());
     let wide = canvas.width().saturating_sub(80);
     let name = 15 + wide / 5;
     let label = name + 18 + wide / 4;
@@ -310,7 +295,7 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
         canvas.text(2, y, &pad(&def.name, name.saturating_sub(1)), style);
         canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());
         canvas.text_right(value, y, &shown.within(value - label), shown.style);
-        let Some(series) = trends.data.hours.get(tag) else { continue };
+        let Some(series) = hour(trends, *tag) else { continue };
         if let Some((min, _, max)) = series.summary.filter(|_| def.labels.is_empty()) {
             canvas.text_right(low, y, &cx.snapshot.format(*tag, min), theme.dim());
             canvas.text_right(high, y, &cx.snapshot.format(*tag, max), theme.dim());
@@ -318,6 +303,11 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
         let cells = usize::from(canvas.width().saturating_sub(high + 3)).min(series.buckets.len());
         canvas.text(high + 2, y, &spark(series, cells, resolution(cx, *tag), theme.glyphs), style);
     }
+}
+
+/// The last hour of a tag.
+fn hour(trends: &Trends, tag: TagId) -> Option<&Series> {
+    trends.hours.value.iter().flatten().find(|series| series.tag == tag)
 }
 
 /// The last digit of a tag: 0.1 for one decimal.
