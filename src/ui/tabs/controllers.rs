@@ -20,7 +20,7 @@ pub use device::signal_mark;
 pub use keys::Action;
 
 use self::{
-    actions::{confirm, notice, write},
+    actions::{notice, write},
     compare::Compare,
     keys::page_keys,
     program::Cell,
@@ -30,7 +30,7 @@ use self::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::{def::ProgramDef, parameter_set},
+    plant::parameter_set,
     ui::keys::{find, hints},
 };
 
@@ -92,76 +92,45 @@ impl TabView for Controllers {
             Action::Guide => {
                 let before = std::mem::replace(&mut self.page, Page::List);
                 self.page = Page::Guide(0, Box::new(before));
-                Vec::new()
             }
             Action::Turn(by) => {
                 if let Page::Guide(page, _) = &mut self.page {
                     *page = page.saturating_add_signed(by).min(guide::count() - 1);
                 }
-                Vec::new()
             }
-            Action::Device(by) => self.step_device(cx, by),
+            Action::Device(by) => self.show(DeviceId(to_u16(around(device.id.index(), by, cx.def().devices.len())))),
             Action::Move(motion) => self.move_by(cx, device, motion),
-            Action::Column(by) => {
-                self.cell.column = self.cell.column.saturating_add_signed(by).min(2);
-                Vec::new()
-            }
-            Action::Open => self.open(cx, device),
-            Action::Program => {
-                if device.program.is_none() {
-                    return notice(device, t!("this device has no ramp/soak program"));
-                }
-                self.page = Page::Program;
-                Vec::new()
-            }
-            Action::Sets => {
-                (self.page, self.set) = (Page::Sets, 0);
-                Vec::new()
-            }
+            Action::Column(by) => self.cell.column = self.cell.column.saturating_add_signed(by).min(2),
+            Action::Open => return self.open_selected(cx, device),
+            Action::Program if device.program.is_some() => self.page = Page::Program,
+            Action::Program => return notice(device, t!("this device has no ramp/soak program")),
+            Action::Sets => (self.page, self.set) = (Page::Sets, 0),
             Action::Find => {
                 self.asked_for = Asked::Filter;
-                let hint = t!("words in name or meaning; empty shows all");
-                vec![UiAction::Open(Modal::Prompt(Prompt::new(
-                    t!("find a parameter"),
-                    hint,
-                    &self.table.filter.to_string(),
-                )))]
+                let (title, hint) = (t!("find a parameter"), t!("words in name or meaning; empty shows all"));
+                return open(Modal::Prompt(Prompt::new(title, hint, &self.table.filter.to_string())));
             }
-            Action::Defaults => {
-                self.table.defaults = !self.table.defaults;
-                Vec::new()
-            }
+            Action::Defaults => self.table.defaults = !self.table.defaults,
             Action::Save => {
                 self.asked_for = Asked::SetName;
                 let title = t!("save the settings of {name} as a set", name = device.name);
-                vec![UiAction::Open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))]
+                return open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")));
             }
-            Action::All | Action::Turnaround => self.in_compare(cx, action),
-            Action::Stop => vec![UiAction::Command(CommandKind::StopRestore(device.id))],
-            Action::ReadSets => vec![UiAction::Command(CommandKind::ReadSets)],
-            Action::CommandKind(which) => device.program.as_ref().map_or(Vec::new(), |program| {
-                let value = match which {
-                    keys::ProgramCommand::Run => Some(program.run),
-                    keys::ProgramCommand::Hold => program.halt,
-                    keys::ProgramCommand::Off => Some(program.off),
-                };
-                value.map_or_else(
-                    || notice(device, t!("this program cannot be held")),
-                    |value| confirm(cx, program.command, value),
-                )
-            }),
-            Action::Mode | Action::Pattern => {
-                let of = |program: &ProgramDef| if action == Action::Mode { program.mode } else { program.pattern };
-                write(cx, device.program.as_ref().and_then(of))
-            }
+            Action::All | Action::Turnaround => return self.in_compare(cx, action),
             Action::Why
             | Action::Refresh
             | Action::Actions
             | Action::Tune
             | Action::Run
             | Action::Line
-            | Action::Settings => self.on_device(cx, device, action),
+            | Action::Settings
+            | Action::Control(_)
+            | Action::Mode
+            | Action::Pattern
+            | Action::Stop
+            | Action::ReadSets => return self.on_device(cx, device, action),
         }
+        self.on_snapshot(cx)
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
@@ -263,7 +232,7 @@ impl TabView for Controllers {
                 let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
                 let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
                 let words = sets::replace_text(cx, there);
-                Ok(vec![UiAction::Open(Modal::Confirm(Confirm::command(t!("save set {text}", text), words, kind)))])
+                Ok(open(Modal::Confirm(Confirm::command(t!("save set {text}", text), words, kind))))
             }
         }
     }

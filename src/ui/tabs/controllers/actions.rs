@@ -1,6 +1,6 @@
 //! What can be done with a device on any of its pages, and the windows that ask before it.
 
-use super::{Action, Controllers, Page};
+use super::{Action, Controllers, Page, keys::ProgramCommand};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::event::LineState,
@@ -33,9 +33,26 @@ impl Controllers {
             },
             Action::Settings => open(Modal::Settings(Box::new(Settings::new(cx, device.line)))),
             Action::Line => open(Modal::Confirm(connect(cx, device.line))),
+            Action::Control(command) => control(cx, device, command),
+            Action::Mode => write(cx, device.program.as_ref().and_then(|program| program.mode)),
+            Action::Pattern => write(cx, device.program.as_ref().and_then(|program| program.pattern)),
+            Action::Stop => vec![UiAction::Command(CommandKind::StopRestore(device.id))],
+            Action::ReadSets => vec![UiAction::Command(CommandKind::ReadSets)],
             _ => Vec::new(),
         }
     }
+}
+
+/// Runs, holds or stops the program of a device.
+fn control(cx: &ViewContext, device: &DeviceDef, command: ProgramCommand) -> Vec<UiAction> {
+    let Some(program) = &device.program else { return Vec::new() };
+    let value = match command {
+        ProgramCommand::Run => Some(program.run),
+        ProgramCommand::Hold => program.halt,
+        ProgramCommand::Off => Some(program.off),
+    };
+    let cannot = || notice(device, t!("this program cannot be held"));
+    value.map_or_else(cannot, |value| confirm(cx, program.command, value))
 }
 
 /// The window that writes a tag.

@@ -41,7 +41,7 @@ pub enum Action {
     /// So many pages of them on.
     Turn(isize),
     /// Run, hold or stop the program.
-    CommandKind(ProgramCommand),
+    Control(ProgramCommand),
     /// What the program does at its end.
     Mode,
     /// Which steps it runs.
@@ -132,12 +132,12 @@ const PROGRAM: &[Key<Action>] = &[
         char('r'),
         "run",
         "run the program, or go on after a hold (asks first)",
-        Action::CommandKind(ProgramCommand::Run),
+        Action::Control(ProgramCommand::Run),
     )
     .needs(Role::Technician),
-    Key::new(char('p'), "hold", "hold the program where it is (asks first)", Action::CommandKind(ProgramCommand::Hold))
+    Key::new(char('p'), "hold", "hold the program where it is (asks first)", Action::Control(ProgramCommand::Hold))
         .needs(Role::Technician),
-    Key::new(char('o'), "off", "stop the program (asks first)", Action::CommandKind(ProgramCommand::Off))
+    Key::new(char('o'), "off", "stop the program (asks first)", Action::Control(ProgramCommand::Off))
         .needs(Role::Technician),
     Key::new(char('t'), "pattern", "which steps are run", Action::Pattern).needs(Role::Technician),
     Key::new(char('m'), "mode", "what happens at the end and at power-on", Action::Mode).needs(Role::Technician),

@@ -1,15 +1,9 @@
 //! Moving between the pages and rows of the controllers tab.
 
 use super::*;
-use crate::t;
 
 impl Controllers {
-    pub(super) fn step_device(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
-        self.show(DeviceId(to_u16(around(self.device.index(), by, cx.def().devices.len()))));
-        self.on_snapshot(cx)
-    }
-
-    pub(super) fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion) -> Vec<UiAction> {
+    pub(super) fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion) {
         let room = usize::from(cx.area.height.saturating_sub(4)).max(1);
         let to = |at: usize, count: usize| motion.to(at, count, room);
         match &mut self.page {
@@ -23,11 +17,10 @@ impl Controllers {
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
             Page::Guide(..) => {}
         }
-        Vec::new()
     }
 
     /// Enter: what is selected is opened, edited or written.
-    pub(super) fn open(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
+    pub(super) fn open_selected(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
         match &self.page {
             Page::List => {
                 self.show(device.id);

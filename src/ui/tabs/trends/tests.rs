@@ -10,6 +10,7 @@ use jiff::SignedDuration;
 use ratatui::{Terminal, backend::TestBackend};
 
 use super::*;
+use crate::plant::record::AlarmEvent;
 use crate::{
     history::Bucket,
     plant::{def::Priority, sample::Sample},
@@ -309,7 +310,7 @@ fn a_snapshot_a_little_older_than_the_guessed_time_changes_nothing() {
     assert_eq!(kinds(&std::mem::take(&mut stand.asked)), "curves alarms");
     stand.send(Msg::Snapshot(stand.model.snapshot.clone()));
     assert_eq!(kinds(&stand.asked), "");
-    assert!(!stand.model.tabs.trends.data.traces[&TagId(0)].past().is_none_or(|past| past.buckets.is_empty()));
+    assert!(!stand.model.tabs.trends.traces[&TagId(0)].past().is_none_or(|past| past.buckets.is_empty()));
 }
 
 #[test]

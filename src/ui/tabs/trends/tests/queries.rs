@@ -69,7 +69,7 @@ fn fast_keys_do_not_pile_up_questions() {
     assert_eq!(kinds(&stand.asked), "curves alarms");
     stand.answer();
     let view = stand.model.tabs.trends.span(&stand.model.cx());
-    let shown = stand.model.tabs.trends.data.traces[&TagId(0)].past().map(|series| series.from);
+    let shown = stand.model.tabs.trends.traces[&TagId(0)].past().map(|series| series.from);
     assert_eq!(shown, Some(view.from), "the last view is asked for in the end");
 }
 
@@ -80,7 +80,7 @@ fn live_values_are_on_the_screen_before_the_history_has_them() {
     stand.press("+++");
     stand.live(20, |second| if (8..12).contains(&second) { None } else { Some(90.0) });
     let cx = stand.model.cx();
-    let trace = &stand.model.tabs.trends.data.traces[&TagId(0)];
+    let trace = &stand.model.tabs.trends.traces[&TagId(0)];
     assert_eq!(trace.value_at(cx.now), Some(90.0));
     assert_eq!(trace.value_at(ago(-9)), None, "no answer is a gap");
     insta::assert_snapshot!(stand.screen());
