@@ -6,10 +6,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Confirm, Modal, Next, confirm::wire_text, window};
 use crate::{
-    plant::{
-        def::{DeviceId, TagId},
-        number::to_u16,
-    },
+    plant::def::{DeviceId, TagId},
     ui::{
         ViewContext, keys,
         widgets::{
@@ -81,7 +78,7 @@ impl Choice {
         let shown = usize::from(body.height.saturating_sub(6)).clamp(1, self.rows.len().max(1));
         let first = first(self.selected, self.rows.len(), shown);
         let inner = self.rows.iter().map(|row| width(&row.text)).max().unwrap_or(0).max(46);
-        let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(shown) + 4));
+        let mut canvas = window(cx, frame, body, &self.title, (inner, shown + 4));
         if let Some(row) = self.rows.get(self.selected) {
             canvas.text(0, 0, &t!("now {whole}", whole = value::show(cx, row.tag).whole()), cx.theme.normal());
             canvas.text(0, 1, &wire_text(cx.def().tag(row.tag)), cx.theme.dim());

@@ -320,10 +320,8 @@ impl Confirm {
         let problem = self.problem.as_ref().map_or(1, |words| to_u16(wrap(words, inner).len()));
         let form = self.reauthentication.as_ref().map_or(0, |form| form.rows() + problem);
         let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(rows.len()) + form + 2));
-        for (y, (text, style)) in rows.iter().enumerate() {
-            canvas.text(0, to_u16(y), text, *style);
-        }
-        self.view_sign(cx, &mut canvas, to_u16(rows.len()));
+        let y = canvas.rows(0, 0, &rows);
+        self.view_sign(cx, &mut canvas, y);
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, &keys, cx.theme.strong());
     }

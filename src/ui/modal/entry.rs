@@ -125,7 +125,7 @@ impl Entry {
             canvas.text(x + 2, 0, &words, theme.strong());
         }
         for (y, (text, style)) in rows.iter().enumerate() {
-            canvas.text(0, to_u16(y) + 1, text, *style);
+            canvas.text(0, y + 1, text, *style);
         }
         let last = canvas.height().saturating_sub(1);
         for (y, line) in problem.iter().enumerate() {

@@ -5,7 +5,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Faceplate, Modal, Next, window};
 use crate::{
-    plant::{def::AlarmId, number::to_u16},
+    plant::def::AlarmId,
     t,
     ui::{
         UiAction, ViewContext,
@@ -88,12 +88,12 @@ impl Guidance {
         let def = cx.def().alarm(self.alarm);
         let condition = guidance::condition_text(cx, def.id);
         let title = format!("{} {} {} {condition}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
-        let mut canvas = window(cx, frame, body, title.trim_end(), (room + NAMES, to_u16(lines.len()) + 2));
+        let mut canvas = window(cx, frame, body, title.trim_end(), (room + NAMES, lines.len() + 2));
         let rows = canvas.height().saturating_sub(2);
         let first = self.scroll.first(lines.len(), usize::from(rows));
         for (y, (name, text)) in lines.iter().skip(first).take(usize::from(rows)).enumerate() {
-            canvas.text(0, to_u16(y), &pad(name, NAMES), theme.dim());
-            canvas.text(NAMES, to_u16(y), text, theme.normal());
+            canvas.text(0, y, &pad(name, NAMES), theme.dim());
+            canvas.text(NAMES, y, text, theme.normal());
         }
         let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
         canvas.text(0, canvas.height().saturating_sub(1), &theme.enter(&keys.join("   ")), theme.strong());

@@ -48,7 +48,7 @@ pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, b
     let inner = rows.iter().map(|hint| keys + 2 + width(&hint.help)).max().unwrap_or(0).max(40);
     let shown = body.height.saturating_sub(2);
     let first = row.min(to_u16(rows.len()).saturating_sub(shown));
-    let mut canvas = window(cx, frame, body, t!("keys"), (inner, to_u16(rows.len())));
+    let mut canvas = window(cx, frame, body, t!("keys"), (inner, rows.len()));
     for (y, hint) in rows.iter().skip(usize::from(first)).enumerate() {
         let y = to_u16(y);
         if hint.key.is_empty() {

@@ -41,7 +41,10 @@ use super::{
     tabs::{Tab, Tabs, bus},
     widgets::text::{Canvas, fit, width},
 };
-use crate::plant::def::TagId;
+use crate::plant::{
+    def::TagId,
+    number::{Number, to_u16},
+};
 
 /// A window.
 #[derive(Debug, Clone, PartialEq)]
@@ -254,10 +257,10 @@ pub(super) fn window<'a>(
     frame: &'a mut Frame,
     body: Rect,
     title: &str,
-    inner: (u16, u16),
+    (columns, rows): (impl Number, impl Number),
 ) -> Canvas<'a> {
-    let width = inner.0.max(width(title) + 4).saturating_add(4).min(body.width);
-    let height = inner.1.saturating_add(2).min(body.height);
+    let width = to_u16(columns).max(width(title) + 4).saturating_add(4).min(body.width);
+    let height = to_u16(rows).saturating_add(2).min(body.height);
     let area = Rect::new(body.x + (body.width - width) / 2, body.y + (body.height - height) / 2, width, height);
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     canvas.clear();

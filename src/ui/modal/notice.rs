@@ -6,7 +6,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
 use crate::{
-    plant::{command::CommandKind, def::DeviceId, event::LineState, number::to_u16, snapshot::DeviceState},
+    plant::{command::CommandKind, def::DeviceId, event::LineState, snapshot::DeviceState},
     ui::{
         UiAction, ViewContext, rights,
         widgets::text::{clock, width, wrap},
@@ -73,10 +73,10 @@ impl Notice {
         let room = body.width.saturating_sub(8).min(64);
         let rows: Vec<String> = self.words.iter().flat_map(|words| wrap(words, room)).collect();
         let inner = rows.iter().map(|row| width(row)).max().unwrap_or(0);
-        let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(rows.len()) + 2));
+        let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() + 2));
         for (y, row) in rows.iter().enumerate() {
             let style = if y == 0 { cx.theme.trouble() } else { cx.theme.normal() };
-            canvas.text(0, to_u16(y), row, style);
+            canvas.text(0, y, row, style);
         }
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, t!("Esc close"), cx.theme.strong());

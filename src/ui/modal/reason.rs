@@ -155,7 +155,7 @@ impl Reason {
         let height = to_u16(notes.len()) + times + 6;
         let mut canvas = window(cx, frame, body, &self.title, (room, height));
         for (y, note) in notes.iter().enumerate() {
-            canvas.text(0, to_u16(y), note, theme.normal());
+            canvas.text(0, y, note, theme.normal());
         }
         let mut y = to_u16(notes.len());
         for (n, (words, _)) in self.choices.iter().enumerate().filter(|_| times > 0) {

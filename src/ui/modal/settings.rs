@@ -114,7 +114,7 @@ impl Settings {
         let (status, pinned) = (self.status(cx, used, room), self.pinned(cx, used, room));
         let title = t!("communication settings of {name}", name = used.name);
         let wanted = 1 + fields.len() + 1 + status.len() + 1 + pinned.len();
-        let mut canvas = window(cx, frame, body, &title, (room, to_u16(wanted)));
+        let mut canvas = window(cx, frame, body, &title, (room, wanted));
         // On a small screen: first the keys and what is asked, then the fields around the selected one, then the rest.
         let height = usize::from(canvas.height());
         let shown = fields.len().min(height.saturating_sub(1 + pinned.len()));
@@ -134,10 +134,10 @@ impl Settings {
         let free = height.saturating_sub(1 + shown + pinned.len());
         let gap = usize::from(status.len() < free);
         for (n, (text, style)) in status.iter().take(free).enumerate() {
-            canvas.text(0, to_u16(1 + shown + gap + n), text, *style);
+            canvas.text(0, 1 + shown + gap + n, text, *style);
         }
         for (n, (text, style)) in pinned.iter().enumerate() {
-            canvas.text(0, to_u16(height.saturating_sub(pinned.len()) + n), text, *style);
+            canvas.text(0, height.saturating_sub(pinned.len()) + n, text, *style);
         }
     }
 

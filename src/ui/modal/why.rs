@@ -97,7 +97,7 @@ impl Why {
         let first = self.row.min(to_u16(rows.len()).saturating_sub(shown));
         let place = if self.tags.len() < 2 { String::new() } else { format!("  {}/{}", self.at + 1, self.tags.len()) };
         let title = t!("why {name} {label}{place}", name = def.name, label = def.label, place);
-        let mut canvas = window(cx, frame, body, &title, (room, to_u16(rows.len())));
+        let mut canvas = window(cx, frame, body, &title, (room, rows.len()));
         for (y, row) in rows.iter().skip(usize::from(first)).enumerate() {
             let y = to_u16(y);
             canvas.text(0, y, row.label, cx.theme.dim());

@@ -1,13 +1,16 @@
 //! Text on a clipped canvas: no widget can write outside its area, whatever the size of the screen.
 
-use crate::t;
 use std::time::Duration;
 
 use jiff::{Timestamp, tz::TimeZone};
 use ratatui::{buffer::Buffer, layout::Rect, style::Style};
 use unicode_width::UnicodeWidthStr;
 
-use crate::ui::glyph_filter::thai_cells;
+use crate::{
+    plant::number::{Number, to_u16},
+    t,
+    ui::glyph_filter::thai_cells,
+};
 
 /// A rectangle of the screen with coordinates of its own; what falls outside is not drawn.
 #[derive(Debug)]
@@ -31,41 +34,64 @@ impl<'a> Canvas<'a> {
         self.area.height
     }
     /// A part of this canvas as a canvas of its own.
-    pub fn part(&mut self, x: u16, y: u16, width: u16, height: u16) -> Canvas<'_> {
-        let wanted = Rect::new(self.area.x.saturating_add(x), self.area.y.saturating_add(y), width, height);
+    pub(crate) fn part(
+        &mut self,
+        x: impl Number,
+        y: impl Number,
+        width: impl Number,
+        height: impl Number,
+    ) -> Canvas<'_> {
+        let (x, y) = (self.area.x.saturating_add(to_u16(x)), self.area.y.saturating_add(to_u16(y)));
+        let wanted = Rect::new(x, y, to_u16(width), to_u16(height));
         Canvas { area: wanted.intersection(self.area), buffer: self.buffer }
     }
     /// Writes text; returns the column after it.
-    pub fn text(&mut self, x: u16, y: u16, text: &str, style: Style) -> u16 {
-        let text = thai_cells(text);
+    pub(crate) fn text(&mut self, x: impl Number, y: impl Number, text: &str, style: Style) -> u16 {
+        let (x, y, text) = (to_u16(x), to_u16(y), thai_cells(text));
         if y < self.area.height && x < self.area.width {
             let room = usize::from(self.area.width - x);
             self.buffer.set_stringn(self.area.x + x, self.area.y + y, &text, room, style);
         }
         x.saturating_add(width(&text))
     }
+    /// Writes rows of text, one below the other; returns the row after them.
+    pub(crate) fn rows(&mut self, x: impl Number, y: impl Number, rows: &[(String, Style)]) -> u16 {
+        let (x, y) = (to_u16(x), to_u16(y));
+        for (n, (text, style)) in rows.iter().enumerate() {
+            self.text(x, usize::from(y) + n, text, *style);
+        }
+        y.saturating_add(to_u16(rows.len()))
+    }
     /// Writes text that ends before column `end`.
-    pub fn text_right(&mut self, end: u16, y: u16, text: &str, style: Style) {
-        self.text(end.saturating_sub(width(&thai_cells(text))), y, text, style);
+    pub(crate) fn text_right(&mut self, end: impl Number, y: impl Number, text: &str, style: Style) {
+        self.text(to_u16(end).saturating_sub(width(&thai_cells(text))), y, text, style);
     }
     /// Writes text in the middle of a row.
-    pub fn text_centred(&mut self, y: u16, text: &str, style: Style) {
+    pub(crate) fn text_centred(&mut self, y: impl Number, text: &str, style: Style) {
         self.text(self.width().saturating_sub(width(text)) / 2, y, text, style);
     }
     /// One character.
-    pub fn glyph(&mut self, x: u16, y: u16, glyph: char, style: Style) {
-        if let Some(cell) = self.cell(x, y) {
+    pub(crate) fn glyph(&mut self, x: impl Number, y: impl Number, glyph: char, style: Style) {
+        if let Some(cell) = self.cell(to_u16(x), to_u16(y)) {
             cell.set_char(glyph).set_style(style);
         }
     }
     /// A horizontal run of one character.
-    pub fn run(&mut self, x: u16, y: u16, length: u16, glyph: char, style: Style) {
+    pub(crate) fn run(&mut self, x: impl Number, y: impl Number, length: impl Number, glyph: char, style: Style) {
+        let (x, y, length) = (to_u16(x), to_u16(y), to_u16(length));
         for column in x..x.saturating_add(length).min(self.area.width) {
             self.glyph(column, y, glyph, style);
         }
     }
     /// Adds a style to a rectangle without changing its characters.
-    pub fn paint(&mut self, x: u16, y: u16, width: u16, height: u16, style: Style) {
+    pub(crate) fn paint(
+        &mut self,
+        x: impl Number,
+        y: impl Number,
+        width: impl Number,
+        height: impl Number,
+        style: Style,
+    ) {
         let area = self.part(x, y, width, height).area;
         self.buffer.set_style(area, style);
     }
@@ -123,7 +149,7 @@ impl<'a> Canvas<'a> {
 
 /// Columns that a text takes.
 pub fn width(text: &str) -> u16 {
-    text.width().try_into().unwrap_or(u16::MAX)
+    to_u16(text.width())
 }
 
 /// The text, cut with `…` where it is too wide.

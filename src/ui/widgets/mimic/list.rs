@@ -66,7 +66,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: Option<usize>) {
     for (y, row) in rows.iter().skip(place / room * room).take(room).enumerate() {
         for (column, n) in row.iter().enumerate() {
             let length = if row.len() == 1 { all } else { half };
-            let mut cell = canvas.part(to_u16(column) * half, to_u16(y), length, 1);
+            let mut cell = canvas.part(to_u16(column) * half, y, length, 1);
             item(cx, &mut cell, &items[*n], names, selected == Some(*n));
         }
     }

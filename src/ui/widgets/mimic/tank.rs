@@ -74,7 +74,7 @@ impl Tank<'_> {
             let mark = alarm_mark(cx, tag).map_or(0, |(mark, _)| width(mark) + 1);
             let length = width(&shown.within(room.saturating_sub(mark))) + mark;
             let x = room.saturating_sub(length) / 2;
-            canvas.run(x.saturating_sub(1), to_u16(y), length + 2, ' ', cx.theme.normal());
+            canvas.run(x.saturating_sub(1), y, length + 2, ' ', cx.theme.normal());
             put_value(cx, canvas, x, to_u16(y), tag, room);
         }
     }

@@ -95,7 +95,7 @@ pub fn curve(canvas: &mut Canvas, series: &Series, (low, high): (f64, f64), glyp
                 (Glyphs::Braille, _) => char::from_u32(0x2800 + bits).unwrap_or(' '),
                 (Glyphs::Block | Glyphs::Ascii, n) => ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'][n - 1],
             };
-            canvas.glyph(to_u16(x), to_u16(y), glyph, style);
+            canvas.glyph(x, y, glyph, style);
         }
     }
 }
