@@ -53,6 +53,23 @@ pub struct Peer {
     pub own: bool,
 }
 
+/// Who waits for the reply to a request.
+#[derive(Debug, Clone, Copy)]
+struct Asker {
+    terminal: u32,
+    ticket: u64,
+}
+
+impl Asker {
+    fn done(self) -> Effect {
+        Effect::Reply(self.ticket, Ok(()))
+    }
+
+    fn refused(self, why: impl Into<String>) -> Vec<Effect> {
+        vec![Effect::Reply(self.ticket, Err(why.into()))]
+    }
+}
+
 /// What must happen because of what was asked.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effect {
@@ -98,8 +115,8 @@ pub struct AccessControl {
     waiting: VecDeque<(PendingJob, Secret)>,
     last_job: JobId,
     saving: Option<Saving>,
-    /// A change that waits until last logins are written: the terminal, its ticket, what.
-    next: Option<(u32, u64, Change)>,
+    /// A change that waits until last logins are written.
+    next: Option<(Asker, Change)>,
     /// A last login is not saved yet.
     unsaved: bool,
 }
@@ -162,9 +179,9 @@ impl AccessControl {
         let mut effects = match self.admit(&session, at) {
             Ok(effects) => effects,
             Err(why) => {
-                let mut effects = self.refused(&session, "attach", "", &why, at);
-                effects.push(Effect::HangUp(terminal, why));
-                return effects;
+                let entry = audit(&session, "attach", "", &format!("refused: {why}"), at);
+                let recorded = self.may_record(&session.origin, at).then_some(entry);
+                return recorded.into_iter().chain([Effect::HangUp(terminal, why)]).collect();
             }
         };
         session.who = self.known(&session.peer);
@@ -217,18 +234,17 @@ impl AccessControl {
             if needed == Role::Viewer { self.may_look(terminal) } else { self.may(terminal, Some(needed)).map(drop) };
         let Err(why) = may else { return Ok(()) };
         // Only a refused read of the audit log is recorded.
-        let mut effects = Vec::new();
-        if needed != Role::Viewer
-            && let Some(session) = self.sessions.remove(&terminal)
-        {
-            effects = self.refused(&session, "read audit log", "", &why, at);
-            self.sessions.insert(terminal, session);
-        }
-        Err((why, effects))
+        let is_audit = needed != Role::Viewer;
+        let entry = if is_audit { self.refused(terminal, "read audit log", "", &why, at) } else { None };
+        Err((why, entry.into_iter().collect()))
+    }
+
+    fn session(&self, terminal: u32) -> Result<&SessionState, &'static str> {
+        self.sessions.get(&terminal).ok_or("this terminal is not attached")
     }
 
     fn may_look(&self, terminal: u32) -> Result<(), String> {
-        match &self.sessions.get(&terminal).ok_or("this terminal is not attached")?.who {
+        match &self.session(terminal)?.who {
             // Locked or not: the snapshot stays, and so does what lies behind it.
             Some(who) if who.must_change => Err(CHANGE_FIRST.to_owned()),
             Some(_) => Ok(()),
@@ -239,36 +255,38 @@ impl AccessControl {
 
     /// Handles a request; the reply goes to the ticket.
     pub fn on_request(&mut self, terminal: u32, ticket: u64, request: SessionRequest, at: Timestamp) -> Vec<Effect> {
+        let asker = Asker { terminal, ticket };
         if !self.within_rate(terminal, at) {
-            return vec![Effect::Reply(ticket, Err(TOO_MANY.to_owned()))];
+            return asker.refused(TOO_MANY);
         }
         let needed = right::needs_for_request(&request);
         if let (Some(_), Err(why)) = (needed, self.may(terminal, needed))
             && !self.could_anyway(terminal, &request)
         {
-            return self.refuse_request(terminal, ticket, &request, why, at);
+            let (action, target) = words(&request);
+            return self.refuse(asker, action, &target, why, at);
         }
         if let Some(session) = self.sessions.get_mut(&terminal).filter(|session| !session.locked) {
             session.active = at;
         }
         match request {
-            SessionRequest::Login { user, password } => self.login(terminal, ticket, &user, password, at),
-            SessionRequest::Logout => self.logout(terminal, ticket, at),
-            SessionRequest::Lock => self.lock(terminal, ticket, at),
-            SessionRequest::Unlock(password) => self.unlock(terminal, ticket, password, at),
-            SessionRequest::Active => vec![Effect::Reply(ticket, Ok(())), Effect::SessionStatus(terminal)],
+            SessionRequest::Login { user, password } => self.login(asker, &user, password, at),
+            SessionRequest::Logout => self.logout(asker, at),
+            SessionRequest::Lock => self.lock(asker, at),
+            SessionRequest::Unlock(password) => self.unlock(asker, password, at),
+            SessionRequest::Active => vec![asker.done(), Effect::SessionStatus(terminal)],
             SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
-                self.record_and_reply(terminal, ticket, "export", &file, new, at)
+                self.record_and_reply(asker, "export", &file, new, at)
             }
             SessionRequest::Stop => {
-                let mut effects = self.record_and_reply(terminal, ticket, "stop station", &self.plant_name(), None, at);
+                let mut effects = self.record_and_reply(asker, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
                 effects
             }
             SessionRequest::Reload => {
-                let mut effects = self.record_and_reply(terminal, ticket, "reload", &self.plant_name(), None, at);
+                let mut effects = self.record_and_reply(asker, "reload", &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket));
                 effects
@@ -279,7 +297,7 @@ impl AccessControl {
             | SessionRequest::SetRole { .. }
             | SessionRequest::Disable { .. }
             | SessionRequest::DeleteUser { .. }
-            | SessionRequest::ResetPassword { .. }) => self.user_admin_request(terminal, ticket, request, at),
+            | SessionRequest::ResetPassword { .. }) => self.user_admin_request(asker, request, at),
         }
     }
 
@@ -299,34 +317,17 @@ impl AccessControl {
     /// Records the action and replies once it is durable.
     fn record_and_reply(
         &self,
-        terminal: u32,
-        ticket: u64,
+        asker: Asker,
         action: &str,
         target: &str,
         new: Option<Arc<str>>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get(&asker.terminal) else { return Vec::new() };
         // What becomes of a stop or a reload is seen by the stop and the start of the station behind it.
         let outcome = if new.is_some() { "done" } else { "permitted" };
         let record = ActionRecord { new, ..record(session, action, target, outcome, at) };
-        vec![Effect::Record(record), Effect::Reply(ticket, Ok(()))]
-    }
-
-    fn refuse_request(
-        &mut self,
-        terminal: u32,
-        ticket: u64,
-        request: &SessionRequest,
-        why: String,
-        at: Timestamp,
-    ) -> Vec<Effect> {
-        let Some(session) = self.sessions.remove(&terminal) else { return vec![Effect::Reply(ticket, Err(why))] };
-        let (action, target) = words(request);
-        let mut effects = self.refused(&session, action, &target, &why, at);
-        self.sessions.insert(terminal, session);
-        effects.push(Effect::Reply(ticket, Err(why)));
-        effects
+        vec![Effect::Record(record), asker.done()]
     }
 
     /// Time passes.
@@ -355,7 +356,7 @@ impl AccessControl {
 
     /// The user, if the role is sufficient. `Err` is the reply to the user.
     fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&Who, String> {
-        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
+        let session = self.session(terminal)?;
         let who = session.who.as_ref().ok_or(LOG_IN_FIRST)?;
         if session.locked {
             return Err("this terminal is locked".to_owned());

@@ -63,18 +63,8 @@ impl Key {
 
     /// The seal, as an entry of the log, after the entry `last`.
     pub fn entry(&self, last: ChainHash, at: Timestamp) -> ActionRecord {
-        ActionRecord {
-            at,
-            by: "station".into(),
-            from: "".into(),
-            action: SEAL_LOG.into(),
-            target: self.number.to_string().into(),
-            old: None,
-            new: Some(hex(&self.seal(last, at)).into()),
-            outcome: "done".into(),
-            note: None,
-            chain_hash: None,
-        }
+        let entry = ActionRecord::new(at, "station", SEAL_LOG, self.number.to_string(), "done");
+        ActionRecord { new: Some(hex(&self.seal(last, at)).into()), ..entry }
     }
 
     fn seal(&self, last: ChainHash, at: Timestamp) -> [u8; 32] {

@@ -56,7 +56,7 @@ pub enum Change {
     },
     /// Change the role of a user.
     Role(Arc<str>, Role),
-    /// Shut out, or let in again.
+    /// Disable, or enable.
     Disable(Arc<str>, bool),
     /// Removed.
     Delete(Arc<str>),
@@ -66,7 +66,7 @@ pub enum Change {
         user: Arc<str>,
         /// The hash.
         hash: Arc<str>,
-        /// He did not choose it himself.
+        /// The user did not choose it.
         must_change: bool,
     },
 }
@@ -82,6 +82,27 @@ impl Change {
             | Change::Delete(user)
             | Change::Password { user, .. } => user,
         }
+    }
+
+    /// What it is called in the audit log.
+    pub fn action(&self) -> &'static str {
+        match self {
+            Change::First { .. } | Change::Add { .. } => "add user",
+            Change::Role(..) => "set role",
+            Change::Disable(_, true) => "disable user",
+            Change::Disable(_, false) => "enable user",
+            Change::Delete(_) => "delete user",
+            Change::Password { must_change: true, .. } => "reset password",
+            Change::Password { must_change: false, .. } => "change password",
+        }
+    }
+
+    /// With this hash of the password, where it sets one.
+    pub fn with_hash(mut self, new: Arc<str>) -> Change {
+        if let Change::First { hash, .. } | Change::Add { hash, .. } | Change::Password { hash, .. } = &mut self {
+            *hash = new;
+        }
+        self
     }
 }
 

@@ -149,6 +149,21 @@ pub struct ActionRecord {
     pub chain_hash: Option<ChainHash>,
 }
 
+impl ActionRecord {
+    /// An action of which no more is to be said; from the station itself.
+    pub fn new(
+        at: Timestamp,
+        by: impl Into<Arc<str>>,
+        action: impl Into<Arc<str>>,
+        target: impl Into<Arc<str>>,
+        outcome: impl Into<Arc<str>>,
+    ) -> ActionRecord {
+        let (by, action, target, outcome) = (by.into(), action.into(), target.into(), outcome.into());
+        let (from, old, new, note, chain_hash) = ("".into(), None, None, None, None);
+        ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash }
+    }
+}
+
 /// The word on record for a write that is about to be sent; its outcome has a line of its own.
 pub const WRITE_REQUESTED: &str = "write requested";
 

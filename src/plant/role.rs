@@ -21,8 +21,8 @@ keyword_enum! {
 }
 
 keyword_enum! {
-    /// What must be entered again to write a tag.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+    /// What must be entered again to write a tag; the stricter one is the greater.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
     pub enum Reauthentication: "reauthenticate" {
         /// The password of the user who writes.
         Password => "password",

@@ -74,16 +74,5 @@ pub(super) fn stopped(plant: &str, at: Timestamp) -> ActionRecord {
 }
 
 fn entry(at: Timestamp, action: &str, target: &str, outcome: &str) -> ActionRecord {
-    ActionRecord {
-        at,
-        by: "station".into(),
-        from: "".into(),
-        action: action.into(),
-        target: target.into(),
-        old: None,
-        new: None,
-        outcome: outcome.into(),
-        note: None,
-        chain_hash: None,
-    }
+    ActionRecord::new(at, "station", action, target, outcome)
 }

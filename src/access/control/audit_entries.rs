@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Effect, passed,
+    AccessControl, Asker, Effect, passed,
     session::{Refusals, SessionState},
 };
 use crate::{
@@ -48,17 +48,31 @@ impl AccessControl {
         self.refusals.entry(origin).or_insert_with(|| Refusals::new(at))
     }
 
+    /// Refuses a request and records that.
+    pub(super) fn refuse(
+        &mut self,
+        asker: Asker,
+        action: &str,
+        target: &str,
+        why: String,
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let entry = self.refused(asker.terminal, action, target, &why, at);
+        entry.into_iter().chain(asker.refused(why)).collect()
+    }
+
     /// The entry of a refusal; none above the rate limit.
     pub(super) fn refused(
         &mut self,
-        session: &SessionState,
+        terminal: u32,
         action: &str,
         target: &str,
         why: &str,
         at: Timestamp,
-    ) -> Vec<Effect> {
-        let recorded = self.may_record(&session.origin, at);
-        recorded.then(|| audit(session, action, target, &format!("refused: {why}"), at)).into_iter().collect()
+    ) -> Option<Effect> {
+        let session = self.sessions.get(&terminal)?;
+        let (origin, entry) = (session.origin.clone(), audit(session, action, target, &format!("refused: {why}"), at));
+        self.may_record(&origin, at).then_some(entry)
     }
 
     /// One entry a minute and user with the number of refusals that have no entry of their own.
@@ -67,18 +81,8 @@ impl AccessControl {
         for (origin, refusals) in &mut self.refusals {
             if refusals.unrecorded > 0 && passed(refusals.recorded_at, at) >= SUMMARY_EVERY {
                 let outcome = format!("refused: {} requests", refusals.unrecorded);
-                effects.push(Effect::Record(ActionRecord {
-                    at,
-                    by: "not logged in".into(),
-                    from: format!("user {origin}").into(),
-                    action: "too many requests".into(),
-                    target: "".into(),
-                    old: None,
-                    new: None,
-                    outcome: outcome.into(),
-                    note: None,
-                    chain_hash: None,
-                }));
+                let entry = ActionRecord::new(at, NOT_LOGGED_IN, "too many requests", "", outcome);
+                effects.push(Effect::Record(ActionRecord { from: format!("user {origin}").into(), ..entry }));
                 (refusals.unrecorded, refusals.recorded_at) = (0, at);
             }
         }
@@ -110,27 +114,19 @@ pub(super) fn words(request: &SessionRequest) -> (&'static str, Arc<str>) {
     }
 }
 
+const NOT_LOGGED_IN: &str = "not logged in";
+
 pub(super) fn actor_name(session: &SessionState) -> Arc<str> {
     match (&session.who, &session.peer.unix_user) {
         (Some(who), _) => who.user.clone(),
         (None, Some(user)) => format!("not logged in ({user})").into(),
-        (None, None) => "not logged in".into(),
+        (None, None) => NOT_LOGGED_IN.into(),
     }
 }
 
 pub(super) fn record(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> ActionRecord {
-    ActionRecord {
-        at,
-        by: actor_name(session),
-        from: session.peer.from.clone(),
-        action: action.into(),
-        target: target.into(),
-        old: None,
-        new: None,
-        outcome: outcome.into(),
-        note: None,
-        chain_hash: None,
-    }
+    let from = session.peer.from.clone();
+    ActionRecord { from, ..ActionRecord::new(at, actor_name(session), action, target, outcome) }
 }
 
 pub(super) fn audit(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {

@@ -4,8 +4,8 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{AccessControl, Effect, user_admin::Hashing};
-use crate::access::{Secret, lockout::Key, password, user};
+use super::{AccessControl, Asker, Effect, audit_entries::audit};
+use crate::access::{Secret, lockout::Key, password, user, user::Change};
 use crate::plant::command::Command;
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
@@ -76,15 +76,15 @@ pub(super) struct PendingJob {
 #[derive(Debug)]
 pub(super) enum JobPurpose {
     /// The password of `user`; `None` for an unknown name.
-    Login { ticket: u64, user: Option<Arc<str>> },
+    Login { asker: Asker, user: Option<Arc<str>> },
     /// The password of the logged-in user.
-    Unlock { ticket: u64, user: Arc<str> },
+    Unlock { asker: Asker, user: Arc<str> },
     /// The present password of the user, before it is changed.
-    Change { ticket: u64, user: Arc<str>, new: Secret },
+    Change { asker: Asker, user: Arc<str>, new: Secret },
     /// The password of the approver.
     Reauthenticate { by: Arc<str>, approver: Option<Arc<str>>, command: Box<Command> },
     /// A new one is hashed.
-    Hash { ticket: u64, hashing: Hashing },
+    Hash { asker: Asker, change: Change },
 }
 
 /// Why an attempt failed.
@@ -97,7 +97,7 @@ pub(super) struct JobError {
 }
 
 impl AccessControl {
-    /// Has the password for this name checked. The time that takes must not publish_status whether the name exists.
+    /// Has the password for this name checked. The time that takes must not tell whether the name exists.
     /// `Err` says in words for the operator why it is not checked.
     pub(super) fn verify_password(
         &mut self,
@@ -107,7 +107,7 @@ impl AccessControl {
         what: JobPurpose,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
-        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
+        let session = self.session(terminal)?;
         let inside = || format!("{} at terminal {terminal}", session.origin).into();
         let key = Key {
             origin: if what.comes_from_outside() { session.origin.clone() } else { inside() },
@@ -125,23 +125,17 @@ impl AccessControl {
     }
 
     /// Has a new password hashed.
-    pub(super) fn hash(
-        &mut self,
-        terminal: u32,
-        ticket: u64,
-        password: Secret,
-        hashing: Hashing,
-    ) -> Result<Vec<Effect>, String> {
-        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
-        let origin = format!("hash for terminal {terminal}").into();
+    pub(super) fn hash(&mut self, asker: Asker, password: Secret, change: Change) -> Result<Vec<Effect>, String> {
+        let session = self.session(asker.terminal)?;
+        let origin = format!("hash for terminal {}", asker.terminal).into();
         let key = Key { origin, account: None, never_locked: self.is_host(&session.peer) };
-        let job = self.pending_job(terminal, key, JobPurpose::Hash { ticket, hashing })?;
+        let job = self.pending_job(asker.terminal, key, JobPurpose::Hash { asker, change })?;
         Ok(self.start_job(job, PasswordJob::Hash(password)))
     }
 
     /// `Err` where too many are under way.
     fn pending_job(&self, terminal: u32, key: Key, what: JobPurpose) -> Result<PendingJob, String> {
-        let session = self.sessions.get(&terminal).ok_or("this terminal is not attached")?;
+        let session = self.session(terminal)?;
         let users = || self.jobs.values().chain(self.waiting.iter().map(|(job, _)| job)).map(|job| &job.user);
         let most = if key.never_locked { JOBS_MAX } else { JOBS_MAX - JOBS_KEPT };
         if most <= users().count() || JOBS_OF_USER_MAX <= users().filter(|user| **user == session.origin).count() {
@@ -209,7 +203,7 @@ impl AccessControl {
 
     fn on_hashed(&mut self, job: PendingJob, hash: Result<String, String>, at: Timestamp) -> Vec<Effect> {
         match job.what {
-            JobPurpose::Hash { ticket, hashing } => self.set_password(job.terminal, ticket, hashing, hash, at),
+            JobPurpose::Hash { asker, change } => self.set_password(asker, change, hash, at),
             other => self.refuse_job(job.terminal, other, "internal error".to_owned(), at),
         }
     }
@@ -231,9 +225,9 @@ impl AccessControl {
             }
         };
         effects.extend(match what {
-            JobPurpose::Login { ticket, user } => self.login_done(terminal, ticket, user, wrong, at),
-            JobPurpose::Unlock { ticket, user } => self.unlock_done(terminal, ticket, user, wrong, at),
-            JobPurpose::Change { ticket, user, new } => self.old_password_done(terminal, ticket, user, new, wrong, at),
+            JobPurpose::Login { asker, user } => self.login_done(asker, user, wrong, at),
+            JobPurpose::Unlock { asker, user } => self.unlock_done(asker, user, wrong, at),
+            JobPurpose::Change { asker, user, new } => self.old_password_done(asker, user, new, wrong, at),
             JobPurpose::Reauthenticate { by, approver, command } => {
                 self.on_reauthenticated(terminal, by, approver, *command, wrong, at)
             }
@@ -260,28 +254,22 @@ impl AccessControl {
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
             let outcome = format!("done: for {seconds} s, system user {origin}");
-            effects.push(super::audit_entries::audit(session, "lockout", &user, &outcome, at));
+            effects.push(audit(session, "lockout", &user, &outcome, at));
             self.publish_status(terminal, &mut effects);
         }
         if locked.origin {
             let outcome = format!("done: for up to {seconds} s");
-            effects.push(super::audit_entries::audit(
-                session,
-                "lockout",
-                &format!("system user {origin}"),
-                &outcome,
-                at,
-            ));
+            effects.push(audit(session, "lockout", &format!("system user {origin}"), &outcome, at));
         }
         effects
     }
 
     fn refuse_job(&mut self, terminal: u32, what: JobPurpose, why: String, at: Timestamp) -> Vec<Effect> {
         match what {
-            JobPurpose::Login { ticket, .. }
-            | JobPurpose::Unlock { ticket, .. }
-            | JobPurpose::Change { ticket, .. }
-            | JobPurpose::Hash { ticket, .. } => vec![Effect::Reply(ticket, Err(why))],
+            JobPurpose::Login { asker, .. }
+            | JobPurpose::Unlock { asker, .. }
+            | JobPurpose::Change { asker, .. }
+            | JobPurpose::Hash { asker, .. } => asker.refused(why),
             JobPurpose::Reauthenticate { command, .. } => self.refuse_reauthentication(terminal, *command, why, at),
         }
     }
@@ -306,7 +294,7 @@ impl JobPurpose {
             JobPurpose::Login { user, .. } => user.as_ref(),
             JobPurpose::Reauthenticate { approver, .. } => approver.as_ref(),
             JobPurpose::Unlock { user, .. } | JobPurpose::Change { user, .. } => Some(user),
-            JobPurpose::Hash { hashing, .. } => Some(hashing.user()),
+            JobPurpose::Hash { change, .. } => Some(change.user()),
         }
     }
 

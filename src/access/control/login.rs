@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Effect, LOG_IN_FIRST, SessionState,
+    AccessControl, Asker, Effect, LOG_IN_FIRST, SessionState,
     audit_entries::audit,
     jobs::{JobError, JobPurpose},
     passed,
@@ -17,53 +17,45 @@ const NO_LOGIN: &str = "this station does not require login";
 const NO_PASSWORD: &str = "the operating system says who you are here, there is no password to ask for";
 
 impl AccessControl {
-    pub(super) fn login(
-        &mut self,
-        terminal: u32,
-        ticket: u64,
-        user: &str,
-        password: Secret,
-        at: Timestamp,
-    ) -> Vec<Effect> {
-        let Some(users) = &self.users else { return reply(ticket, NO_LOGIN) };
+    pub(super) fn login(&mut self, asker: Asker, user: &str, password: Secret, at: Timestamp) -> Vec<Effect> {
+        let Some(users) = &self.users else { return asker.refused(NO_LOGIN) };
         if let Some(why) = &self.closed {
-            return reply(ticket, why);
+            return asker.refused(&**why);
         }
         if users.is_empty() {
-            return reply(ticket, "no users exist: the user who started the station creates the first Supervisor");
+            return asker.refused("no users exist: the user who started the station creates the first Supervisor");
         }
         let (name, user) = (user.to_owned(), users.get(user).map(|user| user.name.clone()));
-        let looked_at = self.verify_password(terminal, &name, password, JobPurpose::Login { ticket, user }, at);
-        looked_at.unwrap_or_else(|why| reply(ticket, &why))
+        let checked = self.verify_password(asker.terminal, &name, password, JobPurpose::Login { asker, user }, at);
+        checked.unwrap_or_else(|why| asker.refused(why))
     }
 
     pub(super) fn login_done(
         &mut self,
-        terminal: u32,
-        ticket: u64,
+        asker: Asker,
         user: Option<Arc<str>>,
         wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(terminal, ticket, "login failed", user.as_deref(), wrong, at);
+            return self.failed(asker, "login failed", user.as_deref(), wrong, at);
         }
         let Some(user) = user.and_then(|user| self.users.as_ref()?.get(&user).cloned()) else { return Vec::new() };
-        if !self.sessions.contains_key(&terminal) {
+        if !self.sessions.contains_key(&asker.terminal) {
             return Vec::new();
         }
-        let mut effects = self.log_out(terminal, "done: another user logs in", at);
+        let mut effects = self.log_out(asker.terminal, "done: another user logs in", at);
         let who = Who { user: user.name.clone(), role: user.role, must_change: user.must_change };
-        effects.extend(self.log_in(terminal, who, at));
-        effects.push(Effect::Reply(ticket, Ok(())));
+        effects.extend(self.log_in(asker.terminal, who, at));
+        effects.push(asker.done());
         effects
     }
 
     /// Starts a login session.
     pub(super) fn log_in(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
+        let utc = self.utc(at);
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let name = who.user.clone();
-        let utc = at.checked_add(self.behind_utc).unwrap_or(at);
         session.enter(who, at);
         let mut effects = vec![audit(session, "login", &name, "done", at)];
         if let Some(users) = &mut self.users {
@@ -77,28 +69,27 @@ impl AccessControl {
     /// Records why an attempt failed, and replies without the reason.
     pub(super) fn failed(
         &mut self,
-        terminal: u32,
-        ticket: u64,
+        asker: Asker,
         action: &str,
         user: Option<&str>,
         JobError { why, message }: JobError,
         at: Timestamp,
     ) -> Vec<Effect> {
         let mut effects = Vec::new();
-        if let Some(session) = self.sessions.get(&terminal) {
+        if let Some(session) = self.sessions.get(&asker.terminal) {
             effects.push(audit(session, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
         }
-        effects.push(Effect::Reply(ticket, Err(message)));
+        effects.extend(asker.refused(message));
         effects
     }
 
-    pub(super) fn logout(&mut self, terminal: u32, ticket: u64, at: Timestamp) -> Vec<Effect> {
-        let mut effects = self.log_out(terminal, "done", at);
+    pub(super) fn logout(&mut self, asker: Asker, at: Timestamp) -> Vec<Effect> {
+        let mut effects = self.log_out(asker.terminal, "done", at);
         if effects.is_empty() {
-            return reply(ticket, "no user is logged in here");
+            return asker.refused("no user is logged in here");
         }
-        effects.push(Effect::Reply(ticket, Ok(())));
-        self.publish_status(terminal, &mut effects);
+        effects.push(asker.done());
+        self.publish_status(asker.terminal, &mut effects);
         effects
     }
 
@@ -112,47 +103,45 @@ impl AccessControl {
         effects
     }
 
-    pub(super) fn lock(&mut self, terminal: u32, ticket: u64, at: Timestamp) -> Vec<Effect> {
-        match self.sessions.get_mut(&terminal) {
-            Some(session) if session.acting().is_some() && session.trusted => reply(ticket, NO_PASSWORD),
+    pub(super) fn lock(&mut self, asker: Asker, at: Timestamp) -> Vec<Effect> {
+        match self.sessions.get_mut(&asker.terminal) {
+            Some(session) if session.acting().is_some() && session.trusted => asker.refused(NO_PASSWORD),
             Some(session) if session.acting().is_some() => {
                 session.locked = true;
                 let target = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                let mut effects =
-                    vec![audit(session, "lock terminal", &target, "done", at), Effect::Reply(ticket, Ok(()))];
-                self.publish_status(terminal, &mut effects);
+                let mut effects = vec![audit(session, "lock terminal", &target, "done", at), asker.done()];
+                self.publish_status(asker.terminal, &mut effects);
                 effects
             }
-            Some(session) if session.locked => reply(ticket, "this terminal is locked already"),
-            Some(_) | None => reply(ticket, LOG_IN_FIRST),
+            Some(session) if session.locked => asker.refused("this terminal is locked already"),
+            Some(_) | None => asker.refused(LOG_IN_FIRST),
         }
     }
 
-    pub(super) fn unlock(&mut self, terminal: u32, ticket: u64, password: Secret, at: Timestamp) -> Vec<Effect> {
-        let session = self.sessions.get(&terminal).filter(|session| session.locked);
+    pub(super) fn unlock(&mut self, asker: Asker, password: Secret, at: Timestamp) -> Vec<Effect> {
+        let session = self.sessions.get(&asker.terminal).filter(|session| session.locked);
         let Some(user) = session.and_then(|session| session.who.as_ref()).map(|who| who.user.clone()) else {
-            return reply(ticket, "this terminal is not locked");
+            return asker.refused("this terminal is not locked");
         };
-        let looked_at =
-            self.verify_password(terminal, &user.clone(), password, JobPurpose::Unlock { ticket, user }, at);
-        looked_at.unwrap_or_else(|why| reply(ticket, &why))
+        let checked =
+            self.verify_password(asker.terminal, &user.clone(), password, JobPurpose::Unlock { asker, user }, at);
+        checked.unwrap_or_else(|why| asker.refused(why))
     }
 
     pub(super) fn unlock_done(
         &mut self,
-        terminal: u32,
-        ticket: u64,
+        asker: Asker,
         user: Arc<str>,
         wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(terminal, ticket, "unlock failed", Some(&user), wrong, at);
+            return self.failed(asker, "unlock failed", Some(&user), wrong, at);
         }
-        let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get_mut(&asker.terminal) else { return Vec::new() };
         (session.locked, session.active) = (false, at);
-        let mut effects = vec![audit(session, "unlock terminal", &user, "done", at), Effect::Reply(ticket, Ok(()))];
-        self.publish_status(terminal, &mut effects);
+        let mut effects = vec![audit(session, "unlock terminal", &user, "done", at), asker.done()];
+        self.publish_status(asker.terminal, &mut effects);
         effects
     }
 
@@ -203,8 +192,4 @@ impl AccessControl {
         }
         effects
     }
-}
-
-pub(super) fn reply(ticket: u64, why: &str) -> Vec<Effect> {
-    vec![Effect::Reply(ticket, Err(why.to_owned()))]
 }

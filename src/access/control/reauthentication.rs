@@ -6,6 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     AccessControl, Effect,
+    audit_entries::audit,
     jobs::{JobError, JobPurpose},
     right,
 };
@@ -75,14 +76,8 @@ impl AccessControl {
         if let Some(JobError { why, message }) = wrong {
             let mut effects = Vec::new();
             if let Some(session) = self.sessions.get(&terminal) {
-                let approver = approver.as_deref().unwrap_or("unknown user");
-                effects.push(super::audit_entries::audit(
-                    session,
-                    "reauthentication failed",
-                    approver,
-                    &format!("refused: {why}"),
-                    at,
-                ));
+                let (approver, outcome) = (approver.as_deref().unwrap_or("unknown user"), format!("refused: {why}"));
+                effects.push(audit(session, "reauthentication failed", approver, &outcome, at));
             }
             effects.extend(self.refuse_reauthentication(terminal, command, message, at));
             return effects;
@@ -124,19 +119,11 @@ pub fn required(def: &PlantDef, kind: &CommandKind) -> Option<Reauthentication> 
         let kind = def.tags.get(tag.index())?.reauthenticate?;
         (!interlock::is_stop(def, tag, value)).then_some(kind)
     };
-    let strictest = |one: Option<Reauthentication>, other: Option<Reauthentication>| match (one, other) {
-        (Some(Reauthentication::SecondUser), _) | (_, Some(Reauthentication::SecondUser)) => {
-            Some(Reauthentication::SecondUser)
-        }
-        (Some(Reauthentication::Password), _) | (_, Some(Reauthentication::Password)) => {
-            Some(Reauthentication::Password)
-        }
-        (None, None) => None,
-    };
     match kind {
         CommandKind::Write { tag, value } => asks(*tag, *value),
         CommandKind::Restore(request) => {
-            request.changes.iter().map(|change| asks(change.tag, change.new)).fold(None, strictest)
+            // The strictest of all.
+            request.changes.iter().filter_map(|change| asks(change.tag, change.new)).max()
         }
         CommandKind::Alarm(_)
         | CommandKind::Refresh(_)

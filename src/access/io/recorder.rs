@@ -337,18 +337,7 @@ impl Recorder {
 
     /// Something about the log itself.
     fn note(&self, outcome: &str) -> ActionRecord {
-        ActionRecord {
-            at: self.clock.utc(),
-            by: "station".into(),
-            from: "".into(),
-            action: "audit log".into(),
-            target: self.path.display().to_string().into(),
-            old: None,
-            new: None,
-            outcome: outcome.into(),
-            note: None,
-            chain_hash: None,
-        }
+        ActionRecord::new(self.clock.utc(), "station", "audit log", self.path.display().to_string(), outcome)
     }
 
     fn status(&self) -> Recorded {
