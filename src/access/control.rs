@@ -94,7 +94,7 @@ pub enum Effect {
 }
 
 /// The state of users, sessions and pending requests.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct AccessControl {
     def: Arc<PlantDef>,
     /// The run of the station: commands made in another one are refused.
@@ -125,23 +125,7 @@ impl AccessControl {
     /// Access control without login: root, the user of the station and its own process may do everything. `host` is the user of the operating
     /// system that the station runs as.
     pub fn new(def: Arc<PlantDef>, host: Option<Arc<str>>) -> AccessControl {
-        AccessControl {
-            def,
-            run: 0,
-            behind_utc: SignedDuration::ZERO,
-            users: None,
-            closed: None,
-            host,
-            sessions: BTreeMap::new(),
-            attempts: LoginAttempts::default(),
-            refusals: BTreeMap::new(),
-            jobs: BTreeMap::new(),
-            waiting: VecDeque::new(),
-            last_job: 0,
-            saving: None,
-            next: None,
-            unsaved: false,
-        }
+        AccessControl { def, host, ..AccessControl::default() }
     }
 
     /// Access control with these users. `host` is the user of the operating system that the station runs as.

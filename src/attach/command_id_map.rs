@@ -47,11 +47,6 @@ impl CommandIdMap {
         }
     }
 
-    /// The number of the terminal as its operator's commands have it.
-    pub fn terminal(&self) -> u32 {
-        self.terminal
-    }
-
     /// A later connection.
     pub fn welcomed(&mut self, run: u64, terminal: u32) {
         if self.run != run {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use crate::plant::{
     Snapshot,
-    interlock::ActuatorTracker,
     sample::{Cause, Sample},
     snapshot::{ActiveAlarm, DeviceStatus, LineStatus},
 };
@@ -12,23 +11,6 @@ use crate::plant::{
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no
 /// bytes, no command. What is left out is absent, not hidden: it does not leave the station.
 pub fn redact(snapshot: &Snapshot) -> Snapshot {
-    let Snapshot {
-        at,
-        run,
-        stepped,
-        def,
-        decimals,
-        lines,
-        devices,
-        alarms,
-        suppressed,
-        sound,
-        alarm_metrics,
-        history,
-        station,
-        speed,
-        ..
-    } = snapshot;
     let reached = |line: &LineStatus| LineStatus {
         state: line.state.clone(),
         since: line.since,
@@ -40,29 +22,23 @@ pub fn redact(snapshot: &Snapshot) -> Snapshot {
         diagnosis: device.diagnosis,
         ..DeviceStatus::default()
     };
+    let blank = Snapshot::blank(snapshot.def.clone());
     Snapshot {
-        at: *at,
-        run: *run,
-        stepped: *stepped,
-        samples: vec![Sample::bad(Cause::NotAuthorised, *at); def.tags.len()],
-        texts: Arc::new(vec![None; def.tags.len()]),
-        decimals: decimals.clone(),
-        source_frames: Arc::new(vec![None; def.tags.len()]),
-        lines: lines.iter().map(reached).collect(),
-        devices: devices.iter().map(answering).collect(),
-        alarms: Arc::new(alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect()),
-        suppressed: suppressed.clone(),
-        sound: *sound,
-        alarm_metrics: alarm_metrics.clone(),
-        commands: Vec::new(),
-        watch: ActuatorTracker::default(),
-        history: history.clone(),
-        station: station.clone(),
-        sets: Arc::default(),
-        restores: Vec::new(),
-        tunings: vec![None; def.devices.len()],
-        programs: vec![None; def.devices.len()],
-        speed: *speed,
-        def: def.clone(),
+        at: snapshot.at,
+        run: snapshot.run,
+        stepped: snapshot.stepped,
+        samples: vec![Sample::bad(Cause::NotAuthorised, snapshot.at); blank.samples.len()],
+        decimals: snapshot.decimals.clone(),
+        lines: snapshot.lines.iter().map(reached).collect(),
+        devices: snapshot.devices.iter().map(answering).collect(),
+        alarms: Arc::new(snapshot.alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect()),
+        suppressed: snapshot.suppressed.clone(),
+        sound: snapshot.sound,
+        alarm_metrics: snapshot.alarm_metrics.clone(),
+        history: snapshot.history.clone(),
+        station: snapshot.station.clone(),
+        speed: snapshot.speed,
+        // Whatever a snapshot will hold some day stays in the station until it is named above.
+        ..blank
     }
 }

@@ -34,8 +34,7 @@ use std::{
 use clap::{Parser, Subcommand};
 
 use crate::{
-    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile,
-    station::io::StartError, ui,
+    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile, ui,
 };
 
 const EXIT_CODES: &str = "\
@@ -153,14 +152,6 @@ enum CliError {
     StationGone,
     #[error("{what}: {error}")]
     Io { what: String, error: std::io::Error },
-}
-
-impl From<StartError> for CliError {
-    fn from(error: StartError) -> CliError {
-        match error {
-            StartError::History(error) => CliError::History(error),
-        }
-    }
 }
 
 impl CliError {

@@ -87,7 +87,7 @@ pub fn start_observed(options: Options, observer: Option<RecordObserver>) -> Res
 }
 
 /// The same for a plant with a users file beside its history: login is required.
-pub fn start_guarded(options: Options) -> Result<Station, StartError> {
+pub fn start_guarded(options: Options) -> Result<Station, HistoryError> {
     let path = users_beside(&options.history);
     let (def, host) = (options.def.clone(), Some(own_user().into()));
     let access = match users::read(&path) {
@@ -98,15 +98,7 @@ pub fn start_guarded(options: Options) -> Result<Station, StartError> {
             AccessControl::closed(def, &error.to_string(), host)
         }
     };
-    Ok(begin(options, None, Some((access, path)))?)
-}
-
-/// Why a station did not start.
-#[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    /// The history cannot be used.
-    #[error(transparent)]
-    History(#[from] HistoryError),
+    begin(options, None, Some((access, path)))
 }
 
 fn begin(

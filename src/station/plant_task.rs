@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, watch},
     task::JoinHandle,
-    time::Instant,
+    time::{Instant, timeout},
 };
 
 use self::files::{Saving, filed, saved};
@@ -95,21 +95,34 @@ impl PlantTask {
     /// Runs until the links have stopped.
     pub async fn run(
         mut self,
-        mut events: mpsc::Receiver<Event>,
-        mut commands: mpsc::Receiver<CommandStatus>,
+        events: mpsc::Receiver<Event>,
+        commands: mpsc::Receiver<CommandStatus>,
         mut messages: mpsc::Receiver<AuditMessage>,
     ) {
-        let tick_every = self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN);
         self.file_sets(SetWork::Read);
-        let mut tick = tokio::time::interval(tick_every);
+        if self.persistence.past.as_ref().is_some_and(|past| past.from_journal) {
+            // Events wait in their queue; the lines are polled meanwhile.
+            self.await_history(past::WAIT_MAX).await;
+        }
+        self.follow(events, commands, &mut messages).await;
+        if self.persistence.past.is_some() {
+            // A station that ends as soon as it has started completes its history all the same.
+            self.await_history(HISTORY_MAX).await;
+        }
+        self.end(messages).await;
+    }
+
+    /// Applies what comes and publishes snapshots, until the links have stopped.
+    async fn follow(
+        &mut self,
+        mut events: mpsc::Receiver<Event>,
+        mut commands: mpsc::Receiver<CommandStatus>,
+        messages: &mut mpsc::Receiver<AuditMessage>,
+    ) {
+        let mut tick = tokio::time::interval(self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN));
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         // Changed since the last snapshot, and when the next one may go out.
         let (mut changed, mut next) = (false, Instant::now());
-        if self.persistence.past.as_ref().is_some_and(|past| past.from_journal) {
-            // Events wait in their queue; the lines are polled meanwhile.
-            let known = tokio::time::timeout(past::WAIT_MAX, Past::known(&mut self.persistence.past)).await;
-            known.into_iter().for_each(|restored| self.restore_history(restored));
-        }
         loop {
             // What a snapshot shows as done is on disk, or marked.
             let due = self.persistence.audit.as_ref().map_or(next, |audit| audit.publish_at(next));
@@ -118,71 +131,72 @@ impl PlantTask {
                 () = tokio::time::sleep_until(due), if changed => {
                     self.publish();
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
+                    continue;
                 }
-                Some(mut status) = commands.recv() => {
-                    status.command.kind.unshift(self.clock.behind_utc());
-                    let effects = self.plant.on_command(status, self.clock.now());
-                    self.apply_effects(effects);
-                    (changed, next) = (true, Instant::now());
+                Some(status) = commands.recv() => {
+                    self.on_command(status);
+                    next = Instant::now();
                 }
-                Some(message) = messages.recv() => self.handle_audit_message(message),
-                saved = saved(&mut self.saving) => {
-                    self.on_saved(saved);
-                    changed = true;
+                Some(message) = messages.recv() => {
+                    self.handle_audit_message(message);
+                    continue;
                 }
-                done = filed(&mut self.filing) => {
-                    self.on_filed(done);
-                    changed = true;
-                }
-                restored = Past::known(&mut self.persistence.past) => {
-                    self.restore_history(restored);
-                    changed = true;
-                }
-                Ok(()) = self.persistence.store.changed() => {
-                    self.update_history_status();
-                    changed = true;
-                }
+                saved = saved(&mut self.saving) => self.on_saved(saved),
+                done = filed(&mut self.filing) => self.on_filed(done),
+                restored = Past::known(&mut self.persistence.past) => self.restore_history(restored),
+                Ok(()) = self.persistence.store.changed() => self.update_history_status(),
                 () = AuditQueue::changed(&mut self.persistence.audit) => {
                     self.send_due_replies();
                     self.update_history_status();
-                    changed = true;
                 }
                 // Before the events: however many there are, values age and commands expire.
-                _ = tick.tick() => {
-                    let effects = self.plant.on_tick(self.clock.now());
-                    self.apply_effects(effects);
-                    self.check_clock();
-                    self.send_due_replies();
-                    changed = true;
-                }
+                _ = tick.tick() => self.on_tick(),
                 event = events.recv() => {
                     // The links have stopped: nothing can become true any more.
                     let Some(event) = event else { break };
                     let effects = self.plant.on_event(event);
                     self.apply_effects(effects);
-                    changed = true;
                 }
             }
+            changed = true;
         }
-        if self.persistence.past.is_some()
-            && let Ok(restored) = tokio::time::timeout(HISTORY_MAX, Past::known(&mut self.persistence.past)).await
-        {
-            // A station that ends as soon as it has started completes its history all the same.
+    }
+
+    fn on_command(&mut self, mut status: CommandStatus) {
+        status.command.kind.unshift(self.clock.behind_utc());
+        let effects = self.plant.on_command(status, self.clock.now());
+        self.apply_effects(effects);
+    }
+
+    fn on_tick(&mut self) {
+        let effects = self.plant.on_tick(self.clock.now());
+        self.apply_effects(effects);
+        self.check_clock();
+        self.send_due_replies();
+    }
+
+    /// Waits for the history, but no longer than this.
+    async fn await_history(&mut self, max: Duration) {
+        if let Ok(restored) = timeout(max, Past::known(&mut self.persistence.past)).await {
             self.restore_history(restored);
         }
+    }
+
+    /// Completes what was begun and records the end of the station.
+    async fn end(mut self, mut messages: mpsc::Receiver<AuditMessage>) {
         // What the session server had begun is on record as well; it ends soon after the links.
-        while let Ok(Some(message)) = tokio::time::timeout(MESSAGES_WAIT_MAX, messages.recv()).await {
+        while let Ok(Some(message)) = timeout(MESSAGES_WAIT_MAX, messages.recv()).await {
             self.handle_audit_message(message);
         }
-        // What was begun is ended, but a disk that hangs does not keep the station from ending.
+        // A disk that hangs does not keep the station from ending.
         if self.saving.is_some() {
-            match tokio::time::timeout(FILES_MAX, saved(&mut self.saving)).await {
+            match timeout(FILES_MAX, saved(&mut self.saving)).await {
                 Ok(saved) => self.on_saved(saved),
                 Err(_) => tracing::error!("the disk of the plant file does not answer: left behind"),
             }
         }
         if self.filing.is_some() {
-            match tokio::time::timeout(FILES_MAX, filed(&mut self.filing)).await {
+            match timeout(FILES_MAX, filed(&mut self.filing)).await {
                 Ok(done) => self.on_filed(done),
                 Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
             }

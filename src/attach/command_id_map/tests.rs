@@ -32,7 +32,7 @@ fn seen(id_map: &mut CommandIdMap, commands: &[(u32, u32, Outcome)]) -> Vec<(u32
 }
 
 fn send(id_map: &mut CommandIdMap, number: u32) -> CommandId {
-    id_map.send(request(id_map.terminal(), number), "anna".into(), Fixture::normal().snapshot().at).id
+    id_map.send(request(id_map.terminal, number), "anna".into(), Fixture::normal().snapshot().at).id
 }
 
 #[test]

@@ -50,24 +50,17 @@ impl Store {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
             Query::Journal { from, to, limit } => {
-                check_span(*from, *to)?;
-                self.list(&sql::journal_newest(), params![utc(*from), utc(*to), capped(*limit)], alarm)
-                    .map(Answer::Journal)
+                self.span_list(&sql::journal_newest(), (*from, *to, *limit), &[], alarm).map(Answer::Journal)
             }
             Query::Actions { from, to, limit } => {
-                check_span(*from, *to)?;
-                self.list(&sql::actions_newest(), params![utc(*from), utc(*to), capped(*limit)], action)
-                    .map(Answer::Actions)
+                self.span_list(&sql::actions_newest(), (*from, *to, *limit), &[], action).map(Answer::Actions)
             }
-            Query::Audit { from, to, words, by, action: what, limit } => {
-                check_span(*from, *to)?;
-                self.list(&sql::audit(), params![utc(*from), utc(*to), capped(*limit), by, what, words], action)
-                    .map(Answer::Actions)
-            }
+            Query::Audit { from, to, words, by, action: what, limit } => self
+                .span_list(&sql::audit(), (*from, *to, *limit), params![by, what, words], action)
+                .map(Answer::Actions),
             Query::LineMinutes { line, from, to, limit } => {
-                check_span(*from, *to)?;
                 let name = self.def.lines.get(line.index()).map_or("", |line| &line.name);
-                self.list(sql::LINE_MINUTES, params![name, utc(*from), utc(*to), capped(*limit)], line_minute)
+                self.span_list(sql::LINE_MINUTES, (*from, *to, *limit), params![name], line_minute)
                     .map(Answer::LineMinutes)
             }
             Query::Report { period } => self.report(period, now).map(|report| Answer::Report(Box::new(report))),
@@ -119,6 +112,19 @@ impl Store {
 
     pub(super) fn id(&self, tag: TagId) -> Option<u16> {
         self.ids.get(tag.index()).copied().flatten()
+    }
+
+    /// The rows between two instants, at most so many; the parameters after these three are `more`.
+    fn span_list<T>(
+        &self,
+        sql: &str,
+        (from, to, limit): (Timestamp, Timestamp, usize),
+        more: &[&dyn duckdb::ToSql],
+        read: fn(&Row) -> duckdb::Result<T>,
+    ) -> Result<Vec<T>, HistoryError> {
+        check_span(from, to)?;
+        let capped = (limit as u64).min(ROWS_MAX);
+        self.list(sql, &[params![utc(from), utc(to), capped], more].concat(), read)
     }
 
     pub(super) fn list<T>(
@@ -184,10 +190,6 @@ pub(super) fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryEr
 
 pub(super) fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
     if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max }) }
-}
-
-fn capped(limit: usize) -> u64 {
-    (limit as u64).min(ROWS_MAX)
 }
 
 pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {

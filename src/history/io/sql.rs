@@ -227,4 +227,4 @@ pub const LAST_ENTRY: &str = "SELECT number, hash FROM operator_action WHERE utc
 pub const LINE_MINUTES: &str = "SELECT * FROM (
     SELECT utc, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes,
         utilisation, reply_p99_ms, reply_max_ms
-    FROM line_minute WHERE line = ? AND utc >= ? AND utc < ? ORDER BY utc DESC LIMIT ?) ORDER BY utc";
+    FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";

@@ -8,7 +8,7 @@ use std::{
 };
 
 use duckdb::{
-    Connection, InterruptHandle, params,
+    Appender, Connection, InterruptHandle, ToSql, params,
     types::{TimeUnit, Value},
 };
 use jiff::Timestamp;
@@ -58,11 +58,17 @@ impl Store {
     /// The same store through a connection of its own, to read beside the one that writes.
     pub fn try_clone(&self) -> Result<Store, HistoryError> {
         let db = self.db.try_clone().map_err(engine)?;
-        let mut own = Store { alive: Arc::clone(&self.alive), ..Store::around(db, &self.path, &self.def) };
-        (own.extent, own.last, own.epoch, own.file) =
-            (self.extent.clone(), self.last.clone(), self.epoch.clone(), self.file);
-        (own.ids, own.ended, own.piece) = (self.ids.clone(), self.ended, self.piece);
-        Ok(own)
+        Ok(Store {
+            extent: self.extent.clone(),
+            last: self.last.clone(),
+            epoch: self.epoch.clone(),
+            file: self.file,
+            ids: self.ids.clone(),
+            ended: self.ended,
+            piece: self.piece,
+            alive: Arc::clone(&self.alive),
+            ..Store::around(db, &self.path, &self.def)
+        })
     }
 
     /// Gone when the last connection to the file is closed.
@@ -86,12 +92,7 @@ impl Store {
         let epoch = |passed: usize| self.epoch.get().saturating_add(u16::try_from(passed).unwrap_or(u16::MAX));
         self.commit(stored, epoch(begun), || {
             for (passed, records) in records.split(is_clock_set).enumerate() {
-                let epoch = epoch(passed);
-                self.append_samples(records, epoch)?;
-                self.append_alarms(records, epoch)?;
-                self.remove_unsealed(records)?;
-                self.append_actions(records, epoch)?;
-                self.append_lines(records, epoch)?;
+                self.append_epoch(records, epoch(passed))?;
             }
             Ok(true)
         })
@@ -138,23 +139,19 @@ impl Store {
     }
 
     pub(super) fn around(db: Connection, path: &Path, def: &Arc<PlantDef>) -> Store {
-        let (def, path) = (Arc::clone(def), path.to_owned());
-        let (extent, last) = (Cell::new(None), Cell::new(LastCommit { identity: 0, number: 0, at: None }));
-        let file = files::inode(&path);
-        let (unreadable, alive) = (RefCell::default(), Arc::default());
         Store {
             db,
-            def,
-            path,
-            extent,
-            last,
+            def: Arc::clone(def),
+            file: files::inode(path),
+            path: path.to_owned(),
+            extent: Cell::new(None),
+            last: Cell::new(LastCommit { identity: 0, number: 0, at: None }),
             epoch: Cell::new(0),
-            file,
             ids: Vec::new(),
             ended: None,
             piece: PIECE,
-            unreadable,
-            alive,
+            unreadable: RefCell::default(),
+            alive: Arc::default(),
         }
     }
 
@@ -236,112 +233,67 @@ impl Store {
         })
     }
 
-    fn append_samples(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
-        let mut rows = records.iter().filter_map(|record| match record {
-            Record::Sample(tag, sample) => Some((self.ids.get(tag.index()).copied().flatten()?, sample)),
-            Record::Alarm(_) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
-        });
-        let Some(first) = rows.next() else { return Ok(()) };
-        let mut appender = self.db.appender("sample")?;
-        for (id, &Sample { at, value, quality }) in std::iter::once(first).chain(rows) {
-            appender.append_row((utc(at), id, value, quality.code(), epoch))?;
+    /// Appends rows to a table; where there are none, nothing is done.
+    fn append_rows<T>(
+        &self,
+        table: &str,
+        rows: Vec<T>,
+        mut append: impl FnMut(&mut Appender, T) -> duckdb::Result<()>,
+    ) -> duckdb::Result<()> {
+        if rows.is_empty() {
+            return Ok(());
         }
+        let mut appender = self.db.appender(table)?;
+        rows.into_iter().try_for_each(|row| append(&mut appender, row))?;
         appender.flush()
     }
 
-    fn append_alarms(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
-        let mut rows = records.iter().filter_map(|record| match record {
-            Record::Alarm(alarm) => Some(alarm),
-            Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
-        });
-        let Some(first) = rows.next() else { return Ok(()) };
-        let mut appender = self.db.appender("alarm_journal")?;
-        for alarm in std::iter::once(first).chain(rows) {
-            let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out } =
-                alarm;
-            let (until, began) = (until.map(utc), first_out.map(|first_out| utc(first_out.began)));
-            let (priority, rank) = (priority.number(), first_out.map(|first_out| first_out.rank));
-            appender.append_row(params![
-                utc(*at),
-                subject,
-                message,
-                priority,
-                event.word(),
-                value,
-                limit,
-                by,
-                reason,
-                until,
-                began,
-                rank,
-                epoch
-            ])?;
+    /// Appends records of one epoch.
+    fn append_epoch(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
+        let (mut samples, mut alarms, mut actions, mut lines) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for record in records {
+            match record {
+                Record::Sample(tag, sample) => samples.extend(self.id(*tag).map(|id| (id, sample))),
+                Record::Alarm(alarm) => alarms.push(alarm),
+                Record::Action(action) => actions.push(action),
+                Record::Line(minute) => lines.push(minute),
+                Record::ClockSet => {}
+            }
         }
-        appender.flush()
+        self.append_rows("sample", samples, |to, (id, &Sample { at, value, quality })| {
+            to.append_row((utc(at), id, value, quality.code(), epoch))
+        })?;
+        self.append_rows("alarm_journal", alarms, |to, alarm| append_alarm(to, alarm, epoch))?;
+        self.remove_unsealed(records)?;
+        self.append_rows("operator_action", actions, |to, action| append_action(to, action, epoch))?;
+        self.append_rows("line_minute", lines, |to, minute| append_line(to, minute, epoch))
     }
+}
 
-    fn append_actions(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
-        let mut rows = records.iter().filter_map(|record| match record {
-            Record::Action(action) => Some(action),
-            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
-        });
-        let Some(first) = rows.next() else { return Ok(()) };
-        let mut appender = self.db.appender("operator_action")?;
-        for action in std::iter::once(first).chain(rows) {
-            let ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash } = action;
-            let (number, hash) =
-                (chain_hash.map(|chain_hash| chain_hash.number), chain_hash.map(|chain_hash| chain_hash.hash.to_vec()));
-            appender.append_row(params![
-                utc(*at),
-                by,
-                action,
-                target,
-                old,
-                new,
-                outcome,
-                from,
-                note,
-                number,
-                hash,
-                epoch
-            ])?;
-        }
-        appender.flush()
-    }
+fn append_alarm(to: &mut Appender, alarm: &AlarmRecord, epoch: u16) -> duckdb::Result<()> {
+    let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out } = alarm;
+    let (at, priority, event, until) = (utc(*at), priority.number(), event.word(), until.map(utc));
+    let (began, rank) = first_out.map(|first_out| (utc(first_out.began), first_out.rank)).unzip();
+    to.append_row(params![at, subject, message, priority, event, value, limit, by, reason, until, began, rank, epoch])
+}
 
-    fn append_lines(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
-        let mut rows = records.iter().filter_map(|record| match record {
-            Record::Line(minute) => Some(minute),
-            Record::Sample(..) | Record::Alarm(_) | Record::Action(_) | Record::ClockSet => None,
-        });
-        let Some(first) = rows.next() else { return Ok(()) };
-        let mut appender = self.db.appender("line_minute")?;
-        for minute in std::iter::once(first).chain(rows) {
-            let LineMinute { at, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, .. } =
-                minute;
-            let LineMinute { sent_bytes, received_bytes, utilisation, reply_p99_ms, reply_max_ms, .. } = minute;
-            let (at, utilisation) = (utc(*at), *utilisation);
-            appender.append_row(params![
-                at,
-                line,
-                small(*requests),
-                small(*ok),
-                small(*timeouts),
-                small(*corrupt),
-                small(*exceptions),
-                small(*retries),
-                small(*late),
-                small(*missed),
-                small(*sent_bytes),
-                small(*received_bytes),
-                utilisation,
-                reply_p99_ms,
-                reply_max_ms,
-                epoch
-            ])?;
-        }
-        appender.flush()
-    }
+fn append_action(to: &mut Appender, action: &ActionRecord, epoch: u16) -> duckdb::Result<()> {
+    let ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash } = action;
+    let (number, hash) = chain_hash.map(|chain_hash| (chain_hash.number, chain_hash.hash.to_vec())).unzip();
+    let at = utc(*at);
+    to.append_row(params![at, by, action, target, old, new, outcome, from, note, number, hash, epoch])
+}
+
+fn append_line(to: &mut Appender, minute: &LineMinute, epoch: u16) -> duckdb::Result<()> {
+    let LineMinute { at, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, .. } = minute;
+    let LineMinute { sent_bytes, received_bytes, utilisation, reply_p99_ms, reply_max_ms, .. } = minute;
+    let counts = [requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes];
+    let counts = counts.map(|count| small(*count));
+    let at = utc(*at);
+    let mut row: Vec<&dyn ToSql> = vec![&at, line];
+    row.extend(counts.iter().map(|count| count as &dyn ToSql));
+    row.extend([utilisation as &dyn ToSql, reply_p99_ms, reply_max_ms, &epoch]);
+    to.append_row(&*row)
 }
 
 fn is_clock_set(record: &Record) -> bool {
