@@ -8,10 +8,14 @@ use jiff::Timestamp;
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, Query},
-    plant::Snapshot,
+    plant::{PlantDef, Snapshot},
     profile::io::atomic::write_for_user,
     report::{self, Period, ShiftReport},
-    sim::{self, drill::SimCommand},
+    sim::{
+        self,
+        drill::SimCommand,
+        scenario::{Scenario, judge::Verdict},
+    },
     station::{Session, io as station},
     ui::{
         self,
@@ -41,7 +45,7 @@ pub struct Args {
     /// A drill: a scenario file, or the name of a shipped scenario; its plant is simulated
     #[arg(long, value_name = "FILE", conflicts_with = "plant")]
     scenario: Option<PathBuf>,
-    /// Tell nothing of the faults before the drill is over
+    /// Show nothing of the faults before the drill is over
     #[arg(long, requires = "scenario", conflicts_with = "headless")]
     exam: bool,
     /// End after this plant time
@@ -56,7 +60,7 @@ pub struct Args {
 
 /// Runs the demonstration.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let (scenario, mut def) = match &args.scenario {
+    let (scenario, def) = match &args.scenario {
         Some(path) => {
             let (scenario, def) = drill::load(path)?;
             (Some(Arc::new(scenario)), Arc::unwrap_or_clone(def))
@@ -72,60 +76,66 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let _log = log::start(args.station.log.as_deref(), args.station.history.as_deref())?;
     // A history of its own, gone with the demonstration, unless the user wants to keep one.
     let scratch = Scratch::new(&args.station)?;
-    in_runtime(async {
-        let clock = Clock::starting_at(Timestamp::now(), args.speed);
-        let services: Vec<_> = def.lines.iter().map(sim::io::Service::of).collect();
-        let simulated = drill::simulator(&def, scenario.as_deref())?;
-        let simulated = sim::io::serve_simulator(&def, simulated, clock, &services).await.map_err(simulation_error)?;
-        simulated.plug_into(&mut def);
-        let def = Arc::new(def);
-        let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
-        let history = scratch.history.clone();
-        let options = station::Options { def: def.clone(), clock, history, connectors, file: None };
-        let (observer, journal) = sim::io::journal();
-        let station = station::start_observed(options, Some(Box::new(observer)))?;
-        let session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
-        let trainer = sim::io::Trainer {
-            def: def.clone(),
-            simulator: simulated.simulator.clone(),
-            snapshots: session.snapshots.clone(),
-            journal,
-            // Without a terminal the operator of the scenario acts.
-            operator: (args.headless && scenario.is_some()).then(|| station.commands.clone()),
-            scenario: scenario.clone(),
-            exam: args.exam,
-        };
-        let (port, _judging) = trainer.spawn();
-        let drilled = port.status.clone();
-        let result = if args.headless {
-            let places: Vec<_> = simulated.places().iter().map(ToString::to_string).collect();
-            say(&format!("{}: simulated on {}", def.title, places.join(", ")));
-            let drill = scenario.as_ref().map(|scenario| scenario.duration);
-            headless(session, clock, args.duration.or(drill), &args).await
-        } else {
-            let options =
-                ui::io::Options { extension: Some(extension(port)), ..ui::io::Options::new(ui::Leaving::Demo) };
-            tokio::select! {
-                result = ui::io::run(session, options) => result.map_err(CliError::from),
-                () = run::over(clock, args.duration) => Ok(()),
-            }
-        };
-        let last = station.stop().await;
-        if args.headless {
-            run::say_anchor(last);
+    in_runtime(demonstrate(&args, def, scenario, scratch.history.clone()))
+}
+
+/// Serves the plant, runs its station, and shows it until the time is over or the operator leaves.
+async fn demonstrate(
+    args: &Args,
+    mut def: PlantDef,
+    scenario: Option<Arc<Scenario>>,
+    history: PathBuf,
+) -> Result<(), CliError> {
+    let clock = Clock::starting_at(Timestamp::now(), args.speed);
+    let services: Vec<_> = def.lines.iter().map(sim::io::Service::of).collect();
+    let simulated = drill::simulator(&def, scenario.as_deref())?;
+    let simulated = sim::io::serve_simulator(&def, simulated, clock, &services).await.map_err(simulation_error)?;
+    simulated.plug_into(&mut def);
+    let def = Arc::new(def);
+    let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+    let options = station::Options { def: def.clone(), clock, history, connectors, file: None };
+    let (observer, journal) = sim::io::journal();
+    let station = station::start_observed(options, Some(Box::new(observer)))?;
+    let session = station.session(&if args.headless { "demo".to_owned() } else { paths::operator() });
+    let trainer = sim::io::Trainer {
+        def: def.clone(),
+        simulator: simulated.simulator.clone(),
+        snapshots: session.snapshots.clone(),
+        journal,
+        // Without a terminal the operator of the scenario acts.
+        operator: (args.headless && scenario.is_some()).then(|| station.commands.clone()),
+        scenario: scenario.clone(),
+        exam: args.exam,
+    };
+    let (port, _judging) = trainer.spawn();
+    let drilled = port.status.clone();
+    let result = if args.headless {
+        let places: Vec<_> = simulated.places().iter().map(ToString::to_string).collect();
+        say(&format!("{}: simulated on {}", def.title, places.join(", ")));
+        let drill = scenario.as_ref().map(|scenario| scenario.duration);
+        headless(session, clock, args.duration.or(drill), args).await
+    } else {
+        let options = ui::io::Options { extension: Some(extension(port)), ..ui::io::Options::new(ui::Leaving::Demo) };
+        tokio::select! {
+            result = ui::io::run(session, options) => result.map_err(CliError::from),
+            () = run::over(clock, args.duration) => Ok(()),
         }
-        drop(simulated);
-        let verdict = drilled.borrow().scenario.as_ref().map(|progress| progress.verdict.clone());
-        if let Some(verdict) = &verdict {
-            drill::say_verdict(verdict);
-        }
-        match (result, verdict) {
-            (Ok(()), Some(verdict)) if args.headless && !(verdict.over && verdict.passed()) => {
-                Err(CliError::Failed("the drill was not passed".into()))
-            }
-            (result, _) => result,
-        }
-    })
+    };
+    let last = station.stop().await;
+    if args.headless {
+        run::say_anchor(last);
+    }
+    let verdict = drilled.borrow().scenario.as_ref().map(|progress| progress.verdict.clone());
+    result.and(verdict.map_or(Ok(()), |verdict| close_drill(&verdict, args.headless)))
+}
+
+/// Prints the verdict of a drill. Without a terminal one that was not passed is a failure.
+fn close_drill(verdict: &Verdict, headless: bool) -> Result<(), CliError> {
+    drill::say_verdict(verdict);
+    if headless && !(verdict.over && verdict.passed()) {
+        return Err(CliError::Failed("the drill was not passed".into()));
+    }
+    Ok(())
 }
 
 /// The simulator as an extension of the terminal: its states, and its commands from the Faults tab.
@@ -143,7 +153,7 @@ fn extension(sim::io::Port { commands, mut status }: sim::io::Port) -> Extension
     ExtensionPort { states: states.fuse().boxed(), send: Box::new(send) }
 }
 
-/// Tells what happens until the time is over, then sums up and writes the report.
+/// Prints what happens until the time is over, then sums up and writes the report.
 async fn headless(session: Session, clock: Clock, duration: Option<Duration>, args: &Args) -> Result<(), CliError> {
     let from = clock.now();
     let last = run::follow(session.snapshots.clone(), clock, duration).await?;

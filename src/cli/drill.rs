@@ -28,7 +28,7 @@ use super::{CliError, demo::simulation_error, log, say};
 pub struct Args {
     /// A scenario file, or the name of a shipped scenario; without it they are listed
     scenario: Option<PathBuf>,
-    /// Nobody acts: what comes of it when the operator of the scenario does nothing
+    /// Run without the operator of the scenario: what happens when no action is taken
     #[arg(long)]
     no_operator: bool,
     /// Only the verdict, not what happens on the way

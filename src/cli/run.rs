@@ -224,7 +224,7 @@ fn start(
     Ok(station::start_guarded(station::Options { def: def.clone(), clock, history, connectors, file })?)
 }
 
-/// Tells what changes until the time is over, a signal comes, or the station ends; gives the last snapshot. Feeds the
+/// Prints what changes until the time is over, a signal comes, or the station ends; gives the last snapshot. Feeds the
 /// watchdog of the init system, if there is one, for as long as the lines are polled.
 pub async fn follow(
     mut snapshots: watch::Receiver<Arc<Snapshot>>,
@@ -236,12 +236,12 @@ pub async fn follow(
     let mut watchdog = init::Watchdog::new();
     let end = over(clock, duration);
     tokio::pin!(end);
-    let told_to_stop = signalled();
-    tokio::pin!(told_to_stop);
+    let stop = signalled();
+    tokio::pin!(stop);
     loop {
         tokio::select! {
             () = &mut end => break,
-            () = &mut told_to_stop => break,
+            () = &mut stop => break,
             changed = snapshots.changed() => {
                 if changed.is_err() {
                     return Err(CliError::StationGone);

@@ -42,6 +42,9 @@ use tokio::{
 
 use crate::support::folder;
 
+mod socket;
+mod strangers;
+
 /// No terminal waits so long for anything here, in virtual time.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -230,7 +233,7 @@ async fn a_terminal_sees_the_plant_and_sends_commands() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn without_a_login_a_terminal_is_told_no_value_and_after_a_logout_none_stays() {
+async fn values_are_withheld_before_a_login_and_after_a_logout() {
     let stand = Stand::start();
     stand.view.send_replace(false);
     stand.set(1.0);
@@ -245,7 +248,7 @@ async fn without_a_login_a_terminal_is_told_no_value_and_after_a_logout_none_sta
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_terminal_that_does_not_read_costs_only_itself_and_is_let_go_after_five_minutes() {
+async fn a_stuck_terminal_costs_only_itself_and_is_disconnected() {
     let mut stand = Stand::start();
     let mut stuck = UnixStream::connect(stand.path()).await.unwrap();
     stuck.write_all(&handshake()).await.unwrap();
@@ -270,7 +273,7 @@ async fn a_terminal_that_does_not_read_costs_only_itself_and_is_let_go_after_fiv
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_terminal_says_at_once_that_the_station_has_gone_and_finds_it_again() {
+async fn a_terminal_shows_a_lost_station_at_once_and_reconnects() {
     let stand = Stand::start();
     stand.set(1.0);
     let mut session = stand.session().await;
@@ -330,229 +333,4 @@ async fn another_plant_after_a_restart_comes_with_its_own_definition() {
     def.title = "Another".to_owned();
     stand.publish.send_replace(Arc::new(Snapshot::blank(Arc::new(def))));
     until(&mut session, "the other plant", |snapshot| snapshot.def.title == "Another").await;
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_second_station_of_a_plant_is_refused_and_a_dead_ones_socket_replaced() {
-    let stand = Stand::start();
-    let mode = std::fs::metadata(stand.path()).unwrap().permissions().mode();
-    assert_eq!(mode & 0o777, 0o660);
-    let error = listen(&stand.path()).unwrap_err();
-    assert!(matches!(error, ListenError::Running { .. }));
-    assert_eq!(error.to_string(), format!("the station is already running, process {}", std::process::id()));
-    let path = stand.path();
-    let places = Places {
-        given: Some(stand.folder.path().into()),
-        service: "/nowhere".into(),
-        login: None,
-        last: "/nowhere".into(),
-    };
-    let living: Vec<String> = places.living().await.into_iter().map(|found| found.name).collect();
-    assert_eq!(living, ["tank"]);
-    let folder = stand.end().await;
-    assert!(!path.exists(), "a station takes its socket with it");
-
-    // As kill -9 leaves it: a name that nobody listens behind.
-    drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
-    assert!(path.exists() && places.living().await.is_empty());
-    assert!(matches!(connect(&path).await, Err(AttachError::NoStation { .. })));
-    let stand = Stand::start_in(folder);
-    stand.session().await;
-    assert_eq!(places.socket("tank").unwrap(), path);
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_folder_that_others_can_write_to_is_not_trusted_with_passwords() {
-    let folder = folder();
-    let last = folder.path().join("sightglass-1");
-    let places = Places { given: None, service: "/nowhere".into(), login: None, last: last.clone() };
-    assert_eq!(places.socket("tank").unwrap(), last.join("tank.sock"));
-    assert_eq!(std::fs::metadata(&last).unwrap().permissions().mode() & 0o777, 0o700);
-    std::fs::set_permissions(&last, std::fs::Permissions::from_mode(0o777)).unwrap();
-    let _listener = std::os::unix::net::UnixListener::bind(last.join("tank.sock")).unwrap();
-    assert!(places.socket("tank").is_err() && places.living().await.is_empty());
-    std::fs::set_permissions(&last, std::fs::Permissions::from_mode(0o700)).unwrap();
-    assert_eq!(places.living().await.len(), 1);
-}
-
-#[tokio::test(start_paused = true)]
-async fn hostile_connections_are_closed_and_the_others_see_the_plant_go_on() {
-    let mut stand = Stand::start();
-    let mut session = stand.session().await;
-    let mut long = handshake();
-    long[..4].copy_from_slice(&u32::MAX.to_le_bytes());
-    let command = asked(&ClientMessage::SessionRequest { ticket: 1, request: SessionRequest::Stop });
-    let hostile: Vec<(&str, Vec<u8>)> = vec![
-        ("nothing at all", Vec::new()),
-        ("random bytes", (0..4_000u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect()),
-        ("a giant length", long),
-        ("a length and nothing", 4_000u32.to_le_bytes().to_vec()),
-        ("half a handshake", handshake()[..9].to_vec()),
-        ("a right message before the handshake", command.clone()),
-        ("an empty message", vec![0; 4]),
-        ("a giant message after the handshake", [handshake(), u32::MAX.to_le_bytes().to_vec()].concat()),
-        ("noise after the handshake", [handshake(), vec![3, 0, 0, 0, 250, 251, 252]].concat()),
-        ("the handshake twice", [handshake(), handshake()].concat()),
-        ("half a message after the handshake", [handshake(), command[..5].to_vec()].concat()),
-    ];
-    for (index, (what, bytes)) in hostile.into_iter().enumerate() {
-        let mut stream = UnixStream::connect(stand.path()).await.unwrap();
-        // It may be closed before all is sent.
-        let _ = stream.write_all(&bytes).await;
-        let closed = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut Vec::new())).await;
-        assert!(closed.is_ok(), "still open: {what}");
-        stand.set(index as f64);
-        sees(&mut session, index as f64).await;
-    }
-    stand.until_present(1).await;
-}
-
-#[tokio::test(start_paused = true)]
-async fn an_old_terminal_is_told_in_words_what_to_do() {
-    let stand = Stand::start();
-    let mut stream = UnixStream::connect(stand.path()).await.unwrap();
-    let old = Handshake { protocol: 0, version: "0.0.9".into(), ..Handshake::current() };
-    stream.write_all(&protocol::encode_first(&old, Some(&()), HANDSHAKE_BYTES_MAX).unwrap()).await.unwrap();
-    let bytes = until_closed(&mut stream).await;
-    let why = protocol::handshake_reply(&bytes[LENGTH_BYTES..]).unwrap().unwrap_err();
-    assert!(why.contains("0.0.9 (protocol 0)") && why.contains("restart the older one"), "{why}");
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_command_of_another_terminal_or_unknown_tag_is_rejected() {
-    let stand = Stand::start();
-    let mut stream = UnixStream::connect(stand.path()).await.unwrap();
-    stream.write_all(&handshake()).await.unwrap();
-    let own = protocol::handshake_reply(&next(&mut stream).await).unwrap().unwrap().terminal;
-    let command = |terminal, kind| {
-        asked(&ClientMessage::Command(Box::new(Command::new(0, CommandId { terminal, number: 1 }, kind)), None))
-    };
-    for (bytes, expected) in [
-        (command(own + 1, CommandKind::Alarm(AlarmCommand::Silence)), "this is terminal"),
-        (command(own, CommandKind::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
-    ] {
-        stream.write_all(&bytes).await.unwrap();
-        let why = loop {
-            if let ServerMessage::Undelivered { why, .. } =
-                protocol::decode(&next(&mut stream).await, "message").unwrap()
-            {
-                break why;
-            }
-        };
-        assert!(why.contains(expected), "{why}");
-    }
-    assert_eq!(*stand.asked.borrow(), 0);
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_thousand_silent_connections_keep_nobody_out() {
-    let mut stand = Stand::start();
-    // In ten waves, because a process may not hold a thousand sockets.
-    for wave in 0..10 {
-        let mut silent = Vec::new();
-        for _ in 0..100 {
-            silent.push(UnixStream::connect(stand.path()).await.unwrap());
-            tokio::task::yield_now().await;
-        }
-        let mut session = stand.session().await;
-        stand.set(f64::from(wave));
-        sees(&mut session, f64::from(wave)).await;
-        for stream in &mut silent {
-            until_closed(stream).await;
-        }
-        drop(session);
-        stand.until_present(0).await;
-    }
-}
-
-#[tokio::test(start_paused = true)]
-async fn one_terminal_more_than_there_is_room_for_is_told_so() {
-    let mut stand = Stand::start();
-    let mut sessions = Vec::new();
-    for _ in 0..TERMINALS_MAX {
-        sessions.push(stand.session().await);
-    }
-    let why = connect(&stand.path()).await.unwrap_err().to_string();
-    assert!(why.contains("64 terminals"), "{why}");
-    sessions.pop();
-    stand.until_present(TERMINALS_MAX - 1).await;
-    sessions.push(stand.session().await);
-}
-
-/// A flood waits in the flooding terminal: the station takes no more than a person can ask.
-#[tokio::test(start_paused = true)]
-async fn a_flood_of_questions_waits_where_it_comes_from() {
-    let stand = Stand::start();
-    let mut quick = stand.session().await;
-    let mut flood = Plain::connect(stand.path()).unwrap();
-    flood.set_nonblocking(true).unwrap();
-    flood.write_all(&handshake()).unwrap();
-    let at = stand.publish.borrow().at;
-    let query = asked(&ClientMessage::Ask { ticket: 1, query: Query::Journal { from: at, to: at, limit: 1 } });
-    let started = tokio::time::Instant::now();
-    let (mut sent, mut begun) = (0, 0);
-    for value in 0..200 {
-        // As much as the socket takes; what did not fit goes first in the next round.
-        while let Ok(count) = flood.write(&query[begun..]) {
-            begun = (begun + count) % query.len();
-            sent += usize::from(begun == 0);
-        }
-        stand.set(f64::from(value));
-        sees(&mut quick, f64::from(value)).await;
-    }
-    let taken = *stand.asked.borrow();
-    let seconds = started.elapsed().as_secs_f64();
-    assert!(taken as f64 <= 64.0 + 50.0 * (seconds + 1.0), "{taken} of {sent} queries were taken in {seconds} s");
-    assert!(taken < sent, "nothing has waited: {taken} of {sent}");
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_removed_socket_is_made_again_and_who_is_attached_stays() {
-    let mut stand = Stand::start();
-    let mut session = stand.session().await;
-    for removed in [vec![".lock"], vec![""], vec!["", ".lock"]] {
-        for ending in &removed {
-            std::fs::remove_file(format!("{}{ending}", stand.path().display())).unwrap();
-        }
-        // Only time passes; the station looks for its socket from time to time.
-        let began = tokio::time::Instant::now();
-        while ["", ".lock"]
-            .iter()
-            .any(|ending| !std::fs::exists(format!("{}{ending}", stand.path().display())).unwrap())
-        {
-            assert!(began.elapsed() < PATIENCE, "{removed:?}");
-            tokio::time::advance(Duration::from_secs(1)).await;
-        }
-        let another = stand.session().await;
-        stand.until_present(2).await;
-        drop(another);
-        stand.until_present(1).await;
-        assert!(
-            removed == [".lock"] || matches!(listen(&stand.path()), Err(ListenError::Running { .. })),
-            "{removed:?}"
-        );
-    }
-    stand.set(1.0);
-    sees(&mut session, 1.0).await;
-}
-
-#[tokio::test(start_paused = true)]
-async fn a_removed_folder_of_the_socket_is_made_again_with_its_rights() {
-    let folder = folder();
-    std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o750)).unwrap();
-    let mut stand = Stand::start_in(folder);
-    let mut session = stand.session().await;
-    std::fs::remove_dir_all(stand.folder.path()).unwrap();
-    let began = tokio::time::Instant::now();
-    while !std::fs::exists(stand.path()).unwrap() {
-        assert!(began.elapsed() < PATIENCE);
-        tokio::time::advance(Duration::from_secs(1)).await;
-    }
-    let mode = std::fs::metadata(stand.folder.path()).unwrap().permissions().mode();
-    assert_eq!(mode & 0o777, 0o750, "group may enter, others may not");
-    let _another = stand.session().await;
-    stand.until_present(2).await;
-    assert!(matches!(listen(&stand.path()), Err(ListenError::Running { .. })), "its lock is back too");
-    stand.set(1.0);
-    sees(&mut session, 1.0).await;
 }

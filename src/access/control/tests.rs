@@ -334,21 +334,6 @@ fn a_hostile_terminal_floods_neither_plant_nor_audit_log() {
 }
 
 #[test]
-fn a_terminal_that_hangs_up_early_has_used_its_attempt() {
-    let mut bench = Bench::new(AccessDef { login_attempts_max: 2, ..AccessDef::default() });
-    for terminal in 1..=2 {
-        bench.open(terminal, "evil");
-        let request = SessionRequest::Login { user: "tech".into(), password: "guess".into() };
-        let effects = bench.access.on_request(terminal, 1, request, bench.now);
-        bench.access.close(terminal, bench.now);
-        bench.work(effects);
-        bench.later(2);
-    }
-    bench.open(3, "other");
-    assert!(bench.login(3, "tech", TECH).is_err());
-}
-
-#[test]
 fn a_demonstration_needs_no_login() {
     let mut bench = Bench::of(AccessControl::new(Arc::new(fixture::plant()), Some("sight".into())));
     let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };

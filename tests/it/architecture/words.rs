@@ -10,7 +10,7 @@ use crate::support::sightglass;
 
 /// What is not written, and what is written instead. A word at the end matches its plural too.
 const BANNED: &[(&str, &str)] = &[
-    ("choose a new password", "choose a new password"),
+    ("a password of your own", "choose a new password"),
     ("anew", "reload, refresh, again"),
     ("asked again", "retries"),
     ("book of deeds", "audit log"),
@@ -29,10 +29,10 @@ const BANNED: &[(&str, &str)] = &[
     ("let in again", "enabled"),
     ("mend", "clear"),
     ("mended", "cleared"),
-    ("collecting data", "collecting data"),
+    ("no curve yet", "collecting data"),
     ("nobody", "no user, no terminal, none"),
     ("not as usual", "abnormal"),
-    ("worst-case scan time", "worst-case scan time"),
+    ("one round at worst", "worst-case scan time"),
     ("put aside", "shelved, suppressed or out of service"),
     ("raised quietly", "active (suppressed)"),
     ("read over", "gap registers read"),

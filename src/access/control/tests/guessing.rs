@@ -127,3 +127,18 @@ fn an_unknown_name_is_delayed_and_locked_like_a_known_one() {
     });
     assert_eq!(replies[0], replies[1]);
 }
+
+#[test]
+fn a_terminal_that_hangs_up_early_has_used_its_attempt() {
+    let mut bench = Bench::new(AccessDef { login_attempts_max: 2, ..AccessDef::default() });
+    for terminal in 1..=2 {
+        bench.open(terminal, "evil");
+        let request = SessionRequest::Login { user: "tech".into(), password: "guess".into() };
+        let effects = bench.access.on_request(terminal, 1, request, bench.now);
+        bench.access.close(terminal, bench.now);
+        bench.work(effects);
+        bench.later(2);
+    }
+    bench.open(3, "other");
+    assert!(bench.login(3, "tech", TECH).is_err());
+}
