@@ -109,7 +109,7 @@ impl TabView for Bus {
             Action::Filter => return vec![self.frames.ask_filter()],
             Action::Save => return self.frames.save(cx, &at),
             Action::Try(tried) => return self.test.open(cx, &at, tried),
-            Action::Again => return test::again(cx, &at),
+            Action::Again => return test::again(&at),
             Action::Stop => return test::stop(&at),
             Action::Retry => return retry(cx, Some(self.line)),
             Action::Settings => {

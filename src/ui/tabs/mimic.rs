@@ -3,10 +3,7 @@
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::{
-        def::{MimicCommand, MimicItem, MimicRect},
-        number::to_u32,
-    },
+    plant::def::{MimicCommand, MimicItem, MimicRect},
     ui::{
         interlock,
         modal::Choice,
@@ -41,8 +38,9 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('M'), "", "motion of agitators and arrows off and on", Action::Motion),
 ];
 
-/// The small trends are asked again after so many ticks (half seconds).
-const TREND_TICKS: u32 = 20;
+/// The small trends are asked again after so many seconds (real time).
+const EVERY_S: f64 = 10.0;
+const PATIENCE_S: f64 = 30.0;
 
 /// State of this tab.
 #[derive(Debug)]
@@ -51,17 +49,17 @@ pub struct Mimic {
     selected: Option<usize>,
     motion: bool,
     /// Curves of the small trends, by the item's place.
-    trends: Vec<(usize, Option<Series>)>,
-    /// Tick of the last queries; their number is a multiple of the number of trends, plus which trend.
-    asked_at: Option<u32>,
+    trends: Vec<(usize, Answered<Vec<Series>>)>,
+    /// Queries asked so far.
     asked: u32,
 }
 
 impl TabView for Mimic {
     fn new(snapshot: &Snapshot) -> Mimic {
         let items = snapshot.def.mimic.items.iter().enumerate();
-        let trends = items.filter(|(_, item)| matches!(item, MimicItem::Trend { .. })).map(|(n, _)| (n, None));
-        Mimic { selected: None, motion: true, trends: trends.collect(), asked_at: None, asked: 0 }
+        let trends =
+            items.filter(|(_, item)| matches!(item, MimicItem::Trend { .. })).map(|(n, _)| (n, Answered::default()));
+        Mimic { selected: None, motion: true, trends: trends.collect(), asked: 0 }
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
@@ -74,35 +72,22 @@ impl TabView for Mimic {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if self.trends.is_empty() || self.asked_at.is_some_and(|at| cx.phase.wrapping_sub(at) < TREND_TICKS) {
-            return Vec::new();
-        }
-        self.asked_at = Some(cx.phase);
-        self.asked = self.asked.wrapping_add(1);
-        let count = to_u32(self.trends.len());
-        let asks = self.trends.iter().enumerate().filter_map(|(n, (item, _))| {
+        let asks = self.trends.iter_mut().filter_map(|(item, trend)| {
             let MimicItem::Trend { tag, window, place } = &cx.def().mimic.items[*item] else { return None };
             let from = cx.now - SignedDuration::try_from(*window).ok()?;
             let buckets = usize::from(scale(cx, cx.area).place(*place).width.max(1)) * 2;
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
-            Some(UiAction::query(Tab::Mimic, self.asked.wrapping_mul(count).wrapping_add(to_u32(n)), query))
+            trend.query.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, PATIENCE_S), query)
         });
         asks.collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        (number.wrapping_sub(self.asked.wrapping_mul(to_u32(self.trends.len()))) as usize) < self.trends.len()
+        self.trends.iter().any(|(_, trend)| trend.query.awaits(number))
     }
 
-    fn on_answer(&mut self, _cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        let first = self.asked.wrapping_mul(to_u32(self.trends.len()));
-        let place = number.wrapping_sub(first) as usize;
-        if let Some((_, series)) = self.trends.get_mut(place) {
-            *series = match answer {
-                Ok(Answer::Series(all)) => all.into_iter().next(),
-                Ok(_) | Err(_) => None,
-            };
-        }
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        self.trends.iter_mut().for_each(|(_, trend)| trend.on_answer(cx, number, &answer));
         Vec::new()
     }
 
@@ -215,7 +200,8 @@ impl Mimic {
                 sequence.view(cx, canvas, scale.place(*place), selected);
             }
             MimicItem::Trend { place, tag, window } => {
-                let series = self.trends.iter().find(|(item, _)| *item == n).and_then(|(_, series)| series.as_ref());
+                let trend = self.trends.iter().find(|(item, _)| *item == n);
+                let series = trend.and_then(|(_, trend)| trend.value.as_ref()?.first());
                 trend::view(cx, canvas, scale.place(*place), *tag, *window, series, selected);
             }
             MimicItem::Text { place, text } => {

@@ -23,10 +23,10 @@ use crate::{
 const EVERY: u32 = 4;
 
 /// The frames as they are shown.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Ring {
-    /// Takes in what is new.
-    runs: bool,
+    /// Takes in nothing new.
+    paused: bool,
     held: Frames,
     /// Tick at which they were taken in; `None` before the first time.
     read_at: Option<u32>,
@@ -36,20 +36,6 @@ pub struct Ring {
     saved: Vec<Result<PathBuf, String>>,
     /// Files that wait for the station's word; two at most.
     outgoing: VecDeque<Outgoing>,
-}
-
-impl Default for Ring {
-    fn default() -> Ring {
-        Ring {
-            runs: true,
-            held: Frames::default(),
-            read_at: None,
-            selected: None,
-            filter: Filter::default(),
-            saved: Vec::new(),
-            outgoing: VecDeque::new(),
-        }
-    }
 }
 
 impl Ring {
@@ -62,7 +48,7 @@ impl Ring {
     /// Takes in what is new, if it runs and it is time.
     pub fn follow(&mut self, cx: &ViewContext, at: &Place) {
         let due = self.read_at.is_none_or(|taken| EVERY <= cx.phase.wrapping_sub(taken));
-        if (self.runs || self.read_at.is_none()) && due {
+        if (!self.paused || self.read_at.is_none()) && due {
             self.read_frames(cx, at);
         }
     }
@@ -76,20 +62,20 @@ impl Ring {
 
     /// Holds still, or runs on from the newest frame.
     pub fn toggle(&mut self, cx: &ViewContext, at: &Place) {
-        self.runs = !self.runs;
+        self.paused = !self.paused;
         self.selected = None;
-        if self.runs {
+        if !self.paused {
             self.read_frames(cx, at);
         }
     }
 
     /// Frames that were held still run on; `false` if they ran.
     pub fn back(&mut self, cx: &ViewContext, at: &Place) -> bool {
-        let held = !self.runs;
-        if held {
+        let paused = self.paused;
+        if paused {
             self.toggle(cx, at);
         }
-        held
+        paused
     }
 
     /// Clears the note about the last files.
@@ -102,7 +88,7 @@ impl Ring {
         if self.read_at.is_none() {
             self.read_frames(cx, at);
         }
-        self.runs = false;
+        self.paused = true;
         let shown = self.shown();
         let place = motion.to(self.place(&shown), shown.len(), room);
         self.selected = shown.get(place).map(|frame| frame.number);
@@ -115,7 +101,7 @@ impl Ring {
         let frame = (*shown.get(self.place(&shown))?).clone();
         let before: Vec<Frame> = self.before(frame.number).take(16).cloned().collect();
         let shown = Shown::Frame { line: at.settings.name.clone(), frame: Box::new(frame), before };
-        Some(UiAction::Open(Modal::Bus(Box::new(Window::Text(TextWindow::new(shown))))))
+        Some(Window::Text(TextWindow::new(shown)).open())
     }
 
     /// Asks for the filter.
@@ -187,9 +173,8 @@ impl Ring {
         }
         let place = ring.place(&shown);
         let first = list::first(place, shown.len(), room);
-        for (y, frame) in shown.iter().skip(first).take(room).enumerate() {
-            let selected = self.selected.is_some() && first + y == place;
-            ring.row(cx, frame, selected, &mut canvas.part(0, to_u16(y) + 1, width, 1));
+        for (y, n, frame) in on_screen(&shown, first, room) {
+            ring.row(cx, frame, self.selected.is_some() && n == place, &mut canvas.part(0, y + 1, width, 1));
         }
         for (n, (words, good)) in notice.iter().enumerate() {
             let y = height.saturating_sub(to_u16(notice.len() - n));
@@ -202,28 +187,24 @@ impl Ring {
         let filter = if filter.is_empty() { String::new() } else { t!("   filter: {filter}", filter) };
         let zone = &cx.def().time_zone;
         let newest = self.held.iter().next_back().map_or(String::new(), |frame| clock(frame.at, zone));
-        let state = match self.runs {
-            true => t!("running, newest {newest} below", newest),
-            false => t!("PAUSED at {newest}, Esc resumes", newest),
+        let (state, style) = match self.paused {
+            true => (t!("PAUSED at {newest}, Esc resumes", newest), cx.theme.strong()),
+            false => (t!("running, newest {newest} below", newest), cx.theme.dim()),
         };
-        let style = if self.runs { cx.theme.dim() } else { cx.theme.strong() };
         (t!("{count} of {max} frames, {state}{filter}", count, max = self.held.len().max(count), state, filter), style)
     }
 
     /// What became of the files, and how to open them.
     fn notice(&self) -> Vec<(String, bool)> {
-        let mut lines = Vec::new();
-        for result in &self.saved {
-            match result {
-                Ok(path) => {
-                    let wireshark = path.extension().is_some_and(|end| end == "pcapng");
-                    let how = if wireshark { t!("open with: wireshark ") } else { t!("read with: less ") };
-                    lines.push((t!("written; {how}{display}", how, display = path.display()), true));
-                }
-                Err(why) => lines.push((t!("NOT WRITTEN: {why}", why), false)),
+        let line = |result: &Result<PathBuf, String>| match result {
+            Ok(path) => {
+                let wireshark = path.extension().is_some_and(|end| end == "pcapng");
+                let how = if wireshark { t!("open with: wireshark ") } else { t!("read with: less ") };
+                (t!("written; {how}{display}", how, display = path.display()), true)
             }
-        }
-        lines
+            Err(why) => (t!("NOT WRITTEN: {why}", why), false),
+        };
+        self.saved.iter().map(line).collect()
     }
 
     fn shown(&self) -> Vec<&Frame> {
@@ -256,11 +237,9 @@ impl Ring {
         let dissection = dissect::in_traffic(frame, self.before(frame.number));
         let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
         let refused = !frame.sent && dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
-        let style = match (selected, good && !refused) {
-            (true, _) => theme.focus(),
-            (false, false) => theme.trouble(),
-            (false, true) if frame.sent => theme.dim(),
-            (false, true) => theme.normal(),
+        let style = match frame.sent && good && !selected {
+            true => theme.dim(),
+            false => row_style(cx, selected, !good || refused),
         };
         let bytes_room = (canvas.width().saturating_sub(20) * 2 / 5).clamp(11, 60);
         let bytes = pad(&cut_bytes(&bytes_text(frame.framing, &frame.bytes), bytes_room), bytes_room);
@@ -282,11 +261,9 @@ impl Ring {
 /// Without what the columns before it say: `read holding 41001–41003 (0x03E8, 3)`.
 fn short(summary: &str) -> String {
     let rest = summary.strip_prefix("unit ").and_then(|rest| rest.split_once(' ')).map_or(summary, |(_, rest)| rest);
-    rest.replacen(t!("holding registers"), t!("holding"), 1).replacen(t!("input registers"), t!("input"), 1).replacen(
-        t!(" registers:"),
-        ":",
-        1,
-    )
+    let words =
+        [(t!("holding registers"), t!("holding")), (t!("input registers"), t!("input")), (t!(" registers:"), ":")];
+    words.into_iter().fold(rest.to_owned(), |text, (long, short)| text.replacen(long, short, 1))
 }
 
 /// The bytes as they are written: hex, or the characters of an ASCII frame.
@@ -305,7 +282,7 @@ fn cut_bytes(text: &str, room: u16) -> String {
 /// How wide hex bytes are, for windows that break them into rows.
 pub fn broken(text: &str, room: u16) -> Vec<String> {
     if text.contains(' ') || width(text) <= room {
-        return crate::ui::widgets::text::wrap(text, room);
+        return wrap(text, room);
     }
     let letters: Vec<char> = text.chars().collect();
     letters.chunks(usize::from(room.max(1))).map(|part| part.iter().collect()).collect()

@@ -6,7 +6,7 @@ use worries::worries;
 
 use super::{
     Place,
-    rows::{self, Flow, Row, bar, number, plain, words},
+    rows::{self, Row, bar, flow, number, plain, words},
     state_text,
 };
 use crate::ui::tabs::prelude::*;
@@ -62,61 +62,53 @@ fn lines(cx: &ViewContext, at: &Place) -> Vec<Row> {
 /// `! what is wrong`, over as many rows as it needs.
 fn sentence(cx: &ViewContext, words: &str, width: u16) -> Vec<Row> {
     let lines = wrap(words, width.saturating_sub(5)).into_iter().enumerate();
-    lines
-        .map(|(n, line)| plain(if n == 0 { format!("! {line}") } else { format!("  {line}") }, cx.theme.trouble()))
-        .collect()
+    lines.map(|(n, line)| plain(format!("{} {line}", if n == 0 { "!" } else { " " }), cx.theme.trouble())).collect()
 }
 
 fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let (theme, line) = (cx.theme, at.settings);
-    let mut flow = Flow::new(t!("settings"), theme.dim(), width);
-    flow.add(plain(line.transport.to_string(), theme.strong()));
-    flow.add(value(cx, t!("timeout"), &ms(line.timeout)));
+    let mut parts =
+        vec![plain(line.transport.to_string(), theme.strong()), value(cx, t!("timeout"), &ms(line.timeout))];
     if let Some(serial) = line.transport.serial() {
-        flow.add(value(cx, t!("silence"), &ms(serial.silence().max(line.gap))));
-        flow.add(value(cx, t!("end of answer"), &ms(line.idle)));
+        parts.push(value(cx, t!("silence"), &ms(serial.silence().max(line.gap))));
+        parts.push(value(cx, t!("end of answer"), &ms(line.idle)));
     }
     let lamp = |on: bool| if on { theme.pick("●", "@") } else { theme.pick("○", "o") };
     let counters = &at.status.counters;
-    let recent = |at: Option<jiff::Timestamp>| {
+    let recent = |at: Option<Timestamp>| {
         at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
     };
     let (tx, rx) = (recent(counters.last_tx), recent(counters.last_rx));
     let deaf = tx && !rx;
-    let lamps = t!(
-        "TX {lamp} RX {lamp2}{value}",
-        lamp = lamp(tx),
-        lamp2 = lamp(rx),
-        value = if deaf { t!(" nothing comes back") } else { "" }
-    );
-    flow.add(plain(lamps, if deaf { theme.trouble() } else { theme.normal() }));
-    flow.rows()
+    let nothing = if deaf { t!(" nothing comes back") } else { "" };
+    let lamps = t!("TX {lamp} RX {lamp2}{value}", lamp = lamp(tx), lamp2 = lamp(rx), value = nothing);
+    parts.push(plain(lamps, if deaf { theme.trouble() } else { theme.normal() }));
+    flow(t!("settings"), theme.dim(), width, parts)
 }
 
 fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     let (theme, counters) = (cx.theme, &report.counters);
     let (now, minute) = (f64::from(counters.utilisation), f64::from(counters.utilisation_minute));
-    let mut flow = Flow::new(t!("load"), theme.dim(), width);
-    let style = if now < 0.9 { theme.normal() } else { theme.trouble() };
-    let mark = if now < 0.9 { "" } else { "! " };
-    flow.add(vec![
+    let (style, mark) = if now < 0.9 { (theme.normal(), "") } else { (theme.trouble(), "! ") };
+    let part = vec![
         (format!("{mark}{:>3.0} % ", now * 100.0), style),
         (bar(cx, now, 12), style),
         (t!(" {minute} % of the last minute ", minute = format!("{:>3.0}", minute * 100.0)), theme.normal()),
         (spark::shares(&report.busy, usize::from(width.saturating_sub(60)).min(60), theme.glyphs), theme.dim()),
-    ]);
-    flow.rows()
+    ];
+    flow(t!("load"), theme.dim(), width, [part])
 }
 
 fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
-    let mut flow = Flow::new(t!("cycle"), cx.theme.dim(), width);
     let plan = Planned::of(report);
-    flow.add(value(cx, t!("blocks"), &plan.blocks.to_string()));
     let measured = plan.measured.map_or(t!("not yet").to_owned(), ms);
-    flow.add(value(cx, t!("worst-case scan time"), &t!("{ms}, measured {measured}", ms = ms(plan.round), measured)));
-    flow.add(value(cx, t!("load at worst"), &format!("{:.0} %", plan.load * 100.0)));
-    flow.add(count(cx, t!("missed"), report.counters.missed, missed_lately(report)));
-    flow.rows()
+    let parts = [
+        value(cx, t!("blocks"), &plan.blocks.to_string()),
+        value(cx, t!("worst-case scan time"), &t!("{ms}, measured {measured}", ms = ms(plan.round), measured)),
+        value(cx, t!("load at worst"), &format!("{:.0} %", plan.load * 100.0)),
+        count(cx, t!("missed"), report.counters.missed, missed_lately(report)),
+    ];
+    flow(t!("cycle"), cx.theme.dim(), width, parts)
 }
 
 /// What the periodic reads take.
@@ -150,46 +142,40 @@ fn missed_lately(report: &LineReport) -> bool {
 }
 
 fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
-    let (theme, counters) = (cx.theme, &report.counters);
+    let (dim, counters) = (cx.theme.dim(), &report.counters);
     let sum = DeviceStats::of(report);
-    let ill = sum.lately;
-    let mut flow = Flow::new(t!("requests"), theme.dim(), width);
-    flow.add(plain(grouped(counters.requests), theme.normal()));
-    flow.add(value(cx, t!("ok"), &grouped(counters.ok)));
-    flow.add(count(cx, t!("no answer"), counters.timeouts, ill));
-    flow.add(count(cx, t!("corrupt"), counters.corrupt, ill));
-    for (name, kind) in [(t!("check"), sum.check), (t!("length"), sum.length), (t!("not ours"), sum.foreign)] {
-        if 0 < kind {
-            flow.add(count(cx, name, kind, ill));
-        }
-    }
-    flow.add(count(cx, t!("refused"), counters.exceptions, ill));
+    let count = |name: &str, times| count(cx, name, times, sum.lately);
+    let mut parts = vec![
+        plain(grouped(counters.requests), cx.theme.normal()),
+        value(cx, t!("ok"), &grouped(counters.ok)),
+        count(t!("no answer"), counters.timeouts),
+        count(t!("corrupt"), counters.corrupt),
+    ];
+    let kinds = [(t!("check"), sum.check), (t!("length"), sum.length), (t!("not ours"), sum.foreign)];
+    parts.extend(kinds.into_iter().filter(|(_, times)| 0 < *times).map(|(name, times)| count(name, times)));
+    parts.push(count(t!("refused"), counters.exceptions));
     for (code, times) in &sum.exceptions {
-        flow.add(count(cx, &format!("{:02X} {}", code.0, translate(code.label())), *times, ill));
+        parts.push(count(&format!("{:02X} {}", code.0, translate(code.label())), *times));
     }
-    flow.add(value(cx, t!("retries"), &grouped(sum.retries)));
-    flow.add(count(cx, t!("late"), counters.late, ill));
-    flow.add(count(cx, t!("stale"), counters.stale, ill));
-    let mut rows = flow.rows();
-    let mut flow = Flow::new(t!("traffic"), theme.dim(), width);
-    flow.add(value(cx, t!("bytes out"), &grouped(counters.sent_bytes)));
-    flow.add(value(cx, t!("in"), &grouped(counters.received_bytes)));
-    flow.add(value(cx, t!("frames"), &grouped(counters.frames)));
+    parts.push(value(cx, t!("retries"), &grouped(sum.retries)));
+    parts.extend([count(t!("late"), counters.late), count(t!("stale"), counters.stale)]);
+    let mut rows = flow(t!("requests"), dim, width, parts);
     let lost = at.status.state != LineState::Connected;
-    flow.add(count(cx, t!("reconnects"), counters.opens.saturating_sub(1), lost));
-    rows.extend(flow.rows());
+    let parts = [
+        value(cx, t!("bytes out"), &grouped(counters.sent_bytes)),
+        value(cx, t!("in"), &grouped(counters.received_bytes)),
+        value(cx, t!("frames"), &grouped(counters.frames)),
+        self::count(cx, t!("reconnects"), counters.opens.saturating_sub(1), lost),
+    ];
+    rows.extend(flow(t!("traffic"), dim, width, parts));
     if let Some(uart) = counters.uart {
-        let mut flow = Flow::new(t!("port"), theme.dim(), width);
         let kinds = [
             (t!("parity"), uart.parity),
             (t!("framing"), uart.framing),
             (t!("overrun"), uart.overrun),
             (t!("break"), uart.breaks),
         ];
-        for (name, times) in kinds {
-            flow.add(count(cx, name, u64::from(times), ill));
-        }
-        rows.extend(flow.rows());
+        rows.extend(flow(t!("port"), dim, width, kinds.map(|(name, times)| count(name, u64::from(times)))));
     }
     rows
 }
@@ -280,20 +266,14 @@ fn state(cx: &ViewContext, device: &DeviceDef) -> String {
         DeviceState::Answering => t!("answering").to_owned(),
         DeviceState::Failing(times) => t!("failing {times}×", times),
         DeviceState::Down { since } => {
-            t!(
-                "DOWN {running}{retry_text}",
-                running = running(between(since, cx.now)),
-                retry_text = retry_text(cx, device.id)
-            )
+            let (running, retry_text) = (running(between(since, cx.now)), retry_text(cx, device.id));
+            t!("DOWN {running}{retry_text}", running, retry_text)
         }
     }
 }
 
 fn is_ill(cx: &ViewContext, device: &DeviceDef) -> bool {
-    match cx.snapshot.device(device.id).state {
-        DeviceState::Failing(_) | DeviceState::Down { .. } => true,
-        DeviceState::Unknown | DeviceState::Answering => false,
-    }
+    matches!(cx.snapshot.device(device.id).state, DeviceState::Failing(_) | DeviceState::Down { .. })
 }
 
 /// The longest usual reply, if it comes near the timeout.

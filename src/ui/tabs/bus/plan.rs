@@ -42,7 +42,7 @@ impl Plan {
     pub fn open(&self, at: &Place) -> Option<UiAction> {
         let poll = at.report?.polls.get(self.selected)?;
         let shown = Shown::Block { line: at.id, device: poll.device, table: poll.table, address: poll.address };
-        Some(UiAction::Open(Modal::Bus(Box::new(Window::Text(TextWindow::new(shown))))))
+        Some(Window::Text(TextWindow::new(shown)).open())
     }
 
     /// Why the values of the selected block are what they are, beginning with one that is not good.
@@ -60,12 +60,8 @@ impl Plan {
         };
         let (width, height) = (canvas.width(), canvas.height());
         let (summary, over) = summary(report);
-        canvas.text(
-            1,
-            0,
-            &fit_words(&summary, width.saturating_sub(14)),
-            if over { theme.trouble() } else { theme.normal() },
-        );
+        let style = if over { theme.trouble() } else { theme.normal() };
+        canvas.text(1, 0, &fit_words(&summary, width.saturating_sub(14)), style);
         let lines: Vec<_> = report.polls.iter().map(|poll| cells(cx, poll)).collect();
         let (heading, lines) = rows::table(&COLUMNS, &lines, width.saturating_sub(2));
         canvas.text(1, 1, &heading, theme.dim());

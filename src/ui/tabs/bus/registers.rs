@@ -55,8 +55,7 @@ impl Registers {
                     Place::of(cx, self.line).ok_or_else(String::new).and_then(|at| test::start(&at, self.diagnostic()));
                 match started {
                     Ok(act) => {
-                        let stay = UiAction::Open(Modal::Bus(Box::new(Window::Registers(self))));
-                        return Next::Do(vec![act, stay]);
+                        return Next::Do(vec![act, Window::Registers(self).open()]);
                     }
                     Err(why) => self.problem = Some(why),
                 }
@@ -80,11 +79,8 @@ impl Registers {
                     words.extend(found.iter().enumerate().map(|(n, word)| (address.wrapping_add(to_u16(n)), *word)));
                 }
                 Finding::Failed { fault: why, .. } => fault = Some(*why),
-                Finding::Exchange(_)
-                | Finding::Bytes { .. }
-                | Finding::Unit { .. }
-                | Finding::Object { .. }
-                | Finding::Verdict(_) => {}
+                // A read finds nothing else.
+                _ => {}
             }
         }
         let at = crate::ui::widgets::text::clock(run.started, &cx.def().time_zone);
@@ -143,12 +139,8 @@ impl Registers {
         let keys = t!("↑↓ move   r read again   Esc close");
         let x = canvas.text(0, height.saturating_sub(1), keys, theme.strong());
         if too_low {
-            canvas.text(
-                x + 2,
-                height.saturating_sub(1),
-                &fit_words(t!("enlarge for more"), width.saturating_sub(x + 2)),
-                theme.dim(),
-            );
+            let more = fit_words(t!("enlarge for more"), width.saturating_sub(x + 2));
+            canvas.text(x + 2, height.saturating_sub(1), &more, theme.dim());
         }
     }
 
@@ -180,12 +172,8 @@ impl Registers {
             return;
         };
         let (from, to) = (self.table.modicon(first), self.table.modicon(second));
-        canvas.text(
-            0,
-            1,
-            &t!("  {text} unsigned 32    signed 32  float", text = format!("{:18}", format!("{from}+{to}"))),
-            theme.dim(),
-        );
+        let text = format!("{:18}", format!("{from}+{to}"));
+        canvas.text(0, 1, &t!("  {text} unsigned 32    signed 32  float", text), theme.dim());
         for (y, (name, order)) in ORDERS.into_iter().enumerate() {
             canvas.text(0, to_u16(y) + 2, &format!("  {name:18} {}", pair_text([*a, *b], order)), theme.normal());
         }

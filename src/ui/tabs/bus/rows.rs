@@ -40,40 +40,25 @@ pub fn last_first(count: usize, height: usize) -> usize {
     if count <= height { 0 } else { count - height.saturating_sub(1) }
 }
 
-/// Words that flow into rows of a width, never broken inside.
-pub struct Flow {
-    rows: Vec<Row>,
-    at: u16,
-    width: u16,
-    indent: u16,
-}
+/// Columns of the label of a flow.
+const LABEL: u16 = 10;
 
-impl Flow {
-    /// Rows of this width that begin with a label.
-    pub fn new(label: &str, style: Style, width: u16) -> Flow {
-        let indent = 10;
-        Flow { rows: vec![plain(pad(label, indent), style)], at: indent, width: width.saturating_sub(2), indent }
-    }
-
-    /// Adds words that stay together.
-    pub fn add(&mut self, parts: Row) -> &mut Flow {
-        let long: u16 = parts.iter().map(|(text, _)| width(text)).sum();
-        if self.width < self.at + long && self.indent < self.at {
-            self.rows.push(plain(" ".repeat(usize::from(self.indent)), Style::new()));
-            self.at = self.indent;
+/// Words that flow into rows of this width behind a label; those of one part stay together.
+pub fn flow(label: &str, style: Style, room: u16, parts: impl IntoIterator<Item = Row>) -> Vec<Row> {
+    let (mut rows, mut at) = (vec![plain(pad(label, LABEL), style)], LABEL);
+    for part in parts {
+        let long: u16 = part.iter().map(|(text, _)| width(text)).sum();
+        if room.saturating_sub(2) < at + long && LABEL < at {
+            rows.push(plain(pad("", LABEL), Style::new()));
+            at = LABEL;
         }
-        if let Some(row) = self.rows.last_mut() {
-            row.extend(parts);
+        if let Some(row) = rows.last_mut() {
+            row.extend(part);
             row.push(("   ".to_owned(), Style::new()));
         }
-        self.at += long + 3;
-        self
+        at += long + 3;
     }
-
-    /// The rows.
-    pub fn rows(self) -> Vec<Row> {
-        self.rows
-    }
+    rows
 }
 
 /// A column of a table.
@@ -143,12 +128,11 @@ mod tests {
 
     #[test]
     fn words_flow_into_the_next_row_whole() {
-        let mut flow = Flow::new("bytes", Style::new(), 33);
-        for text in ["sent 1 200", "received 48 000", "x"] {
-            flow.add(plain(text, Style::new()));
-        }
-        let rows: Vec<String> =
-            flow.rows().iter().map(|row| row.iter().map(|(text, _)| text.as_str()).collect::<String>()).collect();
+        let parts = ["sent 1 200", "received 48 000", "x"].map(|text| plain(text, Style::new()));
+        let rows: Vec<String> = flow("bytes", Style::new(), 33, parts)
+            .iter()
+            .map(|row| row.iter().map(|(text, _)| text.as_str()).collect::<String>())
+            .collect();
         assert_eq!(rows, ["bytes     sent 1 200   ", "          received 48 000   x   "]);
     }
 

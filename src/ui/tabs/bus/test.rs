@@ -7,7 +7,7 @@ pub use send::Send;
 
 use super::{
     Place, Window,
-    frames::broken,
+    frames::{broken, bytes_text},
     registers::Registers,
     request::Form,
     results,
@@ -106,9 +106,9 @@ impl Bench {
             }
         };
         // What is sent as it was typed may be a write.
-        let diagnostic = match tried {
-            Tried::Bytes | Tried::Request => Diagnostic::Send(Vec::new()),
-            Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => Diagnostic::Identify { unit: 1 },
+        let diagnostic = match matches!(tried, Tried::Bytes | Tried::Request) {
+            true => Diagnostic::Send(Vec::new()),
+            false => Diagnostic::Identify { unit: 1 },
         };
         vec![Notice::or(cx, t!("test"), &CommandKind::Test(at.id, diagnostic), Modal::Bus(Box::new(window)))]
     }
@@ -182,14 +182,9 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
     }
     let query = danger(at, &diagnostic);
     let command = CommandKind::Test(at.id, diagnostic);
-    Ok(match query {
-        Some(words) => UiAction::Open(Modal::Confirm(Confirm::command(
-            t!("test of {name}", name = at.settings.name),
-            words,
-            command,
-        ))),
-        None => UiAction::Command(command),
-    })
+    let Some(words) = query else { return Ok(UiAction::Command(command)) };
+    let title = t!("test of {name}", name = at.settings.name);
+    Ok(UiAction::Open(Modal::Confirm(Confirm::command(title, words, command))))
 }
 
 /// What must be asked before a test; `None` for one that only reads.
@@ -238,9 +233,8 @@ fn only_reads(message: &[u8]) -> bool {
 }
 
 /// The last test once more.
-pub fn again(_cx: &ViewContext, at: &Place) -> Vec<UiAction> {
-    let Some(run) = &at.status.test else { return Vec::new() };
-    start(at, run.diagnostic.clone()).into_iter().collect()
+pub fn again(at: &Place) -> Vec<UiAction> {
+    at.status.test.iter().filter_map(|run| start(at, run.diagnostic.clone()).ok()).collect()
 }
 
 /// Stops the test at work.
@@ -250,5 +244,5 @@ pub fn stop(at: &Place) -> Vec<UiAction> {
 
 /// The window of the registers that were read.
 pub fn registers(line: LineId, diagnostic: &Diagnostic) -> Option<UiAction> {
-    Registers::new(line, diagnostic).map(|window| UiAction::Open(Modal::Bus(Box::new(Window::Registers(window)))))
+    Registers::new(line, diagnostic).map(|registers| Window::Registers(registers).open())
 }

@@ -40,10 +40,7 @@ pub enum Window {
 impl Window {
     /// Is it only something to read?
     pub fn only_shows(&self) -> bool {
-        match self {
-            Window::Text(_) => true,
-            Window::Send(_) | Window::Form(_) | Window::Registers(_) => false,
-        }
+        matches!(self, Window::Text(_))
     }
 
     /// A key.
@@ -61,6 +58,11 @@ impl Window {
         Next::Stay(Modal::Bus(Box::new(self)))
     }
 
+    /// Opens it.
+    pub fn open(self) -> UiAction {
+        UiAction::Open(Modal::Bus(Box::new(self)))
+    }
+
     /// Pasted text goes into the entry.
     pub fn on_paste(&mut self, text: &str) {
         match self {
@@ -73,22 +75,14 @@ impl Window {
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
+        let close = hint(t!("Esc"), t!("close"));
         match self {
-            Window::Text(_) => vec![hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))],
-            Window::Send(_) => {
-                vec![hint("⏎", t!("send")), hint(t!("Tab"), t!("check on or off")), hint(t!("Esc"), t!("close"))]
-            }
+            Window::Text(_) => vec![hint("↑↓", t!("scroll")), close],
+            Window::Send(_) => vec![hint("⏎", t!("send")), hint(t!("Tab"), t!("check on or off")), close],
             Window::Form(_) => {
-                vec![
-                    hint("↑↓", t!("field")),
-                    hint("←→", t!("choose")),
-                    hint("⏎", t!("start")),
-                    hint(t!("Esc"), t!("close")),
-                ]
+                vec![hint("↑↓", t!("field")), hint("←→", t!("choose")), hint("⏎", t!("start")), close]
             }
-            Window::Registers(_) => {
-                vec![hint("↑↓", t!("move")), hint("r", t!("read again")), hint(t!("Esc"), t!("close"))]
-            }
+            Window::Registers(_) => vec![hint("↑↓", t!("move")), hint("r", t!("read again")), close],
         }
     }
 
@@ -161,14 +155,11 @@ impl TextWindow {
                 let dissection = dissect::in_traffic(frame, before.iter());
                 (t!("frame {number} on {line}", number = frame.number, line), frame_rows(cx, frame, &dissection, room))
             }
-            Shown::Block { line, device, table, address } => (
-                t!(
-                    "tags of {name} from {modicon}",
-                    name = cx.def().device(*device).name,
-                    modicon = table.modicon(*address)
-                ),
-                { block_rows(cx, *line, *device, *table, *address) },
-            ),
+            Shown::Block { line, device, table, address } => {
+                let (name, modicon) = (&cx.def().device(*device).name, table.modicon(*address));
+                let rows = block_rows(cx, *line, *device, *table, *address);
+                (t!("tags of {name} from {modicon}", name, modicon), rows)
+            }
         };
         let wide = rows.iter().map(|row| row.iter().map(|(text, _)| width(text)).sum::<u16>()).max().unwrap_or(0);
         let mut canvas = window(cx, screen, body, &title, (wide.min(room).max(40) + 1, to_u16(rows.len())));

@@ -31,16 +31,11 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             let first = reports.scroll.first(lines.len(), usize::from(rows));
             let mut part = canvas.part(0, 2, columns, rows);
             let area = part.area();
-            let (head, body) = (heading(cx, columns), lines.iter().skip(first).take(rows.into()));
-            for (y, line) in body.enumerate() {
-                part.buffer().set_line(area.x, area.y + to_u16(y), line, area.width);
+            for (y, _, line) in on_screen(&lines, first, usize::from(rows)) {
+                part.buffer().set_line(area.x, area.y + y, line, area.width);
             }
             let hidden = lines.len().saturating_sub(first + usize::from(rows));
-            let mut row = canvas.part(0, 1, columns, 1);
-            let area = row.area();
-            if !area.is_empty() {
-                row.buffer().set_line(area.x, area.y, &head, area.width);
-            }
+            canvas.text(0, 1, &heading(columns), cx.theme.dim());
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         None => {
@@ -97,11 +92,8 @@ fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden
         }
         Export::Failed(why) => (t!("not written: {why}", why), theme.trouble()),
     };
-    let more = if hidden > 0 {
-        t!("   {pick} {hidden} more", pick = theme.pick("↓", t!("down")), hidden)
-    } else {
-        String::new()
-    };
+    let more = t!("   {pick} {hidden} more", pick = theme.pick("↓", t!("down")), hidden);
+    let more = if hidden > 0 { more } else { String::new() };
     // The path matters most: the format is told in full where there is room.
     let kinds = [
         t!("CSV: {separator}, {decimal}{bom}{more}", separator, decimal, bom, more),
@@ -121,15 +113,14 @@ fn widths(width: u16) -> (u16, u16) {
     (15 + wide / 4, 9 + wide / 10)
 }
 
-fn heading(cx: &ViewContext, width: u16) -> Line<'static> {
+fn heading(width: u16) -> String {
     let (tag, figure) = widths(width);
     let mut text = format!("  {}{}", pad(t!("tag"), tag), pad(t!("unit"), 7));
-    for (name, more) in
-        [(t!("min"), 0), (t!("mean/+"), 0), (t!("max"), 0), (t!("last"), 0), (t!("in alarm"), 1), (t!("good"), 0)]
-    {
+    let names = [t!("min"), t!("mean/+"), t!("max"), t!("last"), t!("in alarm"), t!("good")];
+    for (name, more) in names.into_iter().zip([0, 0, 0, 0, 1, 0]) {
         text.push_str(&pad_left(name, figure + more));
     }
-    Line::from(Span::styled(text, cx.theme.dim()))
+    text
 }
 
 /// Everything below the heading: figures, counts, alarms, actions.
@@ -138,47 +129,34 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
     if report.tags.iter().all(|tag| tag.good == 0.0) {
         let words = t!("  no data: no good value was recorded in this period");
-        lines.push(Line::from(Span::styled(words, theme.trouble())));
+        lines.push(Line::styled(words, theme.trouble()));
     }
     lines.extend(report.tags.iter().map(|tag| figures(cx, tag)));
     lines.push(Line::default());
     lines.push(counts(cx, report));
-    if let Some(entry) = report.audit {
-        // The CSV has the whole hash.
-        let words = fit(&t!("  audit log: entry {entry}", entry), cx.area.width);
-        lines.push(Line::from(Span::styled(words, theme.dim())));
-    }
+    // The CSV has the whole hash.
+    let audit = report.audit.map(|entry| fit(&t!("  audit log: entry {entry}", entry), cx.area.width));
+    lines.extend(audit.map(|words| Line::styled(words, theme.dim())));
     for gap in &report.unreadable {
         let time = |at: Timestamp| local(at, &cx.def().time_zone, "%m-%d %H:%M");
         let words = t!("  not readable, not counted: {time} to {time2}", time = time(gap.from), time2 = time(gap.to));
-        lines.push(Line::from(Span::styled(words, theme.trouble())));
+        lines.push(Line::styled(words, theme.trouble()));
     }
     if let Some((of, _)) = &report.record_of {
         let words = t!("  record of {of}: {count} rows in the CSV", of, count = report.record.len());
-        lines.push(Line::from(Span::styled(words, theme.normal())));
+        lines.push(Line::styled(words, theme.normal()));
     }
     // The name of a shift tells its day; only a longer period needs the date in every line.
     let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
     let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
     let time = |at: Timestamp| format!("  {}  ", local(at, &cx.def().time_zone, form));
-    let more = |n: usize| Line::from(Span::styled(t!("  and {n} more in the CSV", n), theme.dim()));
-    if !report.suppressed.is_empty() {
-        lines.push(section(cx, t!("suppressed alarms")));
-        lines.extend(report.suppressed.iter().take(LIST_MAX).map(|alarm| suppressed_line(cx, alarm)));
-        lines.extend(report.suppressed.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
-    }
-    let annunciated = |alarm: &&AlarmRecord| !alarm.event.is_suppressed();
-    let alarms: Vec<&AlarmRecord> = report.alarms.iter().filter(annunciated).collect();
-    if !alarms.is_empty() {
-        lines.push(section(cx, t!("alarms")));
-        lines.extend(alarms.iter().take(LIST_MAX).map(|alarm| alarm_line(cx, alarm, time(alarm.at))));
-        lines.extend(alarms.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
-    }
-    if !report.actions.is_empty() {
-        lines.push(section(cx, t!("operator actions")));
-        lines.extend(report.actions.iter().take(LIST_MAX).map(|action| action_line(cx, action, time(action.at))));
-        lines.extend(report.actions.len().checked_sub(LIST_MAX).filter(|n| *n > 0).map(more));
-    }
+    let annunciated: Vec<_> = report.alarms.iter().filter(|alarm| !alarm.event.is_suppressed()).collect();
+    let suppressed = report.suppressed.iter().map(|alarm| suppressed_line(cx, alarm));
+    let alarms = annunciated.into_iter().map(|alarm| alarm_line(cx, alarm, time(alarm.at)));
+    let actions = report.actions.iter().map(|action| action_line(cx, action, time(action.at)));
+    lines.extend(section(cx, t!("suppressed alarms"), suppressed));
+    lines.extend(section(cx, t!("alarms"), alarms));
+    lines.extend(section(cx, t!("operator actions"), actions));
     lines
 }
 
@@ -226,28 +204,32 @@ fn counts(cx: &ViewContext, report: &ShiftReport) -> Line<'static> {
         text.push_str(&t!("   most {subject} {pick}{n}", subject, pick = cx.theme.pick("×", "x"), n));
     }
     text.push_str(&t!("   operator actions {count}", count = report.actions.len()));
-    Line::from(Span::styled(text, cx.theme.normal()))
+    Line::styled(text, cx.theme.normal())
 }
 
-fn section(cx: &ViewContext, title: &str) -> Line<'static> {
+/// A heading and its lines, at most [`LIST_MAX`] of them; nothing where there is none.
+fn section<'a>(cx: &ViewContext, title: &str, rows: impl ExactSizeIterator<Item = Line<'a>>) -> Vec<Line<'a>> {
     let rule = cx.theme.pick("─", "-");
     let rest = usize::from(cx.area.width).saturating_sub(title.len() + 5);
-    Line::from(Span::styled(format!(" {rule} {title} {}", rule.repeat(rest)), cx.theme.dim()))
+    let heading = Line::styled(format!(" {rule} {title} {}", rule.repeat(rest)), cx.theme.dim());
+    let more = rows.len().saturating_sub(LIST_MAX);
+    let mut lines: Vec<Line> = rows.take(LIST_MAX).collect();
+    if !lines.is_empty() {
+        lines.insert(0, heading);
+    }
+    if 0 < more {
+        lines.push(Line::styled(t!("  and {n} more in the CSV", n = more), cx.theme.dim()));
+    }
+    lines
 }
 
 /// An alarm that was active without being annunciated, and for how long.
 fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static> {
-    let (theme, room) = (cx.theme, cx.area.width.saturating_sub(46));
+    let (theme, room) = (cx.theme, cx.area.width.saturating_sub(46).clamp(12, 41));
+    let active = t!("active {long}, raised {raised}", long = long(alarm.active), raised = alarm.raised);
     Line::from(vec![
         Span::styled(format!("  {}", theme.priority_mark(alarm.priority)), theme.dim()),
-        Span::styled(
-            format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.message, room.clamp(12, 41))),
-            theme.normal(),
-        ),
-        Span::styled(
-            t!("active {long}, raised {raised}", long = long(alarm.active), raised = alarm.raised),
-            theme.normal(),
-        ),
+        Span::styled(format!(" {} {} {active}", pad(&alarm.subject, 12), pad(&alarm.message, room)), theme.normal()),
     ])
 }
 
@@ -259,21 +241,20 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
         None => format!("{value}"),
     };
     let active = alarm.event == AlarmEvent::Raised;
-    let style: Style = if active { theme.normal() } else { theme.dim() };
+    let style = if active { theme.normal() } else { theme.dim() };
     let detail = match (&alarm.by, alarm.value) {
         (Some(by), _) => t!("by {by}", by),
         (None, Some(number)) => pad_left(value(number).trim(), 10),
         (None, None) => String::new(),
     };
     let text = 21 + (cx.area.width.saturating_sub(68 + width(&time)) / 2).min(20);
+    let words =
+        draw::columns([12, text.cast_signed(), 13], [&alarm.subject, &alarm.message, translate(alarm.event.word())]);
+    let mark = if active { theme.severity(alarm.priority) } else { theme.dim() };
     Line::from(vec![
         Span::styled(time, theme.dim()),
-        Span::styled(
-            theme.priority_mark(alarm.priority),
-            if active { theme.severity(alarm.priority) } else { theme.dim() },
-        ),
-        Span::styled(format!(" {} {} ", pad(&alarm.subject, 12), pad(&alarm.message, text)), style),
-        Span::styled(format!("{} {detail}", pad(translate(alarm.event.word()), 13)), style),
+        Span::styled(theme.priority_mark(alarm.priority), mark),
+        Span::styled(format!(" {words} {detail}"), style),
     ])
 }
 

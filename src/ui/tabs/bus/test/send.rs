@@ -33,10 +33,7 @@ impl Send {
             match self.send(cx) {
                 Ok(UiAction::Command(kind)) => {
                     bench.first = None;
-                    return Next::Do(vec![
-                        UiAction::Command(kind),
-                        UiAction::Open(Modal::Bus(Box::new(Window::Send(self)))),
-                    ]);
+                    return Next::Do(vec![UiAction::Command(kind), Window::Send(self).open()]);
                 }
                 Ok(act) => return Next::Do(vec![act]),
                 Err(problem) => self.problem = Some(problem),
@@ -103,12 +100,8 @@ impl Send {
         let problem = self.problem.clone().or_else(|| closed(&at));
         let room = height.saturating_sub(2 + u16::from(problem.is_some()));
         if usize::from(room) < rows.len() {
-            canvas.text_right(
-                width,
-                0,
-                &t!(" {count} more lines: enlarge", count = rows.len() - usize::from(room)),
-                theme.strong(),
-            );
+            let more = t!(" {count} more lines: enlarge", count = rows.len() - usize::from(room));
+            canvas.text_right(width, 0, &more, theme.strong());
         }
         for (y, row) in rows.iter().take(usize::from(room)).enumerate() {
             let mut x = 0;
@@ -140,15 +133,9 @@ impl Ready {
             rows.extend(wrap(&format!("! {error}"), width).into_iter().map(|line| plain(line, theme.trouble())));
         }
         if rows.len() < 4 {
-            let bytes = broken(
-                &t!(
-                    "sent as {bytes_text}",
-                    bytes_text =
-                        super::super::frames::bytes_text(self.dissection.framing.unwrap_or(Framing::Rtu), &self.frame)
-                ),
-                width,
-            );
-            rows.extend(bytes.into_iter().map(|line| plain(line, theme.dim())));
+            let framing = self.dissection.framing.unwrap_or(Framing::Rtu);
+            let sent = t!("sent as {bytes_text}", bytes_text = bytes_text(framing, &self.frame));
+            rows.extend(broken(&sent, width).into_iter().map(|line| plain(line, theme.dim())));
         }
         rows
     }
