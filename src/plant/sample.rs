@@ -10,7 +10,7 @@ use super::keyword::keyword_enum;
 /// Quality of a value, as in OPC UA. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Quality {
-    /// Read in time, in shape and in range.
+    /// Read in time and complete; the device says nothing against it.
     Good,
     /// The last known value, shown with its age: it may no longer be so.
     Uncertain(Cause),
@@ -41,8 +41,7 @@ keyword_enum! {
         SensorFault = 8 => "sensor fault",
         /// A value that this one needs (decimals, unit, range) is not known.
         Unscaled = 9 => "scale not known",
-        /// Outside the range that the device can report.
-        OutOfRange = 10 => "out of range",
+        // 10 was never stored.
         /// The station was not running.
         StationOff = 11 => "station was off",
         /// There is a value, but no user who may see it is logged in here. Never stored.

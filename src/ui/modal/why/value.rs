@@ -103,7 +103,7 @@ fn because(
         },
         // The verdict on the last answer says it all.
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown => None,
-        Cause::NotRead | Cause::OutOfRange | Cause::StationOff | Cause::NotAuthorised | Cause::Unreadable => None,
+        Cause::NotRead | Cause::StationOff | Cause::NotAuthorised | Cause::Unreadable => None,
     }
 }
 
@@ -133,7 +133,6 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
             Poll::Every(_) | Poll::Once => None,
             Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),
         },
-        Cause::OutOfRange => Some(t!("compare the value with the range of the device").to_owned()),
         Cause::NotAuthorised => Some(t!("log in: tab 0").to_owned()),
         Cause::StationOff | Cause::Unreadable => None,
     }
