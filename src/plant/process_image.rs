@@ -12,7 +12,7 @@ use super::{
     scale,
     tag::{Bound, Decimals, Poll, TagDef},
 };
-use crate::plant::number::{to_i64, to_u8};
+use crate::plant::number::to_i64;
 
 /// A value is uncertain after so many poll periods without an answer, and bad after [`PERIODS_BAD`].
 pub const PERIODS_UNCERTAIN: u32 = 3;
@@ -21,8 +21,6 @@ pub const PERIODS_BAD: u32 = 10;
 /// An unchanged good value is stored again after this time, so that a silent stretch in the history means "no data".
 pub const STORE_EVERY: Duration = Duration::from_secs(60);
 
-/// More decimals than any device announces.
-const DECIMALS_MAX: f64 = 6.0;
 /// A value that is never polled becomes uncertain after this time.
 const NEVER_READ_AGAIN: Duration = Duration::from_secs(60);
 
@@ -198,12 +196,7 @@ impl ProcessImage {
     pub fn scaling_decimals(&self, tag: &TagDef) -> Option<u8> {
         match tag.decimals {
             Decimals::Fixed(_) => Some(0),
-            Decimals::From(from) => {
-                // A register that holds anything else would scale every value to nothing.
-                let known =
-                    self.sample(from).good_value().filter(|n| n.fract() == 0.0 && (0.0..=DECIMALS_MAX).contains(n));
-                known.map(to_u8)
-            }
+            Decimals::From(from) => self.sample(from).good_value().and_then(Decimals::announced),
         }
     }
 

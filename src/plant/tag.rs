@@ -8,6 +8,7 @@ pub use super::data_type::{DataType, Encoding};
 use super::{
     id::{DeviceId, TagId},
     keyword::keyword_enum,
+    number::to_u8,
     role::Reauthentication,
     sample::Sample,
     simulate::Simulate,
@@ -271,6 +272,16 @@ pub enum Decimals {
     Fixed(u8),
     /// Another tag says how many decimals the raw number has: it scales by 10^-n and shows n.
     From(TagId),
+}
+
+impl Decimals {
+    /// Most decimals that a value can have.
+    pub const MAX: u8 = 6;
+
+    /// What a register announces, if it holds a number of decimals: any other would scale every value to nothing.
+    pub(crate) fn announced(value: f64) -> Option<u8> {
+        (value.fract() == 0.0 && (0.0..=f64::from(Decimals::MAX)).contains(&value)).then(|| to_u8(value))
+    }
 }
 
 /// A bound of a value.

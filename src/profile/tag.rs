@@ -246,8 +246,10 @@ pub(super) fn field_of(field: &At<Choice>, point: Point, problems: &mut Problems
 /// Decimals to show if the row does not say: as many as the scale has, two for floats.
 fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
     if let Some(decimals) = row.decimals {
-        if decimals.value > 6 {
-            problems.add(decimals.at, format!("{} decimals are too many", decimals.value)).label("expected 0 to 6");
+        if decimals.value > Decimals::MAX {
+            problems
+                .add(decimals.at, format!("{} decimals are too many", decimals.value))
+                .label(format!("expected 0 to {}", Decimals::MAX));
         }
         return decimals.value;
     }

@@ -13,7 +13,6 @@ use super::{
 };
 use crate::plant::{
     def::TagId,
-    number::to_u8,
     record::{AlarmEvent, AlarmRecord},
     sample::Sample,
     tag::{Decimals, TagDef},
@@ -41,10 +40,9 @@ impl Label {
     pub fn at(def: &TagDef, latest: &HashMap<TagId, f64>) -> Label {
         let decimals = match def.decimals {
             Decimals::Fixed(decimals) => decimals,
-            Decimals::From(tag) => match latest.get(&tag) {
-                Some(decimals) if (0.0..=9.0).contains(decimals) => to_u8(*decimals),
-                Some(_) | None => DECIMALS_UNKNOWN,
-            },
+            Decimals::From(tag) => {
+                latest.get(&tag).and_then(|value| Decimals::announced(*value)).unwrap_or(DECIMALS_UNKNOWN)
+            }
         };
         let chosen = def.unit_from.as_ref().and_then(|(chooser, units)| {
             let value = latest.get(chooser)?;

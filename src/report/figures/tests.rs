@@ -8,7 +8,7 @@ use super::*;
 use crate::{
     plant::{def::Priority, sample::Cause},
     report::step_series::AsOf,
-    report::testing::{at, sec, zone},
+    report::testing::{at, sec, tag, zone},
 };
 
 fn figures(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> TagFigures {
@@ -45,6 +45,14 @@ fn the_figures_count_good_time_only() {
 
 fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
     AlarmRecord::new(sec(at), "TIC-1.PV", text, Priority::High, step)
+}
+
+#[test]
+fn a_report_takes_the_decimals_that_the_screen_takes() {
+    let pv = TagDef { decimals: Decimals::From(TagId(9)), ..tag(0, "PV") };
+    for (announced, expect) in [(2.0, 2), (6.0, 6), (7.0, DECIMALS_UNKNOWN), (1.5, DECIMALS_UNKNOWN)] {
+        assert_eq!(Label::at(&pv, &HashMap::from([(TagId(9), announced)])).decimals, expect, "{announced}");
+    }
 }
 
 #[test]
