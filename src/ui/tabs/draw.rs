@@ -1,6 +1,7 @@
 //! What several tabs draw and open alike.
 
 use super::prelude::*;
+use crate::plant::record::ActionRecord;
 
 /// Opens a window, if there is one.
 pub fn open(window: impl Into<Option<Modal>>) -> Vec<UiAction> {
@@ -22,13 +23,30 @@ pub fn row_style(cx: &ViewContext, selected: bool, trouble: bool) -> Style {
     }
 }
 
-/// Texts in columns with a blank between them; a negative width fills from the left.
+/// Texts in columns with a blank between them. A negative width fills from the left, a column without width is left out.
 pub fn columns<const N: usize>(widths: [i16; N], cells: [&str; N]) -> String {
     let cell = |(text, width): (&str, i16)| match width {
-        ..0 => pad_left(text, width.unsigned_abs()),
-        0.. => pad(text, width.unsigned_abs()),
+        0 => None,
+        ..0 => Some(pad_left(text, width.unsigned_abs())),
+        1.. => Some(pad(text, width.unsigned_abs())),
     };
-    cells.into_iter().zip(widths).map(cell).collect::<Vec<_>>().join(" ")
+    cells.into_iter().zip(widths).filter_map(cell).collect::<Vec<_>>().join(" ")
+}
+
+/// `60.0 °C → 70.0 °C`: what an operator action has changed.
+pub fn change(cx: &ViewContext, action: &ActionRecord) -> String {
+    let arrow = cx.theme.pick("→", "->");
+    match (&action.old, &action.new) {
+        (Some(old), Some(new)) => format!("{old} {arrow} {new}"),
+        (None, Some(new)) => format!("{arrow} {new}"),
+        (Some(old), None) => old.to_string(),
+        (None, None) => String::new(),
+    }
+}
+
+/// A local time in this form of `strftime`.
+pub fn local(cx: &ViewContext, at: Timestamp, form: &str) -> String {
+    at.to_zoned(cx.def().time_zone.clone()).strftime(form).to_string()
 }
 
 /// Draws lines from the scrolled one on; returns how many more there are below.

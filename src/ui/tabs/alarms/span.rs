@@ -32,7 +32,7 @@ pub fn ask(
 
 /// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.
 pub fn words(cx: &ViewContext, shown: &Period) -> String {
-    let local = |at: Timestamp| at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M").to_string();
+    let local = |at| draw::local(cx, at, "%H:%M");
     match shown.name.contains(':') {
         true => shown.name.clone(),
         false => format!("{} {}–{}", shown.name, local(shown.from), local(shown.to)),

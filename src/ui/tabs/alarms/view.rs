@@ -33,17 +33,14 @@ pub(super) fn draw(tab: &Alarms, cx: &ViewContext, frame: &mut Frame, area: Rect
 /// for it.
 fn history_trouble(cx: &ViewContext, canvas: &mut Canvas) -> u16 {
     let rows = trouble_rows(cx, canvas.width(), canvas.height());
-    for (y, line) in rows.iter().enumerate() {
-        canvas.text(1, to_u16(y), line, cx.theme.trouble());
-    }
+    draw::lines(canvas, &rows, Scroll::default());
     to_u16(rows.len())
 }
 
-fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<String> {
-    let Some(trouble) = history_text(cx) else { return Vec::new() };
-    let mut lines = wrap(&trouble, width.saturating_sub(2));
-    lines.truncate(usize::from(height / 3).max(1));
-    lines
+fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<(String, Style)> {
+    let lines = history_text(cx).map(|trouble| wrap(&trouble, width.saturating_sub(2))).unwrap_or_default();
+    let lines = lines.into_iter().take(usize::from(height / 3).max(1));
+    lines.map(|line| (line, cx.theme.trouble())).collect()
 }
 
 /// Rows of a list on a tab of this size.
@@ -108,12 +105,8 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let first = first(place, rows.len(), room);
     filter_line(tab, cx, (&rows, all, first, room), canvas);
     let columns = Columns::of(&rows[first.min(rows.len())..], cx, room, width);
-    canvas.text(
-        1,
-        1,
-        &columns.row(["", "", t!("time"), t!("tag"), t!("what"), t!("value"), t!("state"), t!("for"), t!("by")]),
-        theme.dim(),
-    );
+    let names = ["", "", t!("time"), t!("tag"), t!("what"), t!("value"), t!("state"), t!("for"), t!("by")];
+    canvas.text(1, 1, &columns.row(names), theme.dim());
     if rows.is_empty() {
         let words = match all {
             0 if tab.page == Page::System => t!("No system alarm is active. j shows what was."),
@@ -163,12 +156,8 @@ fn filter_line(
     };
     let mut words = Vec::new();
     if !tab.filter.is_off() {
-        words.push(t!(
-            "FILTER {describe}: {shown} of {all} shown, Esc shows all",
-            describe = tab.filter.describe(),
-            shown,
-            all
-        ));
+        let describe = tab.filter.describe();
+        words.push(t!("FILTER {describe}: {shown} of {all} shown, Esc shows all", describe, shown, all));
     }
     if folded > 0 {
         words.push(t!("{folded} folded, space unfolds", folded));
@@ -201,11 +190,8 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let room = usize::from(height.saturating_sub(1 + guide)).max(1);
     let first = first(place, all.len(), room);
     for (y, n, suppressed) in on_screen(all, first, room) {
-        let style = match (n == place, suppressed.active) {
-            (true, _) => theme.focus(),
-            (false, true) => theme.strong(),
-            (false, false) => theme.normal(),
-        };
+        let style = if suppressed.active { theme.strong() } else { theme.normal() };
+        let style = if n == place { theme.focus() } else { style };
         let text = format!("{} {}", theme.state_mark(suppressed.state), suppressed_words(cx, suppressed));
         canvas.text(1, y + 1, &fit_words(&text, width.saturating_sub(2)), style);
     }
@@ -238,17 +224,9 @@ impl Columns {
         Columns { tag, what: free.saturating_sub(tag + 1).min(48), by }
     }
     fn row(&self, [mark, state_mark, time, tag, what, value, state, since, by]: [&str; 9]) -> String {
-        let (tag, what) = (pad(tag, self.tag), pad(what, self.what));
-        let row = format!(
-            "{}{} {} {tag} {what} {} {} {}",
-            pad(mark, 4),
-            pad(state_mark, 1),
-            pad(time, 9),
-            pad_left(value, 10),
-            pad(state, 8),
-            pad_left(since, 8)
-        );
-        if self.by > 0 { format!("{row} {}", pad(by, self.by)) } else { row }
+        let widths = [1, 9, self.tag.cast_signed(), self.what.cast_signed(), -10, 8, -8, self.by.cast_signed()];
+        let row = draw::columns(widths, [state_mark, time, tag, what, value, state, since, by]);
+        format!("{}{row}", pad(mark, 4))
     }
 }
 

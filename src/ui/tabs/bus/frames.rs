@@ -130,7 +130,7 @@ impl Ring {
             self.saved.push(Err(t!("there is no frame to save").to_owned()));
             return Vec::new();
         }
-        let stamp = cx.now.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d-%H%M%S").to_string();
+        let stamp = draw::local(cx, cx.now, "%Y-%m-%d-%H%M%S");
         let name = |end: &str| cx.def().report.folder.join(format!("{}-{stamp}.{end}", at.settings.name));
         let outgoing = |path, bytes| Outgoing { tab: Tab::Bus, path, bytes };
         let text = outgoing(name("txt"), capture::text(&frames).into_bytes());
@@ -232,8 +232,7 @@ impl Ring {
     fn row(&self, cx: &ViewContext, frame: &Frame, selected: bool, canvas: &mut Canvas) {
         let theme = cx.theme;
         let wide = 100 <= canvas.width();
-        let time = frame.at.to_zoned(cx.def().time_zone.clone());
-        let time = time.strftime(if wide { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
+        let time = draw::local(cx, frame.at, if wide { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
         let dissection = dissect::in_traffic(frame, self.before(frame.number));
         let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
         let refused = !frame.sent && dissection.message.get(1).is_some_and(|code| 0x80 <= *code);

@@ -1,4 +1,4 @@
-//! Tests by their fields: a request, a loopback, an identification, a scan, registers. What is typed is told at once.
+//! Tests by their fields: a request, a loopback, an identification, a scan, registers. What is typed is checked at once.
 
 mod fields;
 
@@ -55,11 +55,7 @@ enum Input {
 }
 
 /// A form that makes sense: the test, and what it does in words.
-#[derive(Debug)]
-struct Built {
-    diagnostic: Diagnostic,
-    told: Vec<String>,
-}
+type Built = (Diagnostic, Vec<String>);
 
 /// Functions that the form offers.
 const FUNCTIONS: [u8; 8] = [3, 4, 1, 2, 6, 5, 16, 15];
@@ -75,21 +71,14 @@ impl Form {
         let choice = |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0) };
         let unit = text(t!("unit"), &unit.to_string());
         let fields = match tried {
-            Tried::Bytes | Tried::Request => vec![
-                unit,
-                choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec()),
-                text(t!("address"), "40001"),
-                text(t!("count"), "1"),
-            ],
-            Tried::Registers => vec![
-                unit,
-                choice(
-                    t!("table"),
-                    TABLES.map(|table| names::function(table.read_fc()).unwrap_or_default().to_owned()).to_vec(),
-                ),
-                text(t!("address"), "40001"),
-                text(t!("count"), "16"),
-            ],
+            Tried::Bytes | Tried::Request => {
+                let function = choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec());
+                vec![unit, function, text(t!("address"), "40001"), text(t!("count"), "1")]
+            }
+            Tried::Registers => {
+                let tables = TABLES.map(|table| names::function(table.read_fc()).unwrap_or_default().to_owned());
+                vec![unit, choice(t!("table"), tables.to_vec()), text(t!("address"), "40001"), text(t!("count"), "16")]
+            }
             Tried::Loopback => vec![unit, text(t!("times"), "10")],
             Tried::Identify => vec![unit],
             Tried::Scan => {
@@ -97,12 +86,8 @@ impl Form {
                 if at.settings.transport.serial().is_some() {
                     settings.push(t!("all baud rates and parities; polling pauses").to_owned());
                 }
-                vec![
-                    text(t!("from unit"), "1"),
-                    text(t!("to unit"), "247"),
-                    choice(t!("settings"), settings),
-                    text(t!("wait ms"), "200"),
-                ]
+                let units = [text(t!("from unit"), "1"), text(t!("to unit"), "247")];
+                units.into_iter().chain([choice(t!("settings"), settings), text(t!("wait ms"), "200")]).collect()
             }
         };
         Form { line: at.id, tried, fields, at: 0, problem: None }
@@ -117,13 +102,13 @@ impl Form {
     pub fn on_key(mut self, cx: &ViewContext, bench: &mut Bench, event: KeyEvent) -> Next {
         let last = self.fields.len() - 1;
         if keys::code(KeyCode::Enter).is(event) {
-            match self.start(cx) {
+            self.problem = match self.start(cx) {
                 Ok(acts) => {
                     (bench.form, bench.first) = (Some(self), None);
                     return Next::Do(acts);
                 }
-                Err(problem) => self.problem = Some(problem),
-            }
+                Err(problem) => Some(problem),
+            };
             return Window::Form(self).stay();
         }
         self.problem = None;
@@ -170,7 +155,7 @@ impl Form {
         if self.fields.iter().any(missed) {
             return Err(t!("the text was cut; Ctrl-U clears a field").to_owned());
         }
-        let diagnostic = self.build(at.settings)?.diagnostic;
+        let diagnostic = self.build(at.settings)?.0;
         let mut acts = vec![test::start(&at, diagnostic.clone())?];
         if self.tried == Tried::Registers {
             acts.extend(test::registers(self.line, &diagnostic));
@@ -198,33 +183,31 @@ impl Form {
         // Unit 0 of a serial line is everybody: it can be written to, and answers nothing.
         let least = if framing == Framing::Mbap || self.tried == Tried::Request { 0 } else { 1 };
         let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(to_u8);
-        match self.tried {
+        Ok(match self.tried {
             Tried::Bytes | Tried::Request => {
                 let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
-                let told = request_text(&message, framing)?;
-                Ok(Built { diagnostic: Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), told })
+                let words = request_text(&message, framing)?;
+                (Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), words)
             }
             Tried::Registers => {
                 let (unit, table) = (unit(0)?, TABLES[self.chosen(1)]);
                 let address = address(&self.text(2), table)?;
                 let count = to_u16(number(&self.text(3), t!("count"), 1..=if table.is_bits() { 2_000 } else { 125 })?);
-                let told = request_text(&read(unit, table, address, count), framing)?;
-                Ok(Built { diagnostic: Diagnostic::Read { unit, table, address, count }, told })
+                let words = request_text(&read(unit, table, address, count), framing)?;
+                (Diagnostic::Read { unit, table, address, count }, words)
             }
             Tried::Loopback => {
                 let (unit, count) = (unit(0)?, to_u16(number(&self.text(1), t!("times"), 1..=1_000)?));
-                let told =
-                    vec![t!("sends a word to unit {unit} and waits for the same word, {count} times", unit, count)];
-                Ok(Built { diagnostic: Diagnostic::Loopback { unit, data: 0xA537, count }, told })
+                let words = t!("sends a word to unit {unit} and waits for the same word, {count} times", unit, count);
+                (Diagnostic::Loopback { unit, data: 0xA537, count }, vec![words])
             }
             Tried::Identify => {
                 let unit = unit(0)?;
-                let told =
-                    vec![t!("asks unit {unit} for its maker, product and version; else for its server id", unit)];
-                Ok(Built { diagnostic: Diagnostic::Identify { unit }, told })
+                let words = t!("asks unit {unit} for its maker, product and version; else for its server id", unit);
+                (Diagnostic::Identify { unit }, vec![words])
             }
-            Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?),
-        }
+            Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?)?,
+        })
     }
 
     fn build_scan(&self, line: &LineDef, first: u8, last: u8) -> Result<Built, String> {
@@ -235,13 +218,13 @@ impl Form {
         let serials = if self.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
         let (units, settings) = (u32::from(last - first) + 1, to_u32(serials.len().max(1)));
         let longest = ms(timeout * units * settings);
-        let told = vec![t!(
+        let words = t!(
             "{units} units, {settings} settings: about {longest}, if no unit answers. Any answer counts, also an exception.",
             units,
             settings,
             longest
-        )];
-        Ok(Built { diagnostic: Diagnostic::Scan(Scan { first, last, serials, timeout }), told })
+        );
+        Ok((Diagnostic::Scan(Scan { first, last, serials, timeout }), vec![words]))
     }
 
     /// Draws it.
@@ -249,26 +232,18 @@ impl Form {
         let Some(at) = Place::of(cx, self.line) else { return };
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);
-        let mut told = match self.build(at.settings) {
-            Ok(built) => {
-                built.told.iter().flat_map(|words| wrap(words, room)).map(|line| (line, theme.normal())).collect()
-            }
-            Err(why) => {
-                wrap(&format!("! {why}"), room).into_iter().map(|line| (line, theme.trouble())).collect::<Vec<_>>()
-            }
+        let wrapped = |words: &str, style| wrap(words, room).into_iter().map(move |line| (line, style));
+        let mut notes: Vec<(String, Style)> = match self.build(at.settings) {
+            Ok((_, words)) => words.iter().flat_map(|words| wrapped(words, theme.normal())).collect(),
+            Err(why) => wrapped(&format!("! {why}"), theme.trouble()).collect(),
         };
         let problem = self.problem.clone().or_else(|| test::closed(&at));
-        let problem = problem.filter(|why| !told.iter().any(|(line, _)| line.ends_with(why.as_str())));
-        told.extend(
-            problem
-                .map(|why| wrap(&format!("! {why}"), room))
-                .into_iter()
-                .flatten()
-                .map(|line| (line, theme.trouble())),
-        );
+        if let Some(why) = problem.filter(|why| !notes.iter().any(|(line, _)| line.ends_with(why.as_str()))) {
+            notes.extend(wrapped(&format!("! {why}"), theme.trouble()));
+        }
         let rows = to_u16(self.fields.len());
-        let mut canvas = window(cx, screen, body, self.title(), (room, rows + to_u16(told.len()) + 3));
-        // On a small screen the chosen field is always seen, and what is told below is cut with a word.
+        let mut canvas = window(cx, screen, body, self.title(), (room, rows + to_u16(notes.len()) + 3));
+        // On a small screen the chosen field is always seen, and the notes below are cut with a word.
         let last = canvas.height().saturating_sub(1);
         let shown = rows.min(last).max(1);
         let first = (self.at + 1).saturating_sub(usize::from(shown));
@@ -291,12 +266,11 @@ impl Form {
             }
         }
         let room = usize::from(last.saturating_sub(shown + 1));
-        let cut = room < told.len();
-        for (n, (line, style)) in told.iter().take(room).enumerate() {
-            canvas.text(0, shown + 1 + to_u16(n), line, *style);
+        for (y, _, (line, style)) in on_screen(&notes, 0, room) {
+            canvas.text(0, shown + 1 + y, line, *style);
         }
-        if cut {
-            let more = t!(" {count} more lines: enlarge the screen", count = told.len() - room);
+        if room < notes.len() {
+            let more = t!(" {count} more lines: enlarge the screen", count = notes.len() - room);
             canvas.text_right(canvas.width(), last.saturating_sub(1), &more, theme.strong());
         }
         let keys = theme.enter(t!("↑↓ field   ←→ choose   ⏎ start   Esc close"));
@@ -326,9 +300,9 @@ fn request_text(message: &[u8], framing: Framing) -> Result<Vec<String>, String>
     if let Some(error) = request_lint::check_request(message, framing).first() {
         return Err(error.to_string());
     }
-    let told =
-        dissect::dissect(&frame::wrap(framing, TRANSACTION, message), Some(framing), Some(Direction::Request), None);
-    Ok(vec![told.summary, hex(message)])
+    let whole = frame::wrap(framing, TRANSACTION, message);
+    let dissection = dissect::dissect(&whole, Some(framing), Some(Direction::Request), None);
+    Ok(vec![dissection.summary, hex(message)])
 }
 
 /// Unit and PDU of a request.

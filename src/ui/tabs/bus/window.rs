@@ -170,7 +170,7 @@ impl TextWindow {
 /// Every byte of a frame with its name and meaning.
 fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
     let theme = cx.theme;
-    let at = frame.at.to_zoned(cx.def().time_zone.clone()).strftime("%H:%M:%S%.6f");
+    let at = draw::local(cx, frame.at, "%H:%M:%S%.6f");
     let direction = if frame.sent { t!("TX sent") } else { t!("RX received") };
     let count = frame.bytes.len();
     let mut rows = vec![plain(t!("{at}  {direction}, {count} bytes", at, direction, count), theme.normal())];

@@ -144,7 +144,7 @@ pub fn replace_text(cx: &ViewContext, there: &StoredSet) -> String {
     let name = &there.name;
     match &there.set {
         Ok(set) => {
-            let saved = set.saved.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M");
+            let saved = draw::local(cx, set.saved, "%Y-%m-%d %H:%M");
             let (device, profile, by) = (&set.device, &set.profile, &set.by);
             t!(
                 "There is a set {name} already: of {device}, profile {profile}, saved {saved} by {by}. Replace it?",

@@ -55,9 +55,9 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     let running = reports.is_running(cx.now);
     let until = reports.report.value.as_ref().map_or(cx.now, |report| report.until);
     let state = match (running, &reports.report.value) {
-        (true, _) => t!("RUNNING, until now {local}", local = local(until, zone, "%H:%M:%S")),
+        (true, _) => t!("RUNNING, until now {local}", local = draw::local(cx, until, "%H:%M:%S")),
         (false, Some(report)) if report.until < report.period.to => {
-            t!("figures until {local} only", local = local(until, zone, "%H:%M:%S"))
+            t!("figures until {local} only", local = draw::local(cx, until, "%H:%M:%S"))
         }
         (false, _) => t!("closed").to_owned(),
     };
@@ -138,7 +138,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
     let audit = report.audit.map(|entry| fit(&t!("  audit log: entry {entry}", entry), cx.area.width));
     lines.extend(audit.map(|words| Line::styled(words, theme.dim())));
     for gap in &report.unreadable {
-        let time = |at: Timestamp| local(at, &cx.def().time_zone, "%m-%d %H:%M");
+        let time = |at: Timestamp| draw::local(cx, at, "%m-%d %H:%M");
         let words = t!("  not readable, not counted: {time} to {time2}", time = time(gap.from), time2 = time(gap.to));
         lines.push(Line::styled(words, theme.trouble()));
     }
@@ -149,7 +149,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
     // The name of a shift tells its day; only a longer period needs the date in every line.
     let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
     let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
-    let time = |at: Timestamp| format!("  {}  ", local(at, &cx.def().time_zone, form));
+    let time = |at: Timestamp| format!("  {}  ", draw::local(cx, at, form));
     let annunciated: Vec<_> = report.alarms.iter().filter(|alarm| !alarm.event.is_suppressed()).collect();
     let suppressed = report.suppressed.iter().map(|alarm| suppressed_line(cx, alarm));
     let alarms = annunciated.into_iter().map(|alarm| alarm_line(cx, alarm, time(alarm.at)));
@@ -260,19 +260,10 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
 
 /// One operator action; where it is too long, its outcome is kept.
 fn action_line(cx: &ViewContext, action: &ActionRecord, time: String) -> Line<'static> {
-    let arrow = cx.theme.pick("→", "->");
-    let change = match (&action.old, &action.new) {
-        (Some(old), Some(new)) => format!("{old} {arrow} {new}"),
-        (None, Some(new)) => format!("{arrow} {new}"),
-        (Some(old), None) => old.to_string(),
-        (None, None) => String::new(),
-    };
     let room = cx.area.width.saturating_sub(width(&time) + 1);
     let outcome = fit(&action.outcome, room / 2);
-    let text = fit(
-        &format!("{} {} {} {change}", pad(&action.by, 8), action.action, action.target),
-        room.saturating_sub(width(&outcome) + 2),
-    );
+    let text = format!("{} {} {} {}", pad(&action.by, 8), action.action, action.target, draw::change(cx, action));
+    let text = fit(&text, room.saturating_sub(width(&outcome) + 2));
     Line::from(vec![
         Span::styled(time, cx.theme.dim()),
         Span::styled(text, cx.theme.normal()),
@@ -295,10 +286,6 @@ fn span(period: &Period, zone: &TimeZone) -> String {
     // Where the clocks change in between, both ends tell their offset.
     let first = if from.offset() == to.offset() { String::new() } else { format!(" {}", offset(&from)) };
     format!("{start}{first} – {} {}", to.strftime(form), offset(&to))
-}
-
-fn local(at: Timestamp, zone: &TimeZone, form: &str) -> String {
-    at.to_zoned(zone.clone()).strftime(form).to_string()
 }
 
 /// Hours, minutes, seconds: `00:00:41`.

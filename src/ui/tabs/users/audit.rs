@@ -160,7 +160,9 @@ impl Audit {
             Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
             None => canvas.text(x, 0, &fit(&self.summary(), room), theme.normal()),
         };
-        canvas.text(1, 1, &self.heading(columns), theme.dim());
+        let names = [t!("no"), t!("time"), t!("who"), t!("from"), t!("action"), t!("target")];
+        let names = draw::columns(widths(columns), names);
+        canvas.text(1, 1, &format!("{names} {}", t!("old → new, outcome")), theme.dim());
         if self.rows().is_empty() {
             let words =
                 if self.rows.value.is_some() { t!("Nothing of this is on record.") } else { t!("collecting data") };
@@ -186,19 +188,6 @@ impl Audit {
         };
         [Some(time), Some(count)].into_iter().chain(parts).flatten().collect::<Vec<_>>().join("   ")
     }
-
-    fn heading(&self, columns: u16) -> String {
-        let from = if from_width(columns) > 0 { pad(t!("from"), from_width(columns)) } else { String::new() };
-        t!(
-            "{pad_left} {pad}{pad2}{from}{pad3}{pad4}old → new, outcome",
-            pad_left = pad_left(t!("no"), 5),
-            pad = pad(t!("time"), 10),
-            pad2 = pad(t!("who"), 10),
-            from,
-            pad3 = pad(t!("action"), 12),
-            pad4 = pad(t!("target"), 12)
-        )
-    }
 }
 
 /// Rows of the list on a tab of this height.
@@ -206,33 +195,19 @@ fn rows_on(height: u16) -> usize {
     usize::from(height.saturating_sub(2)).max(1)
 }
 
-/// Columns for where it was done from; none on a narrow screen, where the window of the entry tells it.
-fn from_width(columns: u16) -> u16 {
-    if columns >= 110 { 22 } else { 0 }
+/// Widths of the columns; none for where it was done from on a narrow screen, where the window of the entry shows it.
+fn widths(columns: u16) -> [i16; 6] {
+    [-5, 9, 9, if columns >= 110 { 21 } else { 0 }, 11, 11]
 }
 
 /// An entry in one row; where it is too long, its outcome is kept.
 fn row(cx: &ViewContext, entry: &ActionRecord, columns: u16) -> String {
-    let cell = |text: &str, columns: u16| pad(&fit(text, columns - 1), columns);
     let number = entry.chain_hash.map_or("–".to_owned(), |chain_hash| chain_hash.number.to_string());
     let at = moment(entry.at, cx.now, &cx.def().time_zone);
-    let from = from_width(columns);
-    let head = format!(
-        " {} {}{}{}{}{}",
-        pad_left(&number, 5),
-        pad(&at, 10),
-        cell(&entry.by, 10),
-        if from > 0 { cell(&entry.from, from) } else { String::new() },
-        cell(&entry.action, 12),
-        cell(&entry.target, 12),
-    );
-    let arrow = cx.theme.pick("→", "->");
-    let change = match (&entry.old, &entry.new) {
-        (Some(old), Some(new)) => format!("{old} {arrow} {new}  "),
-        (None, Some(new)) => format!("{arrow} {new}  "),
-        (Some(old), None) => format!("{old}  "),
-        (None, None) => String::new(),
-    };
+    let cells = [&number, &at, &*entry.by, &entry.from, &entry.action, &entry.target];
+    let head = format!(" {} ", draw::columns(widths(columns), cells));
+    let change = draw::change(cx, entry);
+    let change = if change.is_empty() { change } else { format!("{change}  ") };
     let room = columns.saturating_sub(width(&head) + 1);
     let note = entry.note.as_ref().map_or(String::new(), |note| format!("  {note}"));
     let outcome = fit(&format!("{}{note}", entry.outcome), room.saturating_sub(width(&change)).max(room / 2));

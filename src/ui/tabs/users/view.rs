@@ -26,7 +26,7 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
     );
     let rows = usize::from(canvas.height().saturating_sub(1)).max(1);
     for (y, n, row) in on_screen(all, first(place, all.len(), rows), rows) {
-        let last = row.last_login.map_or(t!("never").to_owned(), |at| date(cx, at));
+        let last = row.last_login.map_or(t!("never").to_owned(), |at| draw::local(cx, at, "%Y-%m-%d %H:%M"));
         let mark = if n == place { theme.pick("▸", ">") } else { " " };
         let text = format!(
             "{mark}{}{}{}{last}",
@@ -71,8 +71,4 @@ fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
     if all.len() > shown {
         canvas.text(1, to_u16(rows), &t!("… and {count} more", count = all.len() - shown), theme.dim());
     }
-}
-
-fn date(cx: &ViewContext, at: Timestamp) -> String {
-    at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M").to_string()
 }
