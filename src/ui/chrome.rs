@@ -193,7 +193,7 @@ pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Sty
         pending.status.as_ref().map_or((&pending.command.kind, None), |status| (&status.command.kind, status.old));
     let what = command_label(cx, kind, old);
     let Some(status) = &pending.status else {
-        return match pending.undelivered {
+        return match &pending.undelivered {
             Some(why) => (t!("{what}  NOT SENT: {why}", what, why), theme.trouble()),
             None => (t!("{what}  sent …", what), theme.normal()),
         };

@@ -229,9 +229,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_answer(cx, id.number, answer)),
         Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
         Msg::Undelivered(id, why) => {
-            if let Some(pending) = model.pending_command.as_mut().filter(|pending| pending.command.id == id) {
-                pending.undelivered = Some(why);
-            }
+            model.note_undelivered(id, why.into());
             Vec::new()
         }
         Msg::Tick { silent } => on_tick(model, silent),

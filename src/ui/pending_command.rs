@@ -1,5 +1,7 @@
 //! The last command of this terminal, from the key to its outcome.
 
+use std::sync::Arc;
+
 use super::{Effect, Model, chrome, modal::Modal};
 use crate::t;
 use crate::{
@@ -19,8 +21,8 @@ pub struct PendingCommand {
     pub status: Option<CommandStatus>,
     /// Tick at which it was given, and at which its outcome last changed.
     pub changed_at: u32,
-    /// Why it never left the terminal.
-    pub undelivered: Option<&'static str>,
+    /// Why it did not reach the plant.
+    pub undelivered: Option<Arc<str>>,
 }
 
 impl PendingCommand {
@@ -48,12 +50,20 @@ impl Model {
     pub(super) fn send_command(&mut self, command: Command, credentials: Option<Credentials>) -> Option<Effect> {
         self.commands_sent = self.commands_sent.wrapping_add(1);
         let id = CommandId { terminal: self.terminal, number: self.commands_sent };
-        let undelivered = self.session.gone.as_ref().map(|_| t!("the station has gone"));
+        let undelivered = self.session.gone.as_ref().map(|_| Arc::from(t!("the station has gone")));
         let changed_at = self.clock.phase;
         let expected_value = command.expected_value.or_else(|| self.snapshot.expected_value(&command.kind));
         let command = Command { id, run: self.snapshot.run, expected_value, ..command };
+        let is_sent = undelivered.is_none();
         self.pending_command = Some(PendingCommand { command: command.clone(), status: None, changed_at, undelivered });
-        undelivered.is_none().then_some(Effect::Command(command, credentials))
+        is_sent.then_some(Effect::Command(command, credentials))
+    }
+
+    /// Notes that the pending command did not reach the plant.
+    pub(super) fn note_undelivered(&mut self, id: CommandId, why: Arc<str>) {
+        if let Some(pending) = self.pending_command.as_mut().filter(|pending| pending.command.id == id) {
+            pending.undelivered = Some(why);
+        }
     }
 
     /// Reads the outcome of the pending command from the new snapshot.
@@ -71,7 +81,7 @@ impl Model {
     /// Ends the wait of a window for the check of its credentials; refused ones are asked for again.
     pub(super) fn close_confirmation(&mut self) {
         let Some(pending) = &self.pending_command else { return };
-        let refused = match (pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
+        let refused = match (&pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
             (Some(why), _) => Some(t!("not sent: {why}", why)),
             (None, Some(Outcome::Refused(Refusal::NotReauthenticated(why)))) => Some(why.clone()),
             (None, Some(_)) => None,

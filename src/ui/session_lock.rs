@@ -62,6 +62,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     let before = mem::replace(&mut model.session, session);
     let (now, phase) = (model.session.clone(), model.clock.phase);
     model.session_lock.status_at = phase;
+    now.undelivered.iter().for_each(|(id, why)| model.note_undelivered(*id, why.clone()));
     match (&before.gone, &now.gone) {
         (None, Some(_)) => {
             model.session_lock.gone_at = Some(phase);

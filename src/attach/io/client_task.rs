@@ -1,6 +1,6 @@
 //! Feeds a session from the socket, and seeks the station again when it goes.
 
-use std::{collections::HashMap, path::PathBuf, sync::Arc, time::Duration};
+use std::{collections::HashMap, mem, path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     net::unix::{OwnedReadHalf, OwnedWriteHalf},
@@ -143,11 +143,13 @@ impl ClientTask {
                 self.assembly.on_snapshot(Arc::unwrap_or_clone(snapshot)).map_err(|error| error.to_string())?;
                 self.show();
             }
-            ServerMessage::SessionStatus(status) => {
-                for (id, why) in &status.undelivered {
+            ServerMessage::SessionStatus(mut status) => {
+                // Under the numbers of this terminal they are among the commands of its snapshots.
+                let undelivered = mem::take(&mut status.undelivered);
+                for (id, why) in &undelivered {
                     self.id_map.undelivered(*id, why.to_string());
                 }
-                if !status.undelivered.is_empty() {
+                if !undelivered.is_empty() {
                     self.show();
                 }
                 self.status_sender.send_replace(Arc::new(*status));

@@ -11,6 +11,7 @@ use jiff::SignedDuration;
 
 use super::{model, screen, sent_kind, type_keys};
 use crate::{
+    access::SessionStatus,
     history::{Answer, HistoryError, Query},
     plant::{
         command::{Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
@@ -315,5 +316,19 @@ fn a_command_that_was_never_sent_is_reported() {
     let effects = type_keys(&mut model, "s60⏎");
     let Some(Effect::Command(Command { id, .. }, _)) = effects.first() else { panic!("{effects:?}") };
     update(&mut model, Msg::Undelivered(*id, "station too busy"));
+    assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
+}
+
+#[test]
+fn a_command_that_the_plant_did_not_take_is_reported() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    let effects = type_keys(&mut model, "s60⏎");
+    let Some(Effect::Command(Command { id, .. }, _)) = effects.first() else { panic!("{effects:?}") };
+    let mut session = SessionStatus::clone(&model.session);
+    session.undelivered = vec![(CommandId { number: id.number + 1, ..*id }, "too many commands".into())];
+    update(&mut model, Msg::SessionStatus(session.clone().into()));
+    assert!(screen(&mut model, 80, 24).contains("sent …"));
+    session.undelivered.push((*id, "station too busy".into()));
+    update(&mut model, Msg::SessionStatus(session.into()));
     assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
 }
