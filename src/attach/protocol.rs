@@ -165,26 +165,9 @@ impl Handshake {
     }
 }
 
-/// A message with its length before it.
+/// A message with its length before it. The first one of either side is a pair: a handshake, and what follows it.
 pub fn encode<T: Serialize>(message: &T, max: usize) -> Result<Vec<u8>, ProtocolError> {
-    let bytes = postcard::to_extend(message, vec![0; LENGTH_BYTES]).expect("our messages are plain data");
-    with_length(bytes, max)
-}
-
-/// The first message of either side: a handshake, and what follows it.
-pub fn encode_first<T: Serialize>(
-    handshake: &Handshake,
-    rest: Option<&T>,
-    max: usize,
-) -> Result<Vec<u8>, ProtocolError> {
-    let mut bytes = postcard::to_extend(handshake, vec![0; LENGTH_BYTES]).expect("our messages are plain data");
-    if let Some(rest) = rest {
-        bytes = postcard::to_extend(rest, bytes).expect("our messages are plain data");
-    }
-    with_length(bytes, max)
-}
-
-fn with_length(mut bytes: Vec<u8>, max: usize) -> Result<Vec<u8>, ProtocolError> {
+    let mut bytes = postcard::to_extend(message, vec![0; LENGTH_BYTES]).expect("our messages are plain data");
     let length = bytes.len() - LENGTH_BYTES;
     if max < length {
         return Err(ProtocolError::TooLong { bytes: length, max });

@@ -36,6 +36,12 @@ pub fn plain(message: &str) -> String {
     }
 }
 
+/// All that is wrong, in one line; `None` if nothing is.
+pub fn joined<'a>(troubles: impl IntoIterator<Item = &'a Option<String>>) -> Option<String> {
+    let troubles: Vec<&str> = troubles.into_iter().flatten().map(String::as_str).collect();
+    (!troubles.is_empty()).then(|| troubles.join("; "))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

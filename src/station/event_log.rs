@@ -93,34 +93,33 @@ fn states_in(snapshot: &Snapshot) -> HashMap<AlarmId, AlarmState> {
 
 /// What has happened to an alarm between two states.
 fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
-    match (old, new) {
-        (_, AlarmState::Unacknowledged) => "RAISED",
-        (_, AlarmState::Acknowledged) => "acknowledged",
-        (_, AlarmState::LatchedUnacknowledged) => "returned to normal, waits for a reset",
-        (AlarmState::LatchedUnacknowledged | AlarmState::ReturnedToNormal, AlarmState::LatchedAcknowledged) => {
+    match new {
+        AlarmState::Unacknowledged => "RAISED",
+        AlarmState::Acknowledged => "acknowledged",
+        AlarmState::LatchedAcknowledged
+            if matches!(old, AlarmState::LatchedUnacknowledged | AlarmState::ReturnedToNormal) =>
+        {
             "acknowledged"
         }
-        (_, AlarmState::LatchedAcknowledged) => "returned to normal, waits for a reset",
-        (_, AlarmState::Shelved) => "shelved",
-        (_, AlarmState::SuppressedByDesign) => "suppressed by design",
-        (_, AlarmState::OutOfService) => "out of service",
-        (AlarmState::ReturnedToNormal, AlarmState::Normal | AlarmState::ReturnedToNormal) => "acknowledged",
-        (
-            AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged,
-            AlarmState::Normal | AlarmState::ReturnedToNormal,
-        ) => "reset",
-        (AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService, AlarmState::Normal) => {
-            "no longer suppressed"
-        }
-        (
+        AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => "returned to normal, waits for a reset",
+        AlarmState::Shelved => "shelved",
+        AlarmState::SuppressedByDesign => "suppressed by design",
+        AlarmState::OutOfService => "out of service",
+        AlarmState::Normal | AlarmState::ReturnedToNormal => match old {
+            AlarmState::ReturnedToNormal => "acknowledged",
+            AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => "reset",
+            AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService
+                if new == AlarmState::Normal =>
+            {
+                "no longer suppressed"
+            }
             AlarmState::Normal
             | AlarmState::Unacknowledged
             | AlarmState::Acknowledged
             | AlarmState::Shelved
             | AlarmState::SuppressedByDesign
-            | AlarmState::OutOfService,
-            AlarmState::Normal | AlarmState::ReturnedToNormal,
-        ) => "returned to normal",
+            | AlarmState::OutOfService => "returned to normal",
+        },
     }
 }
 

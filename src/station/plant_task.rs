@@ -21,7 +21,10 @@ use super::{
 use crate::{
     access::Durability,
     bus::io::clock::Clock,
-    history::io::{open::Restored, thread::offer},
+    history::{
+        io::{open::Restored, thread::offer},
+        words::joined,
+    },
     plant::{
         Effects, Plant, SetWork, Snapshot,
         command::{BusRequest, CommandStatus, WriteJob},
@@ -350,13 +353,12 @@ impl PlantTask {
         let mut status = self.persistence.store.borrow_and_update().clone();
         status.lost += self.lost;
         let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));
-        status.trouble = [status.trouble, lost].into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
+        status.trouble = joined([&status.trouble, &lost]);
         if let Some(audit) = &mut self.persistence.audit {
             let RecorderFaults { lost, log, alarms } = audit.faults();
             status.lost += lost;
             status.audit = audit.last();
-            let parts: Vec<String> = [&status.trouble, &log, &alarms].into_iter().flatten().cloned().collect();
-            status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
+            status.trouble = joined([&status.trouble, &log, &alarms]);
             self.plant.on_fault(StationFault::AuditLog, FaultState::lasting(log));
             self.plant.on_fault(StationFault::AlarmState, FaultState::lasting(alarms));
         }

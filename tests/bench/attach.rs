@@ -84,7 +84,7 @@ async fn viewer(path: &Path) {
 /// Reads whatever comes and says how much that was, each second.
 fn terminal(path: &Path) {
     let mut stream = UnixStream::connect(path).unwrap();
-    let handshake = protocol::encode_first(&Handshake::current(), Some(&Place::default()), HANDSHAKE_BYTES_MAX);
+    let handshake = protocol::encode(&(Handshake::current(), Place::default()), HANDSHAKE_BYTES_MAX);
     stream.write_all(&handshake.unwrap()).unwrap();
     let mut total = 0;
     let mut bytes = vec![0; 1 << 20];

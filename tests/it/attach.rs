@@ -181,7 +181,7 @@ fn of(session: &Session, number: u32) -> Option<Outcome> {
 }
 
 fn handshake() -> Vec<u8> {
-    protocol::encode_first(&Handshake::current(), Some(&Place::default()), HANDSHAKE_BYTES_MAX).unwrap()
+    protocol::encode(&(Handshake::current(), Place::default()), HANDSHAKE_BYTES_MAX).unwrap()
 }
 
 fn asked(asked: &ClientMessage) -> Vec<u8> {

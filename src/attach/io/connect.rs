@@ -89,7 +89,7 @@ pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError
     let no_station = |error| AttachError::NoStation { path: path.to_owned(), error };
     let opened = async {
         let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
-        let hello = protocol::encode_first(&Handshake::current(), Some(place), HANDSHAKE_BYTES_MAX);
+        let hello = protocol::encode(&(Handshake::current(), place), HANDSHAKE_BYTES_MAX);
         wire::write(&mut write, &hello.map_err(WireError::from)?).await?;
         let bytes = wire::read(&mut read, NEWS_BYTES_MAX).await?;
         let welcome = protocol::handshake_reply(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;

@@ -205,7 +205,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
             Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal got no session status"),
         }
         let welcome = HandshakeReply { run, terminal: self.session.terminal, def: self.def.clone() };
-        let welcome = protocol::encode_first(&Handshake::current(), Some(&welcome), NEWS_BYTES_MAX);
+        let welcome = protocol::encode(&(Handshake::current(), welcome), NEWS_BYTES_MAX);
         self.write(&welcome.map_err(WireError::from)?, STUCK_MAX).await?;
         self.send_session_status().await?;
         let mut sent = Arc::new(Snapshot::blank(self.def.clone()));

@@ -372,5 +372,5 @@ async fn hello(read: &mut OwnedReadHalf) -> Result<Place, WireError> {
 }
 
 fn rejection(why: String) -> Vec<u8> {
-    protocol::encode_first(&Handshake::rejected(why), None::<&()>, HANDSHAKE_BYTES_MAX).expect("one line is short")
+    protocol::encode(&Handshake::rejected(why), HANDSHAKE_BYTES_MAX).expect("one line is short")
 }

@@ -28,11 +28,11 @@ fn place() -> Place {
 
 #[test]
 fn a_terminal_says_where_it_is_and_is_told_the_plant() {
-    let hello_bytes = body(encode_first(&Handshake::current(), Some(&place()), HANDSHAKE_BYTES_MAX).unwrap());
+    let hello_bytes = body(encode(&(Handshake::current(), place()), HANDSHAKE_BYTES_MAX).unwrap());
     assert_eq!(client_handshake(&hello_bytes), Ok(place()));
     let def = Fixture::normal().snapshot().def.clone();
     let told = HandshakeReply { run: 7, terminal: 3, def: def.clone() };
-    let bytes = body(encode_first(&Handshake::current(), Some(&told), NEWS_BYTES_MAX).unwrap());
+    let bytes = body(encode(&(Handshake::current(), told), NEWS_BYTES_MAX).unwrap());
     let heard = handshake_reply(&bytes).unwrap().unwrap();
     assert_eq!((heard.run, heard.terminal), (7, 3));
     assert_eq!(encode(&heard.def, usize::MAX), encode(&def, usize::MAX));
@@ -42,7 +42,7 @@ fn a_terminal_says_where_it_is_and_is_told_the_plant() {
 fn different_versions_are_refused_with_what_to_do() {
     let old = Handshake { protocol: PROTOCOL + 1, version: "9.9".into(), ..Handshake::current() };
     // Whatever else that version says is never looked at.
-    let bytes = body(encode_first(&old, Some(&vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
+    let bytes = body(encode(&(old, vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
     let Err(ProtocolError::OtherVersion(why)) = client_handshake(&bytes) else { panic!("taken for one of ours") };
     let expected =
         format!("this terminal is version 9.9 (protocol {}), the station is version {VERSION}", PROTOCOL + 1);
@@ -50,13 +50,12 @@ fn different_versions_are_refused_with_what_to_do() {
     let Err(ProtocolError::OtherVersion(why)) = handshake_reply(&bytes) else { panic!("taken for one of ours") };
     assert!(why.starts_with(&format!("this terminal is version {VERSION}")), "{why}");
     let other_build = Handshake { version: "0.0.1".into(), ..Handshake::current() };
-    let bytes = body(encode_first(&other_build, Some(&place()), HANDSHAKE_BYTES_MAX).unwrap());
+    let bytes = body(encode(&(other_build, place()), HANDSHAKE_BYTES_MAX).unwrap());
     assert!(matches!(client_handshake(&bytes), Err(ProtocolError::OtherVersion(_))));
-    let bytes = body(encode_first(&Handshake::current(), Some(&vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
+    let bytes = body(encode(&(Handshake::current(), vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
     let Err(ProtocolError::OtherVersion(why)) = handshake_reply(&bytes) else { panic!("taken for one of ours") };
     assert!(why.ends_with("restart it"), "{why}");
-    let bytes =
-        body(encode_first(&Handshake::rejected("full, wait\x1b[2J"), None::<&()>, HANDSHAKE_BYTES_MAX).unwrap());
+    let bytes = body(encode(&Handshake::rejected("full, wait\x1b[2J"), HANDSHAKE_BYTES_MAX).unwrap());
     assert_eq!(handshake_reply(&bytes).unwrap().unwrap_err(), "full, wait[2J");
 }
 
@@ -75,7 +74,7 @@ fn the_place_of_a_terminal_is_one_harmless_line() {
     }
     let long = Place { tty: Some("x".repeat(10_000)), ssh: Some("y".repeat(10_000)), term: None };
     assert_eq!(long.words(None, None).chars().count(), 64 + " from ".len() + 64);
-    assert!(encode_first(&Handshake::current(), Some(&long.short()), HANDSHAKE_BYTES_MAX).is_ok());
+    assert!(encode(&(Handshake::current(), long.short()), HANDSHAKE_BYTES_MAX).is_ok());
 }
 
 #[test]

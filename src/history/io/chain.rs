@@ -5,7 +5,7 @@ use duckdb::params;
 use super::store::{Store, engine, utc};
 use crate::{
     history::HistoryError,
-    plant::record::{ChainHash, Record},
+    plant::record::{ActionRecord, ChainHash},
 };
 
 /// Entries that are compared with the audit log at a start: the latest.
@@ -35,17 +35,13 @@ impl Store {
     }
 
     /// Makes room for actions that come with their chain_hashes and were stored without before. Part of a transaction.
-    pub(super) fn remove_unsealed(&self, records: &[Record]) -> duckdb::Result<()> {
-        let mut chained = records.iter().filter_map(|record| match record {
-            Record::Action(action) => action.chain_hash.and(Some(action)),
-            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::ClockSet => None,
-        });
-        let Some(first) = chained.next() else { return Ok(()) };
-        if self.db.query_row(UNCHAINED, [], |row| row.get::<_, u64>(0))? == 0 {
+    pub(super) fn remove_unsealed(&self, actions: &[&ActionRecord]) -> duckdb::Result<()> {
+        let mut chained = actions.iter().filter(|action| action.chain_hash.is_some()).peekable();
+        if chained.peek().is_none() || self.db.query_row(UNCHAINED, [], |row| row.get::<_, u64>(0))? == 0 {
             return Ok(());
         }
         let mut remove = self.db.prepare(REMOVE_UNSEALED)?;
-        for action in std::iter::once(first).chain(chained) {
+        for action in chained {
             let new = action.new.as_deref().unwrap_or_default();
             remove.execute(params![utc(action.at), action.by, action.action, action.target, action.outcome, new])?;
         }

@@ -13,7 +13,10 @@ use super::{
     store::{Store, after, engine},
 };
 use crate::{
-    history::{HistoryError, words::plain},
+    history::{
+        HistoryError,
+        words::{joined, plain},
+    },
     plant::{
         def::PlantDef,
         number::to_u32,
@@ -134,10 +137,7 @@ impl Store {
             }
         })?;
         let missing = missing(&noted, &store.last_commit(), trouble.is_some());
-        trouble = match (trouble, missing) {
-            (Some(one), Some(other)) => Some(format!("{one}; {other}")),
-            (one, other) => one.or(other),
-        };
+        let trouble = joined([&trouble, &missing]);
         store.note_last_commit();
         drop(opening);
         Ok(Opened { store, trouble, read })
@@ -161,9 +161,7 @@ impl Store {
             let words = format!("schema version {version}, this program reads {}", sql::MIGRATIONS.len());
             return Err(HistoryError::Engine(words));
         }
-        let known = store.dictionary().map_err(engine)?;
-        let id = |name: &str, unit: &str| known.get(&(name.to_owned(), unit.to_owned())).copied();
-        store.ids = def.tags.iter().map(|tag| id(&tag.name, &tag.unit)).collect();
+        store.ids = ids(def, &store.dictionary().map_err(engine)?);
         store.read_last_commit().map_err(engine)?;
         store.ended = store.extent().and_then(|(_, last)| after(last));
         Ok(store)
@@ -230,10 +228,14 @@ impl Store {
         }
         appender.flush()?;
         drop(appender);
-        let id = |name: &str, unit: &str| known.get(&(name.to_owned(), unit.to_owned())).copied();
-        self.ids = self.def.tags.iter().map(|tag| id(&tag.name, &tag.unit)).collect();
+        self.ids = ids(&self.def, &known);
         Ok(())
     }
+}
+
+/// The stored number of each tag, by `TagId`.
+fn ids(def: &PlantDef, known: &HashMap<(String, String), u16>) -> Vec<Option<u16>> {
+    def.tags.iter().map(|tag| known.get(&(tag.name.clone(), tag.unit.clone())).copied()).collect()
 }
 
 /// What an error of a read at the start means.

@@ -264,7 +264,7 @@ impl Store {
             to.append_row((utc(at), id, value, quality.code(), epoch))
         })?;
         self.append_rows("alarm_journal", alarms, |to, alarm| append_alarm(to, alarm, epoch))?;
-        self.remove_unsealed(records)?;
+        self.remove_unsealed(&actions)?;
         self.append_rows("operator_action", actions, |to, action| append_action(to, action, epoch))?;
         self.append_rows("line_minute", lines, |to, minute| append_line(to, minute, epoch))
     }

@@ -15,7 +15,7 @@ use super::{
     store::Store,
 };
 use crate::{
-    history::HistoryError,
+    history::{HistoryError, words::joined},
     plant::{def::PlantDef, record::Record, snapshot::HistoryStatus},
 };
 
@@ -35,6 +35,7 @@ const RETRY_SHIFT_MAX: u32 = 3;
 const STORES_MAX: usize = 8;
 
 /// The writing side of a store.
+#[derive(Default)]
 pub struct Writer {
     /// Gone while it is not open: before the first opening, after a fatal error, while another process has it.
     store: Option<Store>,
@@ -72,26 +73,7 @@ pub struct Writer {
 impl Writer {
     /// A writer without a store yet: records wait until one is open.
     pub fn new(path: PathBuf, def: Arc<PlantDef>, started: Timestamp) -> Writer {
-        let mut writer = Writer {
-            store: None,
-            restored: None,
-            reader: None,
-            closed: Weak::new(),
-            path,
-            def,
-            started,
-            pending: Vec::new(),
-            status: HistoryStatus::default(),
-            damaged: None,
-            clock: None,
-            failing: None,
-            unchecked: None,
-            unreadable: None,
-            was_open: false,
-            attempts: 0,
-            wait: 0,
-            commits: 0,
-        };
+        let mut writer = Writer { path, def, started, ..Writer::default() };
         writer.describe();
         writer
     }
@@ -315,14 +297,8 @@ impl Writer {
 
     fn describe(&mut self) {
         let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
-        let damaged: Vec<&str> = [&self.unreadable, &self.damaged].into_iter().flatten().map(String::as_str).collect();
-        let damaged = (!damaged.is_empty()).then(|| damaged.join("; "));
-        let parts: Vec<String> =
-            [self.failing.clone(), self.unchecked.clone(), lost, damaged.clone(), self.clock.clone()]
-                .into_iter()
-                .flatten()
-                .collect();
-        self.status.trouble = (!parts.is_empty()).then(|| parts.join("; "));
+        let damaged = joined([&self.unreadable, &self.damaged]);
+        self.status.trouble = joined([&self.failing, &self.unchecked, &lost, &damaged, &self.clock]);
         self.status.epoch = self.store.as_ref().map_or(self.status.epoch, Store::epoch);
         (self.status.waiting, self.status.waiting_max) = (self.pending.len() as u64, PENDING_MAX as u64);
         self.status.failing.clone_from(&self.failing);
@@ -357,16 +333,7 @@ fn is_of_questions(error: &HistoryError) -> bool {
 }
 
 fn is_fatal(error: &HistoryError) -> bool {
-    match error {
-        HistoryError::Engine(words) => words.contains("FATAL") || words.contains("invalidated"),
-        HistoryError::Locked { .. }
-        | HistoryError::Foreign { .. }
-        | HistoryError::Missing { .. }
-        | HistoryError::TooManyRows { .. }
-        | HistoryError::EmptyPeriod
-        | HistoryError::NotOpen
-        | HistoryError::TooLong { .. } => false,
-    }
+    matches!(error, HistoryError::Engine(words) if words.contains("FATAL") || words.contains("invalidated"))
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ async fn an_old_terminal_is_refused_with_what_to_do() {
     let stand = Stand::start();
     let mut stream = UnixStream::connect(stand.path()).await.unwrap();
     let old = Handshake { protocol: 0, version: "0.0.9".into(), ..Handshake::current() };
-    stream.write_all(&protocol::encode_first(&old, Some(&()), HANDSHAKE_BYTES_MAX).unwrap()).await.unwrap();
+    stream.write_all(&protocol::encode(&(old, ()), HANDSHAKE_BYTES_MAX).unwrap()).await.unwrap();
     let bytes = until_closed(&mut stream).await;
     let why = protocol::handshake_reply(&bytes[LENGTH_BYTES..]).unwrap().unwrap_err();
     assert!(why.contains("0.0.9 (protocol 0)") && why.contains("restart the older one"), "{why}");
