@@ -153,7 +153,7 @@ pub struct Summary {
     /// Rows of the history that have their line here.
     pub compared: u64,
     /// Behind the last line stands the beginning of another one: just being written, or torn by a loss of power. It was
-    /// never confirmed to anybody.
+    /// never confirmed.
     pub torn: bool,
 }
 

@@ -187,17 +187,17 @@ mod tests {
         ) {
             let rules = AccessDef { login_attempts_max, ..AccessDef::default() };
             let (mut attempts, mut now) = (LoginAttempts::default(), 0);
-            let mut looked_at: Vec<(Key, i64)> = Vec::new();
+            let mut checked: Vec<(Key, i64)> = Vec::new();
             for (origin, account, later) in steps {
                 now += later;
                 let key = key(["eve", "mallory"][origin], &account.to_string());
                 if attempts.wait(&key, &rules, at(now)).is_none() {
                     attempts.on_failure(&key, &rules, at(now));
-                    looked_at.push((key, now));
+                    checked.push((key, now));
                 }
             }
-            for (place, (key, from)) in looked_at.iter().enumerate() {
-                let inside = || looked_at[place..].iter().take_while(|(_, t)| *t < from + 300);
+            for (place, (key, from)) in checked.iter().enumerate() {
+                let inside = || checked[place..].iter().take_while(|(_, t)| *t < from + 300);
                 let of_key = inside().filter(|(other, _)| other == key).count();
                 let of_origin = inside().filter(|(other, _)| other.origin == key.origin).count();
                 prop_assert!(of_key <= usize::from(login_attempts_max), "{of_key} attempts in five minutes");

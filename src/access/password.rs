@@ -38,7 +38,7 @@ const COMMON: [&str; 16] = [
     "1234567890",
     "abcdefghijklmnopqrstuvwxyz",
 ];
-/// The hash of nothing that anybody knows: an unknown name costs the same work as a known one.
+/// The hash of an unknown text: an unknown name costs the same work as a known one.
 pub const DUMMY: &str = "$argon2id$v=19$m=19456,t=2,p=1$c2lnaHRnbGFzc25vYm9keQ$\
      AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA";
 

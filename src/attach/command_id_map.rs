@@ -48,7 +48,7 @@ impl CommandIdMap {
     }
 
     /// A later connection.
-    pub fn welcomed(&mut self, run: u64, terminal: u32) {
+    pub fn on_connected(&mut self, run: u64, terminal: u32) {
         if self.run != run {
             self.run = run;
             self.numbers.clear();
@@ -71,7 +71,7 @@ impl CommandIdMap {
     }
 
     /// The station says that it did not take a command.
-    pub fn undelivered(&mut self, id: CommandId, why: String) {
+    pub fn on_undelivered(&mut self, id: CommandId, why: String) {
         if let Some(place) = self.sent.iter().position(|status| status.command.id.number == id.number)
             && let Some(status) = self.sent.remove(place)
         {
@@ -81,7 +81,7 @@ impl CommandIdMap {
     }
 
     /// The connection has ended: what was sent and not seen may or may not have been done.
-    pub fn gone(&mut self) {
+    pub fn on_disconnected(&mut self) {
         self.connected = false;
         while let Some(status) = self.sent.pop_front() {
             let outcome = Outcome::NotConfirmed(NotConfirmed::ConnectionLost);
@@ -90,7 +90,7 @@ impl CommandIdMap {
     }
 
     /// A snapshot of the station as this terminal is to see it: own commands under the own number, lost ones among them.
-    pub fn see(&mut self, snapshot: &Arc<Snapshot>) -> Arc<Snapshot> {
+    pub fn apply(&mut self, snapshot: &Arc<Snapshot>) -> Arc<Snapshot> {
         let has_ended = |number: u32| {
             let own = |status: &&CommandStatus| {
                 status.command.id.number == number && self.numbers.contains(&status.command.id.terminal)

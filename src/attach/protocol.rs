@@ -38,7 +38,7 @@ const WORD_CHARS_MAX: usize = 64;
 /// The beginning of the first message of both sides. Its shape stays the same for ever.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Handshake {
-    /// Tells this socket from any other.
+    /// Distinguishes this socket from any other.
     pub magic: [u8; 4],
     /// The protocol that it speaks.
     pub protocol: u32,

@@ -1,4 +1,4 @@
-//! `sightglass check`: every error of a file at once, or its warnings, the read plan of each line and whether the line can carry it.
+//! `sightglass check`: every error of a file at once, or its warnings, the read plan of each line and whether the line has the capacity.
 
 use std::path::PathBuf;
 

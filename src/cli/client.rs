@@ -20,7 +20,7 @@ use super::CliError;
 const OUTCOME_MAX: Duration = Duration::from_secs(150);
 
 /// A login is seen everywhere within this time.
-const SETTLED_MAX: Duration = Duration::from_secs(5);
+const LOGIN_SEEN_MAX: Duration = Duration::from_secs(5);
 
 /// Who acts.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -83,7 +83,7 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
     let reply =
         session.request(SessionRequest::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
     warn_not_recorded("logged in", reply);
-    let settled = async {
+    let seen = async {
         // The answer may come before the status, and the status before the snapshot that belongs to it.
         let _ = session.status.wait_for(|status| status.who.is_some()).await;
         let view = session.status.borrow().view;
@@ -92,7 +92,7 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
         }
     };
     let silent = |_| CliError::Failed("the station says nothing".to_owned());
-    tokio::time::timeout(SETTLED_MAX, settled).await.map_err(silent)?;
+    tokio::time::timeout(LOGIN_SEEN_MAX, seen).await.map_err(silent)?;
     Ok((session, Some(password)))
 }
 

@@ -1,4 +1,4 @@
-//! Starts the tasks of a station, carries effects between them, and stops them in order.
+//! Starts the tasks of a station and stops them in order.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -75,8 +75,8 @@ pub struct Station {
     tasks: Vec<JoinHandle<()>>,
 }
 
-/// Starts history, links and plant; lines are polled whether or not the store opens. Nobody is asked who he
-/// is: whoever has started the station, or could, may everything. For demonstrations.
+/// Starts history, links and plant; lines are polled whether or not the store opens. No login: root and the
+/// user of the station may do everything. For demonstrations.
 pub fn start(options: Options) -> Result<Station, HistoryError> {
     start_observed(options, None)
 }

@@ -45,7 +45,7 @@ async fn every_action_is_in_the_audit_log_and_in_the_history() {
     let mut station = start_guarded(options(&history)).unwrap();
     let mut session = station.session("whoever");
     session.status.wait_for(|status| status.first).await.unwrap();
-    assert!(session.request(SessionRequest::Stop).await.is_err(), "nobody is logged in");
+    assert!(session.request(SessionRequest::Stop).await.is_err(), "no user is logged in");
     let password = "four wet horses in a tank";
     session.request(SessionRequest::FirstSupervisor { user: "anna".into(), password: password.into() }).await.unwrap();
     session.request(SessionRequest::Lock).await.unwrap();
@@ -118,8 +118,8 @@ async fn a_damaged_users_file_closes_only_the_login() {
     std::fs::write(&users, &good[..good.len() / 2]).unwrap();
     let (alarmed, login, first) = without_users(&history).await;
     assert!(alarmed, "polling and alarms go on");
-    assert!(login.is_err_and(|why| why.starts_with("login is closed: ")), "a damaged file is not nobody");
-    assert!(first.is_err_and(|why| why.starts_with("login is closed: ")), "and nobody makes himself a Supervisor");
+    assert!(login.is_err_and(|why| why.starts_with("login is closed: ")), "a damaged file is not an empty one");
+    assert!(first.is_err_and(|why| why.starts_with("login is closed: ")), "and no first Supervisor is made");
     assert_eq!(std::fs::read(&users).unwrap(), good[..good.len() / 2], "it is left as it is");
     std::fs::remove_file(&users).unwrap();
     let (alarmed, login, first) = without_users(&history).await;

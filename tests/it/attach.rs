@@ -267,7 +267,7 @@ async fn a_stuck_terminal_costs_only_itself_and_is_disconnected() {
         sees(&mut quick, value).await;
         assert!(started.elapsed() < Duration::from_secs(600), "the stuck one is there for ever");
     }
-    assert!(Duration::from_secs(290) < started.elapsed(), "it was let go after {:?}", started.elapsed());
+    assert!(Duration::from_secs(290) < started.elapsed(), "it was disconnected after {:?}", started.elapsed());
     assert!(1_000.0 < value, "the quick one has seen {value} snapshots meanwhile");
     stand.until_present(1).await;
 }
@@ -299,7 +299,7 @@ async fn a_terminal_shows_a_lost_station_at_once_and_reconnects() {
 async fn a_command_in_flight_is_uncertain_when_the_station_goes() {
     let stand = Stand::start();
     let mut session = stand.session().await;
-    // The station takes it and dies before it tells.
+    // The station takes it and dies before it replies.
     stand.tasks[1].abort();
     session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)).unwrap();
     tokio::task::yield_now().await;
@@ -328,7 +328,7 @@ async fn another_plant_after_a_restart_comes_with_its_own_definition() {
     sees(&mut session, 5.0).await;
     assert!(Arc::ptr_eq(&before, &session.snapshots.borrow().def), "an equal definition is the same");
 
-    // Taken up anew with another title: the terminal is let go, and comes back to the new one.
+    // Reloaded with another title: the terminal is disconnected, and comes back to the new one.
     let mut def = PlantDef::clone(&stand.def);
     def.title = "Another".to_owned();
     stand.publish.send_replace(Arc::new(Snapshot::blank(Arc::new(def))));

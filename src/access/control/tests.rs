@@ -1,4 +1,4 @@
-//! What somebody at a terminal sees of access control: logins, lockouts, locks, roles, reauthentication, in virtual time.
+//! What a user at a terminal sees of access control: logins, lockouts, locks, roles, reauthentication, in virtual time.
 #![allow(clippy::unwrap_used)]
 
 use proptest::prelude::*;
@@ -155,8 +155,8 @@ fn failed_logins_look_alike_and_the_log_has_the_reason() {
     {
         let terminal = terminal as u32 + 1;
         bench.open(terminal, &format!("10.0.0.{terminal}"));
-        let told = bench.login(terminal, user, password).unwrap_err();
-        assert_eq!(told, "wrong name or password; wait 1 s");
+        let reply = bench.login(terminal, user, password).unwrap_err();
+        assert_eq!(reply, "wrong name or password; wait 1 s");
     }
     bench.request(2, SessionRequest::Logout).unwrap_err();
     let why: Vec<_> =
@@ -183,8 +183,8 @@ fn five_failures_lock_out_one_system_user_of_one_account() {
         bench.login(1, "tech", "guess").unwrap_err();
         bench.later(16);
     }
-    let told = bench.login(1, "tech", TECH).unwrap_err();
-    assert!(told.contains("wait 284 s"), "{told}");
+    let reply = bench.login(1, "tech", TECH).unwrap_err();
+    assert!(reply.contains("wait 284 s"), "{reply}");
     assert!(bench.login(3, "TECH", TECH).is_err(), "the right password elsewhere does not help");
     assert!(bench.access.session_status(1, bench.now).view, "alarms and process stay to be seen");
     assert_eq!(bench.who(2).as_deref(), Some("tech"));
@@ -267,7 +267,7 @@ fn an_idle_terminal_is_locked_until_the_password_is_entered() {
     assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     bench.request(1, SessionRequest::Lock).unwrap();
     bench.login(1, "boss", BOSS).unwrap();
-    assert_eq!(bench.who(1).as_deref(), Some("boss"), "somebody else may sit down at a locked terminal");
+    assert_eq!(bench.who(1).as_deref(), Some("boss"), "another user may unlock the terminal");
 }
 
 #[test]
@@ -278,7 +278,7 @@ fn a_trusted_system_user_needs_no_password() {
     assert_eq!(bench.who(1).as_deref(), Some("panel"));
     assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);
     bench.later(5000);
-    assert!(!bench.access.session_status(1, bench.now).locked, "he would have no password to unlock it with");
+    assert!(!bench.access.session_status(1, bench.now).locked, "there would be no password to unlock it with");
     assert!(bench.request(1, SessionRequest::Lock).is_err());
 }
 
@@ -319,8 +319,8 @@ fn a_hostile_terminal_floods_neither_plant_nor_audit_log() {
     }
     // Ten minutes, 60,000 commands.
     assert!((20..=330).contains(&commands), "{commands}");
-    let told = bench.records.iter().filter(|record| record.0.ends_with("too many requests")).count();
-    assert!((9..=10).contains(&told), "{told}");
+    let reply = bench.records.iter().filter(|record| record.0.ends_with("too many requests")).count();
+    assert!((9..=10).contains(&reply), "{reply}");
     let mut coming = 0;
     for terminal in 10..2000 {
         coming += bench
@@ -361,7 +361,7 @@ proptest! {
         for terminal in 0..4 {
             bench.open(terminal, &format!("10.0.0.{terminal}"));
         }
-        // Wrong passwords in a row that were looked at, over all terminals, and since when he is locked out.
+        // Wrong passwords in a row that were checked, over all terminals, and since when the user is locked out.
         let (mut wrong, mut locked_at) = (0, None::<Timestamp>);
         for (terminal, right, later) in steps {
             bench.later(later);
@@ -369,12 +369,12 @@ proptest! {
                 (wrong, locked_at) = (0, None);
             }
             let key = Key { origin: "panel".into(), account: Some("tech".to_owned()), never_locked: false };
-            let looked_at = bench.access.attempts.wait(&key, &bench.access.def.access, bench.now).is_none();
+            let checked = bench.access.attempts.wait(&key, &bench.access.def.access, bench.now).is_none();
             let came_in = bench.login(terminal, "tech", if right { TECH } else { "guess" }).is_ok();
-            prop_assert_eq!(came_in, right && looked_at && locked_at.is_none());
+            prop_assert_eq!(came_in, right && checked && locked_at.is_none());
             if came_in {
                 wrong = 0;
-            } else if looked_at && locked_at.is_none() {
+            } else if checked && locked_at.is_none() {
                 wrong += 1;
                 if wrong == login_attempts_max {
                     locked_at = Some(bench.now);

@@ -24,7 +24,7 @@ fn snapshot(commands: &[(u32, u32, Outcome)]) -> Arc<Snapshot> {
 }
 
 fn seen(id_map: &mut CommandIdMap, commands: &[(u32, u32, Outcome)]) -> Vec<(u32, u32, Outcome)> {
-    let seen = id_map.see(&snapshot(commands));
+    let seen = id_map.apply(&snapshot(commands));
     seen.commands
         .iter()
         .map(|status| (status.command.id.terminal, status.command.id.number, status.outcome.clone()))
@@ -39,9 +39,9 @@ fn send(id_map: &mut CommandIdMap, number: u32) -> CommandId {
 fn own_commands_keep_their_number_over_connections() {
     let mut id_map = CommandIdMap::new(1, 3);
     assert_eq!(send(&mut id_map, 1), CommandId { terminal: 3, number: 1 });
-    // The station was started anew: this terminal is 1 now, and somebody else is 3.
-    id_map.gone();
-    id_map.welcomed(2, 1);
+    // The station was restarted: this terminal is 1 now, and another one is 3.
+    id_map.on_disconnected();
+    id_map.on_connected(2, 1);
     assert_eq!(send(&mut id_map, 2), CommandId { terminal: 1, number: 2 });
     let commands = [(1, 2, Outcome::Verified), (3, 9, Outcome::Verified), (4, 7, Outcome::Verified)];
     let lost = (3, 1, NOT_CONFIRMED);
@@ -53,9 +53,9 @@ fn own_commands_keep_their_number_over_connections() {
 fn the_outcome_of_a_command_survives_a_reconnect() {
     let mut id_map = CommandIdMap::new(1, 3);
     send(&mut id_map, 1);
-    id_map.gone();
+    id_map.on_disconnected();
     assert_eq!(seen(&mut id_map, &[]), [(3, 1, NOT_CONFIRMED)], "not known yet");
-    id_map.welcomed(1, 5);
+    id_map.on_connected(1, 5);
     assert_eq!(seen(&mut id_map, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
     assert_eq!(send(&mut id_map, 2), CommandId { terminal: 5, number: 2 });
     assert_eq!(seen(&mut id_map, &[(5, 2, Outcome::Pending)]), [(3, 2, Outcome::Pending)]);
@@ -69,19 +69,19 @@ fn a_pending_command_is_uncertain_until_the_station_is_back() {
         let mut id_map = CommandIdMap::new(1, 3);
         send(&mut id_map, 1);
         assert_eq!(seen(&mut id_map, &under_way), under_way);
-        id_map.gone();
+        id_map.on_disconnected();
         assert_eq!(seen(&mut id_map, &under_way), uncertain, "the last snapshot is not final");
         id_map
     };
     let mut same = begun();
-    same.welcomed(1, 5);
+    same.on_connected(1, 5);
     assert_eq!(seen(&mut same, &under_way), under_way);
-    same.gone();
+    same.on_disconnected();
     assert_eq!(seen(&mut same, &under_way), uncertain, "a second time as well");
-    same.welcomed(1, 6);
+    same.on_connected(1, 6);
     assert_eq!(seen(&mut same, &[(3, 1, Outcome::Verified)]), [(3, 1, Outcome::Verified)]);
     let mut another = begun();
-    another.welcomed(2, 3);
+    another.on_connected(2, 3);
     assert_eq!(seen(&mut another, &[]), uncertain[..1], "a new station does not know it");
 }
 
@@ -89,7 +89,7 @@ fn a_pending_command_is_uncertain_until_the_station_is_back() {
 fn an_undelivered_command_is_refused_with_a_reason() {
     let mut id_map = CommandIdMap::new(1, 3);
     let id = send(&mut id_map, 1);
-    id_map.undelivered(id, "station too busy".to_owned());
+    id_map.on_undelivered(id, "station too busy".to_owned());
     let why = |why: &str| Outcome::Refused(Refusal::NotPermitted(why.to_owned()));
     assert_eq!(seen(&mut id_map, &[]), [(3, 1, why("station too busy"))]);
     id_map.refuse(&request(3, 2), "anna".into(), Fixture::normal().snapshot().at, GONE);
@@ -97,7 +97,7 @@ fn an_undelivered_command_is_refused_with_a_reason() {
     for number in 3..200 {
         send(&mut id_map, number);
     }
-    id_map.gone();
+    id_map.on_disconnected();
     assert_eq!(seen(&mut id_map, &[]).len(), COMMANDS_MAX, "what is remembered is bounded");
 }
 
@@ -105,5 +105,5 @@ fn an_undelivered_command_is_refused_with_a_reason() {
 fn a_snapshot_without_own_news_is_not_copied() {
     let mut id_map = CommandIdMap::new(1, 3);
     let snapshot = snapshot(&[(3, 1, Outcome::Verified), (2, 1, Outcome::Verified)]);
-    assert!(Arc::ptr_eq(&id_map.see(&snapshot), &snapshot));
+    assert!(Arc::ptr_eq(&id_map.apply(&snapshot), &snapshot));
 }

@@ -1,4 +1,4 @@
-//! Feeds a session from the socket, and seeks the station again when it goes.
+//! Feeds a session from the socket, and reconnects when the station has gone.
 
 use std::{collections::HashMap, mem, path::PathBuf, sync::Arc, time::Duration};
 
@@ -24,7 +24,7 @@ use crate::{
     station::Request,
 };
 
-/// First pause before the station is sought again; doubled each time.
+/// First pause before reconnecting; doubled each time.
 const PAUSE_MIN: Duration = Duration::from_millis(200);
 /// Longest pause.
 const PAUSE_MAX: Duration = Duration::from_secs(2);
@@ -88,7 +88,7 @@ impl ClientTask {
         let mut line = Some(line);
         loop {
             let end = match line.take() {
-                Some(Line { read, write, .. }) => self.attend(read, write, &mut requests).await,
+                Some(Line { read, write, .. }) => self.serve(read, write, &mut requests).await,
                 None => Disconnected::Left,
             };
             let Disconnected::Gone(why) = end else { return };
@@ -99,26 +99,26 @@ impl ClientTask {
             for (_, waiting) in self.waiting.drain() {
                 waiting.refuse(GONE);
             }
-            self.id_map.gone();
-            self.show();
-            line = self.seek(&mut requests).await;
+            self.id_map.on_disconnected();
+            self.publish_snapshot();
+            line = self.reconnect(&mut requests).await;
         }
     }
 
     /// Serves one connection to its end.
-    async fn attend(
+    async fn serve(
         &mut self,
         read: OwnedReadHalf,
         write: OwnedWriteHalf,
         requests: &mut mpsc::Receiver<(u32, Request)>,
     ) -> Disconnected {
-        let (come, mut told) = mpsc::channel(IN);
+        let (come, mut incoming) = mpsc::channel(IN);
         let (out, go) = mpsc::channel(OUT);
         let conversation = async {
             loop {
                 self.cancel(&out);
                 tokio::select! {
-                    Some(told) = told.recv() => if let Err(why) = self.take(told) { break Disconnected::Gone(why) },
+                    Some(message) = incoming.recv() => if let Err(why) = self.on_message(message) { break Disconnected::Gone(why) },
                     request = requests.recv() => match request {
                         Some((_, request)) => self.send(request, &out),
                         None => break Disconnected::Left,
@@ -128,29 +128,29 @@ impl ClientTask {
         };
         tokio::select! {
             end = conversation => end,
-            error = listen(read, come) => Disconnected::Gone(error.to_string()),
-            error = speak(write, go) => Disconnected::Gone(error.to_string()),
+            error = receive_messages(read, come) => Disconnected::Gone(error.to_string()),
+            error = send_messages(write, go) => Disconnected::Gone(error.to_string()),
         }
     }
 
-    /// Takes in what the station says.
-    fn take(&mut self, told: ServerMessage) -> Result<(), String> {
-        match told {
+    /// Handles a message of the station.
+    fn on_message(&mut self, message: ServerMessage) -> Result<(), String> {
+        match message {
             ServerMessage::LineReport(line, report) => {
                 self.assembly.on_report(line, report).map_err(|error| error.to_string())?;
             }
             ServerMessage::Snapshot(snapshot) => {
                 self.assembly.on_snapshot(Arc::unwrap_or_clone(snapshot)).map_err(|error| error.to_string())?;
-                self.show();
+                self.publish_snapshot();
             }
             ServerMessage::SessionStatus(mut status) => {
                 // Under the numbers of this terminal they are among the commands of its snapshots.
                 let undelivered = mem::take(&mut status.undelivered);
                 for (id, why) in &undelivered {
-                    self.id_map.undelivered(*id, why.to_string());
+                    self.id_map.on_undelivered(*id, why.to_string());
                 }
                 if !undelivered.is_empty() {
-                    self.show();
+                    self.publish_snapshot();
                 }
                 self.status_sender.send_replace(Arc::new(*status));
             }
@@ -167,16 +167,16 @@ impl ClientTask {
                 }
             }
             ServerMessage::Undelivered { id, why } => {
-                self.id_map.undelivered(id, why);
-                self.show();
+                self.id_map.on_undelivered(id, why);
+                self.publish_snapshot();
             }
         }
         Ok(())
     }
 
     /// Publishes the latest snapshot, with what became of own commands.
-    fn show(&mut self) {
-        let seen = self.id_map.see(self.assembly.latest());
+    fn publish_snapshot(&mut self) {
+        let seen = self.id_map.apply(self.assembly.latest());
         self.publish.send_replace(seen);
     }
 
@@ -187,9 +187,9 @@ impl ClientTask {
                 let (by, at) = (self.by(), self.assembly.latest().at);
                 let command = self.id_map.send(command, by, at);
                 let id = command.id;
-                if let Err(why) = hand_over(&ClientMessage::Command(Box::new(command), credentials), out) {
-                    self.id_map.undelivered(id, why);
-                    self.show();
+                if let Err(why) = enqueue(&ClientMessage::Command(Box::new(command), credentials), out) {
+                    self.id_map.on_undelivered(id, why);
+                    self.publish_snapshot();
                 }
             }
             Request::Ask(QueryRequest { query, reply }) => {
@@ -209,7 +209,7 @@ impl ClientTask {
     }
 
     fn await_answer(&mut self, ticket: u64, waiting: Waiting, asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) {
-        match hand_over(asked, out) {
+        match enqueue(asked, out) {
             Ok(()) => drop(self.waiting.insert(ticket, waiting)),
             Err(why) => waiting.refuse(&why),
         }
@@ -220,7 +220,7 @@ impl ClientTask {
         let given_up = |waiting: &Waiting| matches!(waiting, Waiting::Ask(reply) if reply.is_closed());
         for (ticket, _) in self.waiting.extract_if(|_, waiting| given_up(waiting)) {
             // A station that is too busy for it answers in vain.
-            let _ = hand_over(&ClientMessage::Cancel { ticket }, out);
+            let _ = enqueue(&ClientMessage::Cancel { ticket }, out);
         }
     }
 
@@ -234,7 +234,7 @@ impl ClientTask {
     }
 
     /// Reconnects to the station; `None` when all handles of the session are dropped.
-    async fn seek(&mut self, requests: &mut mpsc::Receiver<(u32, Request)>) -> Option<Line> {
+    async fn reconnect(&mut self, requests: &mut mpsc::Receiver<(u32, Request)>) -> Option<Line> {
         let mut pause = PAUSE_MIN;
         loop {
             let at = Instant::now() + pause;
@@ -253,7 +253,7 @@ impl ClientTask {
             };
             match opened {
                 Ok(line) => {
-                    self.begin_anew(&line.welcome);
+                    self.start_over(&line.welcome);
                     return Some(line);
                 }
                 Err(AttachError::NoStation { .. }) => {}
@@ -271,7 +271,7 @@ impl ClientTask {
             Request::Command(command, _) => {
                 let (by, at) = (self.by(), self.assembly.latest().at);
                 self.id_map.refuse(&command, by, at, GONE);
-                self.show();
+                self.publish_snapshot();
             }
             Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),
             Request::SessionRequest(_, reply) => Waiting::SessionRequest(reply).refuse(GONE),
@@ -279,8 +279,8 @@ impl ClientTask {
     }
 
     /// Nothing is known of the plant again. A definition that is equal stays the very same.
-    fn begin_anew(&mut self, welcome: &HandshakeReply) {
-        self.id_map.welcomed(welcome.run, welcome.terminal);
+    fn start_over(&mut self, welcome: &HandshakeReply) {
+        self.id_map.on_connected(welcome.run, welcome.terminal);
         let def = &self.assembly.latest().def;
         let def = if is_equal(def, &welcome.def) { def.clone() } else { welcome.def.clone() };
         self.assembly = Assembly::new(def);
@@ -291,7 +291,7 @@ fn is_equal(one: &PlantDef, other: &PlantDef) -> bool {
     protocol::encode(one, NEWS_BYTES_MAX) == protocol::encode(other, NEWS_BYTES_MAX)
 }
 
-fn hand_over(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
+fn enqueue(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
     let bytes = protocol::encode(asked, REQUEST_BYTES_MAX).map_err(|error| error.to_string())?;
     out.try_send(bytes).map_err(|error| match error {
         mpsc::error::TrySendError::Full(_) => "station too busy".to_owned(),
@@ -300,19 +300,19 @@ fn hand_over(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), S
 }
 
 /// Reads to the end of the connection, which may be at any moment.
-async fn listen(mut read: OwnedReadHalf, come: mpsc::Sender<ServerMessage>) -> WireError {
+async fn receive_messages(mut read: OwnedReadHalf, come: mpsc::Sender<ServerMessage>) -> WireError {
     loop {
-        let told = match connect::next(&mut read).await {
-            Ok(told) => told,
+        let message = match connect::next(&mut read).await {
+            Ok(message) => message,
             Err(error) => return error,
         };
-        if come.send(told).await.is_err() {
+        if come.send(message).await.is_err() {
             return WireError::Closed;
         }
     }
 }
 
-async fn speak(mut write: OwnedWriteHalf, mut go: mpsc::Receiver<Vec<u8>>) -> WireError {
+async fn send_messages(mut write: OwnedWriteHalf, mut go: mpsc::Receiver<Vec<u8>>) -> WireError {
     while let Some(bytes) = go.recv().await {
         if let Err(error) = wire::write(&mut write, &bytes).await {
             return error;
@@ -339,7 +339,7 @@ mod tests {
         let (near, mut far) = UnixStream::pair().unwrap();
         let (read, write) = near.into_split();
         let (asks, mut requests) = mpsc::channel(4);
-        tokio::spawn(async move { task.attend(read, write, &mut requests).await });
+        tokio::spawn(async move { task.serve(read, write, &mut requests).await });
         let query = Query::Journal { from: Timestamp::UNIX_EPOCH, to: Timestamp::UNIX_EPOCH, limit: 1 };
         let ask = || {
             let (reply, answer) = oneshot::channel();

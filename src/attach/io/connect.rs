@@ -68,7 +68,7 @@ pub(super) struct Line {
 }
 
 /// Attaches to the station that listens at this path. The session feeds itself from now on: when the station goes, the
-/// status says so at once, and it is sought again for as long as somebody holds the session.
+/// status says so at once, and it is sought again for as long as a handle of the session exists.
 pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let place = here();
     let mut line = open(path, &place).await?;
@@ -103,7 +103,7 @@ async fn first(line: &mut Line) -> Result<(SessionStatus, Assembly), AttachError
     let (mut status, mut assembly) = (SessionStatus::default(), Assembly::new(line.welcome.def.clone()));
     loop {
         match next(&mut line.read).await? {
-            ServerMessage::SessionStatus(told) => status = *told,
+            ServerMessage::SessionStatus(latest) => status = *latest,
             ServerMessage::LineReport(line, report) => assembly.on_report(line, report)?,
             ServerMessage::Snapshot(snapshot) => {
                 assembly.on_snapshot(Arc::unwrap_or_clone(snapshot))?;

@@ -33,9 +33,9 @@ use crate::{
 
 /// Messages of one terminal: as fast as a person, so that no terminal fills the queue of all.
 const REQUESTS: RateLimit = RateLimit::new(64, Duration::from_millis(20));
-/// A terminal that takes nothing for so long is let go.
+/// A terminal that reads nothing for so long is disconnected.
 pub const STUCK_MAX: Duration = Duration::from_secs(300);
-/// A terminal that does not take the answer to its own query is let go after so long: answers may be large.
+/// A terminal that does not read the answer to its own query is disconnected after so long: answers may be large.
 pub const ANSWER_STUCK_MAX: Duration = Duration::from_secs(30);
 /// Queries and requests of one terminal that may wait for their answers.
 const IN_FLIGHT_MAX: usize = 16;
@@ -213,7 +213,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         loop {
             tokio::select! {
                 biased;
-                Some((told, _places)) = answered.recv() => self.send(&told).await?,
+                Some((message, _places)) = answered.recv() => self.send(&message).await?,
                 changed = self.session.status.changed() => {
                     changed.map_err(|_| ConnectionEnd::SentAway)?;
                     self.send_session_status().await?;
@@ -264,15 +264,15 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         self.send(&ServerMessage::SessionStatus(Box::new(status))).await
     }
 
-    async fn send(&mut self, told: &ServerMessage) -> Result<(), ConnectionEnd> {
-        let bytes = match (protocol::encode(told, NEWS_BYTES_MAX), told) {
+    async fn send(&mut self, message: &ServerMessage) -> Result<(), ConnectionEnd> {
+        let bytes = match (protocol::encode(message, NEWS_BYTES_MAX), message) {
             (Err(error @ ProtocolError::TooLong { .. }), ServerMessage::Answer { ticket, .. }) => {
                 let answer = Err(HistoryError::Engine(format!("{error}; choose a shorter period")));
                 protocol::encode(&ServerMessage::Answer { ticket: *ticket, answer }, NEWS_BYTES_MAX)
             }
             (bytes, _) => bytes,
         };
-        let max = if let ServerMessage::Answer { .. } = told { ANSWER_STUCK_MAX } else { STUCK_MAX };
+        let max = if let ServerMessage::Answer { .. } = message { ANSWER_STUCK_MAX } else { STUCK_MAX };
         self.write(&bytes.map_err(WireError::from)?, max).await
     }
 

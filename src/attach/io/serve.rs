@@ -67,7 +67,7 @@ pub struct Listener {
     path: PathBuf,
     /// Held for as long as this station lives; the system lets go of it however the station ends.
     lock: File,
-    /// Tells the file of the socket from another one at its place.
+    /// Identifies the file of the socket: another one may be at its place.
     file: Option<(u64, u64)>,
     folder: Folder,
     /// It could not be made again, and that is logged.

@@ -27,21 +27,21 @@ fn place() -> Place {
 }
 
 #[test]
-fn a_terminal_says_where_it_is_and_is_told_the_plant() {
+fn a_handshake_has_place_and_plant() {
     let hello_bytes = body(encode(&(Handshake::current(), place()), HANDSHAKE_BYTES_MAX).unwrap());
     assert_eq!(client_handshake(&hello_bytes), Ok(place()));
     let def = Fixture::normal().snapshot().def.clone();
-    let told = HandshakeReply { run: 7, terminal: 3, def: def.clone() };
-    let bytes = body(encode(&(Handshake::current(), told), NEWS_BYTES_MAX).unwrap());
-    let heard = handshake_reply(&bytes).unwrap().unwrap();
-    assert_eq!((heard.run, heard.terminal), (7, 3));
-    assert_eq!(encode(&heard.def, usize::MAX), encode(&def, usize::MAX));
+    let sent = HandshakeReply { run: 7, terminal: 3, def: def.clone() };
+    let bytes = body(encode(&(Handshake::current(), sent), NEWS_BYTES_MAX).unwrap());
+    let received = handshake_reply(&bytes).unwrap().unwrap();
+    assert_eq!((received.run, received.terminal), (7, 3));
+    assert_eq!(encode(&received.def, usize::MAX), encode(&def, usize::MAX));
 }
 
 #[test]
 fn different_versions_are_refused_with_what_to_do() {
     let old = Handshake { protocol: PROTOCOL + 1, version: "9.9".into(), ..Handshake::current() };
-    // Whatever else that version says is never looked at.
+    // Whatever follows in that version is not read.
     let bytes = body(encode(&(old, vec![0xFFu8; 40]), HANDSHAKE_BYTES_MAX).unwrap());
     let Err(ProtocolError::OtherVersion(why)) = client_handshake(&bytes) else { panic!("taken for one of ours") };
     let expected =
@@ -97,16 +97,16 @@ fn requests_and_news_survive_the_way() {
     for asked in asked {
         assert_eq!(decode(&body(encode(&asked, REQUEST_BYTES_MAX).unwrap()), "message"), Ok(asked));
     }
-    let told = [
+    let sent = [
         ServerMessage::SessionStatus(Box::default()),
         ServerMessage::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
         ServerMessage::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
         ServerMessage::RequestDone { ticket: 2, answer: Err("no".into()) },
         ServerMessage::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: "busy".into() },
     ];
-    for told in told {
-        let received: ServerMessage = decode(&body(encode(&told, NEWS_BYTES_MAX).unwrap()), "message").unwrap();
-        assert_eq!(format!("{received:?}"), format!("{told:?}"));
+    for sent in sent {
+        let received: ServerMessage = decode(&body(encode(&sent, NEWS_BYTES_MAX).unwrap()), "message").unwrap();
+        assert_eq!(format!("{received:?}"), format!("{sent:?}"));
     }
 }
 
@@ -183,7 +183,7 @@ proptest! {
     #[test]
     fn random_bytes_are_refused_without_harm(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
         let _ = client_handshake(&bytes);
-        let _ = handshake_reply(&bytes).map(|told| told.map(|_| ()));
+        let _ = handshake_reply(&bytes).map(|sent| sent.map(|_| ()));
         let _ = decode::<ClientMessage>(&bytes, "message");
         let _ = decode::<ServerMessage>(&bytes, "message");
     }

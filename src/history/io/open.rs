@@ -35,7 +35,7 @@ pub struct Opened<T = ()> {
     pub read: T,
 }
 
-/// What a station takes up from its history when it starts.
+/// What a station restores from its history when it starts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Restored {
     /// The steps of alarms that the plant restores.
@@ -48,7 +48,7 @@ pub struct Restored {
 
 impl Store {
     /// Opens or creates the store of a station that starts: ends the curves that the station before it left behind, and
-    /// reads what the new one takes up. Errors and damage as in [`Store::open`].
+    /// reads what the new one restores. Errors and damage as in [`Store::open`].
     pub fn open_at_start(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened<Restored>, HistoryError> {
         Store::open_and(path, def, now, |store| {
             store.end_curves_left_behind(now)?;

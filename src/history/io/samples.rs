@@ -28,7 +28,7 @@ use crate::{
 /// Rows of a piece that are aimed at; twice as many are held at most.
 pub(super) const PIECE: usize = 1 << 17;
 /// Rows that one statement reads, about, however few of them are asked for: a checkpoint waits for it.
-const LOOKED_AT: f64 = 3e6;
+const SCANNED_ROWS: f64 = 3e6;
 /// Of a period with unreadable blocks at most this share, in parts, is given up with each of them; and this long at the
 /// least, in microseconds.
 const GAP_PARTS: i64 = 500;
@@ -72,7 +72,7 @@ impl Store {
         if let Some((stored, micros)) = self.spread(to) {
             // Few rows need one piece, however close together they are: those of a start have one time.
             let of = |rows: f64| if rows < stored { to_i64(rows / stored * micros).max(1) } else { i64::MAX };
-            (span, span_max) = (span.min(of(self.piece as f64)), of(LOOKED_AT));
+            (span, span_max) = (span.min(of(self.piece as f64)), of(SCANNED_ROWS));
         }
         while next < end {
             let to = next.saturating_add(span).min(end);

@@ -41,7 +41,7 @@ pub struct Handle {
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// How the store stands, after every commit.
     pub status: watch::Receiver<HistoryStatus>,
-    /// What the plant takes up from its history, as soon as it is open for the first time.
+    /// What the plant restores from its history, as soon as it is open for the first time.
     pub restored: Option<oneshot::Receiver<Restored>>,
     /// The thread.
     pub join: JoinHandle<()>,
@@ -130,7 +130,7 @@ impl Outputs {
         if let Some(restored) = writer.take_restored()
             && let Some(station) = self.restored.take()
         {
-            // A station that has ended takes up nothing.
+            // A station that has ended restores nothing.
             let _ = station.send(restored);
         }
         self.status.send_replace(writer.status().clone());

@@ -39,7 +39,7 @@ const STORES_MAX: usize = 8;
 pub struct Writer {
     /// Gone while it is not open: before the first opening, after a fatal error, while another process has it.
     store: Option<Store>,
-    /// What the station takes up from the store, until it is taken.
+    /// What the station restores from the store, until it is taken.
     restored: Option<Restored>,
     /// Where each store goes that is opened, and `None` before one is closed.
     reader: Option<mpsc::Sender<Option<Store>>>,
@@ -92,7 +92,7 @@ impl Writer {
         &self.status
     }
 
-    /// What a station takes up from its history, once after it was opened for the first time.
+    /// What a station restores from its history, once after it was opened for the first time.
     pub fn take_restored(&mut self) -> Option<Restored> {
         self.restored.take()
     }

@@ -22,7 +22,7 @@ async fn a_second_station_is_refused_and_a_dead_socket_replaced() {
     let folder = stand.end().await;
     assert!(!path.exists(), "a station takes its socket with it");
 
-    // As kill -9 leaves it: a name that nobody listens behind.
+    // As kill -9 leaves it: a name without a listener.
     drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
     assert!(path.exists() && places.living().await.is_empty());
     assert!(matches!(connect(&path).await, Err(AttachError::NoStation { .. })));

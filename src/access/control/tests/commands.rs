@@ -1,4 +1,4 @@
-//! What becomes of commands that do not reach the plant: whoever gave them is told.
+//! What becomes of commands that do not reach the plant: the session status says so.
 
 use super::*;
 use crate::plant::def::ActionDef;
@@ -6,8 +6,8 @@ use crate::plant::def::ActionDef;
 impl Bench {
     /// The commands of a terminal that did not reach the plant, and why.
     fn undelivered(&self, terminal: u32) -> Vec<(u32, String)> {
-        let told = self.access.session_status(terminal, self.now).undelivered;
-        told.iter().map(|(id, why)| (id.number, why.to_string())).collect()
+        let reply = self.access.session_status(terminal, self.now).undelivered;
+        reply.iter().map(|(id, why)| (id.number, why.to_string())).collect()
     }
 }
 
@@ -22,9 +22,9 @@ fn a_command_with_a_used_number_is_reported_undelivered() {
         bench.last_command = last;
         assert!(bench.send_command(1, RUN, None).is_none(), "number {} came after 7", last + 1);
     }
-    let told = bench.undelivered(1);
-    assert_eq!(told.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [7, 4]);
-    assert!(told[0].1.contains("number of an earlier one"));
+    let reply = bench.undelivered(1);
+    assert_eq!(reply.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [7, 4]);
+    assert!(reply[0].1.contains("number of an earlier one"));
     bench.open(2, "b");
     bench.login(2, "boss", BOSS).unwrap();
     bench.last_command = 6;
@@ -35,13 +35,13 @@ fn a_command_with_a_used_number_is_reported_undelivered() {
 fn a_command_over_the_rate_limit_is_reported_to_its_terminal() {
     let mut bench = Bench::new(AccessDef::default());
     bench.open(1, "a");
-    // Nobody is logged in: 20 refusals, the coming among them, are on record, the next ones are only told, and from the 41st
+    // No user is logged in: 20 refusals, the attach among them, are recorded, the next ones only reported, and from the 41st
     // request on it is too many.
     let reached = (0..60).filter(|_| bench.send_command(1, RUN, None).is_some()).count();
-    let told = bench.undelivered(1);
-    assert_eq!((reached, told.len()), (19, 41));
-    assert_eq!(told[0], (20, "log in first".to_owned()));
-    assert_eq!(told[40], (60, TOO_MANY.to_owned()));
+    let reply = bench.undelivered(1);
+    assert_eq!((reached, reply.len()), (19, 41));
+    assert_eq!(reply[0], (20, "log in first".to_owned()));
+    assert_eq!(reply[40], (60, TOO_MANY.to_owned()));
     for _ in 0..1_000 {
         bench.send_command(1, RUN, None);
     }

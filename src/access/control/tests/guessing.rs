@@ -36,8 +36,8 @@ fn wrong_passwords_of_one_system_user_lock_no_other_out() {
         bench.later(16);
     }
     bench.login(2, "boss", BOSS).unwrap();
-    let told = bench.login(1, "boss", BOSS).unwrap_err();
-    assert!(told.starts_with("password not checked after wrong ones; wait"), "{told}");
+    let reply = bench.login(1, "boss", BOSS).unwrap_err();
+    assert!(reply.starts_with("password not checked after wrong ones; wait"), "{reply}");
     let rows = bench.access.session_status(2, bench.now).users;
     assert!(rows.iter().any(|row| &*row.user == "boss" && row.locked_until.is_some()), "a supervisor sees it");
     bench.request(2, SessionRequest::Disable { user: "boss".into(), disabled: false }).unwrap();
@@ -77,17 +77,17 @@ fn six_right_logins_at_once_all_succeed() {
 #[test]
 fn too_many_logins_at_once_are_refused_as_busy() {
     let mut bench = Bench::new(AccessDef { sessions_max: 60, ..AccessDef::default() });
-    let mut told = Vec::new();
+    let mut reply = Vec::new();
     for terminal in 1..=20 {
         bench.open_as(terminal, "eve");
         for ticket in 0..4 {
             let login = SessionRequest::Login { user: "tech".into(), password: "guess".into() };
             let ticket = u64::from(terminal) * 4 + ticket;
-            told.extend(answer_in(&bench.access.on_request(terminal, ticket, login, bench.now), ticket));
+            reply.extend(answer_in(&bench.access.on_request(terminal, ticket, login, bench.now), ticket));
         }
     }
-    assert_eq!(told.len(), 80 - JOBS_OF_USER_MAX);
-    assert!(told.iter().all(|answer| *answer == Err(BUSY.to_owned())), "{told:?}");
+    assert_eq!(reply.len(), 80 - JOBS_OF_USER_MAX);
+    assert!(reply.iter().all(|answer| *answer == Err(BUSY.to_owned())), "{reply:?}");
     assert!(bench.access.jobs.len() + bench.access.waiting.len() <= JOBS_MAX);
     // The others are not touched.
     bench.open_as(30, "panel");
@@ -98,13 +98,13 @@ fn too_many_logins_at_once_are_refused_as_busy() {
 fn one_system_user_who_guesses_at_all_names_is_stopped() {
     let mut bench = Bench::new(AccessDef { sessions_max: 60, ..AccessDef::default() });
     bench.open_as(1, "eve");
-    let mut looked_at = 0;
+    let mut checked = 0;
     for name in 0..200 {
-        let told = bench.login(1, &format!("name{name}"), "guess").unwrap_err();
-        looked_at += usize::from(told.starts_with(WRONG));
+        let reply = bench.login(1, &format!("name{name}"), "guess").unwrap_err();
+        checked += usize::from(reply.starts_with(WRONG));
         bench.later(1);
     }
-    assert_eq!(looked_at, 40);
+    assert_eq!(checked, 40);
     let locked = bench.records.iter().filter(|record| record.0.ends_with("lockout"));
     assert_eq!(locked.map(|record| &*record.1).collect::<Vec<_>>(), ["system user eve"]);
     bench.open_as(2, "panel");

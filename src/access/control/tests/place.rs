@@ -1,4 +1,4 @@
-//! What others at the same place can do to somebody who works there.
+//! What others at the same place can do to a user who works there.
 
 use super::*;
 
@@ -30,8 +30,8 @@ fn guesses_at_a_locked_terminal_are_delayed_as_usual() {
     bench.login(1, "tech", TECH).unwrap();
     bench.request(1, SessionRequest::Lock).unwrap();
     for wait in [1, 2, 300] {
-        let told = bench.request(1, SessionRequest::Unlock("guess".into())).unwrap_err();
-        assert!(told.ends_with(&format!("wait {wait} s")), "{told}");
+        let reply = bench.request(1, SessionRequest::Unlock("guess".into())).unwrap_err();
+        assert!(reply.ends_with(&format!("wait {wait} s")), "{reply}");
         bench.later(wait.min(2));
     }
     assert!(bench.request(1, SessionRequest::Unlock(TECH.into())).is_err());

@@ -35,7 +35,7 @@ fn a_long_idle_anonymous_session_makes_room() {
     bench.later(599);
     assert_eq!(bench.comes(3, "panel"), [3]);
     bench.later(1);
-    assert_eq!(bench.comes(4, "panel"), [2], "not the one where somebody works");
+    assert_eq!(bench.comes(4, "panel"), [2], "not the one in use");
     assert_eq!(bench.comes(5, "panel"), [5]);
     assert_eq!(bench.who(1).as_deref(), Some("tech"));
 }
