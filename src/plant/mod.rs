@@ -19,6 +19,7 @@ pub(crate) mod line_check;
 pub mod program;
 pub mod traffic;
 pub(crate) mod data_type;
+pub(crate) mod mimic_def;
 pub mod def;
 pub(crate) mod simulate;
 pub mod tag;
