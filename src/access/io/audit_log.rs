@@ -78,15 +78,7 @@ pub(super) fn verify_each(
 }
 
 fn read_head(audit_log: &Path) -> io::Result<Option<ChainHash>> {
-    match File::open(head_of(audit_log)) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(error),
-        Ok(file) => {
-            let mut text = String::new();
-            file.take(1_000).read_to_string(&mut text)?;
-            Ok(audit_log::head(&text))
-        }
-    }
+    Ok(super::read_line_of(&head_of(audit_log))?.and_then(|text| audit_log::head(&text)))
 }
 
 /// How far the whole lines reach, in bytes, and whether something stands behind them.

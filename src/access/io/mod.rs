@@ -1,15 +1,33 @@
 //! The edge of access: the file of users, the audit log on disk, and who the operating system says is here.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::{self, Read},
+    path::{Path, PathBuf},
+};
 
 pub mod audit_log;
 pub mod recorder;
 pub mod sealing;
 pub mod users;
 
+/// No more of a file is read whose text is one line.
+const LINE_BYTES_MAX: u64 = 1_000;
+
 /// The file of users beside a history: `tank.users.toml` beside `tank.duckdb`.
 pub fn users_beside(history: &Path) -> PathBuf {
     history.with_extension("users.toml")
+}
+
+/// Reads a text of one line; `None` where there is no such file.
+fn read_line_of(path: &Path) -> io::Result<Option<String>> {
+    let file = match File::open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        file => file?,
+    };
+    let mut text = String::new();
+    file.take(LINE_BYTES_MAX).read_to_string(&mut text)?;
+    Ok(Some(text))
 }
 
 /// Random bytes of the system, for a salt or a key.

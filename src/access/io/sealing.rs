@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File, OpenOptions},
-    io::{self, Read},
+    io,
     os::unix::fs::{FileExt, MetadataExt, fchown},
     path::{Path, PathBuf},
 };
@@ -11,7 +11,7 @@ use jiff::Timestamp;
 
 use super::{
     audit_log::{self, AuditLog, VerifyError, verify_each},
-    random,
+    random, read_line_of,
 };
 use crate::{
     access::{
@@ -30,16 +30,8 @@ pub fn beside(log: &Path) -> PathBuf {
 
 /// Reads the present key; `None` where there is none.
 pub fn read(path: &Path) -> io::Result<Option<Key>> {
-    match File::open(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(error),
-        Ok(file) => {
-            let mut text = String::new();
-            file.take(1_000).read_to_string(&mut text)?;
-            let damaged = || io::Error::new(io::ErrorKind::InvalidData, "the sealing key is damaged");
-            Key::parse(&text).map(Some).ok_or_else(damaged)
-        }
-    }
+    let damaged = || io::Error::new(io::ErrorKind::InvalidData, "the sealing key is damaged");
+    read_line_of(path)?.map(|text| Key::parse(&text).ok_or_else(damaged)).transpose()
 }
 
 /// Makes the first key of a log, for the user who owns the log; [`io::ErrorKind::AlreadyExists`] if there is a key. Where a

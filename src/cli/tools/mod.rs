@@ -141,7 +141,7 @@ pub fn run(
             run.findings[printed..].iter().flat_map(&describe).for_each(|text| say(&text));
             printed = run.findings.len();
             if shown && 1 < run.total {
-                progress(run);
+                show_progress(&format!("{} of {}  {}", run.done, run.total, run.now));
             }
             true
         });
@@ -151,7 +151,7 @@ pub fn run(
         }
     });
     if shown {
-        clear_progress();
+        show_progress("");
     }
     let Some(run) = run else { return Err(CliError::Failed("stopped".into())) };
     run.findings[printed.min(run.findings.len())..].iter().flat_map(&describe).for_each(|text| say(&text));
@@ -161,14 +161,10 @@ pub fn run(
     }
 }
 
-fn progress(run: &DiagnosticRun) {
+/// Replaces the line of progress.
+fn show_progress(text: &str) {
     use std::io::Write;
-    let _ = write!(std::io::stderr(), "\r\x1b[K{} of {}  {}", run.done, run.total, run.now);
-}
-
-fn clear_progress() {
-    use std::io::Write;
-    let _ = write!(std::io::stderr(), "\r\x1b[K");
+    let _ = write!(std::io::stderr(), "\r\x1b[K{text}");
 }
 
 /// Request and answer, byte for byte and in words.

@@ -130,6 +130,6 @@ impl Store {
 
     /// The steps of alarms in a span, oldest first.
     pub(super) fn steps(&self, from: Timestamp, to: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::journal_oldest(), params![utc(from), utc(to), ROWS_MAX + 1], alarm)
+        self.whole_list(&sql::journal(sql::OLDEST), params![utc(from), utc(to), ROWS_MAX + 1], alarm)
     }
 }

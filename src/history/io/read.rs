@@ -50,10 +50,10 @@ impl Store {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
             Query::Journal { from, to, limit } => {
-                self.span_list(&sql::journal_newest(), (*from, *to, *limit), &[], alarm).map(Answer::Journal)
+                self.span_list(&sql::journal(sql::NEWEST), (*from, *to, *limit), &[], alarm).map(Answer::Journal)
             }
             Query::Actions { from, to, limit } => {
-                self.span_list(&sql::actions_newest(), (*from, *to, *limit), &[], action).map(Answer::Actions)
+                self.span_list(&sql::actions(sql::NEWEST), (*from, *to, *limit), &[], action).map(Answer::Actions)
             }
             Query::Audit { from, to, words, by, action: what, limit } => self
                 .span_list(&sql::audit(), (*from, *to, *limit), params![by, what, words], action)

@@ -141,16 +141,14 @@ pub const WATCHED_BY_SAMPLES: &str =
 /// A row if there is any sample in a span.
 pub const ANY_SAMPLE: &str = "SELECT 1 FROM sample WHERE utc >= ? AND utc < ? LIMIT 1";
 
-/// Alarm events in a span, newest first.
-pub fn journal_newest() -> String {
-    let columns = EVENT_COLUMNS.join(", ");
-    format!("SELECT {columns} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc DESC, rowid DESC LIMIT ?")
-}
+/// The order of a list, and its limit.
+pub const NEWEST: &str = "ORDER BY utc DESC, rowid DESC LIMIT ?";
+/// The other one.
+pub const OLDEST: &str = "ORDER BY utc, rowid LIMIT ?";
 
-/// Alarm events in a span, oldest first.
-pub fn journal_oldest() -> String {
-    let columns = EVENT_COLUMNS.join(", ");
-    format!("SELECT {columns} FROM alarm_journal WHERE utc >= ? AND utc < ? ORDER BY utc, rowid LIMIT ?")
+/// Alarm events in a span.
+pub fn journal(order: &str) -> String {
+    format!("SELECT {} FROM alarm_journal WHERE utc >= ? AND utc < ? {order}", EVENT_COLUMNS.join(", "))
 }
 
 /// The raising events of the alarms that were active at an instant, also of those that were suppressed.
@@ -184,21 +182,13 @@ pub fn restore() -> String {
     )
 }
 
-/// Actions in a span.
+/// Columns of an action, in the order that it is read.
 const ACTION: &str = "utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash";
 
-/// Actions on the plant, without those on users and terminals.
-fn at_the_plant() -> String {
-    let words: Vec<String> = ELSEWHERE.iter().map(|word| format!("'{word}'")).collect();
-    format!("action NOT IN ({})", words.join(", "))
-}
-
-/// Actions on the plant in a span, newest first.
-pub fn actions_newest() -> String {
-    let plant = at_the_plant();
-    format!(
-        "SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc DESC, rowid DESC LIMIT ?"
-    )
+/// Actions on the plant in a span, without those on users and terminals.
+pub fn actions(order: &str) -> String {
+    let others = ELSEWHERE.map(|word| format!("'{word}'")).join(", ");
+    format!("SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND action NOT IN ({others}) {order}")
 }
 
 /// Actions in a span, newest first, with a part of who, of the action, and of the words of all columns; large and small
@@ -211,12 +201,6 @@ pub fn audit() -> String {
                 lower($6))
          ORDER BY utc DESC, rowid DESC LIMIT $3"
     )
-}
-
-/// Actions on the plant in a span, oldest first.
-pub fn actions_oldest() -> String {
-    let plant = at_the_plant();
-    format!("SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND {plant} ORDER BY utc, rowid LIMIT ?")
 }
 
 /// Number and hash of the last entry of the audit log before an instant.
