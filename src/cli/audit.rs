@@ -20,7 +20,10 @@ use crate::{
     plant::{PlantDef, record::ChainHash},
 };
 
-use super::{CliError, StationArgs, client, in_runtime, load, run, say, source::Source};
+use super::{
+    CliError, StationArgs, client, in_runtime, load, local, run, say,
+    source::{Source, unexpected},
+};
 
 /// The store counts time in these.
 const MICROSECOND: jiff::SignedDuration = jiff::SignedDuration::from_micros(1);
@@ -159,10 +162,6 @@ fn sealed_line(sealed: &Sealed, def: &PlantDef) -> String {
     }
 }
 
-fn local(at: Timestamp, def: &PlantDef) -> String {
-    at.to_zoned(def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S").to_string()
-}
-
 fn summary_lines(summary: &Summary, def: &PlantDef) -> Vec<String> {
     let mut lines = vec![
         format!("lines      {}", summary.entries),
@@ -185,9 +184,7 @@ async fn chain_hashes(def: &Arc<PlantDef>, args: &VerifyArgs) -> Result<Vec<Chai
         let all = String::new;
         let query =
             Query::Audit { from: Timestamp::UNIX_EPOCH, to, words: all(), by: all(), action: all(), limit: PAGE };
-        let Answer::Actions(actions) = source.query(query).await? else {
-            return Err(CliError::Failed("the history answered another query".to_owned()));
-        };
+        let Answer::Actions(actions) = source.query(query).await? else { return Err(unexpected()) };
         let before = chain_hashes.len();
         chain_hashes.extend(
             actions.iter().filter_map(|action| action.chain_hash).map(|chain_hash| (chain_hash.number, chain_hash)),

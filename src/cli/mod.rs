@@ -300,6 +300,11 @@ fn span(text: &str) -> Result<std::time::Duration, String> {
     std::time::Duration::try_from(span).map_err(|_| format!("found `{text}`, expected a time above zero"))
 }
 
+/// Local time of the plant.
+fn local(at: jiff::Timestamp, def: &crate::plant::PlantDef) -> String {
+    at.to_zoned(def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S").to_string()
+}
+
 /// A factor of time, at least one.
 fn speed(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

@@ -18,7 +18,9 @@ use crate::{
     ui,
 };
 
-use super::{CliError, StationArgs, attach, client, in_runtime, init, load_with_file, log, paths, say, span, status};
+use super::{
+    CliError, StationArgs, attach, client, in_runtime, init, load_with_file, local, log, paths, say, span, status,
+};
 
 /// So long an answer takes at most to leave the station before its socket closes.
 const ANSWER: Duration = Duration::from_millis(200);
@@ -248,7 +250,7 @@ pub async fn follow(
                 }
                 let after = snapshots.borrow_and_update().clone();
                 watchdog.see(&after);
-                let time = after.at.to_zoned(after.def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
+                let time = local(after.at, &after.def);
                 for line in event_log::changes(&before, &after) {
                     say(&format!("{time} {line}"));
                 }

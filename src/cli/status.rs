@@ -11,7 +11,7 @@ use crate::plant::{
     snapshot::{ActiveAlarm, DeviceState, SuppressedAlarm},
 };
 
-use super::{CliError, client, in_runtime, say};
+use super::{CliError, client, in_runtime, local, say};
 
 /// Arguments of `status`.
 #[derive(Debug, clap::Args)]
@@ -41,7 +41,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// One fact a line: plant, lines, devices, alarms, history, tags.
 fn in_words(snapshot: &Snapshot) -> Vec<String> {
     let def = &snapshot.def;
-    let time = snapshot.at.to_zoned(def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S");
+    let time = local(snapshot.at, def);
     let mut lines = vec![format!("plant    {} ({}) at {time}", def.title, def.name)];
     for (line, status) in def.lines.iter().zip(&snapshot.lines) {
         lines.push(format!("line     {:12} {}", line.name, line_words(&status.state)));
