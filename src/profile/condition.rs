@@ -6,7 +6,7 @@ use super::{
     diagnostic::{Problems, Span},
     interlock::check_bit,
     names::{Defs, number_of},
-    reader::{At, Choice, toml_table},
+    reader::{At, Choice, toml_tables},
     tag::range_of,
 };
 use crate::plant::{
@@ -16,7 +16,7 @@ use crate::plant::{
     tag::{Bound, TagDef},
 };
 
-toml_table!(
+toml_tables! {
     /// An `[[alarm]]`.
     AlarmTable, "an alarm" {
         opt "tag" tag: String,
@@ -58,7 +58,7 @@ toml_table!(
         opt "action" action: String,
         opt "response_time" response_time: Duration,
     }
-);
+}
 
 keyword_enum! {
     /// Whether something must be written.

@@ -5,11 +5,12 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Unique, check_name},
-    reader::{At, Node, Raw, Value, text},
+    reader::{At, Node, Raw, kind_of, text},
     schema::{SerialTable, TcpTable},
 };
 use crate::plant::{
     def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
+    keyword::keyword_enum,
     line_check::{SettingError, check_settings},
     number::to_u16,
 };
@@ -20,43 +21,36 @@ pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef>
     let mut lines = Vec::new();
     for (index, table) in tables.iter().enumerate() {
         let raw = table.value.clone();
-        let Some(mode) = mode(&raw, problems) else { continue };
+        let Some(mode) = kind_of::<Mode>(&raw, "a line", "mode", problems) else { continue };
         let id = LineId(to_u16(index));
-        let read = if mode.tcp { tcp } else { serial };
-        lines.extend(read(raw, mode.framing, id, &mut seen, problems));
+        let (is_tcp, framing) = mode.transport();
+        let read = if is_tcp { tcp } else { serial };
+        lines.extend(read(raw, framing, id, &mut seen, problems));
     }
     lines
 }
 
-/// What `mode` says.
-#[derive(Debug, Clone, Copy)]
-struct Mode {
-    tcp: bool,
-    framing: Framing,
+keyword_enum! {
+    /// What `mode` says: it decides which other keys a line has.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Mode: "mode" {
+        Rtu => "rtu",
+        Ascii => "ascii",
+        Tcp => "tcp",
+        RtuOverTcp => "rtu-over-tcp",
+    }
 }
 
-const MODES: [(&str, Mode); 4] = [
-    ("rtu", Mode { tcp: false, framing: Framing::Rtu }),
-    ("ascii", Mode { tcp: false, framing: Framing::Ascii }),
-    ("tcp", Mode { tcp: true, framing: Framing::Mbap }),
-    ("rtu-over-tcp", Mode { tcp: true, framing: Framing::Rtu }),
-];
-
-/// The mode decides which other keys a line has, so it is looked at first.
-fn mode(raw: &Raw, problems: &mut Problems) -> Option<Mode> {
-    let words = MODES.map(|(word, _)| word);
-    let Some((_, value)) = raw.table.get("mode") else {
-        let problem = problems.add(raw.at, "a line needs `mode`").label("missing here");
-        problem.help(format!("mode is one of {}", words.join(", ")));
-        return None;
-    };
-    let word = <String as Value>::read(&value.value, value.at, problems)?;
-    let found = MODES.iter().find(|(known, _)| *known == word).map(|(_, mode)| *mode);
-    if found.is_none() {
-        let problem = problems.add(value.at, format!("unknown mode `{word}`"));
-        problem.label(format!("expected {}", words.join(", "))).suggest(&word, words);
+impl Mode {
+    /// Whether it goes over TCP, and its framing.
+    fn transport(self) -> (bool, Framing) {
+        match self {
+            Mode::Rtu => (false, Framing::Rtu),
+            Mode::Ascii => (false, Framing::Ascii),
+            Mode::Tcp => (true, Framing::Mbap),
+            Mode::RtuOverTcp => (true, Framing::Rtu),
+        }
     }
-    found
 }
 
 fn serial(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut Problems) -> Option<LineDef> {
@@ -132,8 +126,8 @@ pub fn usual_data_bits(ascii: bool) -> u8 {
 
 /// The word of a mode in the plant file: `rtu`, `ascii`, `tcp`, `rtu-over-tcp`; `None` for a mode that has none.
 pub(super) fn mode_word(transport: &Transport) -> Option<&'static str> {
-    let (tcp, framing) = (matches!(transport, Transport::Tcp { .. }), transport.framing());
-    MODES.iter().find(|(_, mode)| (mode.tcp, mode.framing) == (tcp, framing)).map(|(word, _)| *word)
+    let written = (matches!(transport, Transport::Tcp { .. }), transport.framing());
+    Mode::ALL.into_iter().find(|mode| mode.transport() == written).map(Mode::word)
 }
 
 /// The name of a line even if the rest of it is wrong, so that one mistake is reported once.

@@ -5,11 +5,12 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Defs, Unique, check_writable, number_of},
-    reader::{At, Raw, Value, text, toml_table},
+    reader::{At, Raw, kind_of, text, toml_tables},
     schema::{CommandTable, MimicTable, TrendTable},
 };
 use crate::plant::{
     def::{MimicCommand, MimicDef, MimicItem, MimicRect, Pen, TagId, TrendGroup},
+    keyword::keyword_enum,
     tag::{Poll, TagDef},
 };
 
@@ -34,7 +35,7 @@ pub(super) fn mimic(table: &MimicTable, defs: &Defs, problems: &mut Problems) ->
 /// Declares the tables of the items: every item has a kind and a place.
 macro_rules! items {
     ($($name:ident, $what:literal { $($mode:ident $key:literal $field:ident: $type:ty,)* })*) => { $(
-        toml_table!(
+        toml_tables!(
             #[doc = $what]
             $name, $what {
                 need "kind" _kind: String,
@@ -76,20 +77,33 @@ items! {
     TextItem, "a text" { need "text" text: String, }
 }
 
-toml_table!(
+toml_tables! {
     /// A pipe has no place but its points.
     PipeItem, "a pipe" { need "kind" _kind: String, list "points" points: [u16; 2], list "flow" flow: String, }
-);
+}
 
-const KINDS: [&str; 9] = ["tank", "valve", "pump", "pipe", "value", "controller", "sequence", "trend", "text"];
+keyword_enum! {
+    #[derive(Debug, Clone, Copy)]
+    enum ItemKind: "kind" {
+        Tank => "tank",
+        Valve => "valve",
+        Pump => "pump",
+        Pipe => "pipe",
+        Value => "value",
+        Controller => "controller",
+        Sequence => "sequence",
+        Trend => "trend",
+        Text => "text",
+    }
+}
 
 /// Reads an item by its kind. The problems of a wrong item are added even where `None` is returned.
 fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicItem>> {
     let at = raw.at;
-    let kind = kind(&raw, problems)?;
+    let kind = kind_of::<ItemKind>(&raw, "a mimic item", "kind", problems)?;
     let layers = &[raw];
-    let value = match kind.as_str() {
-        "tank" => {
+    let value = match kind {
+        ItemKind::Tank => {
             let item = TankItem::of(layers, problems);
             MimicItem::Tank {
                 place: item.place(),
@@ -100,26 +114,26 @@ fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicIte
                 agitator: defs.tag_id(&item.agitator, problems),
             }
         }
-        "valve" => {
+        ItemKind::Valve => {
             let item = ValveItem::of(layers, problems);
             let tag = defs.tag_id(&item.tag, problems)?;
             let vertical = item.vertical.is_some_and(|vertical| vertical.value);
             MimicItem::Valve { place: item.place(), label: text(&item.label), tag, vertical }
         }
-        "pump" => {
+        ItemKind::Pump => {
             let item = PumpItem::of(layers, problems);
             MimicItem::Pump { place: item.place(), label: text(&item.label), tag: defs.tag_id(&item.tag, problems)? }
         }
-        "pipe" => pipe(PipeItem::of(layers, problems), defs, problems),
-        "value" => {
+        ItemKind::Pipe => pipe(PipeItem::of(layers, problems), defs, problems),
+        ItemKind::Value => {
             let item = ValueItem::of(layers, problems);
             // The one item that can show words as well as a number.
             let tag = defs.names.full(item.tag.as_ref()?, problems)?;
             MimicItem::Value { place: item.place(), label: text(&item.label), tag }
         }
-        "controller" => controller(ControllerItem::of(layers, problems), defs, problems)?,
-        "sequence" => sequence(SequenceItem::of(layers, problems), defs, problems)?,
-        "trend" => {
+        ItemKind::Controller => controller(ControllerItem::of(layers, problems), defs, problems)?,
+        ItemKind::Sequence => sequence(SequenceItem::of(layers, problems), defs, problems)?,
+        ItemKind::Trend => {
             let item = TrendItem::of(layers, problems);
             let tag = defs.tag_id(&item.tag, problems)?;
             MimicItem::Trend {
@@ -128,29 +142,12 @@ fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicIte
                 window: item.window.map_or(Duration::ZERO, |window| window.value),
             }
         }
-        _ => {
+        ItemKind::Text => {
             let item = TextItem::of(layers, problems);
             MimicItem::Text { place: item.place(), text: text(&item.text) }
         }
     };
     Some(At { value, at })
-}
-
-fn kind(raw: &Raw, problems: &mut Problems) -> Option<String> {
-    let Some((_, value)) = raw.table.get("kind") else {
-        problems
-            .add(raw.at, "a mimic item needs `kind`")
-            .label("missing here")
-            .help(format!("known: {}", KINDS.join(", ")));
-        return None;
-    };
-    let at = value.at;
-    let kind = <String as Value>::read(&value.value, at, problems)?;
-    if !KINDS.contains(&kind.as_str()) {
-        problems.add(at, format!("unknown kind `{kind}`")).label("no such item").suggest(&kind, KINDS);
-        return None;
-    }
-    Some(kind)
 }
 
 fn pipe(item: PipeItem, defs: &Defs, problems: &mut Problems) -> MimicItem {

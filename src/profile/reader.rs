@@ -230,12 +230,15 @@ pub(crate) fn either(layers: &mut [Raw], first: &str, second: &str, problems: &m
     }
 }
 
-/// Declares a table of the format: its keys, their types, and which are needed (`need`), optional (`opt`) or arrays (`list`).
-macro_rules! toml_table {
+/// Declares tables of the format: their keys, the types, and which are needed (`need`), optional (`opt`) or arrays (`list`).
+macro_rules! toml_tables {
     (@type need $type:ty) => { Option<$crate::profile::reader::At<$type>> };
     (@type opt $type:ty) => { Option<$crate::profile::reader::At<$type>> };
     (@type list $type:ty) => { Vec<$crate::profile::reader::At<$type>> };
-    ($(#[$doc:meta])* $name:ident, $what:literal { $($(#[$note:meta])* $mode:ident $key:literal $field:ident: $type:ty,)* }) => {
+    ($(
+        $(#[$doc:meta])*
+        $name:ident, $what:literal { $($(#[$note:meta])* $mode:ident $key:literal $field:ident: $type:ty,)* }
+    )*) => { $(
         $(#[$doc])*
         #[derive(Debug, Clone)]
         #[allow(dead_code, reason = "some keys are only checked, and not every table is reported as a whole")]
@@ -244,8 +247,9 @@ macro_rules! toml_table {
             pub at: $crate::profile::diagnostic::Span,
             /// Nothing in it was wrong by itself. If something was, what seems missing is better not asked for.
             pub valid: bool,
-            $($(#[$note])* pub $field: $crate::profile::reader::toml_table!(@type $mode $type),)*
+            $($(#[$note])* pub $field: $crate::profile::reader::toml_tables!(@type $mode $type),)*
         }
+        #[allow(dead_code, reason = "not every table is asked for the places of its keys")]
         impl $name {
             pub fn of(layers: &[$crate::profile::reader::Raw], problems: &mut $crate::profile::diagnostic::Problems) -> Self {
                 let before = problems.count();
@@ -255,7 +259,6 @@ macro_rules! toml_table {
             }
 
             /// Where the value of a key stands, if it is written and has the right type.
-            #[allow(dead_code, reason = "not every table is asked for")]
             pub fn span_of(&self, key: &str) -> Option<$crate::profile::diagnostic::Span> {
                 match key {
                     $($key => self.$field.iter().next().map(|value| value.at),)*
@@ -273,9 +276,20 @@ macro_rules! toml_table {
                 Some($name::of(&[raw], problems))
             }
         }
-    };
+    )* };
 }
-pub(crate) use toml_table;
+pub(crate) use toml_tables;
+
+/// The word that decides which other keys a table has, read before them.
+pub(crate) fn kind_of<T: Keyword>(raw: &Raw, what: &str, key: &str, problems: &mut Problems) -> Option<T> {
+    let Some((_, value)) = raw.table.get(key) else {
+        let known: Vec<&str> = T::WORDS.iter().map(|(word, _)| *word).collect();
+        let problem = problems.add(raw.at, format!("{what} needs `{key}`")).label("missing here");
+        problem.help(format!("known: {}", known.join(", ")));
+        return None;
+    };
+    T::read(&value.value, value.at, problems)
+}
 
 impl<T: Keyword> Value for T {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<T> {

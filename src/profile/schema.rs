@@ -12,11 +12,11 @@ pub(super) use self::device::{
 };
 use super::{
     condition::AlarmTable,
-    reader::{Choice, Raw, toml_table},
+    reader::{Choice, Raw, toml_tables},
 };
 use crate::plant::def::{Parity, Role, Rs485};
 
-toml_table!(
+toml_tables! {
     /// A plant file.
     PlantFile, "the plant file" {
         need "title" title: String,
@@ -36,9 +36,7 @@ toml_table!(
         opt "report" report: ReportTable,
         opt "history" history: HistoryTable,
     }
-);
 
-toml_table!(
     /// A `[[line]]` on a serial port.
     SerialTable, "a line on a serial port" {
         need "name" name: String,
@@ -54,9 +52,7 @@ toml_table!(
         opt "frame_timeout_ms" frame_timeout_ms: u16,
         opt "turnaround_ms" turnaround_ms: u16,
     }
-);
 
-toml_table!(
     /// A `[[line]]` over TCP.
     TcpTable, "a line over TCP" {
         need "name" name: String,
@@ -67,9 +63,7 @@ toml_table!(
         opt "request_gap_ms" request_gap_ms: u16,
         opt "frame_timeout_ms" frame_timeout_ms: u16,
     }
-);
 
-toml_table!(
     /// A `[[device]]` of a plant file.
     DeviceTable, "a device" {
         need "name" name: String,
@@ -85,17 +79,13 @@ toml_table!(
         /// More tags, or other keys for the tags of the profile.
         list "tag" tags: Raw,
     }
-);
 
-toml_table!(
     /// What holds for all alarms, `[alarms]`.
     AlarmRulesTable, "the rules for alarms" {
         opt "shelve_max" shelve_max: Duration,
         opt "first_out_window" first_out_window: Duration,
     }
-);
 
-toml_table!(
     /// An `[[interlock]]`.
     InterlockTable, "an interlock" {
         need "tag" tag: String,
@@ -108,9 +98,7 @@ toml_table!(
         need "message" message: String,
         opt "refuse" refuse: bool,
     }
-);
 
-toml_table!(
     /// An `[[actuator]]`.
     ActuatorTable, "an actuator" {
         need "output" output: String,
@@ -119,17 +107,13 @@ toml_table!(
         list "needs" needs: NeedTable,
         opt "travel" travel: Duration,
     }
-);
 
-toml_table!(
     /// A state that another tag must be in.
     NeedTable, "a needed state" {
         need "tag" tag: String,
         need "is" is: Choice,
     }
-);
 
-toml_table!(
     /// A `[[sequence]]`.
     SequenceTable, "a sequence" {
         need "run" run: String,
@@ -137,18 +121,14 @@ toml_table!(
         need "step" step: String,
         need "first" first: Choice,
     }
-);
 
-toml_table!(
     /// The mimic of the process.
     MimicTable, "the mimic" {
         opt "size" size: [u16; 2],
         list "item" items: Raw,
         list "command" commands: CommandTable,
     }
-);
 
-toml_table!(
     /// A command on the mimic.
     CommandTable, "a mimic command" {
         need "key" key: String,
@@ -156,33 +136,25 @@ toml_table!(
         need "tag" tag: String,
         opt "value" value: Choice,
     }
-);
 
-toml_table!(
     /// A `[[trend]]` group.
     TrendTable, "a trend" {
         need "name" name: String,
         list "pens" pens: PenTable,
     }
-);
 
-toml_table!(
     /// A pen of a trend.
     PenTable, "a pen" {
         need "tag" tag: String,
         opt "scale" scale: [f64; 2],
     }
-);
 
-toml_table!(
     /// A `[[shift]]`.
     ShiftTable, "a shift" {
         need "name" name: String,
         need "start" start: Time,
     }
-);
 
-toml_table!(
     /// The rules for logging in.
     AccessTable, "access" {
         opt "banner" banner: String,
@@ -194,17 +166,13 @@ toml_table!(
         opt "sessions_max" sessions_max: u16,
         list "trusted" trusted: TrustedTable,
     }
-);
 
-toml_table!(
     /// A user of the operating system who needs no password.
     TrustedTable, "a trusted user" {
         need "user" user: String,
         need "role" role: Role,
     }
-);
 
-toml_table!(
     /// What reports contain.
     ReportTable, "the report" {
         opt "folder" folder: String,
@@ -212,29 +180,23 @@ toml_table!(
         opt "record" record: RecordTable,
         opt "csv" csv: CsvTable,
     }
-);
 
-toml_table!(
     /// How little of the disk may be free.
     HistoryTable, "the history" {
         opt "disk_free_percent_min" disk_free_percent_min: u8,
         opt "disk_free_mib_min" disk_free_mib_min: u32,
     }
-);
 
-toml_table!(
     /// The raw record of a controller.
     RecordTable, "the report's record" {
         need "device" device: String,
         need "every" every: Duration,
     }
-);
 
-toml_table!(
     /// How CSV is written.
     CsvTable, "the report's csv" {
         opt "separator" separator: String,
         opt "decimal" decimal: String,
         opt "bom" bom: bool,
     }
-);
+}

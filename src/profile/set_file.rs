@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use super::{
     diagnostic::Problems,
     names::number_of,
-    reader::{self, At, Choice, Node, Raw, Value, text, toml_table},
+    reader::{self, At, Choice, Node, Raw, Value, text, toml_tables},
 };
 use crate::plant::{
     def::PlantDef,
@@ -19,7 +19,7 @@ use crate::plant::{
     visible::acts,
 };
 
-toml_table!(
+toml_tables! {
     /// The file of a parameter set.
     SetTable, "the parameter set" {
         need "device" device: String,
@@ -31,7 +31,7 @@ toml_table!(
         opt "given" given: Raw,
         need "values" values: Raw,
     }
-);
+}
 
 /// An instant, as TOML or RFC 3339 writes it.
 #[derive(Debug, Clone, Copy)]

@@ -77,14 +77,10 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         check_name(name, "tag", problems);
     }
     let short = text(&row.name);
+    let name = format!("{}.{short}", context.device_name);
     let tag = TagDef {
-        id,
-        device: context.device,
-        name: format!("{}.{short}", context.device_name),
         label: row.label.as_ref().map_or_else(|| short.clone(), |label| label.value.clone()),
-        short,
         meaning: text(&row.meaning),
-        point: point.unwrap_or(NOWHERE),
         scale: row.scale.map_or(1.0, |scale| scale.value),
         offset: row.offset.map_or(0.0, |offset| offset.value),
         decimals,
@@ -100,11 +96,9 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),
         quality_from: links.quality.map(|tag| (tag, row.quality_mask.map_or(u64::MAX, |mask| mask.value))),
         write_fc: row.write_fc.map(|fc| fc.value),
-        write_unlock: None,
         group: text(&row.group),
         poll,
         // Known when all tags and alarms are.
-        class: PollClass::Normal,
         deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
         store: !is_text
             && row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
@@ -112,9 +106,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
         source: text(&row.source),
         // Needs all tags of the plant.
-        simulate: None,
-        default: None,
-        in_sets: false,
+        ..TagDef::new(id, context.device, &name, point.unwrap_or(NOWHERE))
     };
     let default = row.default.as_ref().and_then(|default| number_of(default, &tag, problems));
     let tag = TagDef { default, ..tag };

@@ -11,12 +11,12 @@ use crate::{
     profile::{
         address::{Location, Modicon},
         diagnostic::{Problems, Span},
-        reader::{Choice, Node, Numbered, Raw, Value, toml_table},
+        reader::{Choice, Node, Numbered, Raw, Value, toml_tables},
         simulate::Choices,
     },
 };
 
-toml_table!(
+toml_tables! {
     /// A device profile.
     ProfileFile, "the device profile" {
         need "vendor" vendor: String,
@@ -39,9 +39,7 @@ toml_table!(
         opt "faceplate" faceplate: FaceplateTable,
         opt "program" program: ProgramTable,
     }
-);
 
-toml_table!(
     /// What one request may hold.
     LimitsTable, "limits" {
         opt "read_registers_max" read_registers_max: u16,
@@ -53,9 +51,7 @@ toml_table!(
         opt "request_gap_ms" request_gap_ms: u16,
         opt "write_gap_ms" write_gap_ms: u16,
     }
-);
 
-toml_table!(
     /// A `[[tag]]` of a profile, or a `[[device.tag]]` of a plant file.
     TagTable, "a tag" {
         need "name" name: String,
@@ -104,9 +100,7 @@ toml_table!(
         /// Part of parameter sets, or not.
         opt "set" in_sets: bool,
     }
-);
 
-toml_table!(
     /// How a simulated device fills a tag.
     SimulateTable, "simulate" {
         opt "start" start: Choice,
@@ -133,9 +127,7 @@ toml_table!(
         opt "when" when: CheckTable,
         opt "idle" idle: f64,
     }
-);
 
-toml_table!(
     /// A condition on another tag; without `is`, `above` and `below`: is it not 0?
     CheckTable, "when" {
         need "tag" tag: String,
@@ -145,25 +137,19 @@ toml_table!(
         opt "below" below: f64,
         list "and" and: CheckTable,
     }
-);
 
-toml_table!(
     /// A value for when something is so.
     CaseTable, "a case" {
         need "when" when: CheckTable,
         need "value" value: Choice,
     }
-);
 
-toml_table!(
     /// What must be written before a tag takes a write.
     UnlockTable, "write_unlock" {
         need "tag" tag: String,
         need "value" value: Choice,
     }
-);
 
-toml_table!(
     /// An `[[action]]` of a profile.
     ActionTable, "an action" {
         need "name" name: String,
@@ -174,9 +160,7 @@ toml_table!(
         need "confirm" confirm: String,
         opt "saves" saves: bool,
     }
-);
 
-toml_table!(
     /// Which tags a controller is operated by.
     FaceplateTable, "the faceplate" {
         need "pv" pv: String,
@@ -189,9 +173,7 @@ toml_table!(
         opt "tune" tune: String,
         list "tunes" tunes: String,
     }
-);
 
-toml_table!(
     /// The ramp/soak program of a controller.
     ProgramTable, "the program" {
         need "position" position: String,
@@ -205,16 +187,14 @@ toml_table!(
         opt "mode" mode: String,
         list "steps" steps: StepTable,
     }
-);
 
-toml_table!(
     /// A step of a program.
     StepTable, "a step of the program" {
         need "sv" sv: String,
         need "ramp" ramp: String,
         need "soak" soak: String,
     }
-);
+}
 
 keyword_enum! {
     /// How addresses are written.

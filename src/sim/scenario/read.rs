@@ -14,13 +14,13 @@ use crate::{
     profile::{
         self, Errors, Search,
         diagnostic::{Problems, Span},
-        reader::{self, At, Choice, Node, Value, text, toml_table},
+        reader::{self, At, Choice, Node, Value, text, toml_tables},
         renamed,
     },
     sim::faults::{Fault, FaultTarget, why_not_applicable},
 };
 
-toml_table!(
+toml_tables! {
     /// A scenario file.
     ScenarioTable, "the scenario" {
         need "title" title: String,
@@ -34,9 +34,7 @@ toml_table!(
         list "operator" operator: OperatorTable,
         list "expect" expect: ExpectTable,
     }
-);
 
-toml_table!(
     /// An `[[event]]`.
     EventTable, "an event" {
         need "at" at_time: Duration,
@@ -49,9 +47,7 @@ toml_table!(
         /// The fault is cleared now.
         opt "clear" clear: bool,
     }
-);
 
-toml_table!(
     /// An `[[operator]]`: what a good operator does.
     OperatorTable, "an operator action" {
         need "at" at_time: Duration,
@@ -60,9 +56,7 @@ toml_table!(
         opt "write" write: String,
         opt "value" value: Choice,
     }
-);
 
-toml_table!(
     /// An `[[expect]]`.
     ExpectTable, "an expectation" {
         opt "what" what: String,
@@ -85,7 +79,7 @@ toml_table!(
         opt "displayed_within" displayed_within: String,
         opt "tolerance" tolerance: f64,
     }
-);
+}
 
 impl Value for Fault {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Fault> {
