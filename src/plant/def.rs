@@ -8,13 +8,19 @@ use serde::{Deserialize, Serialize};
 use super::tag::{Table, TagDef};
 
 pub use super::{
-    alarm::def::{AlarmClass, AlarmDef, AlarmRules, Condition, Guidance, Level, Priority, Subject},
+    alarm::def::Priority,
     id::{AlarmId, DeviceId, LineId, TagId},
+    line::{Framing, LineDef, Serial, Transport},
+    mimic_def::MimicDef,
+    role::{Reauthentication, Role},
+};
+pub(crate) use super::{
+    alarm::def::{AlarmClass, AlarmDef, AlarmRules, Condition, Guidance, Level, Subject},
     interlock::ControlLogic,
-    line::{Framing, LineDef, Parity, Rs485, Serial, Transport},
-    mimic_def::{MimicCommand, MimicDef, MimicItem, MimicRect},
+    line::{Parity, Rs485},
+    mimic_def::{MimicCommand, MimicItem, MimicRect},
     program::{ProgramDef, ProgramStep},
-    role::{AccessDef, Reauthentication, Role},
+    role::AccessDef,
 };
 
 /// Everything that a plant file says, checked.

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::plant::number::to_u8;
 
-pub use plan::{Change, Problem, plan};
+pub(crate) use plan::{Change, Problem, plan};
 
 /// The settings of a device under a name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

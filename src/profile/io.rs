@@ -76,21 +76,16 @@ impl Found {
 
 /// Reads the plant file that an argument means: a path, or the name of a plant.
 pub(super) fn plant(argument: &Path, search: &Search) -> Result<Found, Errors> {
-    find(PLANT, argument, search)
+    find(Kind::Plant, argument, search)
 }
 
 /// Reads the scenario that an argument means: a path, or the name of a scenario. Gives its name and text.
-pub(super) fn scenario(argument: &Path, search: &Search) -> Result<(String, Text), Errors> {
-    find(SCENARIO, argument, search).map(|found| (found.name, found.text))
+pub(crate) fn scenario(argument: &Path, search: &Search) -> Result<(String, Text), Errors> {
+    find(Kind::Scenario, argument, search).map(|found| (found.name, found.text))
 }
 
-/// What is found by path or name: its kind, its folder, its word.
-type FileKind = (Kind, &'static str, &'static str);
-const PLANT: FileKind = (Kind::Plant, "plants", "plant");
-const SCENARIO: FileKind = (Kind::Scenario, "scenarios", "scenario");
-
-fn find(kind: FileKind, argument: &Path, search: &Search) -> Result<Found, Errors> {
-    let folder = kind.1;
+fn find(kind: Kind, argument: &Path, search: &Search) -> Result<Found, Errors> {
+    let folder = folder_of(kind);
     let name = argument.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let by_name = argument.to_str().filter(|name| plain(name)).map(|name| format!("{name}.toml"));
     let in_folders = by_name.iter().flat_map(|file| search.folders.iter().map(move |f| f.join(folder).join(file)));
@@ -111,7 +106,8 @@ fn find(kind: FileKind, argument: &Path, search: &Search) -> Result<Found, Error
     }
 }
 
-fn missing((kind, _, word): FileKind, argument: &Path, name: &str, search: &Search) -> Errors {
+fn missing(kind: Kind, argument: &Path, name: &str, search: &Search) -> Errors {
+    let word = kind.word();
     let what = if argument.exists() { "is not a file" } else { "does not exist" };
     let known: Vec<String> = list(search).into_iter().filter(|l| l.kind == kind).map(|l| l.name).collect();
     let near = known.iter().find(|known| strsim::damerau_levenshtein(known, name) <= 1);
@@ -152,9 +148,9 @@ pub(super) fn device_file(argument: &Path, search: &Search) -> Option<(String, T
 }
 
 /// The names of all plants, device profiles and scenarios, with where each comes from.
-pub(super) fn list(search: &Search) -> Vec<Listed> {
+pub fn list(search: &Search) -> Vec<Listed> {
     let mut all = Vec::new();
-    for (kind, folder) in [(Kind::Plant, "plants"), (Kind::Device, "devices"), (Kind::Scenario, "scenarios")] {
+    for (kind, folder) in Kind::ALL.map(|kind| (kind, folder_of(kind))) {
         let shipped = SHIPPED.get_dir(folder).into_iter().flat_map(Dir::files).filter_map(|file| stem(file.path()));
         let entries = search.folders.iter().filter_map(|path| path.join(folder).read_dir().ok()).flatten().flatten();
         let mut names: Vec<String> = entries.filter_map(|entry| stem(&entry.path())).chain(shipped).collect();
@@ -166,11 +162,19 @@ pub(super) fn list(search: &Search) -> Vec<Listed> {
 }
 
 /// The text of a plant or profile by its name.
-pub(super) fn text_of(name: &str, search: &Search) -> Option<String> {
+pub fn text_of(name: &str, search: &Search) -> Option<String> {
     let named = |kind| find(kind, Path::new(name), search).ok().map(|found| found.text);
-    let other = || plain(name).then(|| named(PLANT).or_else(|| named(SCENARIO))).flatten();
+    let other = || plain(name).then(|| named(Kind::Plant).or_else(|| named(Kind::Scenario))).flatten();
     let text = device(name, search).ok().flatten().or_else(other)?;
     Some(String::from_utf8_lossy(&text.bytes).into_owned())
+}
+
+fn folder_of(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Plant => "plants",
+        Kind::Device => "devices",
+        Kind::Scenario => "scenarios",
+    }
 }
 
 /// Where the file of a name lies on disk; a device profile may also lie in the folder itself.

@@ -47,13 +47,14 @@ use std::{
     sync::Arc,
 };
 
+pub(crate) use self::io::scenario;
 pub use self::{
     diagnostic::{Errors, render},
-    io::{PlantFile, Search},
+    io::{PlantFile, Search, list, text_of},
     set_file::{read_set, text_of_set},
 };
-use crate::plant::def::PlantDef;
 pub use crate::plant::line_check::BAUDS;
+use crate::plant::{def::PlantDef, keyword::keyword_enum};
 
 /// Loads a plant, or returns every error in it.
 ///
@@ -116,28 +117,15 @@ pub struct Listed {
     pub from: Option<PathBuf>,
 }
 
-/// The kinds of profile.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// A whole plant.
-    Plant,
-    /// A device.
-    Device,
-    /// A drill on a simulated plant.
-    Scenario,
-}
-
-/// All plants, all devices, all scenarios, each by name: what `sightglass profiles` shows.
-pub fn list(search: &Search) -> Vec<Listed> {
-    io::list(search)
-}
-
-/// The text of a scenario: of a file, or of a name in a configuration folder or in the program.
-pub(crate) fn scenario(argument: &Path, search: &Search) -> Result<(String, plant::Text), Errors> {
-    io::scenario(argument, search)
-}
-
-/// The text of a device profile, plant or scenario, to read or to copy and change.
-pub fn text_of(name: &str, search: &Search) -> Option<String> {
-    io::text_of(name, search)
+keyword_enum! {
+    /// The kinds of profile.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Kind: "kind of profile" {
+        /// A whole plant.
+        Plant => "plant",
+        /// A device.
+        Device => "device",
+        /// A drill on a simulated plant.
+        Scenario => "scenario",
+    }
 }

@@ -14,70 +14,26 @@ const POINTS_MAX: u32 = 32;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Condition {
     /// A fixed limit; it returns when the value is back by the deadband.
-    Limit {
-        /// Which side, which level.
-        level: Level,
-        /// The limit.
-        limit: f64,
-        /// How far back inside before it returns.
-        deadband: f64,
-    },
-    /// The value is further than `limit` from another tag (its SV), either side.
-    Deviation {
-        /// The tag to compare with.
-        from: TagId,
-        /// Greatest distance.
-        limit: f64,
-        /// How far back inside before it returns.
-        deadband: f64,
-    },
-    /// A discrete tag has this value.
-    State {
-        /// The abnormal value.
-        is: f64,
-    },
-    /// This bit of a word is set.
-    Bit {
-        /// From 0, the lowest.
-        bit: u8,
-    },
-    /// The value rises faster than a limit above 0, or falls faster than one below.
-    Rate {
-        /// Tag's unit per minute.
-        limit: f64,
-        /// The time over which the rate is measured.
-        over: Duration,
-        /// How much slower before it returns, tag's unit per minute.
-        deadband: f64,
-    },
+    Limit { level: Level, limit: f64, deadband: f64 },
+    /// The value is further than `limit` from another tag (its SV), on either side; it returns when it is nearer by the deadband.
+    Deviation { from: TagId, limit: f64, deadband: f64 },
+    /// A discrete tag has this abnormal value.
+    State { is: f64 },
+    /// This bit of a word is set; bit 0 is the lowest.
+    Bit { bit: u8 },
+    /// The value rises faster than a limit above 0, or falls faster than one below: limit and deadband per minute, measured
+    /// `over` a time.
+    Rate { limit: f64, over: Duration, deadband: f64 },
     /// The value has stayed within `deadband` for so long, as if stuck.
-    NoChange {
-        /// So long.
-        lasts: Duration,
-        /// What is no change.
-        deadband: f64,
-    },
+    NoChange { lasts: Duration, deadband: f64 },
     /// There has been no good value for so long.
-    NoUpdate {
-        /// So long.
-        lasts: Duration,
-    },
-    /// The value has changed so often within a time.
-    Changes {
-        /// So often, 2 to 100.
-        count: u32,
-        /// Within this time.
-        within: Duration,
-        /// What is no change.
-        deadband: f64,
-    },
+    NoUpdate { lasts: Duration },
+    /// The value has changed so often (2 to 100), by more than the deadband each time, `within` a time.
+    Changes { count: u32, within: Duration, deadband: f64 },
     /// The device does not answer, or gives no values.
     NotAnswering,
     /// The device has this signal of NE 107.
-    Health {
-        /// Which.
-        signal: Signal,
-    },
+    Health { signal: Signal },
     /// The line is not connected although it should be.
     NotConnected,
     /// The line has no time for all of its polls: some are read less often.

@@ -1,9 +1,9 @@
 //! Alarms: when a condition holds, what state follows, the manager of all of them, and how well the alarm system performs.
 
 pub(crate) mod manager;
-pub mod command;
+pub(crate) mod command;
 pub(crate) mod condition;
-pub mod def;
+pub(crate) mod def;
 pub(crate) mod lists;
 pub(crate) mod monitor;
 pub(crate) mod metrics;

@@ -30,25 +30,13 @@ pub struct Change {
 pub enum Problem {
     /// It was taken from another kind of device.
     #[error("the set is for {set}, this device is {device}")]
-    OtherProfile {
-        /// The set's profile.
-        set: String,
-        /// The device's.
-        device: String,
-    },
+    OtherProfile { set: String, device: String },
     /// The device has no such setting.
     #[error("{0} is no setting of this device")]
     NoSetting(String),
     /// A tag that the set rests on has another value in the device.
     #[error("{tag} is {device} in the device, {set} in the set: the values mean something else")]
-    OtherGround {
-        /// Which tag.
-        tag: String,
-        /// In the set.
-        set: String,
-        /// In the device, or `not known`.
-        device: String,
-    },
+    OtherGround { tag: String, set: String, device: String },
     /// A value that must be known is not.
     #[error("{0} is not known now")]
     Unknown(String),
@@ -57,32 +45,13 @@ pub enum Problem {
     Ground(String),
     /// Outside the limits that the device would then have.
     #[error("{tag} {value} is outside {min} … {max}")]
-    OutOfRange {
-        /// Which tag.
-        tag: String,
-        /// The value of the set.
-        value: f64,
-        /// `−∞` if none.
-        min: String,
-        /// `∞` if none.
-        max: String,
-    },
+    OutOfRange { tag: String, value: f64, min: String, max: String },
     /// Not one of the values of an enumeration.
     #[error("{tag} has no value {value}")]
-    NotAChoice {
-        /// Which tag.
-        tag: String,
-        /// The value of the set.
-        value: f64,
-    },
+    NotAChoice { tag: String, value: f64 },
     /// The station would refuse it now.
     #[error("{tag}: interlock: {text}")]
-    Interlock {
-        /// Which tag.
-        tag: String,
-        /// What the plant file says about it.
-        text: String,
-    },
+    Interlock { tag: String, text: String },
     /// The limits forbid every sequence.
     #[error("{0}: no sequence of writes keeps within the limits")]
     NoOrder(String),
