@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn after_the_clock_was_set_values_are_as_old_as_before_and_alarms_are_acknowledged_as_they_are_shown() {
+    fn a_set_clock_ages_no_value_and_keeps_acknowledgements() {
         for by in [YEARS, -YEARS] {
             let mut plant = Plant::new(fixture::shared(), at(1_000_000), 1.0);
             plant.on_event(values(1_000_000));

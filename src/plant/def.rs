@@ -184,9 +184,9 @@ impl Limits {
 pub struct Faceplate {
     /// Process value.
     pub pv: TagId,
-    /// Set value, as it is written.
+    /// Setpoint, as it is written.
     pub sv: TagId,
-    /// The set value in use, where a program or a ramp may move it away from `sv`.
+    /// The setpoint in use, where a program or a ramp may move it away from `sv`.
     pub sv_used: Option<TagId>,
     /// Manipulated value, output in percent.
     pub mv: Option<TagId>,

@@ -14,7 +14,7 @@ use super::{
 
 /// Process value, decimals from [`DP`], bad while [`FAULT`] is not zero.
 pub const PV: TagId = TagId(0);
-/// Set value, writable between 0 and 100.
+/// Setpoint, writable between 0 and 100.
 pub const SV: TagId = TagId(1);
 /// Decimals of PV and SV.
 pub const DP: TagId = TagId(2);

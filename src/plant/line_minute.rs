@@ -46,9 +46,9 @@ impl LineMinute {
 /// The minute that ends `at`, from the totals before and after it. Counters that were reset count from zero.
 pub fn minute(line: Arc<str>, before: &LineReport, after: &LineReport, at: Timestamp) -> LineMinute {
     let (old, new) = (&before.counters, &after.counters);
-    let anew = new.requests < old.requests || new.sent_bytes < old.sent_bytes;
-    let since = |new: u64, old: u64| if anew { new } else { new.saturating_sub(old) };
-    let devices = devices(after, (!anew).then_some(before));
+    let restarted = new.requests < old.requests || new.sent_bytes < old.sent_bytes;
+    let since = |new: u64, old: u64| if restarted { new } else { new.saturating_sub(old) };
+    let devices = devices(after, (!restarted).then_some(before));
     let ms = |span: Option<std::time::Duration>| span.map(|span| span.as_secs_f32() * 1e3);
     let sent_bytes = since(new.sent_bytes, old.sent_bytes);
     LineMinute {
@@ -205,12 +205,13 @@ mod tests {
     #[test]
     fn every_minute_is_told_once_at_its_end() {
         let mut watch = LineWatch::default();
-        let mut told = Vec::new();
+        let mut minutes = Vec::new();
         for second in 30..250 {
             let report = Arc::new(report(second as u64, 10, 0));
-            told.extend(watch.tick(at(second), "L1", &report).map(|minute| (minute.at.as_second(), minute.requests)));
+            minutes
+                .extend(watch.tick(at(second), "L1", &report).map(|minute| (minute.at.as_second(), minute.requests)));
         }
-        assert_eq!(told, [(60, 30), (120, 60), (180, 60), (240, 60)]);
+        assert_eq!(minutes, [(60, 30), (120, 60), (180, 60), (240, 60)]);
     }
 
     #[test]

@@ -12,10 +12,9 @@ use serde::{Deserialize, Serialize};
 use super::{
     def::{DeviceId, PlantDef, TagId},
     scale,
-    tag::{Bound, Decimals, TagDef},
+    tag::TagDef,
     visible::acts,
 };
-use crate::plant::number::to_u8;
 
 pub(crate) use plan::{Change, Problem, plan};
 
@@ -109,7 +108,7 @@ pub fn capture(
             (None, _) | (_, Some((_, None))) => missing.push(tag.short.clone()),
             (Some(value), unit) => {
                 values.push(SetValue { tag: tag.short.clone(), value });
-                let measured_in = unit_of(tag, trusted).filter(|unit| !unit.is_empty());
+                let measured_in = tag.unit_by(trusted).filter(|unit| !unit.is_empty());
                 units.extend(measured_in.map(|unit| (tag.short.clone(), unit.to_owned())));
                 let unit = unit.and_then(|(from, unit)| Some(SetValue { tag: from.short.clone(), value: unit? }));
                 given.extend(unit.filter(|unit| !given.contains(unit)));
@@ -128,13 +127,6 @@ pub fn capture(
         units,
         missing,
     }
-}
-
-/// What the device measures a tag in; `None` while it has not said which of its units that is.
-pub fn unit_of<'a>(tag: &'a TagDef, trusted: Trusted) -> Option<&'a str> {
-    let Some((from, units)) = &tag.unit_from else { return Some(&tag.unit) };
-    let chosen = trusted(*from)?;
-    units.iter().find(|(number, _)| *number as f64 == chosen).map(|(_, unit)| unit.as_str())
 }
 
 /// A setting of a set compared with a device.
@@ -160,7 +152,7 @@ pub fn compare(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Tr
     let held = def.tags_of(device).filter(|tag| tag.in_sets || in_set(&tag.short).is_some()).map(|tag| {
         let (wanted, now) = (in_set(&tag.short), trusted(tag.id));
         let unit = set.units.get(&tag.short);
-        let measured_alike = unit.is_none_or(|unit| unit_of(tag, trusted) == Some(unit));
+        let measured_alike = unit.is_none_or(|unit| tag.unit_by(trusted) == Some(unit));
         let same = measured_alike && wanted.zip(now).is_some_and(|(wanted, now)| same(tag, wanted, now, trusted));
         Compared { short: tag.short.clone(), tag: Some(tag.id), set: wanted, unit: unit.cloned(), device: now, same }
     });
@@ -178,23 +170,6 @@ pub fn compare(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Tr
 
 /// Would the device hold the same raw number for both?
 fn same(tag: &TagDef, one: f64, other: f64, trusted: Trusted) -> bool {
-    let raw = |value| decimals(tag, trusted).and_then(|decimals| scale::to_raw(tag, value, decimals));
+    let raw = |value| tag.scaling_decimals(trusted).and_then(|decimals| scale::to_raw(tag, value, decimals));
     raw(one).zip(raw(other)).map_or(one == other, |(one, other)| scale::same_raw(tag, one, other))
-}
-
-/// Decimals that the device announces for a tag, as they scale its raw number.
-fn decimals(tag: &TagDef, trusted: Trusted) -> Option<u8> {
-    match tag.decimals {
-        Decimals::Fixed(_) => Some(0),
-        Decimals::From(from) => trusted(from).filter(|n| n.fract() == 0.0 && (0.0..=6.0).contains(n)).map(to_u8),
-    }
-}
-
-/// A bound as a number; `Err` names the tag that is not known.
-fn bound(bound: Option<Bound>, value: impl Fn(TagId) -> Option<f64>) -> Result<Option<f64>, TagId> {
-    match bound {
-        None => Ok(None),
-        Some(Bound::Fixed(value)) => Ok(Some(value)),
-        Some(Bound::From(from)) => value(from).map(Some).ok_or(from),
-    }
 }

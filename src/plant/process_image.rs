@@ -10,7 +10,7 @@ use super::{
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
-    tag::{Bound, Decimals, Poll, TagDef},
+    tag::{Decimals, Poll, TagDef},
 };
 use crate::plant::number::to_i64;
 
@@ -57,7 +57,7 @@ impl ProcessImage {
         let count = def.tags.len();
         let mut dependents = vec![Vec::new(); count];
         for tag in &def.tags {
-            for from in needs(tag) {
+            for from in tag.value_needs() {
                 dependents[from.index()].push(tag.id);
             }
         }
@@ -194,10 +194,7 @@ impl ProcessImage {
 
     /// Decimals that the device announces for a tag: they scale its raw number. 0 for tags with fixed decimals.
     pub fn scaling_decimals(&self, tag: &TagDef) -> Option<u8> {
-        match tag.decimals {
-            Decimals::Fixed(_) => Some(0),
-            Decimals::From(from) => self.sample(from).good_value().and_then(Decimals::announced),
-        }
+        tag.scaling_decimals(|from| self.sample(from).good_value())
     }
 
     /// Decimals to show a tag with: those that the device announces, or announced last.
@@ -205,14 +202,6 @@ impl ProcessImage {
         match tag.decimals {
             Decimals::Fixed(decimals) => decimals,
             Decimals::From(_) => self.scaling_decimals(tag).unwrap_or(self.decimals_seen[tag.id.index()]),
-        }
-    }
-
-    /// A bound as it stands now; `Err` names the tag that is not known.
-    pub fn bound(&self, bound: Bound) -> Result<f64, TagId> {
-        match bound {
-            Bound::Fixed(value) => Ok(value),
-            Bound::From(from) => self.sample(from).good_value().ok_or(from),
         }
     }
 
@@ -282,15 +271,6 @@ impl ProcessImage {
         };
         self.set(tag.id, sample);
     }
-}
-
-/// The tags that a tag's value needs.
-fn needs(tag: &TagDef) -> impl Iterator<Item = TagId> {
-    let decimals = match tag.decimals {
-        Decimals::From(from) => Some(from),
-        Decimals::Fixed(_) => None,
-    };
-    decimals.into_iter().chain(tag.quality_from.map(|(from, _)| from))
 }
 
 enum FaultEffect {

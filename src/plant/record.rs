@@ -143,7 +143,7 @@ pub struct ActionRecord {
     pub new: Option<Arc<str>>,
     /// `verified`, `refused: …`, `not confirmed: …`, `failed: …`.
     pub outcome: Arc<str>,
-    /// Why, in his words.
+    /// Why, in their own words.
     pub note: Option<Arc<str>>,
     /// Its place in the audit log; `None` until it is written.
     pub chain_hash: Option<ChainHash>,

@@ -78,7 +78,7 @@ impl RequestStats {
         (self.recent.count_ones(), self.requests.min(64) as u32)
     }
 
-    /// What was counted after `before`; all of it, if the counters have begun anew since.
+    /// What was counted after `before`; all of it, if the counters have restarted since.
     pub fn since(&self, before: &RequestStats) -> RequestStats {
         let Some(requests) = self.requests.checked_sub(before.requests) else { return self.clone() };
         let earlier = |code| before.exceptions.iter().find(|(known, _)| *known == code).map_or(0, |(_, count)| *count);
@@ -142,7 +142,7 @@ impl Spread {
         *bucket = bucket.saturating_add(1);
     }
 
-    /// What was added after `before`; all of it, if it has begun anew since. The greatest is then known as well as a
+    /// What was added after `before`; all of it, if it has restarted since. The greatest is then known as well as a
     /// percentile is.
     pub fn since(&self, before: &Spread) -> Spread {
         let Some(count) = self.count.checked_sub(before.count) else { return self.clone() };
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn one_slow_answer_in_a_hundred_shows_in_the_maximum_and_two_in_the_percentile() {
+    fn one_slow_answer_is_the_maximum_two_the_percentile() {
         let mut spread = Spread::default();
         assert_eq!((spread.last(), spread.p99()), (None, None));
         for _ in 0..99 {

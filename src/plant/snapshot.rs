@@ -163,12 +163,8 @@ impl Snapshot {
     }
     /// Lowest and highest permitted value of a tag, where both are known now.
     pub fn range(&self, tag: TagId) -> Option<(f64, f64)> {
-        let def = self.def.tag(tag);
-        let bound = |bound: Option<super::tag::Bound>| match bound? {
-            super::tag::Bound::Fixed(value) => Some(value),
-            super::tag::Bound::From(from) => self.sample(from).value,
-        };
-        Some((bound(def.min)?, bound(def.max)?))
+        let (min, max) = self.def.tag(tag).limits(|from| self.sample(from).value).ok()?;
+        min.zip(max)
     }
     /// The state of a line.
     pub fn line(&self, id: LineId) -> &LineStatus {

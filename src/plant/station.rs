@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_fault_that_occurred_is_over_by_itself_and_one_that_lasts_is_not() {
+    fn only_a_fault_that_occurred_ends_by_itself() {
         let mut faults = StationFaults::default();
         faults.set(StationFault::Clock, FaultState::Occurred("set back".into()));
         faults.set(StationFault::DiskSpace, FaultState::Active("3 % free".into()));

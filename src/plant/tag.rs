@@ -130,17 +130,28 @@ impl TagDef {
     }
     /// The tags without which its value cannot be shown or evaluated.
     pub fn needs(&self) -> impl Iterator<Item = TagId> {
-        let decimals = match self.decimals {
-            Decimals::From(tag) => Some(tag),
-            Decimals::Fixed(_) => None,
-        };
-        let bound = |bound: Option<Bound>| match bound {
-            Some(Bound::From(tag)) => Some(tag),
-            Some(Bound::Fixed(_)) | None => None,
-        };
         let unit = self.unit_from.as_ref().map(|(tag, _)| *tag);
-        let quality = self.quality_from.map(|(tag, _)| tag);
-        [decimals, quality, unit, bound(self.min), bound(self.max)].into_iter().flatten()
+        let bounds = [self.min, self.max].map(|bound| bound.and_then(Bound::source));
+        self.value_needs().chain(unit).chain(bounds.into_iter().flatten())
+    }
+    /// The tags without which its value is not known: decimals and quality.
+    pub fn value_needs(&self) -> impl Iterator<Item = TagId> + use<> {
+        self.decimals.source().into_iter().chain(self.quality_from.map(|(tag, _)| tag))
+    }
+    /// Decimals that scale its raw number, as its device announces them; 0 where the profile fixes them, `None` while they
+    /// are not known. A register that holds anything else would scale every value to nothing.
+    pub fn scaling_decimals(&self, value: impl Fn(TagId) -> Option<f64>) -> Option<u8> {
+        let Some(source) = self.decimals.source() else { return Some(0) };
+        value(source).and_then(Decimals::announced)
+    }
+    /// Least and greatest value that may be written now; `Err` names a tag that one of them needs and that is not known.
+    pub fn limits(&self, value: impl Fn(TagId) -> Option<f64>) -> Result<(Option<f64>, Option<f64>), TagId> {
+        let now = |bound: Option<Bound>| match bound {
+            None => Ok(None),
+            Some(Bound::Fixed(value)) => Ok(Some(value)),
+            Some(Bound::From(from)) => value(from).map(Some).ok_or(from),
+        };
+        Ok((now(self.min)?, now(self.max)?))
     }
     /// May an operator write it?
     pub fn writable(&self) -> bool {
@@ -161,16 +172,17 @@ impl TagDef {
     }
     /// The unit that it has now, which the device may choose (°C or °F).
     pub fn unit_now(&self, sample: impl Fn(TagId) -> Sample) -> &str {
-        let chosen = self.unit_from.as_ref().and_then(|(from, units)| {
-            let value = sample(*from).value?;
-            units.iter().find(|(number, _)| *number as f64 == value).map(|(_, unit)| unit.as_str())
-        });
-        match (&self.unit_from, chosen) {
-            (_, Some(unit)) => unit,
-            // The device has not said whether it counts in °C or °F.
-            (Some(_), None) if sample(self.id).value.is_some() => "?",
-            (Some(_), None) | (None, None) => &self.unit,
+        match (self.unit_by(|tag| sample(tag).value), sample(self.id).value) {
+            (Some(unit), _) => unit,
+            (None, Some(_)) => "?",
+            (None, None) => &self.unit,
         }
+    }
+    /// The unit, as the device chooses it; `None` while its choice is not known.
+    pub fn unit_by(&self, value: impl Fn(TagId) -> Option<f64>) -> Option<&str> {
+        let Some((from, units)) = &self.unit_from else { return Some(&self.unit) };
+        let chosen = value(*from)?;
+        units.iter().find(|(number, _)| *number as f64 == chosen).map(|(_, unit)| unit.as_str())
     }
     /// The text of an enumeration's number.
     pub fn label_of(&self, value: f64) -> Option<&str> {
@@ -282,6 +294,14 @@ impl Decimals {
     pub(crate) fn announced(value: f64) -> Option<u8> {
         (value.fract() == 0.0 && (0.0..=f64::from(Decimals::MAX)).contains(&value)).then(|| to_u8(value))
     }
+
+    /// The tag that holds them.
+    pub fn source(self) -> Option<TagId> {
+        match self {
+            Decimals::From(tag) => Some(tag),
+            Decimals::Fixed(_) => None,
+        }
+    }
 }
 
 /// A bound of a value.
@@ -291,6 +311,15 @@ pub enum Bound {
     Fixed(f64),
     /// The present value of another tag.
     From(TagId),
+}
+
+impl Bound {
+    fn source(self) -> Option<TagId> {
+        match self {
+            Bound::From(tag) => Some(tag),
+            Bound::Fixed(_) => None,
+        }
+    }
 }
 
 keyword_enum! {

@@ -22,7 +22,7 @@ pub struct Tuning {
     pub began: Timestamp,
     /// Its beginning was seen; else it was on already when it was first read.
     pub seen: bool,
-    /// The set value that it swings around.
+    /// The setpoint that it swings around.
     pub sv: Option<f64>,
     /// When it was seen off again.
     pub ended: Option<Timestamp>,
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn swings_are_counted_and_old_and_new_parameters_stand_side_by_side() {
+    fn swings_are_counted_beside_old_and_new_parameters() {
         let mut watch = TuningWatch::default();
         take(&mut watch, 0, 60.0, Some(0.0), 5.0);
         assert_eq!(watch.tuning, None);

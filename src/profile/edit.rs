@@ -221,7 +221,7 @@ unit = 1
     }
 
     #[test]
-    fn a_key_that_was_left_out_is_added_when_it_is_not_usual_any_more() {
+    fn a_left_out_key_is_added_once_it_is_not_usual() {
         let end = "timeout_ms = 500 # long\n";
         check(&serial(|serial| serial.stop_bits = 2), &[(end, &format!("{end}stop_bits = 2\n"))]);
         let gap = LineDef { gap: Duration::from_millis(20), ..l1() };

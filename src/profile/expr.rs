@@ -194,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_signs_and_parentheses_are_told_apart_with_or_without_spaces() {
+    fn words_signs_and_parentheses_need_no_spaces() {
         let check = |text: &str, expect: &[&str]| {
             let found: Vec<&str> = tokens(text).into_iter().map(|(_, word)| word).collect();
             assert_eq!(found, expect, "{text}");

@@ -155,9 +155,9 @@ mod tests {
     }
 
     fn check(alarms: &str, expect: &[&str]) {
-        let told = warnings(alarms);
-        assert_eq!(told.len(), expect.len(), "{alarms}\n{told:#?}");
-        for (line, part) in told.iter().zip(expect) {
+        let found = warnings(alarms);
+        assert_eq!(found.len(), expect.len(), "{alarms}\n{found:#?}");
+        for (line, part) in found.iter().zip(expect) {
             assert!(line.contains(part), "no `{part}` in {line}");
         }
     }
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn where_everything_is_urgent_the_file_is_told_so_from_twenty_alarms_up() {
+    fn too_many_urgent_alarms_are_reported_from_twenty_up() {
         let alarms = |urgent: usize, all: usize| -> String {
             let one = |i: usize| {
                 let priority = if i < urgent { "high" } else { "low" };
@@ -228,11 +228,11 @@ mod tests {
         };
         assert_eq!(split(4, 20), [""; 0]);
         assert_eq!(split(19, 19), [""; 0], "too few to say");
-        let told = split(5, 20);
-        assert_eq!(told.len(), 1);
+        let found = split(5, 20);
+        assert_eq!(found.len(), 1);
         assert!(
-            told[0].contains("5 of 20 alarms are high or critical (the first of them; expected at most 20 %"),
-            "{told:?}"
+            found[0].contains("5 of 20 alarms are high or critical (the first of them; expected at most 20 %"),
+            "{found:?}"
         );
     }
 }

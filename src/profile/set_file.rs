@@ -197,7 +197,7 @@ fn units_of(table: &At<Raw>, tags: &[&TagDef], problems: &mut Problems) -> BTree
     found
 }
 
-/// `SV = 70   # °C, set value`.
+/// `SV = 70   # °C, setpoint`.
 fn row(value: &SetValue, tag: Option<&TagDef>, unit: &str) -> String {
     let label = tag.and_then(|tag| tag.label_of(value.value));
     // A label that two numbers share would come back as the first of them.

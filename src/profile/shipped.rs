@@ -47,7 +47,7 @@ fn every_shipped_device_loads_without_a_problem() {
 }
 
 #[test]
-fn a_set_of_the_controller_holds_its_settings_and_none_of_its_commands() {
+fn a_set_of_the_controller_holds_settings_and_no_commands() {
     let plant = tank();
     let in_sets = |name: &str| plant.tag(plant.tag_named(name).unwrap()).in_sets;
     for setting in ["SV", "P", "I", "D", "CTRL", "SV-L", "SV-H", "PTN", "SV-8", "TM8S"] {
@@ -95,7 +95,7 @@ fn the_addresses_are_those_of_the_recorded_frames_and_manuals() {
 }
 
 #[test]
-fn a_temperature_is_not_shown_without_its_decimals_unit_and_sensor_state() {
+fn a_temperature_needs_its_decimals_unit_and_sensor_state() {
     let plant = tank();
     let id = |name: &str| plant.tag_named(name).unwrap();
     let pv = plant.tag(id("TIC-1.PV"));
@@ -109,7 +109,7 @@ fn a_temperature_is_not_shown_without_its_decimals_unit_and_sensor_state() {
 }
 
 #[test]
-fn outputs_and_sensors_cannot_be_written_and_only_what_the_plant_needs_is_polled() {
+fn outputs_are_read_only_and_only_needed_tags_are_polled() {
     let plant = tank();
     let plc = plant.devices[1].id;
     let writable: Vec<&str> = plant.tags_of(plc).filter(|tag| tag.writable()).map(|tag| tag.short.as_str()).collect();
@@ -145,7 +145,7 @@ fn a_plant_is_found_by_name_and_by_its_path_in_the_program() {
 }
 
 #[test]
-fn the_file_beside_the_plant_wins_then_the_users_then_the_shipped_one() {
+fn the_file_beside_the_plant_wins_over_user_and_shipped() {
     let root = tempfile::tempdir().unwrap();
     let (here, user) = (root.path().join("here"), root.path().join("user"));
     std::fs::create_dir_all(&here).unwrap();

@@ -318,7 +318,7 @@ fn the_disk_space_that_the_history_needs_is_read_and_checked() {
 }
 
 #[test]
-fn a_plant_file_changes_a_tag_and_says_so_only_where_it_contradicts_itself() {
+fn a_plant_file_may_change_a_tag_but_not_contradict_itself() {
     let moved = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\naddress = 1010\nmax = 90";
     let plant =
         load(PLANT.replacen("fast = \"1s\"", moved, 1).as_bytes(), METER, PLC).unwrap_or_else(|e| panic!("{e}"));

@@ -22,7 +22,7 @@ pub struct Row {
     pub target: String,
     /// `at most 300`; empty if there is none.
     pub limit: String,
-    /// `good`, `beyond target`, `over limit` or `too few` or `watched < 1 h` to judge.
+    /// `good`, `beyond target`, `over limit` or `too few` or `watched < 1 h` to evaluate.
     pub verdict: &'static str,
     /// Decimals to print.
     #[serde(skip)]

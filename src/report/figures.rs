@@ -44,11 +44,7 @@ impl Label {
                 latest.get(&tag).and_then(|value| Decimals::announced(*value)).unwrap_or(DECIMALS_UNKNOWN)
             }
         };
-        let chosen = def.unit_from.as_ref().and_then(|(chooser, units)| {
-            let value = latest.get(chooser)?;
-            units.iter().find(|(number, _)| *value == *number as f64).map(|(_, unit)| unit.clone())
-        });
-        let unit = chosen.unwrap_or_else(|| def.unit.clone());
+        let unit = def.unit_by(|tag| latest.get(&tag).copied()).unwrap_or(&def.unit).to_owned();
         let counts = def.counter.unwrap_or_else(|| COUNTED.contains(&unit.as_str()));
         Label { tag: def.name.clone(), unit, decimals, counts }
     }
@@ -56,11 +52,7 @@ impl Label {
 
 /// The tags that hold decimals and unit of a tag.
 pub fn choosers(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
-    let decimals = match def.decimals {
-        Decimals::From(tag) => Some(tag),
-        Decimals::Fixed(_) => None,
-    };
-    decimals.into_iter().chain(def.unit_from.as_ref().map(|(tag, _)| *tag))
+    def.decimals.source().into_iter().chain(def.unit_from.as_ref().map(|(tag, _)| *tag))
 }
 
 /// Computes the figures of one tag over a period. The samples come in order of time and begin

@@ -164,7 +164,7 @@ pub struct SuppressedSummary {
 pub struct RecordRow {
     /// When.
     pub at: Timestamp,
-    /// Set value, if good.
+    /// Setpoint, if good.
     pub sv: Option<f64>,
     /// Process value, if good.
     pub pv: Option<f64>,

@@ -19,6 +19,8 @@ type Texts = BTreeMap<String, BTreeSet<String>>;
 struct Found {
     texts: BTreeSet<String>,
     in_label: bool,
+    /// The keywords of `profile` are only read from files.
+    in_profile: bool,
 }
 
 fn is_test(attributes: &[Attribute]) -> bool {
@@ -62,7 +64,7 @@ impl<'a> Visit<'a> for Found {
         if item.ident.as_ref().is_some_and(|name| name == "motions") {
             literals(item.mac.tokens.clone()).into_iter().for_each(|text| self.add(text));
         }
-        if item.mac.path.is_ident("keyword_enum") {
+        if item.mac.path.is_ident("keyword_enum") && !self.in_profile {
             words_of_variants(item.mac.tokens.clone()).into_iter().for_each(|text| self.add(text));
         }
         visit::visit_item_macro(self, item);
@@ -175,7 +177,8 @@ fn texts() -> Texts {
     files.sort();
     let (mut all, mut known) = (Texts::new(), BTreeSet::new());
     for path in files {
-        let mut found = Found::default();
+        let in_profile = path.starts_with(root.join("profile"));
+        let mut found = Found { in_profile, ..Found::default() };
         found.visit_file(&syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap());
         let new: BTreeSet<String> = found.texts.into_iter().filter(|text| known.insert(text.clone())).collect();
         let name = path.strip_prefix(&root).unwrap().with_extension("").display().to_string();

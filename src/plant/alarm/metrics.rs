@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_is_of_the_time_that_was_watched_and_of_less_than_an_hour_it_is_not_judged() {
+    fn a_rate_is_per_watched_time_of_at_least_an_hour() {
         let hours =
             |hours: u64| PeriodMetrics { watched: Duration::from_secs(hours * 3_600), ..figures([0, 0, 0, 24]) };
         assert_eq!(hours(2).value(Metric::PerHour), Some(12.0));
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn fewer_than_five_stale_alarms_and_less_than_one_percent_of_flood_are_good() {
+    fn few_stale_alarms_and_little_flood_are_good() {
         for (stale, flood, expect) in [(4, 863, Verdict::Good), (5, 864, Verdict::Beyond)] {
             let figures = PeriodMetrics { stale, flood: Duration::from_secs(flood), ..figures([0; 4]) };
             assert_eq!([Metric::Stale, Metric::Flood].map(|measure| verdict(&figures, measure)), [expect; 2]);

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_begins_with_the_eleventh_alarm_and_ends_when_fewer_than_five_are_left() {
+    fn a_flood_begins_above_ten_alarms_and_ends_below_five() {
         assert_eq!(floods(0..10, 5_000), [], "ten in ten minutes are no flood yet");
         let flood = floods(0..11, 5_000);
         // The eleventh comes in second 10; in second 606 those of 7 to 10 are left.

@@ -76,7 +76,7 @@ fn the_list_puts_what_waits_before_what_is_known() {
 }
 
 #[test]
-fn what_was_raised_after_the_operator_looked_stays_unacknowledged() {
+fn an_alarm_raised_since_the_display_stays_unacknowledged() {
     let def = with(|alarm| alarm.on_delay = Duration::ZERO);
     let mut manager = AlarmManager::new(def);
     manager.evaluate(at(0), facts(80.0, true));

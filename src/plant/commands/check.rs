@@ -8,7 +8,7 @@ use crate::plant::{
     interlock,
     process_image::ProcessImage,
     scale,
-    tag::{Access, Bound},
+    tag::Access,
 };
 
 impl CommandTracker {
@@ -61,9 +61,8 @@ impl CommandTracker {
         if let Some(lock) = self.def.logic.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {
             return refuse(Refusal::Interlock(lock.message.clone()));
         }
-        let bound = |bound: Option<Bound>| bound.map(|bound| image.bound(bound)).transpose();
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
-        let (min, max) = (bound(def.min).map_err(unknown)?, bound(def.max).map_err(unknown)?);
+        let (min, max) = def.limits(|tag| image.sample(tag).good_value()).map_err(unknown)?;
         let Some(decimals) = decimals else {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };

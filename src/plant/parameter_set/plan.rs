@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{ParameterSet, Trusted, bound, compare, decimals, same, unit_of};
+use super::{ParameterSet, Trusted, compare, same};
 use crate::plant::{
     def::{DeviceId, PlantDef, TagId},
     sample::{Cause, Sample},
@@ -120,7 +120,7 @@ fn other_units<'a>(
     let is_given = |from: TagId| set.given.iter().any(|given| given.tag == def.tag(from).short);
     def.tags_of(device).filter_map(move |tag| {
         let wanted = set.units.get(&tag.short).filter(|_| set.values.iter().any(|value| value.tag == tag.short))?;
-        let now = unit_of(tag, trusted);
+        let now = tag.unit_by(trusted);
         if now == Some(wanted) || tag.unit_from.as_ref().is_some_and(|(from, _)| is_given(*from)) {
             return None;
         }
@@ -146,19 +146,18 @@ fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, t
     if !tag.labels.is_empty() && tag.label_of(change.new).is_none() {
         return Some(Problem::NotAChoice { tag: tag.short.clone(), value: change.new });
     }
-    let held = decimals(tag, trusted).and_then(|decimals| scale::held(tag, change.new, decimals));
+    let held = tag.scaling_decimals(trusted).and_then(|decimals| scale::held(tag, change.new, decimals));
     if let Some(lock) = def.logic.refusal(tag.id, held.unwrap_or(change.new), |tag| as_sample(trusted(tag))) {
         return Some(Problem::Interlock { tag: tag.short.clone(), text: lock.message.clone() });
     }
-    let (min, max) = match (bound(tag.min, then), bound(tag.max, then)) {
-        (Ok(min), Ok(max)) => (min, max),
-        (Err(from), _) | (_, Err(from)) => return Some(Problem::Unknown(def.tag(from).short.clone())),
+    let (min, max) = match tag.limits(then) {
+        Ok(limits) => limits,
+        Err(from) => return Some(Problem::Unknown(def.tag(from).short.clone())),
     };
-    let Some(decimals) = decimals(tag, trusted) else {
+    let Some(decimals) = tag.scaling_decimals(trusted) else {
         return Some(Problem::Unknown(format!("the decimals of {}", tag.short)));
     };
-    let inside = min.is_none_or(|min| min <= change.new) && max.is_none_or(|max| change.new <= max);
-    if inside && scale::to_raw(tag, change.new, decimals).is_some() {
+    if scale::is_inside(min, max, change.new) && scale::to_raw(tag, change.new, decimals).is_some() {
         return None;
     }
     let text = |bound: Option<f64>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
@@ -204,8 +203,5 @@ fn in_order(
 
 /// Is the value within the limits as these tags stand? Limits that are not known forbid it.
 fn inside(tag: &TagDef, held: f64, value: &dyn Fn(TagId) -> Option<f64>) -> bool {
-    match (bound(tag.min, value), bound(tag.max, value)) {
-        (Ok(min), Ok(max)) => min.is_none_or(|min| min <= held) && max.is_none_or(|max| held <= max),
-        (Err(_), _) | (_, Err(_)) => false,
-    }
+    tag.limits(value).is_ok_and(|(min, max)| scale::is_inside(min, max, held))
 }

@@ -7,7 +7,7 @@ use super::*;
 use crate::plant::{
     fixture,
     interlock::{InterlockCondition, InterlockDef},
-    tag::{Access, ByteOrder, DataType, Point, Table},
+    tag::{Access, Bound, ByteOrder, DataType, Point, Table},
 };
 
 const LOW: TagId = TagId(0);
@@ -159,18 +159,18 @@ fn a_value_in_another_unit_is_another_value() {
         |def: &PlantDef| capture(def, TIC, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &device(values));
     let set = capture_in(&unit("°C"));
     assert_eq!(set.units.get("SV").map(String::as_str), Some("°C"));
-    let told = |def: &PlantDef, set: &ParameterSet| {
+    let found = |def: &PlantDef, set: &ParameterSet| {
         let rows = compare(def, TIC, set, &device(values));
         let same = rows.iter().find(|row| row.short == "SV").is_some_and(|row| row.same);
         let problems = plan(def, TIC, set, &device(values)).err().unwrap_or_default();
         (same, problems.iter().map(Problem::to_string).collect::<Vec<_>>())
     };
-    assert_eq!(told(&unit("°C"), &set), (true, vec![]));
+    assert_eq!(found(&unit("°C"), &set), (true, vec![]));
     let other = "the unit of SV is °F in the device, °C in the set: the values mean something else";
-    assert_eq!(told(&unit("°F"), &set), (false, vec![other.to_owned()]));
+    assert_eq!(found(&unit("°F"), &set), (false, vec![other.to_owned()]));
     // A set of before units were kept.
     let old = ParameterSet { units: BTreeMap::new(), ..set };
-    assert_eq!(told(&unit("°F"), &old), (true, vec![]));
+    assert_eq!(found(&unit("°F"), &old), (true, vec![]));
 }
 
 #[test]
@@ -186,9 +186,9 @@ fn what_an_interlock_forbids_is_told_before_anything_is_written() {
     });
     let set = set([0., 100., 60., 1.]);
     let planned = |sv| plan(&def, TIC, &set, &device([0., 100., sv, 0.]));
-    let told = Problem::Interlock { tag: "CTRL".into(), text: "no FUZZY above 40".into() };
-    assert_eq!(planned(50.0), Err(vec![told.clone()]));
-    assert_eq!(told.to_string(), "CTRL: interlock: no FUZZY above 40");
+    let found = Problem::Interlock { tag: "CTRL".into(), text: "no FUZZY above 40".into() };
+    assert_eq!(planned(50.0), Err(vec![found.clone()]));
+    assert_eq!(found.to_string(), "CTRL: interlock: no FUZZY above 40");
     assert_eq!(planned(30.0).map(|changes| changes.len()), Ok(2));
 }
 

@@ -11,7 +11,6 @@ use crate::plant::{
     ne107::{self, DiagnosisInput},
     record::Record,
     snapshot::DeviceStatus,
-    tag::Bound,
     tuning::Noticed,
 };
 
@@ -30,8 +29,8 @@ impl Plant {
         let mut asked = Vec::new();
         for device in &self.def.devices {
             let pv = device.faceplate.as_ref().map(|plate| self.def.tag(plate.pv));
-            let bound = |bound: Option<Bound>| image.bound(bound?).ok();
-            let span = pv.and_then(|pv| Some(bound(pv.max)? - bound(pv.min)?));
+            let limits = pv.and_then(|pv| pv.limits(|tag| sample(tag).good_value()).ok());
+            let span = limits.and_then(|(min, max)| Some(max? - min?));
             if self.tunings[device.id.index()].take(device, &sample, span, at) == Noticed::Ended {
                 asked.push((device.line, BusRequest::Refresh { device: device.id, command: None }));
             }

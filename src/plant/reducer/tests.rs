@@ -125,14 +125,14 @@ fn a_handover_is_on_record_with_its_note() {
         let [Record::Action(action)] = &effects.records[..] else { panic!("{effects:?}") };
         (action.action.to_string(), action.note.as_deref().map(str::to_owned), action.outcome.to_string())
     };
-    let told = |action: &str, note: Option<&str>, outcome: &str| {
+    let found = |action: &str, note: Option<&str>, outcome: &str| {
         (action.to_owned(), note.map(str::to_owned), outcome.to_owned())
     };
     assert_eq!(
         action(1, CommandKind::HandOver, Some("pump is loud".to_owned())),
-        told("hand over", Some("pump is loud"), "verified")
+        found("hand over", Some("pump is loud"), "verified")
     );
-    assert_eq!(action(2, CommandKind::TakeOver, None), told("take over", None, "verified"));
+    assert_eq!(action(2, CommandKind::TakeOver, None), found("take over", None, "verified"));
     let (_, _, outcome) = action(3, CommandKind::HandOver, Some("x".repeat(501)));
     assert_eq!(outcome, "refused: more than 500 characters");
 }

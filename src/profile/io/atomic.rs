@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_replaced_whole_and_what_killed_processes_left_is_removed() {
+    fn a_file_is_replaced_whole_and_leftovers_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("shift.csv");
         let names = || {

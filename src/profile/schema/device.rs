@@ -165,7 +165,7 @@ toml_tables! {
     FaceplateTable, "the faceplate" {
         need "pv" pv: String,
         need "sv" sv: String,
-        /// The set value in use, where a program or a ramp may move it.
+        /// The setpoint in use, where a program or a ramp may move it.
         opt "sv_used" sv_used: String,
         opt "mv" mv: String,
         opt "run" run: String,

@@ -29,7 +29,7 @@ fn the_alarm_of_an_overloaded_line_may_be_written() {
 }
 
 #[test]
-fn two_alarms_of_one_name_would_share_their_state_and_are_refused() {
+fn two_alarms_of_one_name_are_refused() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\nmessage = \"hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:36:11]", "duplicate alarm `hot` of D1.T", "first here"]);
     let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\nmessage = \"not responding\"\n[mimic]";
@@ -57,7 +57,7 @@ fn every_condition_says_what_it_lacks() {
 }
 
 #[test]
-fn what_enables_an_alarm_is_read_and_every_slip_is_shown_at_its_place() {
+fn errors_of_enabled_when_are_shown_at_their_place() {
     use crate::plant::expr::{Compare, Expr};
     let enabled = |words: &str| {
         let text = PLANT.replacen("high = 80.0", &format!("high = 80.0\nenabled_when = '{words}'"), 1);

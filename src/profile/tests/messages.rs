@@ -124,7 +124,7 @@ proptest! {
 
 /// What one reads in an editor or on a screen is what the file says.
 #[test]
-fn characters_that_hide_or_move_the_cursor_are_refused_where_they_stand() {
+fn hidden_and_direction_characters_are_refused_at_their_place() {
     let named = "title = \"Small\"";
     for (to, expect) in [
         ("title = \"Sm\\u001b[2Jall\"", ["[small.toml:1:9]", "U+001B"]),

@@ -72,7 +72,8 @@ fn banned(text: &str) -> Vec<String> {
 /// Literals in production code: screens, logs, errors, reports, keys of files.
 fn in_literals(files: &[Facts]) -> Breaches {
     let mut breaches = Breaches::new();
-    for file in files.iter().filter(|file| !file.test_file) {
+    // The table of old keys has to name them.
+    for file in files.iter().filter(|file| !file.test_file && file.path != "src/profile/renamed.rs") {
         for text in file.texts.iter().filter(|text| !text.in_test) {
             for word in banned(&text.text) {
                 let line = format!("  line {}: {word} in {:?}", text.line, text.text);

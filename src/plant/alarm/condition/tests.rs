@@ -19,7 +19,7 @@ fn over_time(condition: Condition, values: &[(u64, Option<f64>)]) -> Vec<Option<
 }
 
 #[test]
-fn every_condition_holds_beyond_its_limit_and_returns_by_its_deadband() {
+fn a_condition_holds_beyond_its_limit_and_clears_by_deadband() {
     let limit = |level, limit| Condition::Limit { level, limit, deadband: 2.0 };
     let deviation = Condition::Deviation { from: TagId(1), limit: 5.0, deadband: 1.0 };
     for (condition, value, active, expect) in [
@@ -64,7 +64,7 @@ fn silence_is_judged_by_the_device_alone() {
 }
 
 #[test]
-fn a_fast_change_is_told_once_the_window_is_full_and_not_after_a_gap() {
+fn a_rate_needs_a_full_window_without_a_gap() {
     let rising = Condition::Rate { limit: 6.0, over: sec(30), deadband: 2.0 };
     let (no, yes) = (Some(false), Some(true));
     let events = [(0, 20.0), (15, 21.6), (30, 23.2), (60, 25.4), (90, 27.0)].map(|(at, value)| (at, Some(value)));
@@ -105,7 +105,7 @@ fn a_signal_that_changes_too_often_is_told_until_it_calms_down() {
 }
 
 #[test]
-fn an_alarm_of_before_a_restart_returns_only_when_its_value_has_moved_or_was_calm_for_long_enough() {
+fn a_restored_alarm_clears_only_by_what_was_measured_since() {
     let (no, yes) = (Some(false), Some(true));
     let check = |condition, values: &[(u64, f64, Option<bool>)]| {
         let mut memory = Memory::default();

@@ -49,7 +49,7 @@ fn names(alarms: &[Named]) -> Vec<&str> {
 use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
 
 #[test]
-fn only_activations_within_the_period_count_and_windows_without_any_do_too() {
+fn activations_and_empty_windows_of_the_period_count() {
     let events = [
         (-0.001, "before", Raised),
         (0.0, "first", Raised),
@@ -133,7 +133,7 @@ fn alarms_are_stale_after_a_day_and_the_most_at_one_time_count() {
 }
 
 #[test]
-fn the_flood_of_a_period_has_its_whole_seconds_within_the_period() {
+fn a_flood_counts_its_whole_seconds_within_the_period() {
     let raises = |from: f64| (0..11).map(|i| (from + f64::from(i), "x", Raised)).collect::<Vec<_>>();
     assert_eq!(figures(3_600.0, &raises(100.0)).flood.as_secs(), 596);
     assert_eq!(figures(200.0, &raises(100.0)).flood.as_secs(), 90, "it goes on beyond the end");
@@ -174,7 +174,7 @@ fn events() -> impl Strategy<Value = Vec<AlarmRecord>> {
 
 proptest! {
     #[test]
-    fn what_the_screen_shows_now_is_what_the_report_of_the_same_span_says(events in events(), rest in 0.0..5_000.0f64) {
+    fn the_screen_and_the_report_of_one_span_agree(events in events(), rest in 0.0..5_000.0f64) {
         let mut running = AlarmMonitor::running(at(0.0));
         events.iter().for_each(|event| running.take(event));
         let now = events.last().map_or(at(0.0), |event| event.at) + Duration::from_secs_f64(rest);

@@ -85,7 +85,7 @@ fn lasting(manager: &AlarmManager) -> impl PartialEq + std::fmt::Debug {
 
 proptest! {
     #[test]
-    fn whatever_happens_no_alarm_is_lost_or_wrong_and_a_restart_changes_nothing(
+    fn no_alarm_is_lost_and_a_restart_changes_nothing(
         latch in any::<bool>(),
         designed in any::<bool>(),
         delay in 0u64..20,
@@ -131,13 +131,13 @@ proptest! {
                     continue;
                 }
             }
-            let told = manager.evaluate(at(now), |alarm| Facts {
+            let found = manager.evaluate(at(now), |alarm| Facts {
                 value,
                 ill: Some(false),
                 enabled: enabled.filter(|_| alarm.enabled_when.is_some()),
                 ..Facts::default()
             });
-            journal.extend(told);
+            journal.extend(found);
             let (machine, new) = (manager.machine(HIGH), &journal[known..]);
             let raised = new.iter().any(|event| matches!(event.event, AlarmEvent::Raised | AlarmEvent::ReAlarmed));
             // Who is told is told once, and only where something was raised in the open.

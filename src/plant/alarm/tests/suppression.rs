@@ -8,7 +8,7 @@ fn enabled_with(value: f64, enabled: bool) -> impl Fn(&AlarmDef) -> Facts {
 }
 
 #[test]
-fn a_latching_alarm_that_came_and_went_while_suppressed_is_normal_on_release() {
+fn a_latch_of_suppressed_time_is_normal_on_release() {
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.latch = true));
     let mut journal = manager.evaluate(at(0), enabled_with(80.0, false));
     journal.extend(manager.evaluate(at(1), enabled_with(70.0, false)));
@@ -86,7 +86,7 @@ fn shelving_and_out_of_service_acknowledge_no_latched_alarm() {
 }
 
 #[test]
-fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_nothing() {
+fn only_a_known_false_condition_disables_an_alarm() {
     let when =
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
     let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
@@ -113,7 +113,7 @@ fn an_alarm_that_is_not_enabled_tells_nobody_and_an_unknown_enabling_suppresses_
 }
 
 #[test]
-fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_silence_does() {
+fn only_a_long_unknown_condition_ends_suppression() {
     let when =
         |value: f64, enabled| move |_: &AlarmDef| Facts { enabled, ..facts(value, true)(&fixture::plant().alarms[0]) };
     let mut manager = AlarmManager::new(enabled_by_design(|_| ()));
@@ -140,7 +140,7 @@ fn a_restart_or_a_lost_frame_brings_nothing_back_that_is_suppressed_but_a_long_s
 }
 
 #[test]
-fn what_was_annunciated_stays_until_somebody_has_answered_to_it_though_its_enabling_ends() {
+fn an_annunciated_alarm_stays_until_acknowledged() {
     let when = |enabled| {
         move |_: &AlarmDef| Facts { enabled: Some(enabled), ..facts(80.0, true)(&fixture::plant().alarms[0]) }
     };

@@ -220,12 +220,12 @@ fn a_value_changed_during_a_restore_is_not_overwritten() {
         meanwhile(&mut plant);
         let last = end(&mut plant, &first, WriteResult::ReadBack);
         assert_eq!(written(&last), [], "{expect}");
-        let told = [
+        let found = [
             "anna write TIC-1.SV verified",
             expect,
             "anna restore set TIC-1 not confirmed: 1 of 2 written, then SV-H failed",
         ];
-        assert_eq!(actions(&last), told);
+        assert_eq!(actions(&last), found);
         assert_eq!(plant.restore_of(TIC).map(|run| (run.state, run.done())), Some((State::Failed, 1)));
     };
     let at_the_panel = |plant: &mut Plant| drop(read(plant, 1, 500.0, 120.0));

@@ -197,7 +197,7 @@ fn a_write_that_saw_no_value_is_asked_again_and_a_stop_is_not() {
 }
 
 #[test]
-fn a_write_over_a_value_that_came_back_as_another_one_is_refused() {
+fn a_write_over_a_value_that_has_changed_is_refused() {
     let mut plant = running();
     plant.on_event(fail(1, &[SV], Fault::Timeout));
     let write = shown(&plant, 1, SV, 65.0);
