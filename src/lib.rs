@@ -89,6 +89,20 @@
 //! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
 //! | scenario, fault, drill | a scripted plant for tests; what a trainer injects; a scenario that evaluates an operator |
 //!
+//! # Recipes
+//!
+//! | to add | touch |
+//! |---|---|
+//! | a device, a plant, a scenario | one TOML file under `profiles` |
+//! | a data type | its variant and rows in `plant/data_type.rs` |
+//! | an alarm condition | `plant/alarm/condition.rs`, its keys in `profile/condition.rs`, one scenario |
+//! | a report format | its file in `report`, its row in `report/mod.rs` |
+//! | a tab | its file in `ui/tabs`, its row in `ui/tabs/mod.rs` |
+//! | a key of a tab | its row in the tab's table of keys, which the footer, the help and the clash check read; its action in the tab |
+//! | a renamed TOML key | its row in `profile/renamed.rs` |
+//! | a column of the history | one numbered migration |
+//! | a language | a copy of `text/en.toml`, its variant in `text.rs` |
+//!
 //! # Modules, in reading order
 //!
 //! They form a line, not a graph: a module uses only what stands above it. A test holds this and law 4.

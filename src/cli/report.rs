@@ -20,8 +20,8 @@ pub struct Args {
     /// File to write, `-` for standard output [default: the plant's report folder]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// What to write: csv (everything), record (date, time, SV, PV and ER as CSV), text (a summary)
-    #[arg(long, value_name = "FORMAT", default_value = report::FORMATS[0].name(), value_parser = report::format)]
+    #[arg(long, value_name = "FORMAT", help = report::formats_help(), value_parser = report::format,
+          default_value = report::FORMATS[0].name())]
     format: &'static dyn ReportFormat,
     #[command(flatten)]
     csv: CsvArgs,

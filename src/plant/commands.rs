@@ -133,15 +133,13 @@ impl CommandTracker {
         let (key, tag) = (self.def.tag(key), self.def.tag(job.tag));
         Some(ActionRecord {
             at,
-            by: status.by.clone(),
-            from: status.from.clone(),
             action: "unlock".into(),
             target: key.name.as_str().into(),
             old: image.sample(key.id).value.map(|old| value_text(image, key, old).into()),
             new: tag.write_unlock.map(|(_, new)| value_text(image, key, new).into()),
             outcome: format!("{}; for {}", without_read_back(result), tag.name).into(),
             note: None,
-            chain_hash: None,
+            ..record(&self.def, status, image)
         })
     }
 

@@ -61,14 +61,8 @@ impl FaultState {
 impl StationFault {
     fn priority(self) -> Priority {
         match self {
-            StationFault::NotRecording
-            | StationFault::RecordsLost
-            | StationFault::HistoryDamaged
-            | StationFault::AuditLog
-            | StationFault::AlarmState
-            | StationFault::UsersFile
-            | StationFault::LineTask => Priority::High,
             StationFault::DiskSpace | StationFault::Clock => Priority::Medium,
+            _ => Priority::High,
         }
     }
 

@@ -4,7 +4,7 @@ use std::{ops::RangeInclusive, time::Duration};
 
 use super::{
     diagnostic::Problems,
-    reader::{At, within},
+    reader::{At, Written, within},
     schema::AccessTable,
 };
 use crate::plant::role::{AccessDef, Role};
@@ -32,7 +32,7 @@ pub(super) fn access(table: Option<&AccessTable>, problems: &mut Problems) -> Ac
     }
     AccessDef {
         banner: table.banner.as_ref().map(|banner| banner.value.clone()),
-        anonymous_view: table.anonymous_view.map_or(usual.anonymous_view, |view| view.value),
+        anonymous_view: table.anonymous_view.value_or(usual.anonymous_view),
         password_chars_min: chars,
         login_attempts_max: within(
             table.login_attempts_max,
@@ -40,19 +40,9 @@ pub(super) fn access(table: Option<&AccessTable>, problems: &mut Problems) -> Ac
             usual.login_attempts_max,
             problems,
         ),
-        lockout: lockout(table.lockout, usual.lockout, problems),
-        idle_lock: table.idle_lock.map_or(usual.idle_lock, |span| span.value),
+        lockout: within(table.lockout, LOCK_OUT, usual.lockout, problems),
+        idle_lock: table.idle_lock.value_or(usual.idle_lock),
         sessions_max: within(table.sessions_max, 1..=256, usual.sessions_max, problems),
         trusted,
     }
-}
-
-/// A lockout that lasts nothing is none, and one of days stops the plant instead of a guesser.
-fn lockout(given: Option<At<Duration>>, usual: Duration, problems: &mut Problems) -> Duration {
-    let Some(given) = given else { return usual };
-    if !LOCK_OUT.contains(&given.value) {
-        problems.add(given.at, format!("{:?} cannot be used here", given.value)).label("expected 10s … 1h");
-        return usual;
-    }
-    given.value
 }

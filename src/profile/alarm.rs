@@ -8,7 +8,7 @@ use super::{
     diagnostic::Problems,
     expr,
     names::{Defs, Unique},
-    reader::{At, text},
+    reader::{At, Written, text},
     schema::PlantFile,
 };
 use crate::plant::{
@@ -87,10 +87,8 @@ pub(super) fn rules(file: &PlantFile, problems: &mut Problems) -> AlarmRules {
         problems.add(max.at, "not a time to shelve alarms for").label("expected \"1min\" to \"7 days\"");
     }
     AlarmRules {
-        shelve_max: table.shelve_max.map_or(usual.shelve_max, |max| max.value),
-        first_out_window: table
-            .first_out_window
-            .map_or(usual.first_out_window, |first_out_window| first_out_window.value),
+        shelve_max: table.shelve_max.value_or(usual.shelve_max),
+        first_out_window: table.first_out_window.value_or(usual.first_out_window),
     }
 }
 
@@ -102,14 +100,14 @@ fn alarm(
     defs: &Defs,
     problems: &mut Problems,
 ) -> AlarmDef {
-    let time = |time: Option<At<Duration>>| time.map_or(Duration::ZERO, |time| time.value);
-    let flag = |flag: Option<At<bool>>| flag.is_some_and(|flag| flag.value);
+    let time = |time: Option<At<Duration>>| time.value_or(Duration::ZERO);
+    let flag = |flag: Option<At<bool>>| flag.value_or(false);
     if let Some(re_alarm) = table.re_alarm.filter(|re_alarm| re_alarm.value < Duration::from_secs(60)) {
         let problem = problems.add(re_alarm.at, "an alarm that reminds so soon is a nuisance");
         problem.label("expected at least \"1min\"");
     }
     AlarmDef {
-        priority: table.priority.map_or(Priority::High, |priority| priority.value),
+        priority: table.priority.value_or(Priority::High),
         class: table.class.map_or_else(|| class_of(subject, condition), |class| class.value),
         area: text(&table.area),
         on_delay: time(table.on_delay),

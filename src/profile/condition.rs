@@ -6,7 +6,7 @@ use super::{
     diagnostic::{Problems, Span},
     interlock::check_bit,
     names::{Defs, number_of},
-    reader::{At, Choice, toml_tables},
+    reader::{At, Choice, Written, toml_tables},
     tag::range_of,
 };
 use crate::plant::{
@@ -97,7 +97,7 @@ pub(super) fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) 
         (None, None, Some(line)) => {
             let id = defs.line(line, problems)?;
             no_condition(table, "line", "not connected, or with `overloaded` too much to do", problems);
-            let overloaded = table.overloaded.is_some_and(|overloaded| overloaded.value);
+            let overloaded = table.overloaded.value_or(false);
             let condition = if overloaded { Condition::Overloaded } else { Condition::NotConnected };
             Some((Subject::Line(id), condition))
         }

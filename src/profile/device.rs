@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Names, Scope, Unique, check_number, held_number_of, number_of},
-    reader::{At, Node, Raw, text},
+    reader::{At, Node, Raw, Written, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
     simulate::simulate,
     tag::Defined,
@@ -77,9 +77,9 @@ pub(super) fn limits(
         read_registers_max: within(table.read_registers_max, standard.read_registers_max, "read_registers_max"),
         read_bits_max: within(table.read_bits_max, standard.read_bits_max, "read_bits_max"),
         write_registers_max: within(table.write_registers_max, standard.write_registers_max, "write_registers_max"),
-        gap_registers_max: table.gap_registers_max.map_or(8, |gap| gap.value),
-        alignment: table.alignment.map_or(1, |alignment| alignment.value),
-        in_flight_max: table.in_flight_max.map_or(1, |count| count.value),
+        gap_registers_max: table.gap_registers_max.value_or(8),
+        alignment: table.alignment.value_or(1),
+        in_flight_max: table.in_flight_max.value_or(1),
     };
     if let Some(alignment) = table.alignment.filter(|alignment| !matches!(alignment.value, 1 | 2 | 4)) {
         problems.add(alignment.at, format!("alignment = {} is not known", alignment.value)).label("expected 1, 2 or 4");
@@ -213,8 +213,8 @@ pub(super) fn actions(tables: &[At<ActionTable>], scope: &Scope, problems: &mut 
             value,
             settle: Duration::from_millis(action.settle_ms.map_or(0, |ms| u64::from(ms.value))),
             confirm: text(&action.confirm),
-            stop: action.stop.is_some_and(|stop| stop.value),
-            saves: action.saves.is_some_and(|saves| saves.value),
+            stop: action.stop.value_or(false),
+            saves: action.saves.value_or(false),
         });
     }
     found

@@ -3,7 +3,7 @@
 use super::{
     diagnostic::Problems,
     names::{Defs, Unique, check_writable, held_number_of, number_of},
-    reader::{At, text},
+    reader::{At, Written, text},
     schema::{ActuatorTable, InterlockTable, NeedTable, PlantFile, SequenceTable},
 };
 use crate::plant::{
@@ -42,7 +42,7 @@ fn interlock(
             .label("expected refuse = false")
             .help("a stop must always be possible; the operator is warned all the same");
     }
-    let refuse = table.refuse.map_or(!off && !stops.is_empty(), |refuse| refuse.value);
+    let refuse = table.refuse.value_or(!off && !stops.is_empty());
     Some(InterlockDef { tag: tag.id, value, of: of.id, when, message: text(&table.message), refuse })
 }
 

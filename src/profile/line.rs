@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Unique, check_name},
-    reader::{At, Node, Raw, kind_of, text},
+    reader::{At, Node, Raw, Written, kind_of, text},
     schema::{SerialTable, TcpTable},
 };
 use crate::plant::{
@@ -57,17 +57,13 @@ fn serial(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &
     let table = SerialTable::of(&[raw], problems);
     let ascii = framing == Framing::Ascii;
     let serial = Serial {
-        baud: table.baud.map_or(Serial::USUAL.baud, |baud| baud.value),
-        data_bits: table.data_bits.map_or(usual_data_bits(ascii), |bits| bits.value),
-        parity: table.parity.map_or(Parity::None, |parity| parity.value),
-        stop_bits: table.stop_bits.map_or(1, |bits| bits.value),
+        baud: table.baud.value_or(Serial::USUAL.baud),
+        data_bits: table.data_bits.value_or(usual_data_bits(ascii)),
+        parity: table.parity.value_or(Parity::None),
+        stop_bits: table.stop_bits.value_or(1),
     };
-    let transport = Transport::Serial {
-        port: text(&table.port),
-        serial,
-        framing,
-        rs485: table.rs485.map_or(Rs485::Off, |rs485| rs485.value),
-    };
+    let transport =
+        Transport::Serial { port: text(&table.port), serial, framing, rs485: table.rs485.value_or(Rs485::Off) };
     let name = checked_name(&table.name, seen, problems)?;
     let usual = LineDef::new(id, &name, transport);
     let line = LineDef {
@@ -83,7 +79,7 @@ fn serial(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &
 
 fn tcp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut Problems) -> Option<LineDef> {
     let table = TcpTable::of(&[raw], problems);
-    let (host, port) = (text(&table.host), table.tcp_port.map_or(TCP_PORT, |port| port.value));
+    let (host, port) = (text(&table.host), table.tcp_port.value_or(TCP_PORT));
     let name = checked_name(&table.name, seen, problems)?;
     let usual = LineDef::new(id, &name, Transport::Tcp { host, port, framing });
     let line = LineDef {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Defs, Unique, check_writable, number_of},
-    reader::{At, Raw, kind_of, text, toml_tables},
+    reader::{At, Raw, Written, kind_of, text, toml_tables},
     schema::{CommandTable, MimicTable, TrendTable},
 };
 use crate::plant::{
@@ -48,7 +48,7 @@ macro_rules! items {
         );
         impl $name {
             fn place(&self) -> MimicRect {
-                let cells = |value: Option<At<u16>>, usual| value.map_or(usual, |value| value.value);
+                let cells = |value: Option<At<u16>>, usual| value.value_or(usual);
                 MimicRect { x: cells(self.x, 0), y: cells(self.y, 0), width: cells(self.width, 1), height: cells(self.height, 1) }
             }
         }
@@ -117,7 +117,7 @@ fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicIte
         ItemKind::Valve => {
             let item = ValveItem::of(layers, problems);
             let tag = defs.tag_id(&item.tag, problems)?;
-            let vertical = item.vertical.is_some_and(|vertical| vertical.value);
+            let vertical = item.vertical.value_or(false);
             MimicItem::Valve { place: item.place(), label: text(&item.label), tag, vertical }
         }
         ItemKind::Pump => {
@@ -136,11 +136,7 @@ fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicIte
         ItemKind::Trend => {
             let item = TrendItem::of(layers, problems);
             let tag = defs.tag_id(&item.tag, problems)?;
-            MimicItem::Trend {
-                place: item.place(),
-                tag,
-                window: item.window.map_or(Duration::ZERO, |window| window.value),
-            }
+            MimicItem::Trend { place: item.place(), tag, window: item.window.value_or(Duration::ZERO) }
         }
         ItemKind::Text => {
             let item = TextItem::of(layers, problems);

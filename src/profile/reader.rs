@@ -5,7 +5,7 @@
 
 mod value;
 
-use std::{collections::BTreeMap, fmt::Display, ops::RangeInclusive};
+use std::{collections::BTreeMap, fmt::Debug, ops::RangeInclusive};
 
 use toml::{
     Spanned,
@@ -305,7 +305,7 @@ impl<T: Keyword> Value for T {
 }
 
 /// A number that must lie in a range; the usual one where it does not or is not written.
-pub(crate) fn within<T: PartialOrd + Display + Copy>(
+pub(crate) fn within<T: PartialOrd + Debug + Copy>(
     given: Option<At<T>>,
     range: RangeInclusive<T>,
     usual: T,
@@ -313,11 +313,23 @@ pub(crate) fn within<T: PartialOrd + Display + Copy>(
 ) -> T {
     let Some(given) = given else { return usual };
     if !range.contains(&given.value) {
-        let expected = format!("expected {} … {}", range.start(), range.end());
-        problems.add(given.at, format!("{} cannot be used here", given.value)).label(expected);
+        let expected = format!("expected {:?} … {:?}", range.start(), range.end());
+        problems.add(given.at, format!("{:?} cannot be used here", given.value)).label(expected);
         return usual;
     }
     given.value
+}
+
+/// A key that may be left out.
+pub(crate) trait Written<T> {
+    /// What is written, or else the usual value.
+    fn value_or(self, usual: T) -> T;
+}
+
+impl<T> Written<T> for Option<At<T>> {
+    fn value_or(self, usual: T) -> T {
+        self.map_or(usual, |written| written.value)
+    }
 }
 
 /// The words of an optional string; empty if it is not there.

@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use super::{
     diagnostic::Problems,
     names::{Defs, Unique},
-    reader::At,
+    reader::{At, Written},
     schema::{CsvTable, ReportTable, ShiftTable},
 };
 use crate::plant::def::{CsvDialect, ReportDef, ShiftDef};
@@ -62,7 +62,7 @@ fn dialect(table: &CsvTable, problems: &mut Problems) -> CsvDialect {
     {
         problems.add(at, "separator and decimal are the same").label("the columns would be ambiguous");
     }
-    CsvDialect { separator, decimal, bom: table.bom.map_or(usual.bom, |bom| bom.value) }
+    CsvDialect { separator, decimal, bom: table.bom.value_or(usual.bom) }
 }
 
 fn one_of(word: &Option<At<String>>, known: &[char], usual: char, problems: &mut Problems) -> char {

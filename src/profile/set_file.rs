@@ -102,7 +102,7 @@ fn set_of(name: &str, table: &SetTable, def: &PlantDef, problems: &mut Problems)
         return None;
     }
     let values = values(table.values.as_ref()?, &tags, true, problems);
-    let given = table.given.as_ref().map_or(Vec::new(), |given| values_of_given(given, &tags, problems));
+    let given = table.given.as_ref().map_or(Vec::new(), |given| values(given, &tags, false, problems));
     Some(ParameterSet {
         name: name.to_owned(),
         device: text(&table.device),
@@ -114,10 +114,6 @@ fn set_of(name: &str, table: &SetTable, def: &PlantDef, problems: &mut Problems)
         units: table.units.as_ref().map_or(BTreeMap::new(), |units| units_of(units, &tags, problems)),
         missing: table.missing.iter().map(|name| name.value.clone()).collect(),
     })
-}
-
-fn values_of_given(given: &At<Raw>, tags: &[&TagDef], problems: &mut Problems) -> Vec<SetValue> {
-    values(given, tags, false, problems)
 }
 
 /// The rows of a table of values, in the order of the profile.

@@ -1,6 +1,9 @@
 //! Which tags are settings that a parameter set holds: what can be written and read, and is no command.
 
-use super::{diagnostic::Problems, reader::At};
+use super::{
+    diagnostic::Problems,
+    reader::{At, Written},
+};
 use crate::plant::{
     def::DeviceDef,
     tag::{Access, TagDef},
@@ -25,6 +28,6 @@ pub(super) fn mark(devices: &[DeviceDef], tags: &mut [TagDef], written: &[Option
             problem.label("expected access = \"rw\"");
         }
         let setting = can && !tag.is_text() && !tag.point.table.is_bits() && !commands.contains(&tag.id);
-        tag.in_sets = can && written.map_or(setting, |written| written.value);
+        tag.in_sets = can && written.value_or(setting);
     }
 }

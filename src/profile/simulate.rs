@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Scope, number_of},
-    reader::{At, Choice, Value},
+    reader::{At, Choice, Value, Written},
     schema::{CheckTable, SimulateTable},
     tag::field_of,
 };
@@ -51,7 +51,7 @@ pub(super) fn simulate(
     if let Some(noise) = table.noise.filter(|noise| noise.value < 0.0) {
         problems.add(noise.at, "noise cannot be negative").label("expected 0 or more");
     }
-    let noise = table.noise.map_or(0.0, |noise| noise.value);
+    let noise = table.noise.value_or(0.0);
     let pulse = table.pulse.and_then(|pulse| lasting(pulse, "pulse", problems));
     let motion = motion(table, scope, problems);
     Some(Arc::new(Simulate { start, cases, motion, range, noise, pulse }))
@@ -100,8 +100,8 @@ fn motion(table: &SimulateTable, scope: &Scope, problems: &mut Problems) -> Opti
         table.when.as_ref().map_or(Some(Vec::new()), |when| checks(std::slice::from_ref(&when.value), scope, problems));
     Some(Motion {
         source: source?,
-        gain: table.gain.map_or(1.0, |gain| gain.value),
-        offset: table.offset.map_or(0.0, |offset| offset.value),
+        gain: table.gain.value_or(1.0),
+        offset: table.offset.value_or(0.0),
         pace: pace(table, problems),
         when: when?,
         idle: table.idle.map(|idle| idle.value),

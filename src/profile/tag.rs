@@ -9,7 +9,7 @@ use super::{
     address::{check_modicon, locate},
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
-    reader::{At, Choice, Raw, either, supersede, text},
+    reader::{At, Choice, Raw, Written, either, supersede, text},
     schema::{PollWord, Scheme, SimulateTable, TagTable},
     units,
 };
@@ -67,7 +67,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     };
     check_scaling(&row, kind, decimals, problems);
     let access = access(&row, point, problems);
-    let poll = match row.poll.map_or(PollWord::Slow, |poll| poll.value) {
+    let poll = match row.poll.value_or(PollWord::Slow) {
         PollWord::Fast => Poll::Every(context.fast),
         PollWord::Slow => Poll::Every(context.slow),
         PollWord::Once => Poll::Once,
@@ -81,8 +81,8 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     let tag = TagDef {
         label: row.label.as_ref().map_or_else(|| short.clone(), |label| label.value.clone()),
         meaning: text(&row.meaning),
-        scale: row.scale.map_or(1.0, |scale| scale.value),
-        offset: row.offset.map_or(0.0, |offset| offset.value),
+        scale: row.scale.value_or(1.0),
+        offset: row.offset.value_or(0.0),
         decimals,
         unit: row.unit.as_ref().map(|unit| units::check(unit, problems)).unwrap_or_default(),
         unit_from: links.unit.map(|tag| (tag, Vec::new())),
@@ -94,16 +94,15 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         labels: labels(&row, kind, problems),
         bit_labels: bit_labels(&row.bits, kind, problems),
         bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),
-        quality_from: links.quality.map(|tag| (tag, row.quality_mask.map_or(u64::MAX, |mask| mask.value))),
+        quality_from: links.quality.map(|tag| (tag, row.quality_mask.value_or(u64::MAX))),
         write_fc: row.write_fc.map(|fc| fc.value),
         group: text(&row.group),
         poll,
         // Known when all tags and alarms are.
-        deadband: row.deadband.map_or(0.0, |deadband| deadband.value),
-        store: !is_text
-            && row.store.map_or(access != Access::Write && matches!(poll, Poll::Every(_)), |store| store.value),
+        deadband: row.deadband.value_or(0.0),
+        store: !is_text && row.store.value_or(access != Access::Write && matches!(poll, Poll::Every(_))),
         counter: row.counter.map(|counter| counter.value),
-        confidence: row.confidence.map_or(Confidence::Medium, |confidence| confidence.value),
+        confidence: row.confidence.value_or(Confidence::Medium),
         source: text(&row.source),
         // Needs all tags of the plant.
         ..TagDef::new(id, context.device, &name, point.unwrap_or(NOWHERE))
@@ -183,7 +182,7 @@ fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Op
         Some(field) => Some(bit_field(field, kind, table, problems)?),
         None => None,
     };
-    let point = Point { table, address, kind, order: row.order.map(|order| order.value).unwrap_or_default(), field };
+    let point = Point { table, address, kind, order: row.order.value_or(Default::default()), field };
     check_place(point, location.at, context.limits, problems).then_some(point)
 }
 
@@ -248,7 +247,7 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
     if kind.is_some_and(|(kind, _)| kind.encoding() == Encoding::Float) {
         return 2;
     }
-    let scale = row.scale.map_or(1.0, |scale| scale.value);
+    let scale = row.scale.value_or(1.0);
     let whole = |digits: &u8| {
         ((scale * 10f64.powi(i32::from(*digits))).round() / 10f64.powi(i32::from(*digits)) - scale).abs() < 1e-9
     };
@@ -273,8 +272,8 @@ fn check_scaling(row: &TagTable, kind: Option<Raws>, decimals: Decimals, problem
             .also(min.at, "min");
     }
     let (Some(kind), Decimals::Fixed(_)) = (kind, decimals) else { return };
-    let scale = row.scale.map_or(1.0, |scale| scale.value);
-    let offset = row.offset.map_or(0.0, |offset| offset.value);
+    let scale = row.scale.value_or(1.0);
+    let offset = row.offset.value_or(0.0);
     let Some((low, high)) = value_range(kind, scale, offset) else { return };
     for (bound, word) in [(row.min, "min"), (row.max, "max")] {
         let Some(bound) = bound.filter(|bound| bound.value < low || bound.value > high) else { continue };
@@ -334,7 +333,7 @@ fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
 }
 
 fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Access {
-    let access = row.access.map_or(Access::Read, |access| access.value);
+    let access = row.access.value_or(Access::Read);
     let Some(point) = point.filter(|_| access != Access::Read) else { return access };
     let at = row.access.map_or(row.at, |access| access.at);
     // A few devices read a bit with function 02 and write it with 05 all the same (Delta DTB 0810H); they say so.

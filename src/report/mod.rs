@@ -29,8 +29,13 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
     /// The value of `--format`.
     fn name(&self) -> &'static str;
 
+    /// What it holds, for the help.
+    fn about(&self) -> &'static str;
+
     /// The extension of its files.
-    fn extension(&self) -> &'static str;
+    fn extension(&self) -> &'static str {
+        "csv"
+    }
 
     /// The bytes of its file.
     fn render(&self, report: &ShiftReport, def: &PlantDef, csv: CsvDialect) -> Vec<u8>;
@@ -55,6 +60,12 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
 
 /// Every format of the report; the first is the default.
 pub const FORMATS: [&dyn ReportFormat; 3] = [&shift_csv::ShiftCsv, &record_csv::RecordCsv, &text::Text];
+
+/// The help of `--format`: every format with what it holds.
+pub fn formats_help() -> String {
+    let rows = FORMATS.map(|format| format!("{} ({})", format.name(), format.about()));
+    format!("What to write: {}", rows.join(", "))
+}
 
 /// The format of this name, or the names that there are.
 pub fn format(name: &str) -> Result<&'static dyn ReportFormat, String> {

@@ -19,9 +19,8 @@ impl ReportFormat for RecordCsv {
     fn name(&self) -> &'static str {
         "record"
     }
-
-    fn extension(&self) -> &'static str {
-        "csv"
+    fn about(&self) -> &'static str {
+        "date, time, SV, PV and ER as CSV"
     }
 
     fn render(&self, report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {

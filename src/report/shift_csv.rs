@@ -21,9 +21,8 @@ impl ReportFormat for ShiftCsv {
     fn name(&self) -> &'static str {
         "csv"
     }
-
-    fn extension(&self) -> &'static str {
-        "csv"
+    fn about(&self) -> &'static str {
+        "everything"
     }
 
     fn render(&self, report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {

@@ -15,6 +15,9 @@ impl ReportFormat for Text {
     fn name(&self) -> &'static str {
         "text"
     }
+    fn about(&self) -> &'static str {
+        "a summary"
+    }
 
     fn extension(&self) -> &'static str {
         "txt"
