@@ -4,7 +4,7 @@ use std::{ops::RangeInclusive, time::Duration};
 
 use super::{
     diagnostic::Problems,
-    reader::{At, Written, within},
+    reader::{Written, within},
     schema::AccessTable,
 };
 use crate::plant::role::{AccessDef, Role};

@@ -101,7 +101,7 @@ fn set_of(name: &str, table: &SetTable, def: &PlantDef, problems: &mut Problems)
         problem.label("expected the profile of a device").suggest(&profile.value, known);
         return None;
     }
-    let values = values(table.values.as_ref()?, &tags, true, problems);
+    let settings = values(table.values.as_ref()?, &tags, true, problems);
     let given = table.given.as_ref().map_or(Vec::new(), |given| values(given, &tags, false, problems));
     Some(ParameterSet {
         name: name.to_owned(),
@@ -110,7 +110,7 @@ fn set_of(name: &str, table: &SetTable, def: &PlantDef, problems: &mut Problems)
         saved: table.saved?.value.0,
         by: Arc::from(text(&table.by)),
         given,
-        values,
+        values: settings,
         units: table.units.as_ref().map_or(BTreeMap::new(), |units| units_of(units, &tags, problems)),
         missing: table.missing.iter().map(|name| name.value.clone()).collect(),
     })
