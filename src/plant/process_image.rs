@@ -30,9 +30,9 @@ pub struct ProcessImage {
     def: Arc<PlantDef>,
     /// What was last read, by tag; `None` when there is no value to stand on.
     raw: Vec<Option<Reading>>,
-    samples: Vec<Sample>,
+    pub samples: Vec<Sample>,
     /// The text of tags that hold text, by tag; `None` while there is none to stand on. Shared with snapshots.
-    texts: Arc<Vec<Option<Arc<str>>>>,
+    pub texts: Arc<Vec<Option<Arc<str>>>>,
     /// Decimals that the device last announced, by tag: for showing what was, while it does not answer.
     decimals_seen: Vec<u8>,
     /// What the history last got, by tag.
@@ -74,10 +74,6 @@ impl ProcessImage {
         }
     }
 
-    pub fn samples(&self) -> &[Sample] {
-        &self.samples
-    }
-
     pub fn sample(&self, tag: TagId) -> Sample {
         self.samples[tag.index()]
     }
@@ -95,10 +91,6 @@ impl ProcessImage {
                 self.recompute_sample(dependent);
             }
         }
-    }
-
-    pub fn texts(&self) -> &Arc<Vec<Option<Arc<str>>>> {
-        &self.texts
     }
 
     /// Takes the texts of one answer.

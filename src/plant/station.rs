@@ -143,7 +143,8 @@ impl StationFault {
 pub struct StationFaults {
     /// Those that are active; `Some` counts the ticks that are left.
     active: BTreeMap<StationFault, Option<u8>>,
-    details: Arc<BTreeMap<StationFault, Arc<str>>>,
+    /// What is known about each, the last that was active.
+    pub details: Arc<BTreeMap<StationFault, Arc<str>>>,
 }
 
 impl StationFaults {
@@ -181,11 +182,6 @@ impl StationFaults {
     pub fn is_active(&self, fault: StationFault) -> bool {
         self.active.contains_key(&fault)
     }
-
-    /// The details of the last time, for each fault that was ever active.
-    pub fn details(&self) -> &Arc<BTreeMap<StationFault, Arc<str>>> {
-        &self.details
-    }
 }
 
 #[cfg(test)]
@@ -204,6 +200,6 @@ mod tests {
         assert_eq!(active(&faults), (false, true));
         faults.set(StationFault::DiskSpace, FaultState::Cleared);
         assert_eq!(active(&faults), (false, false));
-        assert_eq!(&*faults.details()[&StationFault::Clock], "set back", "kept for the alarm that waits");
+        assert_eq!(&*faults.details[&StationFault::Clock], "set back", "kept for the alarm that waits");
     }
 }

@@ -57,9 +57,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
 fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
     let mut seen = Unique::default();
     for table in tables.iter().map(|table| &table.value) {
-        let (Some(subject), Some(text)) =
-            (table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref()), &table.message)
-        else {
+        let (Some(subject), Some(text)) = (table.subject(), &table.message) else {
             continue;
         };
         let message = format!("duplicate alarm `{}` of {}", text.value, subject.value);
@@ -70,7 +68,7 @@ fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
 /// The same where the other one is not in the file: the alarm that every device or line has.
 fn check_generated(tables: &[At<AlarmTable>], name: &str, generated: &str, problems: &mut Problems) {
     for table in tables.iter().map(|table| &table.value) {
-        let subject = table.tag.as_ref().or(table.device.as_ref()).or(table.line.as_ref());
+        let subject = table.subject();
         let same = subject.is_some_and(|subject| subject.value == name);
         if let Some(text) = table.message.as_ref().filter(|text| same && text.value == generated) {
             let problem = problems.add(text.at, format!("duplicate alarm `{generated}` of {name}"));

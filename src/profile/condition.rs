@@ -60,6 +60,13 @@ toml_tables! {
     }
 }
 
+impl AlarmTable {
+    /// The name of what it watches.
+    pub fn subject(&self) -> Option<&At<String>> {
+        self.tag.as_ref().or(self.device.as_ref()).or(self.line.as_ref())
+    }
+}
+
 keyword_enum! {
     /// Whether something must be written.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]

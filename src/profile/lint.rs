@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::{
     condition::{AlarmTable, conditions_of},
     diagnostic::{Problems, Span},
-    reader::At,
+    reader::{At, text},
 };
 use crate::plant::def::Priority;
 
@@ -116,9 +116,7 @@ fn split(tables: &[&AlarmTable], problems: &mut Problems) {
 }
 
 fn name(table: &AlarmTable) -> String {
-    let words = |words: &Option<At<String>>| words.as_ref().map(|words| words.value.clone());
-    let subject = words(&table.tag).or_else(|| words(&table.device)).unwrap_or_default();
-    format!("the alarm `{}` of {subject}", words(&table.message).unwrap_or_default())
+    format!("the alarm `{}` of {}", text(&table.message), table.subject().map_or("", |name| &name.value))
 }
 
 fn place(table: &AlarmTable) -> Span {

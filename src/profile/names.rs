@@ -15,20 +15,12 @@ use crate::plant::{
 /// The full names of all tags, known before the tags themselves are, since tags refer to each other.
 #[derive(Debug, Default)]
 pub(super) struct Names {
-    tags: BTreeMap<String, TagId>,
+    pub tags: BTreeMap<String, TagId>,
     /// Devices whose profile could not be read. Their tags are not missing, only unknown: one mistake, one message.
-    unread: Vec<String>,
+    pub unread: Vec<String>,
 }
 
 impl Names {
-    /// Adds a tag.
-    pub fn insert(&mut self, full: String, id: TagId) {
-        self.tags.insert(full, id);
-    }
-    /// Remembers a device whose tags cannot be known.
-    pub fn unread(&mut self, device: &str) {
-        self.unread.push(device.to_owned());
-    }
     /// A tag that is named beside a tag of `device`: `SV-L`, or in full `TIC-1.SV-L`.
     pub fn near(&self, name: &At<String>, device: &str, problems: &mut Problems) -> Option<TagId> {
         let inside = format!("{device}.{}", name.value);

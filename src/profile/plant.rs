@@ -148,7 +148,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         for row in &of_device {
             // A row without a name is reported when it is read.
             if !row.short.is_empty() {
-                names.insert(format!("{}.{}", device.name, row.short), TagId(to_u16(count)));
+                names.tags.insert(format!("{}.{}", device.name, row.short), TagId(to_u16(count)));
             }
             count += 1;
         }
@@ -216,7 +216,7 @@ fn known_devices<'a>(
         let profile = profile(&table.profile, library, &mut profiles, problems);
         match (&table.name, profile) {
             (Some(name), Some(profile)) => known.push(ResolvedDevice { name: &name.value, table, profile }),
-            (Some(name), None) => names.unread(&name.value),
+            (Some(name), None) => names.unread.push(name.value.clone()),
             (None, _) => {}
         }
     }

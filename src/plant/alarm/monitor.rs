@@ -156,7 +156,7 @@ impl AlarmMonitor {
     /// their end and none after it: events of the new second are taken afterwards.
     pub fn advance(&mut self, at: Timestamp) {
         self.pass(at);
-        let now = self.rate.now();
+        let now = self.rate.now;
         let fresh = (0..REFRESH_S).contains(&(now - second(self.day.until)));
         if self.span == Span::Running && !(fresh && self.day.windows > 0) {
             let from = now.div_euclid(HOUR_S) * HOUR_S - (HOURS - 1) * HOUR_S;
@@ -171,7 +171,7 @@ impl AlarmMonitor {
             self.flooded(flooded);
         }
         if self.span == Span::Running {
-            self.watched.insert(self.rate.now().div_euclid(WINDOW_S));
+            self.watched.insert(self.rate.now.div_euclid(WINDOW_S));
             self.forget();
         }
     }
@@ -179,8 +179,8 @@ impl AlarmMonitor {
     /// The alarm system as of the last event; the figures of the day as of some seconds ago.
     pub fn metrics(&self) -> AlarmMetrics {
         AlarmMetrics {
-            last_10_min: self.rate.in_window(),
-            last_hour: self.rate.in_hour(),
+            last_10_min: self.rate.in_window,
+            last_hour: self.rate.in_hour,
             flood_since: self.rate.flood_since().and_then(|since| Timestamp::from_second(since).ok()),
             day: self.day.clone(),
         }
@@ -280,7 +280,7 @@ impl AlarmMonitor {
 
     /// Drops what is older than the running figures.
     fn forget(&mut self) {
-        let first = (self.rate.now().div_euclid(HOUR_S) - (HOURS - 1)) * HOUR_S;
+        let first = (self.rate.now.div_euclid(HOUR_S) - (HOURS - 1)) * HOUR_S;
         // Nearly always none goes, and then nothing is looked through.
         while self.watched.first().is_some_and(|window| (window + 1) * WINDOW_S <= first) {
             self.watched.pop_first();
@@ -289,7 +289,7 @@ impl AlarmMonitor {
             self.sums.pop_front();
             self.stale.retain(|(_, until)| first < *until);
             // Nothing is lost with an alarm that has not come for an hour: it counts from 1 again.
-            let recent = |at: &Timestamp| self.rate.now() - HOUR_S < second(*at);
+            let recent = |at: &Timestamp| self.rate.now - HOUR_S < second(*at);
             self.alarms.retain(|_, history| history.active.is_some() || history.raised.back().is_some_and(recent));
         }
     }

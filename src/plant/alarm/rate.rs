@@ -14,10 +14,10 @@ const FLOOD_BELOW: u32 = 5;
 /// Counts of each second of the last hour, as a ring.
 #[derive(Debug, Clone)]
 pub struct Rate {
-    now: i64,
+    pub now: i64,
     counts: Box<[u32; HOUR_S]>,
-    in_window: u32,
-    in_hour: u32,
+    pub in_window: u32,
+    pub in_hour: u32,
     /// The second in which the flood began.
     flood: Option<i64>,
 }
@@ -26,20 +26,6 @@ impl Rate {
     /// Nothing yet; the running second is `start`.
     pub fn new(start: i64) -> Rate {
         Rate { now: start, counts: Box::new([0; HOUR_S]), in_window: 0, in_hour: 0, flood: None }
-    }
-
-    pub fn now(&self) -> i64 {
-        self.now
-    }
-
-    /// Activations of the last ten minutes, the running second included.
-    pub fn in_window(&self) -> u32 {
-        self.in_window
-    }
-
-    /// Activations of the last hour, the running second included.
-    pub fn in_hour(&self) -> u32 {
-        self.in_hour
     }
 
     /// The second in which the flood began that is under way.
@@ -128,13 +114,13 @@ mod tests {
             rate.advance(second);
             rate.raised();
         }
-        assert_eq!((rate.in_window(), rate.in_hour()), (2, 4), "those of second 0 are 600 s old");
+        assert_eq!((rate.in_window, rate.in_hour), (2, 4), "those of second 0 are 600 s old");
         rate.advance(3_600);
-        assert_eq!((rate.in_window(), rate.in_hour()), (0, 2));
+        assert_eq!((rate.in_window, rate.in_hour), (0, 2));
         rate.advance(1_000);
-        assert_eq!(rate.now(), 3_600, "a clock that went back waits");
+        assert_eq!(rate.now, 3_600, "a clock that went back waits");
         rate.advance(i64::MAX / 2);
-        assert_eq!((rate.in_window(), rate.in_hour(), rate.flood_since()), (0, 0, None));
+        assert_eq!((rate.in_window, rate.in_hour, rate.flood_since()), (0, 0, None));
     }
 
     #[test]

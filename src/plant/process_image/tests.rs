@@ -43,15 +43,15 @@ fn a_text_is_trusted_and_doubted_like_a_number_and_never_stored() {
     let mut def = fixture::plant();
     (def.tags[PV.index()].point.kind, def.tags[PV.index()].store) = (DataType::Text(8), false);
     let mut image = ProcessImage::new(Arc::new(def), at(0));
-    assert_eq!(image.texts()[PV.index()], None);
+    assert_eq!(image.texts[PV.index()], None);
     image.read_texts(&[(PV, "PXR4".into())], at(1));
     assert_eq!(image.sample(PV), Sample { value: None, quality: Quality::Good, at: at(1) });
     image.failed(&[PV], Fault::Timeout, at(2));
     assert_eq!(image.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
-    assert_eq!(image.texts()[PV.index()].as_deref(), Some("PXR4"), "doubtful, not gone");
+    assert_eq!(image.texts[PV.index()].as_deref(), Some("PXR4"), "doubtful, not gone");
     image.gone(TIC, Cause::NotConnected, at(3));
     assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::NotConnected));
-    assert_eq!(image.texts()[PV.index()], None, "what is not known is not shown");
+    assert_eq!(image.texts[PV.index()], None, "what is not known is not shown");
     let stored = |record: &Record| matches!(record, Record::Sample(tag, _) if *tag == PV);
     assert!(!image.records(at(4)).iter().any(stored));
 }

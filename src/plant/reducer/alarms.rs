@@ -88,7 +88,7 @@ fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
         return;
     }
     let fault = StationFault::ALL.into_iter().find(|fault| fault.word() == &*step.message);
-    step.reason = fault.and_then(|fault| faults.details().get(&fault).cloned());
+    step.reason = fault.and_then(|fault| faults.details.get(&fault).cloned());
 }
 
 /// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
