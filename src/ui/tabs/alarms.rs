@@ -228,7 +228,7 @@ impl TabView for Alarms {
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        Page::ALL.iter().map(|page| (page.title(), keys::table(*page).iter().map(|key| key.chord).collect())).collect()
+        Page::ALL.iter().map(|page| (page.title(), crate::ui::keys::chords_of(&keys::table(*page)))).collect()
     }
 }
 

@@ -258,7 +258,10 @@ impl TabView for Controllers {
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        keys::all_chords()
+        let compare = Page::Compare(Compare::new(Source::Set(String::new())));
+        let pages =
+            [Page::List, Page::Device, Page::Program, Page::Sets, compare, Page::Guide(0, Box::new(Page::List))];
+        pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).to_vec()
     }
 }
 

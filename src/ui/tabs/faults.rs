@@ -35,18 +35,14 @@ pub struct Faults {
 /// What a key does here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Select the row above.
-    Up,
-    /// Select the row below.
-    Down,
+    /// Select another row.
+    Move(Motion),
     /// Select the first row of the next target.
     NextTarget,
     /// Inject or clear the fault.
     Toggle,
-    /// Decrease the parameter.
-    Less,
-    /// Increase the parameter.
-    More,
+    /// Increase the parameter, or decrease it.
+    Parameter(bool),
     /// Clear all faults.
     ClearAll,
     /// Points or fault.
@@ -55,12 +51,12 @@ pub enum Action {
 
 /// Keys of this tab.
 const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Up), "", "select the fault above", Action::Up),
-    Key::new(code(KeyCode::Down), "select", "select the fault below", Action::Down),
+    Key::new(code(KeyCode::Up), "", "select the fault above", Action::Move(Motion::Rows(-1))),
+    Key::new(code(KeyCode::Down), "select", "select the fault below", Action::Move(Motion::Rows(1))),
     Key::new(code(KeyCode::PageDown), "", "select the next line, unit or the process", Action::NextTarget),
     Key::new(code(KeyCode::Enter), "on/off", "inject or clear the fault", Action::Toggle),
-    Key::new(code(KeyCode::Left), "", "decrease its parameter", Action::Less),
-    Key::new(code(KeyCode::Right), "number", "increase its parameter", Action::More),
+    Key::new(code(KeyCode::Left), "", "decrease its parameter", Action::Parameter(false)),
+    Key::new(code(KeyCode::Right), "number", "increase its parameter", Action::Parameter(true)),
     Key::new(char('c'), "clear all", "clear all faults", Action::ClearAll),
     Key::new(char('v'), "points", "score of the drill, or the fault", Action::Verdict),
 ];
@@ -113,16 +109,15 @@ impl Faults {
         let fault = self.number(status, target, offered);
         let active = status.find(target, fault).is_some();
         match action {
-            Action::Up => self.selected = self.selected.min(rows.len()).saturating_sub(1),
-            Action::Down => self.selected = (self.selected + 1).min(rows.len() - 1),
+            Action::Move(motion) => self.selected = motion.to(self.selected, rows.len(), 1),
             Action::NextTarget => {
                 self.selected =
                     rows.iter().skip(self.selected).position(|row| row.0 != target).map_or(0, |by| self.selected + by);
             }
             Action::Toggle if active => return cleared(cx, SimCommand::Clear(target, fault)),
             Action::Toggle => return send(SimCommand::Inject(target, fault)),
-            Action::Less | Action::More => {
-                let other = fault.step(action == Action::More);
+            Action::Parameter(more) => {
+                let other = fault.step(more);
                 self.numbers.insert((target, fault.word()), other);
                 // An active fault changes at once.
                 if active && other != fault {

@@ -18,10 +18,8 @@ use crate::{
 /// What a key means here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// The shift before.
-    Before,
-    /// The shift after.
-    After,
+    /// The shift so many further on.
+    Shift(isize),
     /// The running shift.
     Running,
     /// Any period.
@@ -40,8 +38,8 @@ pub enum Action {
 
 /// Keys of this tab.
 const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "earlier", "the shift before", Action::Before),
-    Key::new(code(KeyCode::Right), "later", "the shift after", Action::After),
+    Key::new(code(KeyCode::Left), "earlier", "the shift before", Action::Shift(-1)),
+    Key::new(code(KeyCode::Right), "later", "the shift after", Action::Shift(1)),
     Key::new(char('l'), "running", "the shift that is running", Action::Running),
     Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
     Key::new(char('e'), "export", "write the report as CSV", Action::Export).needs(Role::Technician),
@@ -169,8 +167,11 @@ impl TabView for Reports {
 impl Reports {
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         match action {
-            Action::Before => self.step(cx, period::before),
-            Action::After => self.step(cx, |def, shown| period::after(def, shown, cx.now)),
+            Action::Shift(by) => {
+                if let Some(next) = period::step(cx, self.period.as_ref(), by) {
+                    self.show(Some(next));
+                }
+            }
             Action::Running => {
                 self.show(period::at(cx.def(), cx.now));
                 self.follow = true;
@@ -206,12 +207,6 @@ impl Reports {
     fn show(&mut self, period: Option<Period>) {
         (self.period, self.follow, self.scroll) = (period, false, Scroll::default());
         (self.export, self.report) = (Export::Not, Answered::default());
-    }
-
-    fn step(&mut self, cx: &ViewContext, to: impl Fn(&crate::plant::def::PlantDef, &Period) -> Option<Period>) {
-        if let Some(next) = self.period.as_ref().and_then(|shown| to(cx.def(), shown)) {
-            self.show(Some(next));
-        }
     }
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {

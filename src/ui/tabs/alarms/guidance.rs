@@ -20,13 +20,8 @@ use crate::{
 /// Columns of the names at the left, and a blank at the right.
 const NAMES: u16 = 10;
 
-/// All there is to say about a listed alarm.
-pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
-    rows_of_any(cx, alarm.id, now_text(cx, cx.def().alarm(alarm.id), alarm))
-}
-
-/// The same for one that is not in a list.
-pub fn rows_of_any(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
+/// What there is to say about an alarm; `now` says how it stands.
+pub fn rows(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
     let guidance = &cx.def().alarm(alarm).guidance;
     [
         (t!("now"), now),
@@ -42,23 +37,14 @@ pub fn height(rows: &[(&str, String)], width: u16) -> u16 {
     rows.iter().map(|(_, text)| to_u16(wrap(text, room).len())).sum::<u16>() + 2
 }
 
-/// Draws it for a listed alarm.
-pub fn view(cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Canvas) {
-    let def = cx.def().alarm(alarm.id);
-    let go = go_text(cx, def, Some(alarm));
-    let rows = rows(cx, alarm);
-    let respond = respond_text(cx, def, alarm)
-        .map(|(words, overdue)| (format!(" {words} "), if overdue { cx.theme.trouble() } else { cx.theme.strong() }));
-    let cut = title(cx, def, Some(alarm), respond, canvas);
-    draw(cx, cut.as_deref(), &rows, &go, canvas);
-}
-
-/// Draws what there is to know of any alarm, with words of its own at the top.
-pub fn view_any(cx: &ViewContext, alarm: AlarmId, now: String, canvas: &mut Canvas) {
-    let def = cx.def().alarm(alarm);
-    let rows = rows_of_any(cx, alarm, now);
-    let cut = title(cx, def, None, None, canvas);
-    draw(cx, cut.as_deref(), &rows, &go_text(cx, def, None), canvas);
+/// Draws it; for a listed alarm with the keys that act on it, and how long there is to respond.
+pub fn view(cx: &ViewContext, id: AlarmId, listed: Option<&ActiveAlarm>, now: String, canvas: &mut Canvas) {
+    let def = cx.def().alarm(id);
+    let respond = listed.and_then(|alarm| respond_text(cx, def, alarm));
+    let style = |overdue| if overdue { cx.theme.trouble() } else { cx.theme.strong() };
+    let respond = respond.map(|(words, overdue)| (format!(" {words} "), style(overdue)));
+    let cut = title(cx, def, listed, respond, canvas);
+    draw(cx, cut.as_deref(), &rows(cx, id, now), &go_text(cx, def, listed), canvas);
 }
 
 /// Which alarm it is about; at the right how long there is to respond. Its whole name, where there was no room for that.
@@ -132,9 +118,9 @@ fn or_dash(text: &str) -> &str {
 }
 
 /// The value now and when it was raised, how often, and who acknowledged it.
-fn now_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> String {
+pub fn now_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
     let zone = &cx.def().time_zone;
-    let mut words = match def.subject {
+    let mut words = match cx.def().alarm(alarm.id).subject {
         Subject::Tag(tag) => {
             let raised = alarm.value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
             t!("{whole}, raised at {raised}", whole = value::show(cx, tag).whole(), raised)

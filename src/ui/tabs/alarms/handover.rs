@@ -46,7 +46,7 @@ pub struct Handover {
 impl Handover {
     /// So many shifts later; `0` is the running one.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
-        let chosen = span::step(cx, self.period(cx).as_ref(), by);
+        let chosen = period::step(cx, self.period(cx).as_ref(), by);
         *self = Handover { period: chosen.filter(|chosen| chosen.to <= cx.now), ..Handover::default() };
     }
 

@@ -60,7 +60,7 @@ impl Journal {
         if by == 0 {
             self.words = Words::default();
         }
-        self.show(span::step(cx, self.period.as_ref(), by));
+        self.show(period::step(cx, self.period.as_ref(), by));
     }
 
     /// Scrolls.

@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn consequences_are_folded_under_the_first_one_and_urgent_ones_never() {
+    fn consequences_fold_under_the_first_alarm_urgent_ones_never() {
         use Priority::{High, Low, Medium};
         let (def, alarms) = book(&[(Low, 7, 1), (High, 7, 2), (Medium, 7, 3), (Low, 7, 4), (Medium, 0, 1)]);
         let folded = rows(&def, alarms.iter(), &[]);

@@ -39,7 +39,7 @@ impl Metrics {
     /// So many shifts later; `0` is the present.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
         // Figures of one period must not stand under the name of another.
-        *self = Metrics { period: span::step(cx, self.period.as_ref(), by), ..Metrics::default() };
+        *self = Metrics { period: period::step(cx, self.period.as_ref(), by), ..Metrics::default() };
     }
 
     /// Scrolls.

@@ -6,16 +6,6 @@ use crate::ui::tabs::prelude::*;
 /// An answer that has not come after so long (real time) counts as lost: a query over weeks may take its time.
 const PATIENCE_S: f64 = 30.0;
 
-/// The shift so many further on than the one shown; `None` is the present, where `by` is 0 and after the running shift.
-pub fn step(cx: &ViewContext, shown: Option<&Period>, by: isize) -> Option<Period> {
-    match (by, shown) {
-        (..0, None) => period::at(cx.def(), cx.now),
-        (..0, Some(shown)) => period::before(cx.def(), shown).or_else(|| Some(shown.clone())),
-        (1.., Some(shown)) => period::after(cx.def(), shown, cx.now),
-        (0, _) | (1.., None) => None,
-    }
-}
-
 /// The query, if it is due: every `seconds` for what is still going on, once in a while for the past.
 pub fn ask(
     cx: &ViewContext,

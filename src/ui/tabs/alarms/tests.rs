@@ -161,7 +161,7 @@ fn a_storm_is_folded_and_counted() {
 }
 
 #[test]
-fn an_acknowledgement_that_is_not_on_disk_is_marked_in_list_and_guidance() {
+fn list_and_guidance_mark_an_unrecorded_acknowledgement() {
     let mut fixture = storm();
     fixture.alarms.iter_mut().filter_map(|alarm| alarm.acknowledged.as_mut()).for_each(|note| note.recorded = false);
     let mut model = shown(&fixture, Theme::FULL, " ");
@@ -271,7 +271,7 @@ fn the_handover_tells_what_the_next_shift_must_know() {
 }
 
 #[test]
-fn an_alarm_of_more_than_a_day_is_handed_over_whether_acknowledged_or_not() {
+fn a_handover_names_every_alarm_of_more_than_a_day() {
     let mut fixture = Fixture::alarm();
     fixture.alarms[0].raised_at = ago(100_000);
     let mut model = shown(&fixture, Theme::FULL, "V");

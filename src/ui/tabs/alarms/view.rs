@@ -4,7 +4,7 @@ use super::{Alarms, Page, guidance, handover::suppressed_words, is_on, list::Row
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        def::Subject,
+        def::{AlarmId, Subject},
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{chrome::history_text, modal::confirm::subject},
@@ -128,12 +128,31 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
             canvas.text(1, y, &mark, theme.alarm(priority, row.alarm.state, cx.flash()));
         }
     }
-    // Rows that the list leaves empty belong to the guidance, as far as it needs them.
-    let free = height.saturating_sub(2 + to_u16(rows.len().min(room)));
-    let needs = guidance::height(&guidance::rows(cx, rows[place].alarm), width);
-    let guide = guide(height + 1).max(needs.min(free));
-    let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);
-    guidance::view(cx, rows[place].alarm, &mut below);
+    let used = 2 + to_u16(rows.len().min(room));
+    let selected = rows[place].alarm;
+    guidance_below(
+        cx,
+        canvas,
+        (used, guide(height + 1)),
+        selected.id,
+        Some(selected),
+        guidance::now_text(cx, selected),
+    );
+}
+
+/// The guidance below a list that uses so many rows: rows that it leaves empty are given to it, as far as it needs them.
+fn guidance_below(
+    cx: &ViewContext,
+    canvas: &mut Canvas,
+    (used, least): (u16, u16),
+    alarm: AlarmId,
+    listed: Option<&ActiveAlarm>,
+    now: String,
+) {
+    let (width, height) = (canvas.width(), canvas.height());
+    let needs = guidance::height(&guidance::rows(cx, alarm, now.clone()), width);
+    let rows = least.max(needs.min(height.saturating_sub(used)));
+    guidance::view(cx, alarm, listed, now, &mut canvas.part(0, height.saturating_sub(rows), width, rows));
 }
 
 /// The filter in force, how many it shows of how many, and what is above and below the rows that are seen.
@@ -199,12 +218,8 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         let end = width.saturating_sub(1);
         canvas.text_right(end, 0, &t!("{count} more below", count = all.len() - first - room), theme.strong());
     }
-    let now = suppressed_words(cx, &all[place]);
-    let free = height.saturating_sub(1 + to_u16(all.len().min(room)));
-    let needs = guidance::height(&guidance::rows_of_any(cx, all[place].id, now.clone()), width);
-    let guide = guide.max(needs.min(free));
-    let mut below = canvas.part(0, height.saturating_sub(guide), width, guide);
-    guidance::view_any(cx, all[place].id, now, &mut below);
+    let used = 1 + to_u16(all.len().min(room));
+    guidance_below(cx, canvas, (used, guide), all[place].id, None, suppressed_words(cx, &all[place]));
 }
 
 /// Widths of the columns between time and state; wider screens give room to tag, words and who acknowledged.

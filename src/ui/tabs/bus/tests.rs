@@ -338,7 +338,7 @@ fn no_size_breaks_a_page_or_a_window() {
 }
 
 #[test]
-fn on_the_smallest_screen_windows_show_what_matters_and_say_what_is_cut() {
+fn windows_on_the_smallest_screen_say_what_they_cut() {
     let mut fixture = Fixture::traffic();
     fixture.line.test = Some(read_of_three());
     let clear = "\u{8}".repeat(6);

@@ -179,22 +179,3 @@ pub fn page_keys(page: &Page) -> Vec<Key<Action>> {
         Page::Guide(..) => READ.to_vec(),
     }
 }
-
-/// The chords of every page, for the check that none means two things.
-#[cfg(test)]
-pub fn all_chords() -> crate::ui::keys::PageChords {
-    use crate::ui::keys::chords_of;
-    let tables = [
-        ("controllers", [&[], LIST]),
-        ("controllers, device", [DEVICE_FIRST, DEVICE]),
-        ("controllers, program", [PROGRAM_FIRST, PROGRAM]),
-        ("controllers, sets", [&[], SETS]),
-        ("controllers, compare", [&[], COMPARE]),
-    ];
-    let guide = ("controllers, guide", chords_of(READ));
-    tables
-        .map(|(name, [first, rest])| (name, chords_of(&[first, &SELECT, rest].concat())))
-        .into_iter()
-        .chain([guide])
-        .collect()
-}

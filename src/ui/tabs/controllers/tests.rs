@@ -179,7 +179,7 @@ fn a_restore_shows_each_write_and_where_it_stopped() {
 }
 
 #[test]
-fn a_restore_of_this_morning_hides_nothing_of_what_the_device_holds_now() {
+fn an_old_restore_hides_nothing_of_what_the_device_holds() {
     let mut fixture = with_sets();
     let mut run = half_done(&fixture, State::Running);
     let id = run.id;

@@ -28,8 +28,18 @@ pub fn before(def: &PlantDef, period: &Period) -> Option<Period> {
 }
 
 /// The shift or day after a period, if it has begun.
-pub fn after(def: &PlantDef, period: &Period, now: Timestamp) -> Option<Period> {
+fn after(def: &PlantDef, period: &Period, now: Timestamp) -> Option<Period> {
     at(def, period.to).filter(|next| next.from <= now)
+}
+
+/// The shift so many further on than the one shown; `None` is the present, where `by` is 0 and after the running shift.
+pub fn step(cx: &ViewContext, shown: Option<&Period>, by: isize) -> Option<Period> {
+    match (by, shown) {
+        (..0, None) => at(cx.def(), cx.now),
+        (..0, Some(shown)) => before(cx.def(), shown).or_else(|| Some(shown.clone())),
+        (1.., Some(shown)) => after(cx.def(), shown, cx.now),
+        (0, _) | (1.., None) => None,
+    }
 }
 
 /// The period that was typed: `from-to`, each a time, a date or both; a date alone is that day, a time alone lasts until

@@ -302,7 +302,7 @@ fn figures_of_another_view_do_not_stand_beside_this_one() {
 }
 
 #[test]
-fn a_snapshot_a_little_older_than_the_guessed_time_changes_nothing() {
+fn a_snapshot_a_little_behind_the_clock_changes_nothing() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.answer();
     stand.press("+++");
@@ -314,7 +314,7 @@ fn a_snapshot_a_little_older_than_the_guessed_time_changes_nothing() {
 }
 
 #[test]
-fn the_figures_of_a_trend_are_those_of_its_times_in_utc_after_the_clock_was_set() {
+fn figures_keep_their_utc_times_after_the_clock_was_set() {
     let screen = |by| {
         let mut stand = Stand::new(Theme::FULL, 80, 24);
         stand.answer();

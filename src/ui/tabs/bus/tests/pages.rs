@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_silent_device_shows_when_it_is_asked_next_and_r_asks_it_now() {
+fn a_silent_device_shows_its_next_poll_and_r_polls_it_now() {
     let mut fixture = Fixture::traffic();
     let device = fixture.def.devices[0].id;
     fixture.devices[0].state = DeviceState::Down { since: now() - jiff::SignedDuration::from_secs(75) };

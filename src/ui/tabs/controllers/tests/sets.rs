@@ -11,7 +11,7 @@ pub(super) fn restored(model: &mut Model, keys: &str) -> Option<RestoreRequest> 
 }
 
 #[test]
-fn a_set_is_written_only_after_its_differences_were_shown_and_confirmed() {
+fn a_set_is_written_after_its_differences_are_confirmed() {
     let fixture = with_sets();
     let mut model = model(&fixture, Theme::FULL);
     assert_eq!(restored(&mut model, "4⏎s↓⏎⏎"), None);
@@ -21,7 +21,7 @@ fn a_set_is_written_only_after_its_differences_were_shown_and_confirmed() {
 }
 
 #[test]
-fn a_copy_goes_from_one_controller_to_the_other_and_can_be_turned_around() {
+fn a_copy_between_controllers_can_be_turned_around() {
     let mut fixture = many(2);
     fixture.set("TIC-2.P", 9.0);
     let mut model = model(&fixture, Theme::FULL);
@@ -57,7 +57,7 @@ fn nothing_is_restored_to_a_device_that_does_not_answer() {
 }
 
 #[test]
-fn a_name_is_asked_before_a_set_is_saved_and_again_before_one_is_replaced() {
+fn a_set_is_saved_by_name_and_replaced_after_a_confirmation() {
     let fixture = with_sets();
     let saved = |keys: &str| {
         let mut model = model(&fixture, Theme::FULL);
