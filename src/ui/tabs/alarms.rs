@@ -113,9 +113,7 @@ impl TabView for Alarms {
             Action::AcknowledgePage => return actions::acknowledge_all(cx, self.seen(cx).into_iter()),
             Action::Shelve => return alarm.map_or_else(Vec::new, |alarm| actions::shelve(cx, alarm.id)),
             Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| actions::out_of_service(cx, alarm.id)),
-            Action::PutBack => {
-                return self.suppressed(cx).map_or_else(Vec::new, |suppressed| actions::put_back(cx, suppressed));
-            }
+            Action::PutBack => return self.suppressed(cx).map_or_else(Vec::new, |alarm| actions::put_back(cx, alarm)),
             Action::Reset => return alarm.map_or_else(Vec::new, |alarm| actions::reset(cx, alarm)),
             Action::Why | Action::Open | Action::Mimic | Action::Trend | Action::Controller => {
                 return self.go(cx, action);

@@ -149,7 +149,7 @@ impl TabView for Controllers {
                 _ => false,
             })
         };
-        // On the page of a device there is no room left for what everybody tries anyway.
+        // On the page of a device there is no room left for a key that every operator tries anyway.
         if !matches!(self.page, Page::List | Page::Device) {
             let place = hints.iter().position(|hint| hint.key == "⏎").map_or(hints.len(), |enter| enter + 1);
             hints.insert(place, Hint::new("Esc", t!("back"), t!("a page back")));

@@ -58,3 +58,13 @@ pub fn lines(canvas: &mut Canvas, lines: &[(String, Style)], scroll: Scroll) -> 
     }
     lines.len().saturating_sub(first + room)
 }
+
+/// How many of so many rows are shown in this room, where the last row says how many are left out.
+pub fn shown(cx: &ViewContext, canvas: &mut Canvas, count: usize, room: usize) -> usize {
+    if count <= room {
+        return count;
+    }
+    let shown = room.saturating_sub(1);
+    canvas.text(1, to_u16(room), &t!("… and {count} more", count = count - shown), cx.theme.dim());
+    shown
+}

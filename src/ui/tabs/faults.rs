@@ -163,11 +163,11 @@ fn demo_part(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
 /// The result of the drill, once it is over.
 fn result_part(cx: &ViewContext, status: &Status) -> Option<(usize, String, Style)> {
     let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
-    Some(if verdict.passed() {
-        (5, t!("drill PASSED: see 8").to_owned(), cx.theme.strong())
-    } else {
-        (5, t!("drill FAILED: see 8").to_owned(), cx.theme.trouble())
-    })
+    let (words, style) = match verdict.passed() {
+        true => (t!("drill PASSED: see 8"), cx.theme.strong()),
+        false => (t!("drill FAILED: see 8"), cx.theme.trouble()),
+    };
+    Some((5, words.to_owned(), style))
 }
 
 /// The state of the simulator, unless an exam hides it.

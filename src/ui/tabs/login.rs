@@ -40,7 +40,7 @@ pub struct Login {
     /// Who is in, and since when as far as this terminal knows.
     since: Option<(Arc<str>, Timestamp)>,
     /// What came of the last request that had no form.
-    told: Option<Result<&'static str, String>>,
+    outcome: Option<Result<&'static str, String>>,
 }
 
 impl TabView for Login {
@@ -76,14 +76,14 @@ impl TabView for Login {
                 }
                 if form.answered(cx, answer) {
                     if matches!(form.purpose, Purpose::Change(_)) {
-                        self.told = Some(Ok(t!("The new password is in force.")));
+                        self.outcome = Some(Ok(t!("The new password is in force.")));
                     }
                     self.changing = false;
                     self.form = None;
                     self.fit(cx.session);
                 }
             }
-            Some(_) | None => self.told = answer.err().map(Err),
+            Some(_) | None => self.outcome = answer.err().map(Err),
         }
         Vec::new()
     }
@@ -111,7 +111,7 @@ impl Login {
         if cx.session.who.is_none() {
             return Vec::new();
         }
-        self.told = None;
+        self.outcome = None;
         match action {
             Action::Password => {
                 self.changing = true;
@@ -142,7 +142,7 @@ impl Login {
         let user = session.who.as_ref().map(|who| &who.user);
         if self.since.as_ref().map(|(user, _)| user) != user {
             self.since = user.map(|user| (user.clone(), cx.now));
-            (self.changing, self.told) = (false, None);
+            (self.changing, self.outcome) = (false, None);
         }
         if session.who.as_ref().is_some_and(|who| !who.must_change) {
             self.given = None;

@@ -26,7 +26,7 @@ pub enum Action {
     Motion,
 }
 
-/// Keys of this tab; the plant file adds its own, and [`Mimic::hints`] tells the four arrows as one.
+/// Keys of this tab; the plant file adds its own, and [`Mimic::hints`] lists the four arrows as one.
 pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "", Action::Move(-1, 0)),
     Key::new(code(KeyCode::Right), "", "", Action::Move(1, 0)),
@@ -103,25 +103,16 @@ impl TabView for Mimic {
         }
         // When all is drawn it is known where there is room for a mark.
         for item in items {
-            match item {
-                MimicItem::Valve { place, tag, vertical, .. } => {
-                    let (x, y) = scale.spot(*place);
-                    let rows =
-                        if *vertical { [y, y + 1, y.saturating_sub(1)] } else { [y.saturating_sub(1), y + 1, y + 2] };
-                    unit::mark(cx, &mut canvas, x + 1, &rows, *tag);
-                }
-                MimicItem::Pump { place, tag, .. } => {
-                    let at = scale.place(*place);
-                    let y = at.y + at.height / 2;
-                    unit::mark(cx, &mut canvas, at.x, &[y + 1, y.saturating_sub(1), y + 2, y], *tag);
-                }
-                MimicItem::Tank { .. }
-                | MimicItem::Pipe { .. }
-                | MimicItem::Value { .. }
-                | MimicItem::Controller { .. }
-                | MimicItem::Sequence { .. }
-                | MimicItem::Trend { .. }
-                | MimicItem::Text { .. } => {}
+            if let MimicItem::Valve { place, tag, vertical, .. } = item {
+                let (x, y) = scale.spot(*place);
+                let above = y.saturating_sub(1);
+                let rows = if *vertical { [y, y + 1, above] } else { [above, y + 1, y + 2] };
+                unit::mark(cx, &mut canvas, x + 1, &rows, *tag);
+            }
+            if let MimicItem::Pump { place, tag, .. } = item {
+                let at = scale.place(*place);
+                let y = at.y + at.height / 2;
+                unit::mark(cx, &mut canvas, at.x, &[y + 1, y.saturating_sub(1), y + 2, y], *tag);
             }
         }
         if items.is_empty() {

@@ -57,7 +57,7 @@ pub trait TabView {
     where
         Self: Sized;
 
-    /// Is it offered here? Before a login nothing but the login page, unless the plant file lets everybody look.
+    /// Is it offered here? Before a login nothing but the login page, unless the plant file lets anonymous users look.
     fn is_offered(cx: &ViewContext) -> bool
     where
         Self: Sized,

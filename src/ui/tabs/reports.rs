@@ -138,10 +138,7 @@ impl TabView for Reports {
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        self.export = match result {
-            Ok(path) => Export::Done(path),
-            Err(why) => Export::Failed(why),
-        };
+        self.export = result.map_or_else(Export::Failed, Export::Done);
         Vec::new()
     }
 
@@ -221,8 +218,8 @@ impl Reports {
 
     fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
-        let settled = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
-        let every = if settled && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
+        let closed = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
+        let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
         let Some(period) = self.period.clone() else { return Vec::new() };
         let number = (Tab::Reports, &mut self.number);
         let query = self.report.query.ask(cx, number, every, real(cx, PATIENCE_S), Query::Report { period });

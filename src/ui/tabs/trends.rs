@@ -28,7 +28,7 @@ use crate::{
 
 /// An answer that takes longer (real time) is taken for lost.
 const PATIENCE_S: f64 = 15.0;
-/// The tab was out of sight if it heard nothing for so long (real time): what happened meanwhile only the history knows.
+/// The tab was out of sight if it got no snapshot for so long (real time): what happened meanwhile only the history knows.
 const UNSEEN_S: f64 = 3.0;
 /// The history may lag behind the present: it commits once a second (real time), and a commit takes up to another.
 const COMMIT_LAG_S: f64 = 3.0;
@@ -58,7 +58,7 @@ pub struct Trends {
     cursor: Option<Timestamp>,
     /// The list of values instead of the curves: first row shown, row selected.
     values: Option<(usize, usize)>,
-    /// When the tab last heard of the plant.
+    /// When the tab last got a snapshot.
     seen: Option<Timestamp>,
     traces: BTreeMap<TagId, Trace>,
     /// Figures of the view up to now, by tag: (min, mean, max) and the share of good time.

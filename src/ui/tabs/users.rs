@@ -1,4 +1,4 @@
-//! Tab 7, for a Supervisor: everybody who may log in, the terminals that are attached, and the list of all that was done.
+//! Tab 7, for a Supervisor: its users, the terminals that are attached, and the audit list.
 
 mod audit;
 mod view;

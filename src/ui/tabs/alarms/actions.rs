@@ -116,12 +116,8 @@ pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction>
             let words = t!("It is suppressed by design, and comes back when its enabling condition holds again.");
             return open(Modal::Notice(Notice::new(t!("suppressed"), vec![words.to_owned()])));
         }
-        AlarmState::Normal
-        | AlarmState::Unacknowledged
-        | AlarmState::Acknowledged
-        | AlarmState::ReturnedToNormal
-        | AlarmState::LatchedUnacknowledged
-        | AlarmState::LatchedAcknowledged => return Vec::new(),
+        // Every other state is annunciated.
+        _ => return Vec::new(),
     };
     let holds = suppressed.active.then(|| t!("Its condition holds: it will be annunciated at once.").to_owned());
     let kind = CommandKind::Alarm(alarm_command);

@@ -84,7 +84,7 @@ fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str,
         canvas.text(1, y, &line, theme.strong());
         y += 1;
     }
-    // Where there is no room for all of it the action is told whole, and one line of the others; the least wanted go.
+    // Where there is no room for all of it the action is shown whole, and one line of the others; the least wanted go.
     let free = usize::from(height.saturating_sub(1 + y));
     let mut rows: Vec<&(&str, String)> = rows.iter().collect();
     for least in [t!("effect"), t!("cause"), t!("now")] {

@@ -34,7 +34,7 @@ struct Group<'a> {
     /// Those that may be folded, in the order of the list; the leader may be among them.
     below: Vec<&'a ActiveAlarm>,
     count: usize,
-    told: bool,
+    listed: bool,
 }
 
 /// The rows of these alarms, which come in order of urgency. The first of a first-out group stands where the most urgent of it
@@ -44,7 +44,7 @@ pub fn rows<'a>(def: &PlantDef, alarms: impl Iterator<Item = &'a ActiveAlarm>, u
     let mut groups: HashMap<Timestamp, Group> = HashMap::new();
     for alarm in &alarms {
         let Some(first_out) = alarm.first_out else { continue };
-        let new = || Group { leader: alarm, rank: first_out.rank, below: Vec::new(), count: 0, told: false };
+        let new = || Group { leader: alarm, rank: first_out.rank, below: Vec::new(), count: 0, listed: false };
         let group = groups.entry(first_out.began).or_insert_with(new);
         if first_out.rank < group.rank {
             (group.leader, group.rank) = (alarm, first_out.rank);
@@ -62,7 +62,7 @@ pub fn rows<'a>(def: &PlantDef, alarms: impl Iterator<Item = &'a ActiveAlarm>, u
             rows.push(plain(alarm));
             continue;
         };
-        if !std::mem::replace(&mut group.told, true) {
+        if !std::mem::replace(&mut group.listed, true) {
             let below: Vec<_> = group.below.iter().filter(|other| other.id != group.leader.id).copied().collect();
             let more_waiting = below.iter().filter(|other| other.state.needs_acknowledgement()).count();
             let folded = !below.is_empty() && !unfolded.contains(&began);

@@ -1,4 +1,4 @@
-//! How good the alarm system is: every figure of the meter beside target and limit, and the alarms to look into.
+//! How good the alarm system is: every metric beside target and limit, and the bad actors.
 
 use super::span;
 use crate::ui::tabs::prelude::*;
@@ -22,7 +22,7 @@ use crate::{
 const EVERY_S: f64 = 30.0;
 /// An alarm that has been active for longer is stale.
 const STALE: Duration = Duration::from_secs(24 * 3_600);
-/// Columns of the table; where there are more than twice as many the alarms to look into stand beside it.
+/// Columns of the table; where there are more than twice as many the bad actors stand beside it.
 const TABLE: u16 = 76;
 
 /// State of the page.
@@ -96,7 +96,7 @@ impl Metrics {
         canvas.text_right(end, last, &more, theme.strong());
     }
 
-    /// The table, and below it the alarms to look into unless they stand beside it.
+    /// The table, and below it the bad actors unless they stand beside it.
     fn lines(&self, cx: &ViewContext, width: u16) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
         let head = line(cx.theme, [t!("measure"), t!("figure"), t!("target"), t!("limit"), t!("verdict")]);

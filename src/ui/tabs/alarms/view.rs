@@ -80,7 +80,7 @@ fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let bell = if tab.bell { t!("bell") } else { "" };
     let room = canvas.width().saturating_sub(2 + width(bell));
     let fits = |names: &Vec<String>| names.iter().map(|name| width(name) + 3).sum::<u16>() <= room + 3;
-    // Where there is no room for the word the brackets alone tell how many wait.
+    // Where there is no room for the word the brackets alone show how many wait.
     let all = Some(names(t!(" unack"))).filter(fits).unwrap_or_else(|| names(""));
     let bar = if fits(&all) { " │ " } else { "│" };
     let mut x = 1;

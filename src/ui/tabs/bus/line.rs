@@ -30,7 +30,7 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
     let Some(report) = at.report else {
-        rows.push(plain(t!("nothing heard from this line yet"), cx.theme.trouble()));
+        rows.push(plain(t!("nothing received from this line yet"), cx.theme.trouble()));
         return rows;
     };
     rows.extend(load(cx, report, width));

@@ -17,7 +17,7 @@ use crate::{
     ui::widgets::list::{self},
 };
 
-/// Rows below the table that tell of the selected block.
+/// Rows below the table that describe the selected block.
 const DETAIL: u16 = 5;
 
 /// Which block is selected.
@@ -76,9 +76,9 @@ impl Plan {
             canvas.text_right(width.saturating_sub(1), 0, &t!(" {below} more ▼", below), theme.strong());
         }
         let bottom = (2 + to_u16(lines.len().min(room))).min(height.saturating_sub(DETAIL - 1));
-        let told = detail(cx, report, &report.polls[selected]);
+        let details = detail(cx, report, &report.polls[selected]);
         let style = |line: &str| if line.starts_with('!') { theme.trouble() } else { theme.normal() };
-        let rows = told.iter().flat_map(|line| {
+        let rows = details.iter().flat_map(|line| {
             let parts = wrap(line, width.saturating_sub(2));
             parts.into_iter().map(move |part| plain(part, style(line)))
         });

@@ -180,7 +180,7 @@ impl Form {
     fn build(&self, line: &LineDef) -> Result<Built, String> {
         let framing = line.transport.framing();
         let top = if framing == Framing::Mbap { 255 } else { 247 };
-        // Unit 0 of a serial line is everybody: it can be written to, and answers nothing.
+        // Unit 0 of a serial line is a broadcast: it can be written to, and answers nothing.
         let least = if framing == Framing::Mbap || self.tried == Tried::Request { 0 } else { 1 };
         let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(to_u8);
         Ok(match self.tried {

@@ -191,7 +191,7 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
 fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
     match diagnostic {
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Some(t!(
-            "Polling of {name} pauses while other settings are tried, and its alarms are not judged. Start the scan?",
+            "Polling of {name} pauses while other settings are tried, and its alarms are not evaluated. Start the scan?",
             name = at.settings.name
         )),
         Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {

@@ -21,7 +21,7 @@ const TREND: u16 = 22;
 /// Rows that [`strip`] takes.
 pub fn strip_height(cx: &ViewContext, device: &DeviceDef) -> u16 {
     let Some(faceplate) = &device.faceplate else { return 0 };
-    3 + u16::from(faceplate.mv.is_some()) + u16::from(tuning_of(cx, device).is_some())
+    3 + u16::from(faceplate.mv.is_some()) + u16::from(cx.snapshot.tuning(device.id).is_some())
 }
 
 /// Three bars over each other, with their ranges, the trend beside them, and a row of states and alarms.
@@ -34,7 +34,7 @@ pub fn strip(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     let at = Bounds { x: bars + 1, y: 0, width: TREND, height: rows };
     trend::view(cx, canvas, at, faceplate.pv, WINDOW, series, false);
     states(cx, &mut canvas.part(0, rows, wide, 1), device, faceplate);
-    if let Some(tuning) = tuning_of(cx, device) {
+    if let Some(tuning) = cx.snapshot.tuning(device.id) {
         tuning_row(cx, &mut canvas.part(0, rows + 1, wide, 1), faceplate, tuning);
     }
 }
@@ -60,7 +60,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
         y += 1;
     }
     y += 1;
-    if let Some(tuning) = tuning_of(cx, device) {
+    if let Some(tuning) = cx.snapshot.tuning(device.id) {
         for (n, words) in tuning_text(cx, faceplate, tuning).into_iter().enumerate() {
             let style = if n == 0 { cx.theme.strong() } else { cx.theme.normal() };
             for line in crate::ui::widgets::text::wrap(&words, wide) {
@@ -74,11 +74,6 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     if at.height > 3 {
         trend::view(cx, canvas, at, faceplate.pv, WINDOW, series, false);
     }
-}
-
-/// The tuning worth a word: at work, or ended and not older than the plant's memory of it.
-fn tuning_of<'a>(cx: &ViewContext<'a>, device: &DeviceDef) -> Option<&'a Tuning> {
-    cx.snapshot.tuning(device.id)
 }
 
 /// A row a bar (`tall`: three, with value, bar and ends of the scale).
@@ -214,7 +209,7 @@ pub fn tuning_text(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) -> 
             if turns.is_empty() { t!("no swing yet").to_owned() } else { t!("swings {join}", join = turns.join(" ")) };
         let period = tuning.period().map_or(String::new(), |period| t!(", {period} s each", period = period.as_secs()));
         let known = faceplate.tune.is_some_and(|tune| cx.snapshot.sample(tune).good_value().is_some());
-        let how = if known { t!("AUTO-TUNING") } else { t!("not known now; when last heard AUTO-TUNING") };
+        let how = if known { t!("AUTO-TUNING") } else { t!("not known now; AUTO-TUNING when last read") };
         return vec![
             t!("{how} {least}{elapsed}{around} (T stops)", how, least, elapsed, around),
             format!("{swings}{period}"),

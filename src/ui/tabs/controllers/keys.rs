@@ -58,7 +58,7 @@ pub enum Action {
     Stop,
 }
 
-/// What a program is told.
+/// What a program is to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProgramCommand {
     /// From the beginning, or on from a halt.

@@ -145,7 +145,7 @@ fn segments(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Optio
     let (first, last) = chosen(cx, program)?;
     let trusted = |tag: TagId| cx.snapshot.sample(tag).good_value();
     // A ramp begins where the step before has ended; the first at PV as it is at the start. Once it runs that is past,
-    // and the device does not tell it: the first ramp is a gap then.
+    // and the device does not report it: the first ramp is a gap then.
     let resting = matches!(place(cx, program), Some(ProgramPosition::Off | ProgramPosition::Ended));
     let mut from = device.faceplate.as_ref().and_then(|faceplate| trusted(faceplate.pv)).filter(|_| resting);
     let mut segments = Vec::new();

@@ -32,8 +32,8 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
         }
         None => who(login, cx, &mut part, y),
     };
-    if let Some(told) = &login.told {
-        let (words, style) = match told {
+    if let Some(outcome) = &login.outcome {
+        let (words, style) = match outcome {
             Ok(words) => (*words, cx.theme.done()),
             Err(why) => (why.as_str(), cx.theme.trouble()),
         };
@@ -103,16 +103,12 @@ fn alarms(cx: &ViewContext, canvas: &mut Canvas) {
     };
     canvas.text(1, 0, &title, theme.dim());
     let rows = usize::from(canvas.height().saturating_sub(1));
-    // The last row tells what it leaves out.
-    let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
+    let shown = draw::shown(cx, canvas, all.len(), rows);
     for (y, alarm) in all.iter().take(shown).enumerate() {
         let (y, def) = (to_u16(y) + 1, cx.def().alarm(alarm.id));
         let mark = theme.alarm(def.priority, alarm.state, cx.flash());
         let x = canvas.text(1, y, theme.priority_mark(def.priority), mark) + 1;
         let text = fit_words(&alarm_words(cx, alarm), width.saturating_sub(x));
         canvas.text(x, y, &text, theme.alarm(def.priority, alarm.state, false));
-    }
-    if all.len() > shown {
-        canvas.text(1, to_u16(rows), &t!("… and {count} more", count = all.len() - shown), theme.dim());
     }
 }

@@ -94,7 +94,7 @@ fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden
     };
     let more = t!("   {pick} {hidden} more", pick = theme.pick("↓", t!("down")), hidden);
     let more = if hidden > 0 { more } else { String::new() };
-    // The path matters most: the format is told in full where there is room.
+    // The path matters most: the format is written in full where there is room.
     let kinds = [
         t!("CSV: {separator}, {decimal}{bom}{more}", separator, decimal, bom, more),
         t!("CSV {separator} {decimal}{bom}{more}", separator = dialect.separator, decimal = dialect.decimal, bom, more),
@@ -146,7 +146,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
         let words = t!("  record of {of}: {count} rows in the CSV", of, count = report.record.len());
         lines.push(Line::styled(words, theme.normal()));
     }
-    // The name of a shift tells its day; only a longer period needs the date in every line.
+    // The name of a shift has its day; only a longer period needs the date in every line.
     let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
     let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
     let time = |at: Timestamp| format!("  {}  ", draw::local(cx, at, form));
@@ -233,7 +233,7 @@ fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static>
     ])
 }
 
-/// One step of an alarm. An acknowledgement tells who, the other steps tell the value.
+/// One step of an alarm. An acknowledgement shows who, the other steps the value.
 fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'static> {
     let theme = cx.theme;
     let value = |value: f64| match cx.def().tag_named(&alarm.subject) {
@@ -271,7 +271,7 @@ fn action_line(cx: &ViewContext, action: &ActionRecord, time: String) -> Line<'s
     ])
 }
 
-/// `22:00 – 11-21 06:00 +07`; dates only where the name of the period does not tell them.
+/// `22:00 – 11-21 06:00 +07`; dates only where the name of the period does not have them.
 fn span(period: &Period, zone: &TimeZone) -> String {
     let (from, to) = (period.from.to_zoned(zone.clone()), period.to.to_zoned(zone.clone()));
     let form = if from.date() == to.date() { "%H:%M" } else { "%m-%d %H:%M" };
@@ -283,7 +283,7 @@ fn span(period: &Period, zone: &TimeZone) -> String {
         let hours = format!("{sign}{:02}", seconds.abs() / 3_600);
         if minutes == 0 { hours } else { format!("{hours}:{minutes:02}") }
     };
-    // Where the clocks change in between, both ends tell their offset.
+    // Where the clocks change in between, both ends show their offset.
     let first = if from.offset() == to.offset() { String::new() } else { format!(" {}", offset(&from)) };
     format!("{start}{first} – {} {}", to.strftime(form), offset(&to))
 }

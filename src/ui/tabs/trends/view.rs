@@ -203,7 +203,7 @@ fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Opt
     }
 }
 
-/// One row of the legend. A pen with a scale of its own tells it, because no axis does.
+/// One row of the legend. A pen with a scale of its own shows it, because no axis does.
 fn draw_pen(
     trends: &Trends,
     cx: &ViewContext,

@@ -104,9 +104,7 @@ impl Audit {
                 };
                 return open(Modal::Prompt(Prompt::new(title, hint, text)));
             }
-            Action::Everything => {
-                *self = Audit::default();
-            }
+            Action::Everything => *self = Audit::default(),
             Action::Back => {}
         }
         Vec::new()

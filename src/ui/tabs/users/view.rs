@@ -34,11 +34,8 @@ fn users(cx: &ViewContext, place: usize, canvas: &mut Canvas) {
             pad(rights::title(row.role), 13),
             pad(&state(cx, row), 27),
         );
-        let style = match (n == place, row.disabled) {
-            (true, _) => theme.focus(),
-            (false, true) => theme.dim(),
-            (false, false) => theme.normal(),
-        };
+        let style = if row.disabled { theme.dim() } else { theme.normal() };
+        let style = if n == place { theme.focus() } else { style };
         let width = canvas.width();
         canvas.text(0, y + 1, &pad(&fit(&text, width), width), style);
     }
@@ -54,7 +51,7 @@ fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
     canvas.run(0, 0, width, '─', theme.dim());
     canvas.text(1, 0, &t!(" terminals attached {count} ", count = all.len()), theme.dim());
     let rows = usize::from(canvas.height().saturating_sub(1));
-    let shown = if all.len() > rows { rows.saturating_sub(1) } else { all.len() };
+    let shown = draw::shown(cx, canvas, all.len(), rows);
     for (y, row) in all.iter().take(shown).enumerate() {
         let user = row.user.as_deref().unwrap_or("–");
         let locked = if row.locked { t!("  LOCKED") } else { "" };
@@ -67,8 +64,5 @@ fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
             locked
         );
         canvas.text(0, to_u16(y) + 1, &fit(&text, width), theme.normal());
-    }
-    if all.len() > shown {
-        canvas.text(1, to_u16(rows), &t!("… and {count} more", count = all.len() - shown), theme.dim());
     }
 }
