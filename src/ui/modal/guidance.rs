@@ -66,12 +66,12 @@ impl Guidance {
     fn lines(&self, cx: &ViewContext, room: u16) -> Vec<(&'static str, String)> {
         let listed = cx.snapshot.alarms.iter().find(|alarm| alarm.id == self.alarm);
         let suppressed = cx.snapshot.suppressed.iter().find(|suppressed| suppressed.id == self.alarm);
-        let now = match (listed, suppressed) {
-            (Some(alarm), _) => guidance::now_text(cx, alarm),
-            (None, Some(suppressed)) => suppressed_words(cx, suppressed),
-            (None, None) => t!("no longer active").to_owned(),
-        };
-        let mut rows = guidance::rows(cx, self.alarm, now).to_vec();
+        let now = suppressed.map_or(t!("no longer active").to_owned(), |suppressed| suppressed_words(cx, suppressed));
+        let mut rows = match listed {
+            Some(alarm) => guidance::rows(cx, alarm),
+            None => guidance::rows_of_any(cx, self.alarm, now),
+        }
+        .to_vec();
         let respond = listed.and_then(|alarm| guidance::respond_text(cx, cx.def().alarm(self.alarm), alarm));
         rows.splice(0..0, respond.map(|(words, _)| (t!("time"), words)));
         let lines = |(name, text): (&'static str, String)| {

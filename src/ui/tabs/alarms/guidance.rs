@@ -20,8 +20,13 @@ use crate::{
 /// Columns of the names at the left, and a blank at the right.
 const NAMES: u16 = 10;
 
-/// What there is to say about an alarm; `now` says how it stands.
-pub fn rows(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
+/// What there is to say about a listed alarm.
+pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
+    rows_of_any(cx, alarm.id, now_text(cx, alarm))
+}
+
+/// What there is to say about any alarm; `now` says how it stands.
+pub fn rows_of_any(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
     let guidance = &cx.def().alarm(alarm).guidance;
     [
         (t!("now"), now),
@@ -44,7 +49,7 @@ pub fn view(cx: &ViewContext, id: AlarmId, listed: Option<&ActiveAlarm>, now: St
     let style = |overdue| if overdue { cx.theme.trouble() } else { cx.theme.strong() };
     let respond = respond.map(|(words, overdue)| (format!(" {words} "), style(overdue)));
     let cut = title(cx, def, listed, respond, canvas);
-    draw(cx, cut.as_deref(), &rows(cx, id, now), &go_text(cx, def, listed), canvas);
+    draw(cx, cut.as_deref(), &rows_of_any(cx, id, now), &go_text(cx, def, listed), canvas);
 }
 
 /// Which alarm it is about; at the right how long there is to respond. Its whole name, where there was no room for that.
