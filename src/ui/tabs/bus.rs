@@ -312,9 +312,10 @@ pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
 fn state_text(cx: &ViewContext, at: &Place) -> String {
     let zone = &cx.def().time_zone;
-    let since = at.status.since.map_or(String::new(), |since| {
-        t!(" since {moment}", moment = crate::ui::widgets::text::moment(since, cx.now, zone))
-    });
+    let since = at
+        .status
+        .since
+        .map_or(String::new(), |since| t!(" since {moment}", moment = text::moment(since, cx.now, zone)));
     match &at.status.state {
         LineState::Connected => t!("connected{since}", since),
         LineState::Connecting => t!("connecting").to_owned(),

@@ -29,8 +29,8 @@ pub(super) use crate::{
         last_frame::Rows,
         modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
         widgets::{
-            list::{Motion, Scroll, Selected, Words, first, motions, on_screen},
-            text::{Canvas, between, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},
+            list::{self, Motion, Scroll, Selected, Words, first, motions, on_screen},
+            text::{self, Canvas, between, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},
             value,
         },
     },

@@ -186,7 +186,7 @@ fn state(cx: &ViewContext, row: &UserRow) -> String {
     match (row.disabled, locked, row.must_change) {
         (true, ..) => t!("disabled").to_owned(),
         (false, Some(until), _) => {
-            t!("locked out until {clock}", clock = crate::ui::widgets::text::clock(until, &cx.def().time_zone))
+            t!("locked out until {clock}", clock = text::clock(until, &cx.def().time_zone))
         }
         (false, None, true) => t!("must change password").to_owned(),
         (false, None, false) => t!("active").to_owned(),

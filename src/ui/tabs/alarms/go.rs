@@ -1,7 +1,6 @@
 //! Where the keys of an alarm lead.
 
 use super::*;
-use crate::t;
 
 impl Alarms {
     pub(super) fn ask_text(&self) -> Vec<UiAction> {

@@ -13,7 +13,6 @@ use crate::{
             faceplate::{device_text, line_state_text},
         },
         rights,
-        widgets::text::{self},
     },
 };
 

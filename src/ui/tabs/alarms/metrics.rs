@@ -11,11 +11,7 @@ use crate::{
         snapshot::ActiveAlarm,
     },
     report::{Period, alarm_metrics},
-    ui::{
-        modal::confirm::subject,
-        theme::Theme,
-        widgets::text::{self},
-    },
+    ui::{modal::confirm::subject, theme::Theme},
 };
 
 /// How often the figures of a running shift are queried again, real time.

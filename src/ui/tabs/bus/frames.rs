@@ -13,10 +13,7 @@ use crate::{
         def::Framing,
         traffic::{Frame, Frames},
     },
-    ui::{
-        tabs::Outgoing,
-        widgets::list::{self},
-    },
+    ui::tabs::Outgoing,
 };
 
 /// The page takes in what is new every so many half seconds: reading needs time, and slow lines have few bytes a second.

@@ -14,7 +14,6 @@ use crate::{
         line_report::{LineReport, PollReport},
         tag::Poll,
     },
-    ui::widgets::list::{self},
 };
 
 /// Rows below the table that describe the selected block.

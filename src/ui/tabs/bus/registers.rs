@@ -13,10 +13,7 @@ use crate::{
         number::to_f32,
         tag::{ByteOrder, DataType, Point, Table},
     },
-    ui::{
-        modal::{Next, window},
-        widgets::list::{self},
-    },
+    ui::modal::{Next, window},
 };
 
 /// Registers of a device.
@@ -83,7 +80,7 @@ impl Registers {
                 _ => {}
             }
         }
-        let at = crate::ui::widgets::text::clock(run.started, &cx.def().time_zone);
+        let at = clock(run.started, &cx.def().time_zone);
         let (state, ill) = match (&run.state, fault) {
             (DiagnosticState::Running, _) => {
                 (t!("reading, {done} of {total} requests", done = run.done, total = run.total), false)

@@ -22,10 +22,7 @@ use crate::{
         hex_input, request_lint,
     },
     plant::{def::Framing, diagnostics::Diagnostic, event::LineState},
-    ui::{
-        modal::{Next, line::Line},
-        widgets::list::{self},
-    },
+    ui::modal::{Next, line::Line},
 };
 
 /// Transaction id of a typed Modbus TCP request; polls use others.

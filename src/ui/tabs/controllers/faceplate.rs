@@ -63,7 +63,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     if let Some(tuning) = cx.snapshot.tuning(device.id) {
         for (n, words) in tuning_text(cx, faceplate, tuning).into_iter().enumerate() {
             let style = if n == 0 { cx.theme.strong() } else { cx.theme.normal() };
-            for line in crate::ui::widgets::text::wrap(&words, wide) {
+            for line in wrap(&words, wide) {
                 canvas.text(0, y, &line, style);
                 y += 1;
             }

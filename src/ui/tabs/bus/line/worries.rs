@@ -1,7 +1,6 @@
 //! What is wrong on a line, in sentences, the worst first.
 
 use super::*;
-use crate::t;
 
 /// What is wrong and what to do about it, a sentence each.
 pub(super) fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {

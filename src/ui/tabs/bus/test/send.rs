@@ -1,7 +1,6 @@
 //! The window that sends bytes as they are typed.
 
 use super::*;
-use crate::t;
 
 /// Bytes on their way onto a line.
 #[derive(Debug, Clone, PartialEq)]
