@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_is_found_whole_and_behind_noise_and_cut_at_every_character() {
+    fn an_answer_is_found_whole_behind_noise_and_cut_anywhere() {
         let whole = encode(&ANSWER);
         let length = whole.len();
         check(&whole, FrameMatch::Answer(0..length));
@@ -250,7 +250,7 @@ mod tests {
 
     /// Each published answer, alone, behind noise and cut at every byte, against every published request.
     #[test]
-    fn every_published_answer_belongs_to_its_request_and_to_no_other() {
+    fn every_published_answer_belongs_to_its_request_only() {
         let rows = vectors();
         let of = |wanted: &'static str| rows.iter().filter(move |row| row.1 == wanted);
         for (id, _, answer, ..) in of("response") {

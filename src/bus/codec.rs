@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_beyond_what_a_double_holds_exactly_is_a_rounded_value() {
+    fn a_counter_too_large_for_a_double_is_rounded() {
         for (kind, words, expect) in [
             (DataType::U64, [0xFFFF; 4], 18_446_744_073_709_551_615.0),
             (DataType::U64, [0x0020, 0, 0, 1], 9_007_199_254_740_992.0),

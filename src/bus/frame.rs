@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn every_published_answer_belongs_to_its_request_and_to_no_other() {
+    fn every_published_answer_belongs_to_its_request_only() {
         let rows = vectors();
         let of = |wanted: &'static str| rows.iter().filter(move |row| row.1 == wanted);
         for (id, _, answer, _) in of("response") {

@@ -195,7 +195,7 @@ mod tests {
     use crate::plant::fixture;
 
     #[test]
-    fn the_load_of_the_last_ten_seconds_and_of_the_last_minute_are_told_apart() {
+    fn the_load_of_ten_seconds_and_of_a_minute_differ() {
         let def = fixture::plant();
         let blocks = plan::blocks(&def, LineId(0), &plan::UnreadableRanges::default());
         let mut stats = LineStats::new(&def, LineId(0), &blocks);

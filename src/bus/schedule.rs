@@ -248,7 +248,7 @@ impl Schedule {
             *share += poll.demand();
         }
         self.judged_at = now;
-        if !self.overload.judge(demand, std::mem::take(&mut self.late), now) {
+        if !self.overload.evaluate(demand, std::mem::take(&mut self.late), now) {
             return;
         }
         self.stale = true;

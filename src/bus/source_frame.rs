@@ -80,7 +80,7 @@ pub fn advice(fault: Fault) -> &'static str {
         }
         Fault::Exception(code) => names::advice(code.0),
         Fault::NotConnected => "check that the port or host is there and that no other program has it; settings: c",
-        Fault::BackedOff => "it is asked again by itself now and then; find out why it stopped answering",
+        Fault::BackedOff => "it is retried at growing intervals; find out why it stopped responding",
     }
 }
 

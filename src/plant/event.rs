@@ -200,10 +200,23 @@ pub enum Fault {
     BackedOff,
 }
 
+/// What a fault proves about the device and the line; what exactly was wrong with a frame makes no difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FaultKind {
+    Timeout,
+    /// A frame came, but it was no valid response.
+    Corrupt,
+    OutOfSync,
+    Exception(ExceptionCode),
+    NotANumber,
+    NotConnected,
+    BackedOff,
+}
+
 impl Fault {
-    /// Frames that came but were corrupt, as opposed to silence and refusals.
-    pub fn is_corrupt(self) -> bool {
+    pub(crate) fn kind(self) -> FaultKind {
         match self {
+            Fault::Timeout => FaultKind::Timeout,
             Fault::Crc { .. }
             | Fault::Lrc { .. }
             | Fault::NotHex(_)
@@ -211,14 +224,18 @@ impl Fault {
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
-            | Fault::WrongEcho => true,
-            Fault::Timeout
-            | Fault::OutOfSync
-            | Fault::NotANumber
-            | Fault::Exception(_)
-            | Fault::NotConnected
-            | Fault::BackedOff => false,
+            | Fault::WrongEcho => FaultKind::Corrupt,
+            Fault::OutOfSync => FaultKind::OutOfSync,
+            Fault::Exception(code) => FaultKind::Exception(code),
+            Fault::NotANumber => FaultKind::NotANumber,
+            Fault::NotConnected => FaultKind::NotConnected,
+            Fault::BackedOff => FaultKind::BackedOff,
         }
+    }
+
+    /// Frames that came but were corrupt, as opposed to silence and refusals.
+    pub fn is_corrupt(self) -> bool {
+        self.kind() == FaultKind::Corrupt
     }
 }
 

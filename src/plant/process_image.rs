@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{
     def::{DeviceId, PlantDef, TagId},
-    event::{ExceptionCode, Fault},
+    event::{ExceptionCode, Fault, FaultKind},
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
@@ -272,23 +272,15 @@ enum FaultEffect {
 
 /// What a fault means for the values that were asked for.
 fn effect_of(fault: Fault) -> FaultEffect {
-    match fault {
-        Fault::Timeout => FaultEffect::Uncertain(Cause::Timeout),
-        Fault::Crc { .. }
-        | Fault::Lrc { .. }
-        | Fault::NotHex(_)
-        | Fault::Truncated { .. }
-        | Fault::WrongUnit { .. }
-        | Fault::WrongFunction { .. }
-        | Fault::WrongLength { .. }
-        | Fault::WrongEcho
-        | Fault::OutOfSync => FaultEffect::Uncertain(Cause::Corrupt),
+    match fault.kind() {
+        FaultKind::Timeout => FaultEffect::Uncertain(Cause::Timeout),
+        FaultKind::Corrupt | FaultKind::OutOfSync => FaultEffect::Uncertain(Cause::Corrupt),
         // 05 acknowledge and 06 busy pass; any other exception means that there is no such value.
-        Fault::Exception(ExceptionCode(0x05 | 0x06)) => FaultEffect::Uncertain(Cause::Exception),
-        Fault::Exception(_) => FaultEffect::Gone(Cause::Exception),
-        Fault::NotANumber => FaultEffect::Gone(Cause::SensorFault),
-        Fault::NotConnected => FaultEffect::Gone(Cause::NotConnected),
-        Fault::BackedOff => FaultEffect::Gone(Cause::DeviceDown),
+        FaultKind::Exception(ExceptionCode(0x05 | 0x06)) => FaultEffect::Uncertain(Cause::Exception),
+        FaultKind::Exception(_) => FaultEffect::Gone(Cause::Exception),
+        FaultKind::NotANumber => FaultEffect::Gone(Cause::SensorFault),
+        FaultKind::NotConnected => FaultEffect::Gone(Cause::NotConnected),
+        FaultKind::BackedOff => FaultEffect::Gone(Cause::DeviceDown),
     }
 }
 

@@ -2,7 +2,7 @@
 
 pub mod target;
 pub mod process;
-pub mod description;
+mod table;
 pub mod values;
 pub mod syntax;
 
@@ -11,7 +11,6 @@ use std::{collections::BTreeMap, time::Duration};
 use jiff::Timestamp;
 
 pub use self::{
-    description::Description,
     syntax::{Fault, Position, TargetKind, Valve},
     target::{AvailableFaults, FaultTarget, available_faults, why_not_applicable},
 };

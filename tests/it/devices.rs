@@ -37,7 +37,7 @@ use crate::support::folder;
 /// What a unit can do wrong on the wire. Each makes every value of the unit doubtful, and none of them wrong. An answer that
 /// is only late must be later than any shipped line waits.
 fn faults() -> impl Iterator<Item = Fault> {
-    let of_unit = Fault::ALL.into_iter().filter(|fault| fault.target_kind() == TargetKind::Unit);
+    let of_unit = Fault::all().filter(|fault| fault.target_kind() == TargetKind::Unit);
     of_unit.map(|fault| if matches!(fault, Fault::Late(_)) { Fault::Late(Duration::from_secs(3)) } else { fault })
 }
 

@@ -93,7 +93,7 @@ fn a_long_poll_in_the_way_of_a_fast_one_is_named() {
 }
 
 #[test]
-fn what_is_too_much_says_how_far_process_values_will_be_stretched() {
+fn an_overload_says_how_far_process_values_are_stretched() {
     let mut def = fixture::plant();
     for tag in &mut def.tags {
         tag.poll = Poll::Every(Duration::from_millis(60));

@@ -77,16 +77,7 @@ impl<'r, 'a> Fields<'r, 'a> {
                 (self.count, self.counts) = (Some(count), true);
                 self.values.blocks.last_mut()?.1 = count;
             }
-            Item::CoilState => {
-                let value = self.reader.word("value", |value| match coil_state(value) {
-                    Some(state) => state.into(),
-                    None => "neither on (FF00) nor off (0000)".into(),
-                })?;
-                if coil_state(value).is_none() {
-                    self.reader.wrong(format!("coil value {value:04X}, expected FF00 (on) or 0000 (off)"));
-                }
-                self.values.numbers.push(value);
-            }
+            Item::CoilState => self.coil_state()?,
             Item::Register => {
                 self.values.registers = self.reader.registers(function, self.start, 1)?;
             }
@@ -108,14 +99,7 @@ impl<'r, 'a> Fields<'r, 'a> {
             Item::WordCount => {
                 self.bytes = self.reader.word("byte count", |count| format!("{count} bytes follow"))?.into();
             }
-            Item::FifoCount => {
-                self.number("FIFO count", |count| format!("{} queued", counted(count.into(), "register")))?;
-                let count = usize::from(*self.values.numbers.last()?);
-                if self.bytes != 2 + 2 * count {
-                    self.reader.wrong(format!("byte count says {}, {} fit", self.bytes, 2 + 2 * count));
-                }
-                (self.start, self.bytes) = (None, 2 * count);
-            }
+            Item::FifoCount => self.fifo_count()?,
             Item::Events => {
                 if self.bytes < 6 {
                     self.reader.wrong(format!("byte count says {}, expected 6 or more", self.bytes));
@@ -146,6 +130,27 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn number(&mut self, name: &str, label: impl FnOnce(u16) -> String) -> Option<()> {
         let number = self.reader.word(name, label)?;
         self.values.numbers.push(number);
+        Some(())
+    }
+
+    fn coil_state(&mut self) -> Option<()> {
+        let label = |value| coil_state(value).unwrap_or("neither on (FF00) nor off (0000)").into();
+        let value = self.reader.word("value", label)?;
+        if coil_state(value).is_none() {
+            self.reader.wrong(format!("coil value {value:04X}, expected FF00 (on) or 0000 (off)"));
+        }
+        self.values.numbers.push(value);
+        Some(())
+    }
+
+    /// The count of a queue must fit the byte count before it.
+    fn fifo_count(&mut self) -> Option<()> {
+        self.number("FIFO count", |count| format!("{} queued", counted(count.into(), "register")))?;
+        let count = usize::from(*self.values.numbers.last()?);
+        if self.bytes != 2 + 2 * count {
+            self.reader.wrong(format!("byte count says {}, {} fit", self.bytes, 2 + 2 * count));
+        }
+        (self.start, self.bytes) = (None, 2 * count);
         Some(())
     }
 

@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_system_clock_that_was_set_is_followed_and_one_that_only_drifts_is_not() {
+    fn a_clock_that_was_set_is_followed_and_one_that_drifts_is_not() {
         let clock = Clock::real();
         let copy = clock;
         let System { wall, steady, .. } = clock.system.expect("a real clock");

@@ -41,7 +41,7 @@ use crate::{
     },
     plant::{
         def::{Framing, LineDef},
-        event::{ExceptionCode, Fault, LineCounters},
+        event::{ExceptionCode, Fault, FaultKind, LineCounters},
         number::to_u32,
         traffic::{Exchange, Frame},
     },
@@ -342,27 +342,20 @@ impl Link {
     fn account(&mut self, message: &[u8], fault: Fault) {
         let Some(unit) = message.first() else { return };
         let mbap = self.framing() == Framing::Mbap;
-        match fault {
-            Fault::Exception(_) => {
+        match fault.kind() {
+            FaultKind::Exception(_) => {
                 self.wire.counters.exceptions += 1;
                 // An exception names no address: while the unit owes, it may be the answer to an older request.
                 if mbap || self.wire.replies.of(*unit).is_clear() {
                     return;
                 }
             }
-            Fault::Timeout => self.wire.counters.timeouts += 1,
-            Fault::Crc { .. }
-            | Fault::Lrc { .. }
-            | Fault::NotHex(_)
-            | Fault::Truncated { .. }
-            | Fault::WrongUnit { .. }
-            | Fault::WrongFunction { .. }
-            | Fault::WrongLength { .. }
-            | Fault::WrongEcho
-            | Fault::OutOfSync
-            | Fault::NotANumber
-            | Fault::NotConnected
-            | Fault::BackedOff => self.wire.counters.corrupt += 1,
+            FaultKind::Timeout => self.wire.counters.timeouts += 1,
+            FaultKind::Corrupt
+            | FaultKind::OutOfSync
+            | FaultKind::NotANumber
+            | FaultKind::NotConnected
+            | FaultKind::BackedOff => self.wire.counters.corrupt += 1,
         }
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a corrupt answer may have been noise, with the answer still on its way.

@@ -332,7 +332,7 @@ impl Task<'_> {
         let (def, line) = (self.def.clone(), self.line);
         for unit in link.take_unsolicited() {
             for device in def.devices.iter().filter(|device| device.line == line && device.unit == unit) {
-                tracing::warn!(device = device.name, "unsolicited frames: its values are in doubt");
+                tracing::warn!(device = device.name, "unsolicited frames: its values are uncertain");
                 let tags = def.tags_of(device.id).map(|tag| tag.id).collect();
                 self.publish_failure(self.clock.now(), device.id, tags, Fault::OutOfSync, None).await?;
             }

@@ -198,7 +198,7 @@ async fn a_hole_in_a_block_costs_only_itself() {
 /// A device with a single register that ignores loopbacks: nothing tells its answers apart, so only patience helps – and
 /// it does help.
 #[tokio::test(start_paused = true)]
-async fn a_device_that_nothing_brings_into_step_is_read_again_after_a_rest() {
+async fn a_device_that_stays_out_of_step_is_read_again_after_a_rest() {
     let mut def = plant(Mode::Rtu);
     def.devices.truncate(1);
     def.tags.retain(|tag| tag.device == DeviceId(0) && tag.point.address == 400);

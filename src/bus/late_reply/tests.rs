@@ -73,7 +73,7 @@ fn a_unit_that_was_late_must_rest_longer() {
 }
 
 #[test]
-fn a_unit_whose_answers_overtake_each_other_proves_nothing_by_a_later_one() {
+fn answers_that_overtake_each_other_prove_nothing() {
     let s = Duration::from_secs;
     let mut replies = LineReplies::new(s(1), 0);
     let (request, answer) = ([1, 3, 0, 0, 0, 2], [1, 3, 4, 0, 1, 0, 2]);

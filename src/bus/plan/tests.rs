@@ -92,7 +92,7 @@ fn ranges(def: &PlantDef, unreadable: &UnreadableRanges) -> Vec<(u32, u32)> {
 }
 
 #[test]
-fn a_request_is_not_filled_up_if_that_costs_a_longer_gap_elsewhere() {
+fn a_request_is_not_filled_if_that_costs_a_longer_gap() {
     let mut def = words(&[0, 6, 7, 12]);
     def.devices[0].limits.read_registers_max = 8;
     // Greedy would take 0 to 7 and leave 12 alone: 9 words with a gap of 5; this reads 7.
@@ -100,7 +100,7 @@ fn a_request_is_not_filled_up_if_that_costs_a_longer_gap_elsewhere() {
 }
 
 #[test]
-fn over_tcp_a_gap_is_cheaper_than_a_round_trip_and_in_ascii_as_dear_as_the_device_allows() {
+fn a_gap_costs_little_over_tcp_and_much_in_ascii() {
     let mut def = words(&[0, 30]);
     def.devices[0].limits.gap_registers_max = 40;
     assert_eq!(ranges(&def, &UnreadableRanges::default()), [(0, 1), (30, 31)]);
@@ -154,7 +154,7 @@ fn kept(def: &PlantDef, unreadable: &UnreadableRanges) -> Vec<Block> {
 }
 
 #[test]
-fn a_missing_register_between_tags_is_found_and_never_read_over_again() {
+fn a_missing_register_is_found_and_not_read_over_again() {
     // Every second register: 15 gaps, the one at 13 is missing.
     let def = words(&(0..16).map(|n| 2 * n).collect::<Vec<u16>>());
     let (unreadable, asked) = bisection(&def, &[13], 125);
@@ -173,7 +173,7 @@ fn a_missing_tag_is_told_and_its_neighbours_are_read() {
 }
 
 #[test]
-fn what_is_refused_is_asked_for_seldom_and_believed_when_it_answers() {
+fn a_refused_range_is_probed_seldom_and_trusted_when_it_answers() {
     let def = words(&[0, 1, 2]);
     let mut unreadable = holes_at(&[1]);
     let plan = blocks(&def, LineId(0), &unreadable);
@@ -209,7 +209,7 @@ fn a_device_that_stumbles_once_loses_nothing() {
 }
 
 #[test]
-fn a_device_that_takes_fewer_registers_than_it_says_is_read_in_shorter_blocks() {
+fn a_device_that_takes_fewer_registers_gets_shorter_blocks() {
     let def = words(&(0..40).collect::<Vec<u16>>());
     let (unreadable, _) = bisection(&def, &[], 16);
     assert!(refused(&def, LineId(0), &unreadable).is_empty(), "nothing is missing");
@@ -343,7 +343,7 @@ proptest! {
     }
 
     #[test]
-    fn whatever_registers_are_missing_all_others_are_read_in_the_end(
+    fn all_registers_but_the_missing_ones_are_read_in_the_end(
         addresses in proptest::collection::btree_set(0u16..80, 1..40),
         missing in proptest::collection::btree_set(0u32..80, 0..12),
     ) {

@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_of_writes_leaves_four_fifths_of_the_line_to_the_polls() {
+    fn a_flood_of_writes_leaves_four_fifths_of_the_line_to_polls() {
         let mut budget = Budget::new(WRITE_SHARE, at(0));
         let (mut now, mut writes, mut polls) = (0, 0, 0);
         while now < 100_000 {

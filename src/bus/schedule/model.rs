@@ -150,7 +150,7 @@ fn late_starter(until: i64) -> i64 {
 }
 
 #[test]
-fn a_unit_that_loses_its_first_frame_is_read_while_others_are_dead() {
+fn a_unit_that_loses_its_first_frame_is_read_beside_dead_ones() {
     // It is asked first after two seconds.
     let found = late_starter(2_100);
     assert!(found < 5_000, "read {found} ms later");

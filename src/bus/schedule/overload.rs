@@ -101,7 +101,7 @@ impl Overload {
     }
 
     /// Judges the present demand; `late` when a critical poll cannot keep its period. `true` if the state has changed.
-    pub fn judge(&mut self, demand: Demand, late: bool, now: Timestamp) -> bool {
+    pub fn evaluate(&mut self, demand: Demand, late: bool, now: Timestamp) -> bool {
         let (before, total) = (self.load, demand.total());
         match self.load {
             Load::Normal => {

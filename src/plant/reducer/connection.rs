@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use super::Plant;
 use crate::plant::{
     def::{DeviceId, LineId, TagId},
-    event::{Fault, LineState},
+    event::{Fault, FaultKind, LineState},
     record::ActionRecord,
     sample::Cause,
     snapshot::DeviceState,
@@ -19,30 +19,20 @@ impl Plant {
         self.image.failed(tags, fault, at);
         let status = &mut self.devices[device.index()];
         let down = matches!(status.state, DeviceState::Down { .. });
-        match fault {
+        match fault.kind() {
             // The device is in backoff; these are its other tags.
-            Fault::BackedOff => {
+            FaultKind::BackedOff => {
                 if !down {
                     status.state = DeviceState::Down { since: at };
                 }
                 self.image.gone(device, Cause::DeviceDown, at);
                 return;
             }
-            Fault::NotConnected => return,
+            FaultKind::NotConnected => return,
             // An exception proves that the device is there, unless a gateway sent it.
-            Fault::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Answering,
-            Fault::NotANumber => status.state = DeviceState::Answering,
-            Fault::Exception(_)
-            | Fault::Timeout
-            | Fault::Crc { .. }
-            | Fault::Lrc { .. }
-            | Fault::NotHex(_)
-            | Fault::Truncated { .. }
-            | Fault::WrongUnit { .. }
-            | Fault::WrongFunction { .. }
-            | Fault::WrongLength { .. }
-            | Fault::WrongEcho
-            | Fault::OutOfSync => {
+            FaultKind::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Answering,
+            FaultKind::NotANumber => status.state = DeviceState::Answering,
+            FaultKind::Exception(_) | FaultKind::Timeout | FaultKind::Corrupt | FaultKind::OutOfSync => {
                 status.state = match status.state {
                     DeviceState::Down { since } => DeviceState::Down { since },
                     DeviceState::Failing(n) => DeviceState::Failing(n.saturating_add(1)),

@@ -56,7 +56,7 @@ const IDENTITY: Identity = Identity {
         (
             0x06,
             "water tank: fills TK-1 from TK-2 with pump P-1 through valve SV-2, heats while agitator M-1 turns, holds at \
-             the set value of TIC-1 for three minutes, drains through valve SV-1, cools, returns the water, begins again",
+             the setpoint of TIC-1 for three minutes, drains through valve SV-1, cools, returns the water, begins again",
         ),
     ],
 };

@@ -1,5 +1,6 @@
 //! The faults and their spelling, the same in a scenario file and on screen.
 
+use super::table::{ROWS, Row};
 use crate::plant::number::{to_u8, to_u32, to_u64};
 use std::{fmt, str::FromStr, time::Duration};
 
@@ -100,63 +101,18 @@ pub enum FaultSyntaxError {
 
 impl Fault {
     /// Every fault, with its usual number, in the order of the page.
-    pub const ALL: [Fault; 18] = [
-        Fault::Noise(10),
-        Fault::Silent,
-        Fault::Late(Duration::from_secs(2)),
-        Fault::BadCrc,
-        Fault::Cut,
-        Fault::Exception(4),
-        Fault::Stuck,
-        Fault::Torn,
-        Fault::WordOrder,
-        Fault::SensorBurnout,
-        Fault::HeaterBurnout,
-        Fault::ValveStuck(Valve::Drain, Position::Open),
-        Fault::ValveStuck(Valve::Drain, Position::Closed),
-        Fault::ValveStuck(Valve::Fill, Position::Open),
-        Fault::ValveStuck(Valve::Fill, Position::Closed),
-        Fault::Leak(2_000),
-        Fault::PumpFailed,
-        Fault::AgitatorFailed,
-    ];
+    pub fn all() -> impl Iterator<Item = Fault> {
+        ROWS.iter().map(|row| row.fault)
+    }
 
     /// Its name, without its number.
     pub fn word(self) -> &'static str {
-        match self {
-            Fault::Noise(_) => "noise",
-            Fault::Silent => "silent",
-            Fault::Late(_) => "late",
-            Fault::BadCrc => "bad crc",
-            Fault::Cut => "cut",
-            Fault::Exception(_) => "exception",
-            Fault::Stuck => "stuck value",
-            Fault::Torn => "torn value",
-            Fault::WordOrder => "word order",
-            Fault::SensorBurnout => "sensor burnout",
-            Fault::HeaterBurnout => "heater burnout",
-            Fault::ValveStuck(Valve::Drain, Position::Open) => "SV-1 stuck open",
-            Fault::ValveStuck(Valve::Drain, Position::Closed) => "SV-1 stuck closed",
-            Fault::ValveStuck(Valve::Fill, Position::Open) => "SV-2 stuck open",
-            Fault::ValveStuck(Valve::Fill, Position::Closed) => "SV-2 stuck closed",
-            Fault::Leak(_) => "leak",
-            Fault::PumpFailed => "pump failed",
-            Fault::AgitatorFailed => "agitator failed",
-        }
+        self.row().word
     }
 
     /// What it is a fault of.
     pub fn target_kind(self) -> TargetKind {
-        match self {
-            Fault::Noise(_) => TargetKind::Line,
-            Fault::Silent | Fault::Late(_) | Fault::BadCrc | Fault::Cut | Fault::Exception(_) => TargetKind::Unit,
-            Fault::Stuck | Fault::Torn | Fault::WordOrder | Fault::SensorBurnout => TargetKind::Value,
-            Fault::HeaterBurnout
-            | Fault::ValveStuck(..)
-            | Fault::Leak(_)
-            | Fault::PumpFailed
-            | Fault::AgitatorFailed => TargetKind::Process,
-        }
+        self.row().target_kind
     }
 
     /// Whether two faults of the same thing cannot both be: the later one takes the place of the earlier.
@@ -172,39 +128,17 @@ impl Fault {
 
     /// What its number may be, if it has one.
     pub fn parameter(self) -> Option<Parameter> {
-        self.parameter_and_number().map(|(parameter, _)| parameter)
+        self.row().parameter
     }
 
     /// Its number, in the unit of [`Fault::parameter`].
     pub fn number(self) -> Option<f64> {
-        self.parameter_and_number().map(|(_, number)| number)
-    }
-
-    fn parameter_and_number(self) -> Option<(Parameter, f64)> {
-        let parameter = |unit, min, max, steps| Parameter { unit, min, max, steps };
         match self {
-            Fault::Noise(percent) => {
-                Some((parameter("%", 1.0, 100.0, &[1.0, 5.0, 10.0, 20.0, 50.0]), f64::from(percent)))
-            }
-            Fault::Late(by) => Some((parameter("s", 0.05, 60.0, &[0.2, 0.5, 1.0, 2.0, 5.0]), by.as_secs_f64())),
-            Fault::Exception(code) => {
-                let steps = &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 11.0];
-                Some((parameter("", 1.0, 255.0, steps), f64::from(code)))
-            }
-            Fault::Leak(ml_per_min) => {
-                Some((parameter("l/min", 0.01, 20.0, &[0.2, 0.5, 1.0, 2.0, 5.0]), f64::from(ml_per_min) / 1e3))
-            }
-            Fault::Silent
-            | Fault::BadCrc
-            | Fault::Cut
-            | Fault::Stuck
-            | Fault::Torn
-            | Fault::WordOrder
-            | Fault::SensorBurnout
-            | Fault::HeaterBurnout
-            | Fault::ValveStuck(..)
-            | Fault::PumpFailed
-            | Fault::AgitatorFailed => None,
+            Fault::Noise(percent) => Some(f64::from(percent)),
+            Fault::Late(by) => Some(by.as_secs_f64()),
+            Fault::Exception(code) => Some(f64::from(code)),
+            Fault::Leak(ml_per_min) => Some(f64::from(ml_per_min) / 1e3),
+            _ => None,
         }
     }
 
@@ -255,12 +189,13 @@ impl FromStr for Fault {
     fn from_str(text: &str) -> Result<Fault, FaultSyntaxError> {
         let text = text.trim();
         // The longest name first: `SV-1 stuck open` before any that it might begin with.
-        let named = |fault: &&Fault| {
-            text.strip_prefix(fault.word()).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+        let named =
+            |row: &&Row| text.strip_prefix(row.word).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '));
+        let longest = ROWS.iter().filter(named).max_by_key(|row| row.word.len());
+        let Some(Row { fault, word, .. }) = longest.copied() else {
+            return Err(FaultSyntaxError::Unknown(text.to_owned()));
         };
-        let fault = Fault::ALL.iter().filter(named).max_by_key(|fault| fault.word().len());
-        let Some(fault) = fault.copied() else { return Err(FaultSyntaxError::Unknown(text.to_owned())) };
-        let rest = text[fault.word().len()..].trim();
+        let rest = text[word.len()..].trim();
         if rest.is_empty() {
             return Ok(fault);
         }
@@ -298,7 +233,7 @@ mod tests {
 
     #[test]
     fn every_fault_is_written_as_it_is_shown() {
-        for fault in Fault::ALL {
+        for fault in Fault::all() {
             assert_eq!(fault.to_string().parse(), Ok(fault));
             assert_eq!(fault.word().parse(), Ok(fault), "its usual number may be left out");
             assert!(fault.excludes(fault), "{fault} twice is once");

@@ -75,7 +75,7 @@ pub fn available_faults(def: &PlantDef) -> Vec<AvailableFaults> {
     let units = def.devices.iter().map(FaultTarget::of);
     let targets = lines.chain(units).chain([FaultTarget::Process]);
     let available = targets.map(|target| {
-        let faults = Fault::ALL.into_iter().filter(|fault| why_not_applicable(def, target, *fault).is_none()).collect();
+        let faults = Fault::all().filter(|fault| why_not_applicable(def, target, *fault).is_none()).collect();
         AvailableFaults { target, faults }
     });
     available.filter(|available| !available.faults.is_empty()).collect()

@@ -87,7 +87,7 @@ impl Value for Fault {
         match word.parse() {
             Ok(fault) => Some(fault),
             Err(error) => {
-                let mut known: Vec<&str> = Fault::ALL.iter().map(|fault| fault.word()).collect();
+                let mut known: Vec<&str> = Fault::all().map(|fault| fault.word()).collect();
                 known.dedup();
                 let problem = problems.add(at, format!("{error}")).label("not a fault");
                 renamed::offer(problem, "a fault", &word, &known);

@@ -51,7 +51,7 @@ async fn an_answer_owed_to_a_process_that_was_killed_is_no_value() {
 
 /// The same where the dead process had begun as this one does: what is owed answers the very first request.
 #[tokio::test(start_paused = true)]
-async fn an_owed_answer_to_the_first_request_does_not_shift_the_others() {
+async fn an_outstanding_first_reply_does_not_shift_the_others() {
     for mode in MODES {
         let def = plant(mode);
         let mut line = line(def.clone());

@@ -13,15 +13,15 @@ fn crowd() -> [Block; 4] {
 }
 
 #[test]
-fn overload_sheds_background_then_stretches_normal_and_returns_when_it_is_over() {
+fn overload_sheds_background_stretches_normal_and_ends() {
     let mut schedule = Schedule::new(&crowd(), at(0));
     // 20 % + 10 % critical, 85 % normal, 4 % background.
     let heavy = |index: usize, _| [40, 40, 85, 40][index];
     play(&mut schedule, 0, 20_000, heavy);
     // What the critical polls leave is 70 %.
     assert!(matches!(schedule.load(), Load::Overload { factor } if (factor / (85.0 / 70.0) - 1.0).abs() < 0.05));
-    let told: Vec<_> = schedule.polls().map(|poll| (1.0 < poll.factor, poll.shed)).collect();
-    assert_eq!(told, [(false, false), (false, false), (true, false), (false, true)]);
+    let state: Vec<_> = schedule.polls().map(|poll| (1.0 < poll.factor, poll.shed)).collect();
+    assert_eq!(state, [(false, false), (false, false), (true, false), (false, true)]);
     assert!(schedule.load().to_string().contains("every 1.2 periods"));
     let before = missed(&schedule);
     let log = play(&mut schedule, 20_000, 60_000, heavy);
@@ -68,7 +68,7 @@ fn a_device_that_does_not_answer_does_not_overload_its_line() {
 }
 
 #[test]
-fn identification_is_read_even_on_a_line_that_is_always_too_full() {
+fn identification_is_read_even_on_an_overloaded_line() {
     let blocks = [
         classed(0, every(100), PollClass::Critical),
         classed(1, Poll::Once, PollClass::Background),
@@ -106,4 +106,30 @@ fn five_hundred_polls_have_each_their_turn() {
     let mut seen: Vec<usize> = play(&mut schedule, 0, 20_000, |_, _| 30).into_iter().map(|(_, index)| index).collect();
     seen.sort_unstable();
     assert_eq!(seen, (0..500).collect::<Vec<_>>());
+}
+
+proptest! {
+    #[test]
+    fn critical_polls_keep_their_period_if_they_are_admissible(
+        critical in polls(1..5), normal in proptest::collection::vec((50u64..200, 20i64..80), 4..9),
+    ) {
+        // Any one of the others may be under way when a critical poll falls due.
+        let mut tasks: Vec<Task> =
+            critical.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
+        let blocking = normal.iter().map(|(_, cost)| *cost as u64).max().unwrap_or(0);
+        tasks.push(Task { cost: blocking, period: 600_000 });
+        prop_assume!(admission::test(&tasks) == Test::Accept && admission::utilisation(&tasks) < 0.9);
+        let load: Vec<(u64, i64)> = critical.iter().chain(&normal).copied().collect();
+        let all: Vec<Task> = load.iter().map(|(period, cost)| Task { cost: *cost as u64, period: *period }).collect();
+        prop_assume!(admission::utilisation(&all) > 1.02);
+        let class = |n: usize| if n < critical.len() { PollClass::Critical } else { PollClass::Normal };
+        let blocks = blocks(&load, class);
+        let mut schedule = Schedule::new(&blocks, at(0));
+        play(&mut schedule, 0, 20_000, |index, _| load[index].1);
+        prop_assert!(schedule.load() > Load::Normal);
+        let missed_critical = |schedule: &Schedule| schedule.polls().take(critical.len()).map(|poll| poll.missed).sum::<u64>();
+        let before = missed_critical(&schedule);
+        play(&mut schedule, 20_000, 200_000, |index, _| load[index].1);
+        prop_assert_eq!(missed_critical(&schedule), before);
+    }
 }

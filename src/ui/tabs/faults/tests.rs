@@ -27,7 +27,7 @@ const TIC: FaultTarget = FaultTarget::Unit(L1, 1);
 /// TIC-1 is silent and TK-1 leaks; the screen does not know yet that the valve is open.
 fn status(fixture: &Fixture) -> Status {
     let of = |target: FaultTarget| {
-        let faults = Fault::ALL.into_iter().filter(|fault| target.accepts(*fault)).collect();
+        let faults = Fault::all().filter(|fault| target.accepts(*fault)).collect();
         AvailableFaults { target, faults }
     };
     let since = fixture::now() - SignedDuration::from_secs(42);
@@ -140,11 +140,9 @@ fn a_fault_is_switched_only_as_it_was_drawn() {
 fn the_number_of_a_fault_in_force_changes_at_once() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
-    let leak = Fault::ALL.into_iter().position(|fault| matches!(fault, Fault::Leak(_))).expect("a leak");
-    let process = Fault::ALL
-        .into_iter()
-        .position(|fault| fault.target_kind() == TargetKind::Process)
-        .expect("faults of the process");
+    let leak = Fault::all().position(|fault| matches!(fault, Fault::Leak(_))).expect("a leak");
+    let process =
+        Fault::all().position(|fault| fault.target_kind() == TargetKind::Process).expect("faults of the process");
     let units = 2 * (process - 1);
     press(&mut model, &"↓".repeat(1 + units + leak - process));
     assert_eq!(press(&mut model, "→"), [SimCommand::Inject(FaultTarget::Process, Fault::Leak(1_000))]);

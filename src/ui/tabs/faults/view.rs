@@ -112,7 +112,7 @@ fn target_label(cx: &ViewContext, target: FaultTarget) -> String {
 /// Describes the selected fault above the comparison.
 fn describe(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
-    let description = fault.description();
+    let description = fault.row();
     let mut lines = vec![(format!("{}: {fault}", target.name(cx.def())), theme.strong())];
     let mut paragraph = |head: &str, text: &str| {
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn the_id_of_a_request_that_was_given_up_for_a_stop_names_no_later_one() {
+fn the_id_of_an_abandoned_request_is_not_used_again() {
     let mut transactions = Transactions::new();
     let id = transactions.begin(&[1, 3, 0, 0, 0, 1], Duration::from_secs(1));
     transactions.under_way[0].sent_at = Some(Instant::now());
