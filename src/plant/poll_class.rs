@@ -1,10 +1,27 @@
-//! Which tags are alarm inputs, which process values and which identification, as far as the plant file shows.
+//! The poll classes: which tags are alarm inputs, which process values and which identification, as far as the plant file shows.
+
+use serde::{Deserialize, Serialize};
 
 use super::{
     def::{AlarmDef, Subject},
     id::TagId,
-    tag::{Poll, PollClass, TagDef},
+    keyword::keyword_enum,
+    tag::{Poll, TagDef},
 };
+
+keyword_enum! {
+    /// How important it is that a tag is read in time, the most important first. On an overloaded line background polls are
+    /// shed, then the periods of normal polls are stretched; critical polls keep theirs.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    pub enum PollClass: "poll class" {
+        /// An alarm is evaluated from it.
+        Critical => "critical",
+        /// A process value.
+        Normal => "normal",
+        /// Identification.
+        Background => "background",
+    }
+}
 
 /// The class of each tag, by [`TagId`]: critical if an alarm watches it, compares with it or needs it for such a tag; background
 /// if it is read once; else normal. What is `written` for a tag in a file stands above all that.

@@ -4,7 +4,10 @@ use std::{sync::Arc, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-pub use super::data_type::{DataType, Encoding};
+pub use super::{
+    data_type::{DataType, Encoding},
+    poll_class::PollClass,
+};
 use super::{
     id::{DeviceId, TagId},
     keyword::keyword_enum,
@@ -344,20 +347,6 @@ pub enum Poll {
     Once,
     /// Never by itself.
     Never,
-}
-
-keyword_enum! {
-    /// How important it is that a tag is read in time, the most important first. On an overloaded line background polls are
-    /// shed, then the periods of normal polls are stretched; critical polls keep theirs.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-    pub enum PollClass: "poll class" {
-        /// An alarm is evaluated from it.
-        Critical => "critical",
-        /// A process value.
-        Normal => "normal",
-        /// Identification.
-        Background => "background",
-    }
 }
 
 keyword_enum! {
