@@ -1,5 +1,6 @@
 //! Whether the polls of a line can all meet their periods: the verdict, the interval that is overloaded, and warnings, as plain data.
 
+use crate::t;
 use std::{fmt, time::Duration};
 
 use serde::{Deserialize, Serialize};
@@ -131,9 +132,10 @@ pub enum Warning {
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Verdict::Fits => f.write_str("every poll meets its period"),
+            Verdict::Fits => f.write_str(t!("every poll meets its period")),
             Verdict::TooMuch { utilisation } => {
-                write!(f, "too much: the polls want {:.1} % of the line's time", utilisation * 100.0)
+                let share = format!("{:.1}", utilisation * 100.0);
+                f.write_str(&t!("too much: the polls want {share} % of the line's time", share))
             }
             Verdict::Blocked(overload) => overload.fmt(f),
         }
@@ -143,36 +145,43 @@ impl fmt::Display for Verdict {
 impl fmt::Display for OverloadInterval {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let OverloadInterval { span, demand, blocker, due, more } = self;
-        write!(f, "in {} the line must carry {}: ", ms(*span), ms(*demand))?;
-        write!(f, "while {} ({}) is read, ", blocker.name, ms(blocker.cost))?;
-        for (place, poll) in due.iter().enumerate() {
-            let comma = if place == 0 { "" } else { ", " };
-            write!(f, "{comma}{} every {} ({})", poll.name, seconds(poll.period), ms(poll.cost))?;
-        }
-        if *more > 0 {
-            write!(f, " and {more} more")?;
-        }
-        write!(f, " cannot meet {} period", if due.len() + more == 1 { "its" } else { "their" })
+        let poll = |poll: &PollWords| {
+            t!("{name} every {period} ({cost})", name = poll.name, period = seconds(poll.period), cost = ms(poll.cost))
+        };
+        let due_polls = due.iter().map(poll).collect::<Vec<_>>().join(", ");
+        let others = if *more > 0 { t!(" and {more} more", more) } else { String::new() };
+        let (span, demand, name, cost) = (ms(*span), ms(*demand), &blocker.name, ms(blocker.cost));
+        let when =
+            t!("in {span} the line must carry {demand}: while {name} ({cost}) is read", span, demand, name, cost);
+        f.write_str(&match due.len() + more {
+            1 => t!("{when}, {due_polls}{others} cannot meet its period", when, due_polls, others),
+            _ => t!("{when}, {due_polls}{others} cannot meet their period", when, due_polls, others),
+        })
     }
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Warning::NoParityOneStopBit => f.write_str(
-                "no parity and one stop bit: a disturbed character is noticed less surely; the standard wants E or O, or two stop bits",
-            ),
+            Warning::NoParityOneStopBit => f.write_str(t!(
+                "no parity and one stop bit: a disturbed character is noticed less surely; the standard wants E or O, or two stop bits"
+            )),
             Warning::TimeoutBelowAnswer { timeout, answer, poll } => {
-                write!(f, "timeout {} is shorter than an answer takes on the wire: {poll} needs {}", ms(*timeout), ms(*answer))
+                let (timeout, answer) = (ms(*timeout), ms(*answer));
+                f.write_str(&t!(
+                    "timeout {timeout} is shorter than an answer takes on the wire: {poll} needs {answer}",
+                    timeout,
+                    poll,
+                    answer
+                ))
             }
-            Warning::NoRoomForWrites { share } => write!(
-                f,
-                "less than {:.0} % of the time is left for writes: polls are stretched while an operator works",
-                share * 100.0
-            ),
-            Warning::SerialServer => f.write_str(
-                "a serial server: the time on the line behind it is not known here and not counted",
-            ),
+            Warning::NoRoomForWrites { share } => f.write_str(&t!(
+                "less than {share} % of the time is left for writes: polls are stretched while an operator works",
+                share = format!("{:.0}", share * 100.0)
+            )),
+            Warning::SerialServer => f.write_str(t!(
+                "a serial server: the time on the line behind it is not known here and not counted"
+            )),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What an operator asks, its way to the bus, and its outcome.
 
+use crate::{t, text::translate};
 use std::{fmt, sync::Arc};
 
 use jiff::Timestamp;
@@ -186,10 +187,10 @@ impl From<Result<(), Refusal>> for Outcome {
 /// The label with the reason: `refused: read only`.
 impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.label())?;
+        f.write_str(translate(self.label()))?;
         match self {
             Outcome::Pending | Outcome::Verified => Ok(()),
-            Outcome::Unchanged => f.write_str(", not written"),
+            Outcome::Unchanged => f.write_str(t!(", not written")),
             Outcome::Refused(why) => write!(f, ": {why}"),
             Outcome::NotConfirmed(why) => write!(f, ": {why}"),
             Outcome::Failed(fault) => write!(f, ": {fault}"),
@@ -207,16 +208,16 @@ pub enum Refusal {
     #[error("{0}")]
     NotReauthenticated(String),
     /// The value changed after it was shown; this is the present one.
-    #[error("it was changed to {0} after it was shown")]
+    #[error("{}", t!("it was changed to {what} after it was shown", what = .0))]
     ChangedTo(String),
     /// The command has no expected value; this is the present one.
-    #[error("it is {0} now; check and confirm again")]
+    #[error("{}", t!("it is {what} now; check and confirm again", what = .0))]
     NotSeen(String),
     /// The profile says read-only.
-    #[error("read only")]
+    #[error("{}", t!("read only"))]
     ReadOnly,
     /// Not a number, or outside the permitted range.
-    #[error("outside {min} … {max}")]
+    #[error("{}", t!("outside {min} … {max}", min = .min, max = .max))]
     OutOfRange {
         /// Lowest permitted, as text in the tag's unit; `−∞` if none.
         min: String,
@@ -224,10 +225,10 @@ pub enum Refusal {
         max: String,
     },
     /// A bound, the decimals or the present value is not known, so the write cannot be checked.
-    #[error("{0} is not known")]
+    #[error("{}", t!("{what} is not known", what = .0))]
     Unknown(String),
     /// Not one of the values of the enumeration.
-    #[error("not one of the values of this tag")]
+    #[error("{}", t!("not one of the values of this tag"))]
     NotAChoice,
     /// The device responded with an exception.
     #[error("{0}")]
@@ -236,43 +237,43 @@ pub enum Refusal {
     #[error("{0}")]
     NotSent(Fault),
     /// The station's queue to the line is full.
-    #[error("line too busy")]
+    #[error("{}", t!("line too busy"))]
     Busy,
     /// Another write to this tag is still under way.
-    #[error("a write to this tag is under way")]
+    #[error("{}", t!("a write to this tag is under way"))]
     UnderWay,
     /// It still waited when a stop of the same tag came, and would have undone it.
-    #[error("a stop came before it, nothing was sent")]
+    #[error("{}", t!("a stop came before it, nothing was sent"))]
     Overtaken,
     /// An interlock of the plant file blocks it now.
-    #[error("interlock: {0}")]
+    #[error("{}", t!("interlock: {what}", what = .0))]
     Interlock(String),
     /// A parameter set cannot be written to this device.
     #[error("{0}")]
     NotFit(String),
     /// The confirmed changes are not those that are needed now.
-    #[error("the device has changed; check and confirm again")]
+    #[error("{}", t!("the device has changed; check and confirm again"))]
     Changed,
     /// A step of a restore would overwrite another value than the confirmed one.
-    #[error("changed since you confirmed")]
+    #[error("{}", t!("changed since you confirmed"))]
     ChangedSince,
     /// A step of a restore would overwrite an unknown value.
-    #[error("not known now")]
+    #[error("{}", t!("not known now"))]
     NotKnownNow,
     /// The settings of the line changed during a restore.
-    #[error("the settings of the line were changed meanwhile")]
+    #[error("{}", t!("the settings of the line were changed meanwhile"))]
     LineChanged,
     /// The device was not read in time before a restore.
-    #[error("the device could not be read within {0} s")]
+    #[error("{}", t!("the device could not be read within {what} s", what = .0))]
     NotRead(u64),
     /// Stopped by an operator before anything was written.
-    #[error("stopped before anything was written")]
+    #[error("{}", t!("stopped before anything was written"))]
     Stopped,
     /// The settings could not be written into the plant file, or a parameter set into its folder.
-    #[error("not saved: {0}")]
+    #[error("{}", t!("not saved: {what}", what = .0))]
     NotSaved(String),
     /// No line has this name and place.
-    #[error("no such line")]
+    #[error("{}", t!("no such line"))]
     NotALine,
     /// Settings or a test that a line cannot have.
     #[error("{0}")]
@@ -286,28 +287,28 @@ pub enum Refusal {
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum NotConfirmed {
     /// No valid answer: it may or may not have taken effect.
-    #[error("{0}; it may have taken effect")]
+    #[error("{}", t!("{what}; it may have taken effect", what = .0))]
     NotAnswered(Fault),
     /// No valid answer, and the device holds another value.
-    #[error("no answer, not applied: the device holds {0}")]
+    #[error("{}", t!("no answer, not applied: the device holds {what}", what = .0))]
     NotApplied(f64),
     /// Read back, and different.
-    #[error("read back {0}")]
+    #[error("{}", t!("read back {what}", what = .0))]
     Different(f64),
     /// Could not be read back.
-    #[error("not read back: {0}")]
+    #[error("{}", t!("not read back: {what}", what = .0))]
     NotRead(Fault),
     /// Of several writes only some are done.
     #[error("{0}")]
     Partly(String),
     /// The station stopped before the result.
-    #[error("the station stopped; it may have taken effect")]
+    #[error("{}", t!("the station stopped; it may have taken effect"))]
     StationStopped,
     /// The terminal lost the station before the outcome.
-    #[error("connection to the station lost; it may have taken effect")]
+    #[error("{}", t!("connection to the station lost; it may have taken effect"))]
     ConnectionLost,
     /// The profile excludes a read-back.
-    #[error("accepted, not read back")]
+    #[error("{}", t!("accepted, not read back"))]
     NoReadBack,
 }
 

@@ -1,5 +1,6 @@
 //! Diagnostics of a line: what a technician can ask of a line beyond polling, how far it has come, and what was found.
 
+use crate::{t, text::translate};
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
@@ -84,17 +85,23 @@ impl std::fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Diagnostic::Send(bytes) => {
-                write!(f, "send")?;
+                f.write_str(t!("send"))?;
                 bytes.iter().try_for_each(|byte| write!(f, " {byte:02X}"))
             }
-            Diagnostic::Loopback { unit, count, .. } => write!(f, "loopback unit {unit}, {count} times"),
-            Diagnostic::Identify { unit } => write!(f, "identify unit {unit}"),
+            Diagnostic::Loopback { unit, count, .. } => {
+                f.write_str(&t!("loopback unit {unit}, {count} times", unit, count))
+            }
+            Diagnostic::Identify { unit } => f.write_str(&t!("identify unit {unit}", unit)),
             Diagnostic::Read { unit, table, address, count } => {
-                write!(f, "read unit {unit} {} {address} / 0x{address:04X}, {count}", table.word())
+                let (table, place) = (translate(table.word()), format!("{address} / 0x{address:04X}"));
+                f.write_str(&t!("read unit {unit} {table} {place}, {count}", unit, table, place, count))
             }
             Diagnostic::Scan(scan) => {
-                write!(f, "scan units {} to {}", scan.first, scan.last)?;
-                if scan.serials.is_empty() { Ok(()) } else { write!(f, " at {} settings", scan.serials.len()) }
+                f.write_str(&t!("scan units {first} to {last}", first = scan.first, last = scan.last))?;
+                match scan.serials.len() {
+                    0 => Ok(()),
+                    count => f.write_str(&t!(" at {count} settings", count)),
+                }
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Events for the plant: values read, requests that failed, states of lines, outcomes of writes, faults of the station.
 
+use crate::{t, text::translate};
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
@@ -127,10 +128,10 @@ pub enum WriteResult {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum Fault {
     /// No complete response before the deadline.
-    #[error("no answer in time")]
+    #[error("{}", t!("no answer in time"))]
     Timeout,
     /// The check did not fit.
-    #[error("CRC error: got {got:04X}, computed {computed:04X}")]
+    #[error("{}", t!("CRC error: got {got}, computed {computed}", got = format!("{:04X}", .got), computed = format!("{:04X}", .computed)))]
     Crc {
         /// As received, low byte first on the wire.
         got: u16,
@@ -138,7 +139,7 @@ pub enum Fault {
         computed: u16,
     },
     /// The check of an ASCII frame did not fit.
-    #[error("LRC error: got {got:02X}, computed {computed:02X}")]
+    #[error("{}", t!("LRC error: got {got}, computed {computed}", got = format!("{:02X}", .got), computed = format!("{:02X}", .computed)))]
     Lrc {
         /// As received.
         got: u8,
@@ -146,10 +147,10 @@ pub enum Fault {
         computed: u8,
     },
     /// A character that has no place in an ASCII frame.
-    #[error("character {0:02X} in an ASCII frame, expected a hexadecimal digit")]
+    #[error("{}", t!("character {what} in an ASCII frame, expected a hexadecimal digit", what = format!("{:02X}", .0)))]
     NotHex(u8),
     /// The frame ended too early.
-    #[error("answer cut short: {got} of {expected} bytes")]
+    #[error("{}", t!("answer cut short: {got} of {expected} bytes", got = .got, expected = .expected))]
     Truncated {
         /// Bytes received.
         got: u16,
@@ -157,7 +158,7 @@ pub enum Fault {
         expected: u16,
     },
     /// Another unit answered.
-    #[error("answer from unit {got}, asked unit {asked}")]
+    #[error("{}", t!("answer from unit {got}, asked unit {asked}", got = .got, asked = .asked))]
     WrongUnit {
         /// Unit in the answer.
         got: u8,
@@ -165,7 +166,7 @@ pub enum Fault {
         asked: u8,
     },
     /// The answer is to another function.
-    #[error("answer to function {got} / 0x{got:02X}, asked {asked} / 0x{asked:02X}")]
+    #[error("{}", t!("answer to function {got} / 0x{got_hex}, asked {asked} / 0x{asked_hex}", got = .got, got_hex = format!("{:02X}", .got), asked = .asked, asked_hex = format!("{:02X}", .asked)))]
     WrongFunction {
         /// Function in the answer.
         got: u8,
@@ -173,7 +174,7 @@ pub enum Fault {
         asked: u8,
     },
     /// The answer has another length than was asked for.
-    #[error("answer with {got} data bytes, asked {asked}")]
+    #[error("{}", t!("answer with {got} data bytes, asked {asked}", got = .got, asked = .asked))]
     WrongLength {
         /// Data bytes in the answer.
         got: u16,
@@ -181,22 +182,22 @@ pub enum Fault {
         asked: u16,
     },
     /// The echo of a write names another address or value.
-    #[error("echo of the write differs from the request")]
+    #[error("{}", t!("echo of the write differs from the request"))]
     WrongEcho,
     /// Unsolicited frames came: the answer may be one of them.
-    #[error("unsolicited frames: responses are not reliable")]
+    #[error("{}", t!("unsolicited frames: responses are not reliable"))]
     OutOfSync,
     /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).
-    #[error("the registers hold no number of this type")]
+    #[error("{}", t!("the registers hold no number of this type"))]
     NotANumber,
     /// The device responded with an exception.
     #[error("{0}")]
     Exception(ExceptionCode),
     /// The port or connection is not open.
-    #[error("line not connected")]
+    #[error("{}", t!("line not connected"))]
     NotConnected,
     /// The device is left alone (it has failed, or is saving its settings); nothing was sent.
-    #[error("device in backoff, try again later")]
+    #[error("{}", t!("device in backoff, try again later"))]
     BackedOff,
 }
 
@@ -241,7 +242,7 @@ impl Fault {
 
 /// Exception code of an answer (Modbus application protocol V1.1b3, section 7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, thiserror::Error, Serialize, Deserialize)]
-#[error("exception {0:02X}, {words}", words = self.label())]
+#[error("{}", t!("exception {code}, {words}", code = format!("{:02X}", .0), words = translate(self.label())))]
 pub struct ExceptionCode(pub u8);
 
 impl ExceptionCode {

@@ -1,5 +1,6 @@
 //! How a device stands, by NAMUR NE 107: one of four letters with its reason, or nothing while all is well.
 
+use crate::t;
 use std::{fmt, time::Duration};
 
 use serde::{Deserialize, Serialize};
@@ -95,19 +96,23 @@ impl Reason {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Reason::LineClosed => f.write_str("line closed by an operator"),
-            Reason::LineTesting => f.write_str("a test has the line"),
-            Reason::NotConnected => f.write_str("line not connected"),
-            Reason::Down => f.write_str("not answering"),
-            Reason::Settling => f.write_str("left alone after an action"),
-            Reason::Slow { p99, timeout } => {
-                write!(f, "answers take {} of {} ms", p99.as_millis(), timeout.as_millis())
+            Reason::LineClosed => f.write_str(t!("line closed by an operator")),
+            Reason::LineTesting => f.write_str(t!("a test has the line")),
+            Reason::NotConnected => f.write_str(t!("line not connected")),
+            Reason::Down => f.write_str(t!("not answering")),
+            Reason::Settling => f.write_str(t!("left alone after an action")),
+            Reason::Slow { p99, timeout } => f.write_str(&t!(
+                "answers take {p99} of {timeout} ms",
+                p99 = p99.as_millis(),
+                timeout = timeout.as_millis()
+            )),
+            Reason::Failing { failed, of } => f.write_str(&t!("{failed} of {of} requests failed", failed, of)),
+            Reason::NoValues => f.write_str(t!("responds without valid values")),
+            Reason::Corrupt { corrupt, of } => {
+                f.write_str(&t!("{corrupt} of {of} answers corrupt or repeated", corrupt, of))
             }
-            Reason::Failing { failed, of } => write!(f, "{failed} of {of} requests failed"),
-            Reason::NoValues => f.write_str("responds without valid values"),
-            Reason::Corrupt { corrupt, of } => write!(f, "{corrupt} of {of} answers corrupt or repeated"),
-            Reason::Late(count) => write!(f, "{count} answers came too late"),
-            Reason::MemoryParity(count) => write!(f, "memory parity error ({count})"),
+            Reason::Late(count) => f.write_str(&t!("{count} answers came too late", count)),
+            Reason::MemoryParity(count) => f.write_str(&t!("memory parity error ({count})", count)),
         }
     }
 }

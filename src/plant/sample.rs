@@ -1,5 +1,6 @@
 //! A value never travels alone: number, quality and time are one thing.
 
+use crate::{t, text::translate};
 use std::fmt;
 
 use jiff::Timestamp;
@@ -55,9 +56,9 @@ keyword_enum! {
 impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Quality::Good => f.write_str("good"),
-            Quality::Uncertain(cause) => write!(f, "uncertain: {}", cause.word()),
-            Quality::Bad(cause) => write!(f, "bad: {}", cause.word()),
+            Quality::Good => f.write_str(t!("good")),
+            Quality::Uncertain(cause) => f.write_str(&t!("uncertain: {cause}", cause = translate(cause.word()))),
+            Quality::Bad(cause) => f.write_str(&t!("bad: {cause}", cause = translate(cause.word()))),
         }
     }
 }

@@ -59,7 +59,13 @@ impl<'a> Visit<'a> for Found {
     fn visit_impl_item_fn(&mut self, function: &'a ImplItemFn) {
         self.within(&function.sig, |found| visit::visit_impl_item_fn(found, function));
     }
-    fn visit_attribute(&mut self, _: &'a Attribute) {}
+    fn visit_attribute(&mut self, attribute: &'a Attribute) {
+        if attribute.path().is_ident("error")
+            && let syn::Meta::List(list) = &attribute.meta
+        {
+            texts_of_calls(list.tokens.clone()).into_iter().for_each(|text| self.add(text));
+        }
+    }
     fn visit_item_macro(&mut self, item: &'a syn::ItemMacro) {
         if item.ident.as_ref().is_some_and(|name| name == "motions") {
             literals(item.mac.tokens.clone()).into_iter().for_each(|text| self.add(text));
@@ -127,6 +133,17 @@ impl<'a> Visit<'a> for Found {
             self.in_label = within;
         }
     }
+}
+
+/// The texts of `t!(…)` among the tokens of an attribute, which are no expressions: `t!("read back {value}", value = .0)`.
+fn texts_of_calls(tokens: proc_macro2::TokenStream) -> Vec<String> {
+    use proc_macro2::TokenTree::{Group, Ident};
+    let tokens: Vec<_> = tokens.into_iter().collect();
+    let text = |three: &[proc_macro2::TokenTree]| match three {
+        [Ident(name), _, Group(call)] if name == "t" => literals(call.stream()).into_iter().next(),
+        _ => None,
+    };
+    tokens.windows(3).filter_map(text).collect()
 }
 
 /// The strings among the tokens of a table.

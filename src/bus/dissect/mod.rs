@@ -13,6 +13,7 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
+use crate::{t, text::translate};
 use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
@@ -251,7 +252,7 @@ fn unit_words(unit: u8, mbap: bool) -> String {
 
 /// `3 / 0x03 read holding registers`.
 pub fn function_words(code: u8) -> String {
-    format!("{code} / 0x{code:02X} {}", names::function(code).unwrap_or("not in the standard"))
+    format!("{code} / 0x{code:02X} {}", translate(names::function(code).unwrap_or(t!("not in the standard"))))
 }
 
 fn function_name(code: u8) -> String {

@@ -1,5 +1,6 @@
 //! What an operator does with alarms: acknowledge, silence, reset, shelve, take out of service.
 
+use crate::t;
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
@@ -56,46 +57,46 @@ pub enum AlarmCommand {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum AlarmRefusal {
     /// The plant has no such alarm.
-    #[error("no such alarm")]
+    #[error("{}", t!("no such alarm"))]
     NoSuchAlarm,
     /// It does not wait for an acknowledgement.
-    #[error("nothing to acknowledge")]
+    #[error("{}", t!("nothing to acknowledge"))]
     NothingToAcknowledge,
     /// It was raised again after the operator looked.
-    #[error("raised again since it was displayed")]
+    #[error("{}", t!("raised again since it was displayed"))]
     RaisedSince,
     /// The plant file wants a note with the acknowledgement.
-    #[error("a comment is required")]
+    #[error("{}", t!("a comment is required"))]
     NoteNeeded,
     /// Shelving and taking out of service need a reason.
-    #[error("a reason is required")]
+    #[error("{}", t!("a reason is required"))]
     ReasonNeeded,
     /// A note or reason is longer than [`NOTE_CHARS_MAX`] characters.
-    #[error("more than {NOTE_CHARS_MAX} characters")]
+    #[error("{}", t!("more than {most} characters", most = NOTE_CHARS_MAX))]
     TooLong,
     /// Not for no time, and not for longer than the plant allows.
-    #[error("an alarm can be shelved for up to {} min", .max.as_secs() / 60)]
+    #[error("{}", t!("an alarm can be shelved for up to {minutes} min", minutes = .max.as_secs() / 60))]
     ShelveTime {
         /// The longest.
         max: Duration,
     },
     /// Nothing sounds.
-    #[error("no audible alarm")]
+    #[error("{}", t!("no audible alarm"))]
     NothingSounds,
     /// It does not wait for a reset.
-    #[error("nothing to reset")]
+    #[error("{}", t!("nothing to reset"))]
     NothingToReset,
     /// Its condition still holds.
-    #[error("its condition is still active")]
+    #[error("{}", t!("its condition is still active"))]
     CauseLasts,
     /// It is not shelved.
-    #[error("not shelved")]
+    #[error("{}", t!("not shelved"))]
     NotShelved,
     /// It is out of service.
-    #[error("out of service")]
+    #[error("{}", t!("out of service"))]
     OutOfService,
     /// It is in service.
-    #[error("in service already")]
+    #[error("{}", t!("in service already"))]
     InService,
 }
 

@@ -3,6 +3,7 @@
 //! Targets and limits are those of ISA-18.2 and IEC 62682 for one operator's position, meant for at least 30 days; the
 //! plant is one position. Only *annunciated* activations count: an event `raised` of an alarm that is not suppressed.
 
+use crate::t;
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
@@ -210,9 +211,9 @@ impl Bound {
 impl std::fmt::Display for Bound {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Bound::AtMost(bound) => write!(f, "at most {bound}"),
-            Bound::Below(bound) => write!(f, "below {bound}"),
-            Bound::AtLeast(bound) => write!(f, "at least {bound}"),
+            Bound::AtMost(bound) => f.write_str(&t!("at most {bound}", bound)),
+            Bound::Below(bound) => f.write_str(&t!("below {bound}", bound)),
+            Bound::AtLeast(bound) => f.write_str(&t!("at least {bound}", bound)),
         }
     }
 }

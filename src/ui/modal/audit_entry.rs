@@ -4,17 +4,12 @@ use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Modal, Next, window};
-use crate::{
-    plant::{number::to_u16, record::ActionRecord},
-    ui::{
-        ViewContext,
-        widgets::text::{pad, wrap},
-    },
+use super::{
+    Modal, Next,
+    sheet::{Row, Sheet},
+    window,
 };
-
-/// Columns of the names at the left.
-const NAMES: u16 = 8;
+use crate::{plant::record::ActionRecord, ui::ViewContext};
 
 /// The dialog.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,8 +23,8 @@ impl AuditEntryDialog {
         }
     }
 
-    /// Name and words of every line that says something.
-    fn lines(&self, cx: &ViewContext) -> Vec<(&'static str, String)> {
+    /// Name and words of every field that has a value.
+    fn rows(&self, cx: &ViewContext) -> Vec<Row> {
         let entry = &self.0;
         let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
         let at = entry.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
@@ -50,31 +45,14 @@ impl AuditEntryDialog {
             (t!("note"), told(&entry.note)),
             (t!("hash"), chain_hash.1),
         ];
-        lines.into_iter().filter(|(_, words)| !words.is_empty()).collect()
+        let lines = lines.into_iter().filter(|(_, words)| !words.is_empty());
+        lines.map(|(label, words)| Row::new(label, words, cx.theme.normal())).collect()
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
-        let room = body.width.saturating_sub(8).min(76).saturating_sub(NAMES).max(1);
-        let lines = self.lines(cx).into_iter().map(|(name, words)| (name, broken(&words, room)));
-        let lines: Vec<(&str, Vec<String>)> = lines.collect();
-        let height = lines.iter().map(|(_, rows)| to_u16(rows.len())).sum::<u16>();
-        let mut canvas = window(cx, frame, body, t!("audit entry"), (room + NAMES, height));
-        let mut y = 0;
-        for (name, rows) in &lines {
-            canvas.text(0, y, &pad(name, NAMES), cx.theme.dim());
-            for row in rows {
-                canvas.text(NAMES, y, row, cx.theme.normal());
-                y += 1;
-            }
-        }
+        let columns = body.width.saturating_sub(8).min(76);
+        let sheet = Sheet::new(self.rows(cx), columns, 0);
+        let mut canvas = window(cx, frame, body, t!("audit entry"), (columns, sheet.len()));
+        sheet.view(cx.theme, &mut canvas, 0);
     }
-}
-
-/// Words in lines of so many columns; a word that is longer, as a hash is, goes on in the next one.
-fn broken(words: &str, room: u16) -> Vec<String> {
-    if words.contains(' ') {
-        return wrap(words, room);
-    }
-    let chars: Vec<char> = words.chars().collect();
-    chars.chunks(usize::from(room)).map(|part| part.iter().collect()).collect()
 }

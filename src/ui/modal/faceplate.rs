@@ -3,14 +3,19 @@
 use crate::t;
 use crate::text::translate;
 use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame, layout::Rect, style::Style};
+use ratatui::{Frame, layout::Rect};
 
-use super::{Confirm, Modal, Next, Notice, Why, confirm::wire_text, number::range_text, window};
+use super::{
+    Confirm, Modal, Next, Notice, Why,
+    confirm::wire_text,
+    number::range_text,
+    sheet::{Row, Sheet},
+    window,
+};
 use crate::{
     plant::{
         def::TagId,
         event::LineState,
-        number::to_u16,
         snapshot::DeviceState,
         tag::{Access, Poll},
     },
@@ -19,7 +24,7 @@ use crate::{
         keys::Hint,
         tabs::mimic,
         widgets::{
-            text::{age, between, clock, fit, fit_words, pad, width, wrap},
+            text::{age, between, clock, fit, pad, width},
             value,
         },
     },
@@ -117,14 +122,13 @@ impl Faceplate {
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let names = self.tags.iter().map(|tag| width(&cx.def().tag(*tag).name)).max().unwrap_or(0);
         let room = body.width.saturating_sub(8).min(64);
-        let details = wrapped(details(cx, self.tag(), room), room.saturating_sub(9));
-        let list = to_u16(self.tags.len());
-        let mut canvas = window(cx, frame, body, &self.title, (room, list + 1 + to_u16(details.len())));
+        let details = Sheet::new(details(cx, self.tag()), room, 9);
+        let list = self.tags.len();
+        let mut canvas = window(cx, frame, body, &self.title, (room, list + 1 + details.len()));
         for (y, tag) in self.tags.iter().enumerate() {
-            let y = to_u16(y);
             let def = cx.def().tag(*tag);
             let shown = value::show(cx, *tag);
-            let name = if usize::from(y) == self.selected { cx.theme.focus() } else { cx.theme.normal() };
+            let name = if y == self.selected { cx.theme.focus() } else { cx.theme.normal() };
             let x = canvas.text(0, y, &pad(&def.name, names), name);
             let room = canvas.width().saturating_sub(x + 2);
             let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
@@ -135,11 +139,8 @@ impl Faceplate {
                 canvas.text(x + 2, y, &fit(&words, left), style);
             }
         }
-        for (y, (label, text, style)) in details.iter().enumerate() {
-            let y = list + 1 + to_u16(y);
-            canvas.text(0, y, label, cx.theme.dim());
-            canvas.text(9, y, &fit_words(text, canvas.width().saturating_sub(9)), *style);
-        }
+        let (width, height) = (canvas.width(), canvas.height());
+        details.view(cx.theme, &mut canvas.part(0, list + 1, width, height), 0);
     }
 
     fn tag(&self) -> TagId {
@@ -147,17 +148,8 @@ impl Faceplate {
     }
 }
 
-/// Words that are too long go on in the next row.
-fn wrapped(rows: Vec<(&'static str, String, Style)>, room: u16) -> Vec<(&'static str, String, Style)> {
-    let parts = |(label, text, style): (&'static str, String, Style)| {
-        let lines = if width(&text) <= room { vec![text] } else { wrap(&text, room) };
-        lines.into_iter().enumerate().map(move |(n, line)| (if n == 0 { label } else { "" }, line, style))
-    };
-    rows.into_iter().flat_map(parts).collect()
-}
-
-/// What is known about one tag: (label, words, style).
-fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String, Style)> {
+/// What is known about one tag.
+fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
     let quality = match def.access {
         Access::Write => t!("none: write only").to_owned(),
@@ -214,14 +206,10 @@ fn details(cx: &ViewContext, tag: TagId, room: u16) -> Vec<(&'static str, String
         let text = format!("{} {} {}", theme.priority_mark(def.priority), def.message, translate(alarm.state.word()));
         rows.push((t!("alarm"), text, theme.alarm(def.priority, alarm.state, cx.flash())));
     }
-    let meaning = wrap(&def.meaning, room.saturating_sub(9));
-    rows.extend(
-        meaning
-            .into_iter()
-            .enumerate()
-            .map(|(n, line)| (if n == 0 { t!("meaning") } else { "" }, line, theme.normal())),
-    );
-    rows
+    if !def.meaning.is_empty() {
+        rows.push((t!("meaning"), def.meaning.clone(), theme.normal()));
+    }
+    rows.into_iter().map(|(label, text, style)| Row::new(label, text, style)).collect()
 }
 
 /// What Enter writes for a tag: itself, or the command of an output that is only read.

@@ -15,6 +15,7 @@ pub(crate) mod prompt;
 pub(crate) mod reason;
 pub(crate) mod confirmed_value;
 pub(crate) mod settings;
+mod sheet;
 pub(crate) mod user_form;
 pub(crate) mod why;
 
@@ -249,6 +250,13 @@ impl Modal {
             Modal::AuditEntry(dialog) => dialog.view(cx, frame, body),
         }
     }
+}
+
+/// The keys of the moment in the last row of a window.
+pub(super) fn view_keys(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint]) {
+    let keys: Vec<String> = hints.iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
+    let last = canvas.height().saturating_sub(1);
+    canvas.text(0, last, &cx.theme.enter(&keys.join("   ")), cx.theme.strong());
 }
 
 /// A cleared, framed window of this inner size in the middle of the body; drawn smaller where there is no room.

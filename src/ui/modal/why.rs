@@ -11,9 +11,13 @@ mod tests;
 
 use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
-use ratatui::{Frame, layout::Rect, style::Style};
+use ratatui::{Frame, layout::Rect};
 
-use super::{Modal, Next, window};
+use super::{
+    Modal, Next,
+    sheet::{Sheet, label_columns},
+    window,
+};
 use crate::{
     plant::{
         def::{DeviceId, TagId},
@@ -22,10 +26,7 @@ use crate::{
     ui::{
         UiAction, ViewContext,
         keys::Hint,
-        widgets::{
-            list::Motion,
-            text::{Canvas, fit_words, width, wrap},
-        },
+        widgets::{list::Motion, text::Canvas},
     },
 };
 
@@ -35,15 +36,6 @@ pub struct Why {
     tags: Vec<TagId>,
     at: usize,
     row: u16,
-}
-
-/// A row: what it is about (empty: it goes on), and its words.
-struct Row {
-    label: &'static str,
-    text: String,
-    style: Style,
-    /// Words may go on in further rows; bytes and headings are laid out already.
-    wraps: bool,
 }
 
 impl Why {
@@ -92,18 +84,15 @@ impl Why {
         let tag = self.tags[self.at];
         let def = cx.def().tag(tag);
         let room = body.width.saturating_sub(4).min(WIDTH_MAX);
-        let rows = laid_out(facts::rows(cx, tag, room.saturating_sub(LABEL)), room.saturating_sub(LABEL));
+        let labels = label_columns(&facts::rows(cx, tag, room)).max(LABELS_MIN);
+        let sheet = Sheet::new(facts::rows(cx, tag, room.saturating_sub(labels)), room, LABELS_MIN);
         let shown = body.height.saturating_sub(2);
-        let first = self.row.min(to_u16(rows.len()).saturating_sub(shown));
+        let first = self.row.min(to_u16(sheet.len()).saturating_sub(shown));
         let place = if self.tags.len() < 2 { String::new() } else { format!("  {}/{}", self.at + 1, self.tags.len()) };
         let title = t!("why {name} {label}{place}", name = def.name, label = def.label, place);
-        let mut canvas = window(cx, frame, body, &title, (room, rows.len()));
-        for (y, row) in rows.iter().skip(usize::from(first)).enumerate() {
-            let y = to_u16(y);
-            canvas.text(0, y, row.label, cx.theme.dim());
-            canvas.text(LABEL, y, &fit_words(&row.text, room.saturating_sub(LABEL)), row.style);
-        }
-        let (inner, below) = (canvas.area(), to_u16(rows.len()).saturating_sub(first + canvas.height()));
+        let mut canvas = window(cx, frame, body, &title, (room, sheet.len()));
+        sheet.view(cx.theme, &mut canvas, usize::from(first));
+        let (inner, below) = (canvas.area(), to_u16(sheet.len()).saturating_sub(first + canvas.height()));
         if 0 < below {
             let words = t!(" {below} more ↓ ", below);
             let frame_row = Rect { y: inner.bottom(), height: 1, ..inner };
@@ -112,24 +101,9 @@ impl Why {
     }
 }
 
-/// Columns of the label.
-const LABEL: u16 = 9;
+/// Least columns of the labels.
+const LABELS_MIN: u16 = 9;
 /// Wider than this a window is harder to read, not easier.
 const WIDTH_MAX: u16 = 100;
 /// Further than this nothing is scrolled.
 const ROWS_MAX: usize = 999;
-
-/// Words that are too long go on in the next row.
-fn laid_out(rows: Vec<Row>, room: u16) -> Vec<Row> {
-    let mut all = Vec::new();
-    for row in rows {
-        if !row.wraps || width(&row.text) <= room {
-            all.push(row);
-            continue;
-        }
-        for (n, text) in wrap(&row.text, room).into_iter().enumerate() {
-            all.push(Row { label: if n == 0 { row.label } else { "" }, text, style: row.style, wraps: false });
-        }
-    }
-    all
-}

@@ -50,6 +50,8 @@ impl<'a> Canvas<'a> {
         let (x, y, text) = (to_u16(x), to_u16(y), thai_cells(text));
         if y < self.area.height && x < self.area.width {
             let room = usize::from(self.area.width - x);
+            #[cfg(test)]
+            tests::note_overwritten(self, x, y, &text);
             self.buffer.set_stringn(self.area.x + x, self.area.y + y, &text, room, style);
         }
         x.saturating_add(width(&text))
@@ -269,8 +271,25 @@ pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    thread_local! {
+        static OVERWRITTEN: std::cell::RefCell<Vec<String>> = const { std::cell::RefCell::new(Vec::new()) };
+    }
+
+    /// Texts that were written over other texts of the same frame since the last call, each with what stood there.
+    pub(crate) fn take_overwritten() -> Vec<String> {
+        OVERWRITTEN.take()
+    }
+
+    pub(super) fn note_overwritten(canvas: &Canvas, x: u16, y: u16, text: &str) {
+        let end = x.saturating_add(width(text)).min(canvas.width());
+        let there: String = (x..end).filter_map(|column| canvas.symbol(column, y)).collect();
+        if there.contains(char::is_alphanumeric) && !text.trim().is_empty() && there.trim_end() != text.trim_end() {
+            OVERWRITTEN.with_borrow_mut(|all| all.push(format!("{text:?} over {there:?}")));
+        }
+    }
 
     #[test]
     fn a_cut_text_says_that_it_is_cut() {

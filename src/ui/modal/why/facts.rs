@@ -3,14 +3,12 @@
 use crate::t;
 use std::time::Duration;
 
-use ratatui::style::Style;
-
-use super::{Row, service, value, wire};
+use super::{service, value, wire};
+use crate::ui::modal::sheet::Row;
 use crate::{
     bus::source_frame,
     plant::{
         def::{LineDef, TagId},
-        event::Fault,
         tag::TagDef,
     },
     ui::ViewContext,
@@ -24,12 +22,12 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     let found = exchange.and_then(|exchange| source_frame::find(def.point, exchange));
     let mut rows = value::value_rows(cx, def, exchange, found.as_ref());
     let label = if def.is_text() { t!("text") } else { t!("number") };
-    rows.push(row(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
-    rows.push(row("where", wire::place(cx, def, device), cx.theme.normal()));
-    rows.push(row("", wire::point(def), cx.theme.normal()));
+    rows.push(Row::new(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
+    rows.push(Row::new(t!("where"), wire::place(cx, def, device), cx.theme.normal()));
+    rows.push(Row::new("", wire::point(def), cx.theme.normal()));
     let dissection = exchange.map(|exchange| wire::exchange_rows(cx, def, exchange, found.as_ref(), room, &mut rows));
     if exchange.is_none() {
-        rows.push(row("asked", wire::never_asked(cx, def).to_owned(), cx.theme.normal()));
+        rows.push(Row::new(t!("asked"), wire::never_asked(cx, def).to_owned(), cx.theme.normal()));
     }
     rows.extend(service::device_rows(cx, def, device, exchange));
     rows.extend(service::poll_rows(cx, def));
@@ -39,17 +37,9 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     rows
 }
 
-pub(super) fn row(label: &'static str, text: impl Into<String>, style: Style) -> Row {
-    Row { label, text: text.into(), style, wraps: true }
-}
-
 pub(super) fn settings<'a>(cx: &ViewContext<'a>, def: &TagDef) -> &'a LineDef {
     let line = cx.def().device(def.device).line;
     cx.snapshot.line(line).report.as_ref().map_or(cx.def().line(line), |report| &report.settings)
-}
-
-pub(super) fn words(fault: Fault) -> String {
-    fault.to_string()
 }
 
 /// `0.4 ms`, `12 ms`, `1.5 s`, `10 min`.

@@ -3,10 +3,8 @@
 use crate::t;
 use std::time::Duration;
 
-use super::{
-    Row,
-    facts::{row, span, words},
-};
+use super::facts::span;
+use crate::ui::modal::sheet::Row;
 use crate::{
     plant::{
         def::DeviceDef,
@@ -37,18 +35,20 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
         text += &t!(", {failed} of the last {of} failed", failed, of);
     }
     let well = matches!(status.state, DeviceState::Answering | DeviceState::Unknown);
-    let mut rows = vec![row("device", text, if well { theme.normal() } else { theme.trouble() })];
+    let mut rows = vec![Row::new(t!("device"), text, if well { theme.normal() } else { theme.trouble() })];
     rows.extend(status.diagnosis.map(|reason| {
         let signal = reason.signal();
-        row("", format!("{} {}: {reason}", signal.word(), signal.label()), theme.trouble())
+        Row::new("", format!("{} {}: {reason}", signal.word(), signal.label()), theme.trouble())
     }));
     // What stands above already is not said again.
     let told = cx.snapshot.sample(def.id).quality.cause() == Some(Cause::NotConnected);
-    rows.extend(line_words(cx, &line.state).filter(|_| !told).map(|words| row("line", words, theme.trouble())));
+    rows.extend(
+        line_words(cx, &line.state).filter(|_| !told).map(|words| Row::new(t!("line"), words, theme.trouble())),
+    );
     let verdict = exchange.and_then(|exchange| exchange.outcome.err());
     if let Some((at, fault)) = status.last_fault.filter(|(_, fault)| Some(*fault) != verdict) {
         let ago = age(between(at, cx.now));
-        rows.push(row("", format!("last fault {ago} ago: {}", words(fault)), theme.dim()));
+        rows.push(Row::new("", t!("last fault {ago} ago: {fault}", ago, fault), theme.dim()));
     }
     rows
 }
@@ -58,7 +58,7 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
     let line = cx.snapshot.line(cx.def().device(def.device).line);
     let Some(report) = &line.report else { return Vec::new() };
     if report.refused.contains(&def.id) {
-        return vec![row("poll", "asked no more: the device refuses this address", cx.theme.trouble())];
+        return vec![Row::new(t!("poll"), t!("asked no more: the device refuses this address"), cx.theme.trouble())];
     }
     let Some(poll) = report.poll_of(def.id) else { return Vec::new() };
     let period = match poll.poll {
@@ -86,8 +86,8 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
         text += &t!(", jitter {span}", span = span(p99));
     }
     text += &t!(", costs {span}", span = span(poll.cost));
-    vec![row(
-        "poll",
+    vec![Row::new(
+        t!("poll"),
         text,
         if poll.stats.missed == 0 && busy.is_empty() { cx.theme.normal() } else { cx.theme.trouble() },
     )]

@@ -1,12 +1,9 @@
 //! The value with quality and cause, what to do about a doubt, and the number that it was made from.
 
-use super::{
-    Row,
-    facts::{row, span, words},
-    service::line_words,
-};
+use super::{facts::span, service::line_words};
 use crate::t;
 use crate::text::translate;
+use crate::ui::modal::sheet::Row;
 use crate::{
     bus::{
         codec,
@@ -52,13 +49,13 @@ pub(super) fn value_rows(
         }
         Quality::Bad(cause) => t!("bad: {cause}, since {at}", cause = translate(cause.word()), at),
     };
-    let mut rows = vec![row("value", format!("{}  {quality}", shown.with_unit()), shown.style)];
+    let mut rows = vec![Row::new(t!("value"), format!("{}  {quality}", shown.with_unit()), shown.style)];
     let Some(cause) = sample.quality.cause().filter(|_| def.access != Access::Write) else { return rows };
     if let Some(because) = because(cx, def, cause, exchange, found) {
-        rows.push(row("because", because, cx.theme.normal()));
+        rows.push(Row::new(t!("because"), because, cx.theme.normal()));
     }
     if let Some(advice) = advice(cx, def, cause, exchange) {
-        rows.push(row("to do", advice, cx.theme.strong()));
+        rows.push(Row::new(t!("to do"), advice, cx.theme.strong()));
     }
     rows
 }
@@ -82,7 +79,7 @@ fn because(
                 return Some(t!("raw {raw} means \"no value\" for this device", raw));
             }
             match (exchange.and_then(|exchange| exchange.outcome.err()), def.quality_from) {
-                (Some(Fault::NotANumber), _) => Some(words(Fault::NotANumber)),
+                (Some(Fault::NotANumber), _) => Some(Fault::NotANumber.to_string()),
                 (_, Some((word, mask))) => Some(t!(
                     "{words_of} (bits 0x{mask} any bit set = fault)",
                     words_of = words_of(word),
@@ -112,7 +109,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
     let device = cx.def().device(def.device);
     let fault = exchange.and_then(|exchange| exchange.outcome.err());
     let last = cx.snapshot.device(device.id).last_fault.map(|(_, fault)| fault);
-    let of = |fault: Fault| Some(source_frame::advice(fault).to_owned());
+    let of = |fault: Fault| Some(translate(source_frame::advice(fault)).to_owned());
     match cause {
         Cause::NotConnected => match cx.snapshot.line(device.line).state {
             LineState::Disconnected => Some(t!("connect the line again: tab 4, L").to_owned()),

@@ -1,10 +1,11 @@
 //! Where the value lives, the request and the answer that brought it, in bytes and in words.
 
 use super::{
-    Row, bytes,
-    facts::{row, settings, span, words},
+    bytes,
+    facts::{settings, span},
 };
 use crate::t;
+use crate::ui::modal::sheet::Row;
 use crate::{
     bus::{
         dissect::{self, Direction, Dissection},
@@ -46,15 +47,15 @@ pub(super) fn exchange_rows(
     let at = clock(exchange.at, &cx.def().time_zone);
     // What was good then says nothing of now.
     let old = !cx.snapshot.sample(def.id).quality.is_good() && exchange.outcome.is_ok();
-    rows.push(row("", format!("{}, at {at}", request.summary), theme.dim()));
+    rows.push(Row::new("", format!("{}, at {at}", request.summary), theme.dim()));
     if exchange.answer.is_empty() {
         let timeout = settings(cx, def).timeout;
-        rows.push(row("answer", format!("none within {}", span(timeout)), theme.trouble()));
+        rows.push(Row::new(t!("answer"), t!("none within {span}", span = span(timeout)), theme.trouble()));
     } else {
         for (n, text) in frame(&exchange.answer, found.map(|found| &found.range)).into_iter().enumerate() {
             rows.push(hex(if n == 0 { t!("answer") } else { "" }, text, theme.normal()));
         }
-        rows.push(Row { wraps: false, ..row("", answer.summary.clone(), theme.dim()) });
+        rows.push(Row { wraps: false, ..Row::new("", answer.summary.clone(), theme.dim()) });
     }
     let reply = exchange.reply.map(|reply| t!(", after {span}", span = span(reply))).unwrap_or_default();
     let tries = if 1 < exchange.tries { t!(", second try: the first answer was corrupt") } else { t!(", first try") };
@@ -64,9 +65,9 @@ pub(super) fn exchange_rows(
             (t!("ok, but {ago} ago: no good answer since", ago), theme.trouble())
         }
         Ok(()) => (t!("ok").to_owned(), theme.normal()),
-        Err(fault) => (words(fault), theme.trouble()),
+        Err(fault) => (fault.to_string(), theme.trouble()),
     };
-    rows.push(row("verdict", format!("{verdict}{reply}{tries}"), style));
+    rows.push(Row::new(t!("verdict"), format!("{verdict}{reply}{tries}"), style));
     (request, answer)
 }
 

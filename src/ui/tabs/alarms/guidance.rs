@@ -16,8 +16,11 @@ use crate::{
     },
 };
 
-/// Columns of the names at the left, and a blank at the right.
-const NAMES: u16 = 10;
+/// Columns of the names at the left, with a blank before and behind them.
+fn names() -> u16 {
+    let names = [t!("now"), t!("cause"), t!("effect"), t!("action"), t!("go to")];
+    names.into_iter().map(|name| text::width(name) + 2).max().unwrap_or(0).max(9)
+}
 
 /// What there is to say about a listed alarm.
 pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
@@ -37,7 +40,7 @@ pub fn rows_of_any(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static 
 
 /// The rows of the screen that all of it needs, with its title and the way on.
 pub fn height(rows: &[(&str, String)], width: u16) -> u16 {
-    let room = width.saturating_sub(NAMES);
+    let room = width.saturating_sub(names() + 1);
     rows.iter().map(|(_, text)| to_u16(wrap(text, room).len())).sum::<u16>() + 2
 }
 
@@ -82,7 +85,7 @@ fn title(
 fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
-    let room = width.saturating_sub(NAMES);
+    let room = width.saturating_sub(names() + 1);
     let mut y = 1;
     for line in name.iter().flat_map(|name| wrap(name, width.saturating_sub(2))) {
         canvas.text(1, y, &line, theme.strong());
@@ -108,13 +111,13 @@ fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str,
             (false, false) => vec![fit_words(text, room)],
         };
         for line in shown {
-            canvas.text(9, y, &line, style);
+            canvas.text(names(), y, &line, style);
             y += 1;
         }
     }
     let last = height.saturating_sub(1);
     canvas.text(1, last, t!("go to"), theme.dim());
-    canvas.text(9, last, &fit_words(go, room), theme.normal());
+    canvas.text(names(), last, &fit_words(go, room), theme.normal());
 }
 
 fn or_dash(text: &str) -> &str {

@@ -78,9 +78,10 @@ impl Metrics {
         if let Some(trouble) = &self.figures.trouble {
             canvas.text(x + 2, 1, trouble, theme.trouble());
         }
-        let mut table = canvas.part(0, 2, width, height.saturating_sub(3));
+        let side = 2 * TABLE <= width;
+        let mut table = canvas.part(0, 2, if side { TABLE - 1 } else { width }, height.saturating_sub(3));
         let more = draw::lines(&mut table, &self.lines(cx, width), self.scroll);
-        if 2 * TABLE <= width {
+        if side {
             let mut side = canvas.part(TABLE, 2, width - TABLE, height.saturating_sub(3));
             draw::lines(&mut side, &self.bad_actors(cx), Scroll::default());
         }
