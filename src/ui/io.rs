@@ -231,7 +231,7 @@ impl Loop {
         let waiting = tokio::spawn(async move {
             let answer = match sent {
                 Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
-                Err(_) => Err(HistoryError::Engine("too busy, asked again later".to_owned())),
+                Err(_) => Err(HistoryError::Engine("too busy, repeated later".to_owned())),
             };
             // A terminal that has left needs no answer.
             let _ = outbox.send((plants, Msg::Answer(id, answer))).await;

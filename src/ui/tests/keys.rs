@@ -33,7 +33,7 @@ use crate::{
 };
 
 #[test]
-fn a_device_that_does_not_answer_is_said_so_before_anything_is_typed() {
+fn an_unreachable_device_is_named_before_anything_is_typed() {
     let check = |fixture: &Fixture, keys: &str, expect: &str| {
         let mut model = model(fixture, Theme::FULL);
         type_keys(&mut model, keys);

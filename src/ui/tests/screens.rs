@@ -31,7 +31,7 @@ use crate::{
 
 /// A program, a ramp or another hand at the controller: what it works towards is what counts.
 #[test]
-fn the_set_value_in_use_stands_where_sv_stands_with_what_was_set_beside_it() {
+fn the_sv_in_use_stands_beside_the_one_that_was_set() {
     let mut fixture = Fixture::normal();
     let used = fixture.tag("TIC-1.MV");
     if let Some(faceplate) = &mut fixture.def.devices[0].faceplate {
@@ -207,7 +207,7 @@ fn nobody_says_no_alarms_who_cannot_see_them() {
 }
 
 #[test]
-fn a_long_alarm_text_pushes_neither_state_nor_counts_out_of_the_banner() {
+fn a_long_alarm_leaves_state_and_counts_in_the_banner() {
     let mut fixture = Fixture::alarm();
     let text = "the outlet of the second heat exchanger is much warmer than its jacket permits for this product at all";
     fixture.def.alarms[0].message = text.to_owned();

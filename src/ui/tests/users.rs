@@ -113,7 +113,7 @@ fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
 }
 
 #[test]
-fn a_password_is_sent_and_never_seen_and_a_wrong_one_is_told_with_its_wait() {
+fn a_password_is_never_shown_and_a_wrong_one_has_a_wait() {
     let mut model = with(&Fixture::normal(), closed());
     let effects = type_keys(&mut model, "anna⏎horse 1q?⏎");
     let expect = SessionRequest::Login { user: "anna".to_owned(), password: "horse 1q?".into() };
@@ -206,7 +206,7 @@ fn a_tag_with_reauthentication_gets_credentials() {
 }
 
 #[test]
-fn a_value_that_changes_under_an_open_window_is_told_at_once_and_asked_again() {
+fn a_value_that_changes_under_a_window_is_confirmed_again() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, person("boris", Role::Technician));
     type_keys(&mut model, "s68");

@@ -115,7 +115,7 @@ fn guidance_takes_the_rows_that_the_list_leaves_empty() {
 }
 
 #[test]
-fn enter_on_an_alarm_opens_its_guidance_in_full_and_then_the_faceplate() {
+fn enter_on_an_alarm_opens_guidance_then_the_faceplate() {
     let mut model = model(&long_guidance(), Theme::FULL);
     type_keys(&mut model, "3⏎");
     assert!(matches!(model.modal, Some(Modal::Guidance(_))), "{:?}", model.modal);

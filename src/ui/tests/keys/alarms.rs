@@ -99,7 +99,7 @@ pub(super) fn plain_alarms() -> Fixture {
 }
 
 #[test]
-fn a_key_for_an_alarm_that_has_left_the_list_acknowledges_no_other() {
+fn a_key_for_an_alarm_that_left_acknowledges_no_other() {
     let mut fixture = plain_alarms();
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "3");
@@ -119,7 +119,7 @@ fn a_key_for_an_alarm_that_has_left_the_list_acknowledges_no_other() {
 }
 
 #[test]
-fn a_chosen_alarm_that_was_raised_again_is_not_acknowledged_unseen() {
+fn a_chosen_alarm_raised_again_is_not_acknowledged_unseen() {
     let mut fixture = plain_alarms();
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "3↓↑");
@@ -133,7 +133,7 @@ fn a_chosen_alarm_that_was_raised_again_is_not_acknowledged_unseen() {
 }
 
 #[test]
-fn rows_that_move_between_two_frames_take_no_key_meant_for_another() {
+fn moved_rows_take_no_key_meant_for_another() {
     let mut fixture = plain_alarms();
     let newest = fixture.alarms.remove(0);
     let mut model = model(&fixture, Theme::FULL);

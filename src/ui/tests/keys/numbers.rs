@@ -44,7 +44,7 @@ fn what_is_typed_is_what_is_written_or_refused() {
 }
 
 #[test]
-fn what_was_seen_is_sent_though_the_values_are_doubted_meanwhile() {
+fn what_was_seen_is_sent_though_values_become_uncertain() {
     let fixture = Fixture::normal();
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "s65.5");
@@ -58,7 +58,7 @@ fn what_was_seen_is_sent_though_the_values_are_doubted_meanwhile() {
 }
 
 #[test]
-fn a_number_that_the_device_rounds_is_shown_rounded_before_it_is_written() {
+fn a_rounded_number_is_shown_rounded_before_it_is_written() {
     let mut fixture = Fixture::normal();
     let sv = fixture.tag("TIC-1.SV");
     fixture.def.tags[sv.index()].scale = 0.5;

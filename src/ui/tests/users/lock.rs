@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_form_that_waits_when_the_terminal_is_locked_takes_its_answer() {
+fn a_waiting_form_takes_its_answer_under_the_lock() {
     for (answer, left) in
         [(Ok(()), None), (Err("at least one Supervisor must remain"), Some("at least one Supervisor"))]
     {
@@ -74,7 +74,7 @@ fn a_locked_terminal_looks_and_does_nothing() {
 }
 
 #[test]
-fn a_terminal_that_is_locked_on_the_login_page_still_shows_the_process() {
+fn a_terminal_locked_on_the_login_page_shows_the_process() {
     let mut model = with(&Fixture::alarm(), person("anna", Role::Technician));
     assert_eq!(sent_request(&type_keys(&mut model, "0k")), Some(&SessionRequest::Lock));
     change_session(&mut model, |session| session.locked = true);

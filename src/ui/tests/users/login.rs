@@ -31,7 +31,7 @@ fn before_a_login_every_other_tab_is_closed_and_alarms_are_seen() {
 }
 
 #[test]
-fn a_plant_that_lets_everybody_look_shows_the_process_and_nothing_can_be_done() {
+fn an_anonymous_view_shows_the_process_and_takes_no_action() {
     let mut model = with(&Fixture::normal(), SessionStatus { view: true, ..closed() });
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "Technician: s r m");
