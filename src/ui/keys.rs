@@ -62,6 +62,10 @@ impl Hint {
     pub fn new(key: impl Into<String>, label: impl Into<String>, help: impl Into<String>) -> Hint {
         Hint { key: key.into(), label: label.into(), help: help.into(), needs: None }
     }
+    /// A hint of a window, which the help does not list.
+    pub(crate) fn of(key: impl Into<String>, label: impl Into<String>) -> Hint {
+        Hint::new(key, label, "")
+    }
     /// The same for users of at least this role.
     pub fn needs(self, role: Role) -> Hint {
         Hint { needs: Some(role), ..self }

@@ -124,9 +124,7 @@ impl Entry {
         if let Some(words) = number::relative_text(cx, self.tag, &self.line.text()) {
             canvas.text(x + 2, 0, &words, theme.strong());
         }
-        for (y, (text, style)) in rows.iter().enumerate() {
-            canvas.text(0, y + 1, text, *style);
-        }
+        canvas.rows(0, 1, &rows);
         let last = canvas.height().saturating_sub(1);
         for (y, line) in problem.iter().enumerate() {
             canvas.text(0, last.saturating_sub(told) + to_u16(y), line, theme.trouble());

@@ -45,24 +45,23 @@ impl Faceplate {
     }
 
     pub(super) fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = Vec::new();
         if self.tags.len() > 1 {
-            hints.push(hint("↑↓", t!("select")));
+            hints.push(Hint::of("↑↓", t!("select")));
         }
         match (self.toggle(cx), command_tag(cx, self.tag())) {
             (Some((tag, value)), _) => {
                 let words = format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(self.tag()).short);
-                hints.insert(0, hint("t", &words));
+                hints.insert(0, Hint::of("t", &words));
             }
             (None, Some(tag)) if tag != self.tag() => {
-                hints.push(hint("⏎", &t!("write {short}", short = cx.def().tag(tag).short)));
+                hints.push(Hint::of("⏎", &t!("write {short}", short = cx.def().tag(tag).short)));
             }
-            (None, Some(_)) => hints.push(hint("⏎", t!("write"))),
+            (None, Some(_)) => hints.push(Hint::of("⏎", t!("write"))),
             (None, None) => {}
         }
-        hints.push(hint("w", t!("why")));
-        hints.push(hint(t!("Esc"), t!("close")));
+        hints.push(Hint::of("w", t!("why")));
+        hints.push(Hint::of(t!("Esc"), t!("close")));
         hints
     }
 

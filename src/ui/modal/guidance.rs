@@ -40,9 +40,8 @@ impl Guidance {
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
-        let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        let faceplate = self.faceplate.is_some().then(|| hint("⏎", t!("faceplate")));
-        faceplate.into_iter().chain([hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))]).collect()
+        let faceplate = self.faceplate.is_some().then(|| Hint::of("⏎", t!("faceplate")));
+        faceplate.into_iter().chain([Hint::of("↑↓", t!("scroll")), Hint::of(t!("Esc"), t!("close"))]).collect()
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {

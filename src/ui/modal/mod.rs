@@ -206,27 +206,28 @@ impl Modal {
 
     /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let mut hints = match self {
-            Modal::Help(_) => vec![hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))],
-            Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![hint(t!("Esc"), confirm.escape())],
-            Modal::Confirm(confirm) => vec![hint("⏎", confirm.verb()), hint(t!("Esc"), confirm.escape())],
-            Modal::Entry(_) => vec![hint("⏎", t!("write and verify")), hint(t!("Esc"), t!("cancel"))],
-            Modal::Choice(_) => vec![hint("↑↓", t!("select")), hint("⏎", t!("next")), hint(t!("Esc"), t!("cancel"))],
-            Modal::Prompt(_) => vec![hint("⏎", t!("OK")), hint(t!("Esc"), t!("cancel"))],
-            Modal::Reason(reason) => reason.hints().into_iter().map(|(key, label)| hint(key, label)).collect(),
+            Modal::Help(_) => vec![Hint::of("↑↓", t!("scroll")), Hint::of(t!("Esc"), t!("close"))],
+            Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![Hint::of(t!("Esc"), confirm.escape())],
+            Modal::Confirm(confirm) => vec![Hint::of("⏎", confirm.verb()), Hint::of(t!("Esc"), confirm.escape())],
+            Modal::Entry(_) => vec![Hint::of("⏎", t!("write and verify")), Hint::of(t!("Esc"), t!("cancel"))],
+            Modal::Choice(_) => {
+                vec![Hint::of("↑↓", t!("select")), Hint::of("⏎", t!("next")), Hint::of(t!("Esc"), t!("cancel"))]
+            }
+            Modal::Prompt(_) => vec![Hint::of("⏎", t!("OK")), Hint::of(t!("Esc"), t!("cancel"))],
+            Modal::Reason(reason) => reason.hints(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
-            Modal::Notice(_) => vec![hint(t!("Esc"), t!("close"))],
+            Modal::Notice(_) => vec![Hint::of(t!("Esc"), t!("close"))],
             Modal::Guidance(guidance) => guidance.hints(),
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
-            Modal::UserForm(form) => form.hints().into_iter().chain([hint(t!("Esc"), t!("cancel"))]).collect(),
-            Modal::AuditEntry(_) => vec![hint(t!("Esc"), t!("close"))],
+            Modal::UserForm(form) => form.hints().into_iter().chain([Hint::of(t!("Esc"), t!("cancel"))]).collect(),
+            Modal::AuditEntry(_) => vec![Hint::of(t!("Esc"), t!("close"))],
         };
         // A digit is typed here: the tabs are one key further away.
         if let Some(last) = Tab::offered(cx).last().filter(|_| self.takes_text()) {
-            hints.push(hint(&t!("Esc, 0-{number}", number = last.number()), t!("another tab")));
+            hints.push(Hint::of(&t!("Esc, 0-{number}", number = last.number()), t!("another tab")));
         }
         hints
     }

@@ -6,7 +6,7 @@ use std::{sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Modal, Next, line::Line, window};
+use super::{Modal, Next, line::Line, view_keys, window};
 use crate::{
     plant::{
         alarm::{AlarmCommand, command::NOTE_CHARS_MAX},
@@ -14,7 +14,12 @@ use crate::{
         def::AlarmId,
         number::to_u16,
     },
-    ui::{UiAction, ViewContext, keys, rights, widgets::text::wrap},
+    ui::{
+        UiAction, ViewContext,
+        keys::{self, Hint},
+        rights,
+        widgets::text::wrap,
+    },
 };
 
 /// The window.
@@ -55,11 +60,13 @@ impl Reason {
     }
 
     /// The keys of the moment.
-    pub fn hints(&self) -> Vec<(&'static str, &'static str)> {
-        let choose = (1 < self.choices.len()).then_some(("↑↓", t!("select")));
-        let other =
-            self.other().map(|time| (t!("Tab"), if time.typing { t!("type the reason") } else { t!("type the time") }));
-        [("⏎", self.verb)].into_iter().chain(choose).chain(other).chain([(t!("Esc"), t!("cancel"))]).collect()
+    pub fn hints(&self) -> Vec<Hint> {
+        let choose = (1 < self.choices.len()).then(|| Hint::of("↑↓", t!("select")));
+        let other = self
+            .other()
+            .map(|time| Hint::of(t!("Tab"), if time.typing { t!("type the reason") } else { t!("type the time") }));
+        let (enter, escape) = (Hint::of("⏎", self.verb), Hint::of(t!("Esc"), t!("cancel")));
+        [enter].into_iter().chain(choose).chain(other).chain([escape]).collect()
     }
 
     pub(super) fn paste(&mut self, text: &str) {
@@ -182,9 +189,7 @@ impl Reason {
         for (n, line) in wrap(&problem.unwrap_or_default(), room).iter().take(2).enumerate() {
             canvas.text(0, y + 2 + to_u16(n), line, theme.trouble());
         }
-        let keys: Vec<String> = self.hints().iter().map(|(key, label)| format!("{key} {label}")).collect();
-        let keys = theme.enter(&keys.join("   "));
-        canvas.text(0, canvas.height().saturating_sub(1), &keys, theme.strong());
+        view_keys(cx, &mut canvas, &self.hints());
     }
 }
 

@@ -53,19 +53,18 @@ impl Settings {
     }
 
     pub(super) fn hints(&self) -> Vec<Hint> {
-        let hint = |key: &str, label: &str| Hint::new(key, label, "");
         if self.asking.is_some() {
-            return vec![hint("⏎", t!("yes")), hint("n", t!("no")), hint(t!("Esc"), t!("close"))];
+            return vec![Hint::of("⏎", t!("yes")), Hint::of("n", t!("no")), Hint::of(t!("Esc"), t!("close"))];
         }
-        let mut hints = vec![hint("↑↓", t!("select"))];
+        let mut hints = vec![Hint::of("↑↓", t!("select"))];
         if self.field().is_choice() {
-            hints.push(hint("←→", t!("change")));
+            hints.push(Hint::of("←→", t!("change")));
         }
-        hints.push(hint("⏎", t!("apply")));
+        hints.push(Hint::of("⏎", t!("apply")));
         if !self.field().is_text() {
-            hints.extend([hint("u", t!("revert")), hint("S", t!("save to plant file"))]);
+            hints.extend([Hint::of("u", t!("revert")), Hint::of("S", t!("save to plant file"))]);
         }
-        hints.push(hint(t!("Esc"), t!("close")));
+        hints.push(Hint::of(t!("Esc"), t!("close")));
         hints
     }
 
@@ -133,12 +132,8 @@ impl Settings {
         }
         let free = height.saturating_sub(1 + shown + pinned.len());
         let gap = usize::from(status.len() < free);
-        for (n, (text, style)) in status.iter().take(free).enumerate() {
-            canvas.text(0, 1 + shown + gap + n, text, *style);
-        }
-        for (n, (text, style)) in pinned.iter().enumerate() {
-            canvas.text(0, height.saturating_sub(pinned.len()) + n, text, *style);
-        }
+        canvas.rows(0, 1 + shown + gap, &status[..free.min(status.len())]);
+        canvas.rows(0, height.saturating_sub(pinned.len()), &pinned);
     }
 
     /// The new value of a field: a text with its cursor, or a choice between arrows; bold where it differs.

@@ -61,9 +61,8 @@ impl Why {
     }
 
     pub(super) fn hints(&self) -> Vec<Hint> {
-        let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        let others = (1 < self.tags.len()).then(|| hint("←→", t!("other value")));
-        others.into_iter().chain([hint("↑↓", t!("scroll")), hint(t!("Esc"), t!("close"))]).collect()
+        let others = (1 < self.tags.len()).then(|| Hint::of("←→", t!("other value")));
+        others.into_iter().chain([Hint::of("↑↓", t!("scroll")), Hint::of(t!("Esc"), t!("close"))]).collect()
     }
 
     pub(super) fn on_key(mut self, event: KeyEvent) -> Next {

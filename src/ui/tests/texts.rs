@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{model, screen, type_keys};
 use crate::{
     text::{Language, translate},
-    ui::{fixture::Fixture, tabs::Tab, theme::Theme, widgets::text::tests::take_overwritten},
+    ui::{fixture::Fixture, tabs::Tab, theme::Theme, widgets::text::take_overwritten},
 };
 
 /// Words that no language changes: letters of controllers, names of protocols, standards and keys.

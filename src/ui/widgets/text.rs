@@ -12,6 +12,9 @@ use crate::{
     ui::glyph_filter::thai_cells,
 };
 
+#[cfg(test)]
+pub(crate) use tests::take_overwritten;
+
 /// A rectangle of the screen with coordinates of its own; what falls outside is not drawn.
 #[derive(Debug)]
 pub struct Canvas<'a> {
@@ -271,7 +274,7 @@ pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
 
     thread_local! {

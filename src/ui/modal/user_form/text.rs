@@ -22,16 +22,15 @@ impl UserForm {
 
     /// The keys of the moment; Esc is told by whoever shows the form.
     pub fn hints(&self) -> Vec<Hint> {
-        let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        let mut hints = vec![hint("⏎", self.verb())];
+        let mut hints = vec![Hint::of("⏎", self.verb())];
         if self.form.rows() > 1 {
-            hints.push(hint(t!("Tab"), t!("next line")));
+            hints.push(Hint::of(t!("Tab"), t!("next line")));
         }
         if self.form.has_secret() {
-            hints.push(hint(t!("Ctrl-R"), t!("show password")));
+            hints.push(Hint::of(t!("Ctrl-R"), t!("show password")));
         }
         if matches!(self.purpose, Purpose::Unlock(_)) {
-            hints.push(hint(t!("Ctrl-O"), t!("other user")));
+            hints.push(Hint::of(t!("Ctrl-O"), t!("other user")));
         }
         hints
     }
