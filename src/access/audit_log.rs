@@ -204,11 +204,11 @@ impl Check {
     }
 
     fn look_at(&mut self, bytes: &[u8]) -> Result<(Entry, ChainHash), String> {
-        let text = std::str::from_utf8(bytes).map_err(|_| "this is no text".to_owned())?;
+        let text = std::str::from_utf8(bytes).map_err(|_| "this is not text".to_owned())?;
         let (body, hash) =
-            split(text).ok_or("the line has no hash at its end: it was cut or is no line of an audit log")?;
-        let entry: Entry =
-            serde_json::from_str(&format!("{body}}}")).map_err(|_| "this is no line of an audit log".to_owned())?;
+            split(text).ok_or("the line has no hash at its end: it was cut or does not belong to an audit log")?;
+        let entry: Entry = serde_json::from_str(&format!("{body}}}"))
+            .map_err(|_| "this line does not belong to an audit log".to_owned())?;
         let expected = self.last.number + 1;
         if entry.n < expected {
             return Err(format!("found entry {}, expected {expected}: it was moved or doubled", entry.n));
@@ -219,10 +219,10 @@ impl Check {
         // A log that an earlier version began goes on in the same chain.
         let is_first_of_v1 = || self.last == START && tied(START_V1, body.as_bytes()) == hash;
         if tied(self.last.hash, body.as_bytes()) != hash && !is_first_of_v1() {
-            return Err("the hash does not fit: this line was changed or put in".to_owned());
+            return Err("the hash does not match: this line was changed or inserted".to_owned());
         }
         if self.head.is_some_and(|head| head.number == entry.n && head.hash != hash) {
-            return Err("the station has noted another hash for this entry: the audit log was rewritten".to_owned());
+            return Err("the station has recorded another hash for this entry: the audit log was rewritten".to_owned());
         }
         match self.rows.remove(&entry.n) {
             Some(row) if row != hash => return Err("the history holds another hash for this entry".to_owned()),
@@ -249,7 +249,7 @@ impl Check {
             return Err(FirstBad { line, why });
         }
         if self.head.is_none() && 0 < self.line {
-            let why = "what the station has noted of the last entry is missing or damaged: lines may be missing here";
+            let why = "the record of the last entry is missing or damaged: lines may be missing here";
             return Err(FirstBad { line, why: why.to_owned() });
         }
         if let Some((row, _)) = self.rows.range(self.last.number + 1..).next() {

@@ -27,7 +27,7 @@ use self::{
     user_admin::Saving,
 };
 use super::{
-    Secret, SessionRequest, Who,
+    LoggedInUser, Secret, SessionRequest,
     lockout::LoginAttempts,
     right,
     user::{Change, Users},
@@ -103,7 +103,7 @@ pub struct AccessControl {
     behind_utc: SignedDuration,
     /// `None` where login is not required: in a demonstration.
     users: Option<Users>,
-    /// Why login is closed: the users file could not be read.
+    /// Why login is disabled: the users file could not be read.
     closed: Option<Arc<str>>,
     /// The user of the operating system that the station runs as.
     host: Option<Arc<str>>,
@@ -136,7 +136,7 @@ impl AccessControl {
     /// Login is closed because the users file is damaged; `why` is the reply to each attempt.
     pub fn closed(def: Arc<PlantDef>, why: &str, host: Option<Arc<str>>) -> AccessControl {
         AccessControl {
-            closed: Some(format!("login is closed: {why}").into()),
+            closed: Some(format!("login is disabled: {why}").into()),
             ..AccessControl::with_users(def, Users::default(), host)
         }
     }
@@ -146,12 +146,12 @@ impl AccessControl {
         AccessControl { run, ..self }
     }
 
-    /// The [`Users::digest`] of its users; `None` in a demonstration, or while login is closed.
+    /// The [`Users::digest`] of its users; `None` in a demonstration, or while login is disabled.
     pub fn users_digest(&self) -> Option<String> {
         self.users.as_ref().filter(|_| self.closed.is_none()).map(Users::digest)
     }
 
-    /// Why login is closed, if it is.
+    /// Why login is disabled, if it is.
     pub fn is_closed(&self) -> Option<&Arc<str>> {
         self.closed.as_ref()
     }
@@ -184,7 +184,7 @@ impl AccessControl {
     }
 
     /// Who is known without a password.
-    fn known(&self, peer: &Peer) -> Option<Who> {
+    fn known(&self, peer: &Peer) -> Option<LoggedInUser> {
         let user = peer.unix_user.clone();
         let role = match (&self.users, &user) {
             (None, _) if self.is_host(peer) => Some(Role::Supervisor),
@@ -194,12 +194,12 @@ impl AccessControl {
             (_, None) => None,
         };
         let user = user.unwrap_or_else(|| "operator".into());
-        role.map(|role| Who { user, role, must_change: false })
+        role.map(|role| LoggedInUser { user, role, must_change: false })
     }
 
     /// A terminal has gone.
     pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
-        let mut effects = self.log_out(terminal, "done: the terminal has gone", at);
+        let mut effects = self.log_out(terminal, "done: terminal disconnected", at);
         let Some(session) = self.sessions.remove(&terminal) else { return effects };
         if !session.peer.own && self.may_record(&session.origin, at) {
             effects.push(audit(&session, "detach", "", "done", at));
@@ -339,7 +339,7 @@ impl AccessControl {
     }
 
     /// The user, if the role is sufficient. `Err` is the reply to the user.
-    fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&Who, String> {
+    fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&LoggedInUser, String> {
         let session = self.session(terminal)?;
         let who = session.who.as_ref().ok_or(LOG_IN_FIRST)?;
         if session.locked {

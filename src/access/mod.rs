@@ -13,5 +13,7 @@ pub mod io;
 
 pub use control::{AccessControl, Effect, Peer};
 pub(crate) use rate_limit::RateLimit;
-pub use session_request::{Credentials, Durability, Secret, SessionRequest, SessionRow, SessionStatus, UserRow, Who};
+pub use session_request::{
+    Credentials, Durability, LoggedInUser, Secret, SessionRequest, SessionRow, SessionStatus, UserRow,
+};
 pub use user::Users;

@@ -62,7 +62,7 @@ pub fn check(password: &str, user: &str, chars_min: u16) -> Result<(), String> {
         return Err(format!("the password has {chars} characters, at most {CHARS_MAX} can be"));
     }
     if password.chars().any(char::is_control) {
-        return Err("the password holds a character that cannot be typed".to_owned());
+        return Err("the password has a character that cannot be typed".to_owned());
     }
     let plain = plain(&password);
     let name = self::plain(user);

@@ -140,8 +140,11 @@ mod tests {
         let serial = crate::plant::def::Serial::USUAL;
         let technician = [
             CommandKind::Write { tag: TagId(1), value: 1.0 },
-            CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: AlarmId(0), seen: jiff::Timestamp::UNIX_EPOCH }),
-            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([]) }),
+            CommandKind::Alarm(AlarmCommand::Acknowledge {
+                alarm: AlarmId(0),
+                annunciated_at: jiff::Timestamp::UNIX_EPOCH,
+            }),
+            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Arc::from([]) }),
             CommandKind::Alarm(AlarmCommand::Silence),
             CommandKind::Alarm(AlarmCommand::Reset(AlarmId(0))),
             CommandKind::Refresh(DeviceId(0)),

@@ -123,7 +123,7 @@ pub struct Credentials {
 
 /// A logged-in user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Who {
+pub struct LoggedInUser {
     /// The user name.
     pub user: Arc<str>,
     /// The role.
@@ -136,7 +136,7 @@ pub struct Who {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SessionStatus {
     /// The logged-in user; `None` before a login.
-    pub who: Option<Who>,
+    pub who: Option<LoggedInUser>,
     /// Locked: only looking, until the password is given.
     pub locked: bool,
     /// The process may be seen.

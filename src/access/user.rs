@@ -174,7 +174,7 @@ impl Users {
         let place = self.place(change.user());
         let place = place.ok_or_else(|| format!("there is no user {}", change.user()));
         match change {
-            Change::First { .. } if !self.list.is_empty() => return Err("users exist already".to_owned()),
+            Change::First { .. } if !self.list.is_empty() => return Err("users already exist".to_owned()),
             Change::First { user, hash } => self.list.push(new(user, Role::Supervisor, hash, false)),
             Change::Add { user, role, hash } => self.list.push(new(user, *role, hash, true)),
             Change::Role(_, role) => self.list[place?].role = *role,
@@ -191,7 +191,7 @@ impl Users {
     fn check_new(&self, name: &str) -> Result<(), String> {
         check_name(name)?;
         if self.get(name).is_some() {
-            return Err(format!("there is a user {name} already"));
+            return Err(format!("user {name} already exists"));
         }
         if USERS_MAX <= self.list.len() {
             return Err(format!("there are {USERS_MAX} users, no more can be"));
@@ -209,7 +209,7 @@ impl Users {
     }
 }
 
-const NO_SUPERVISOR: &str = "at least one supervisor who is not disabled must remain";
+const NO_SUPERVISOR: &str = "at least one enabled supervisor must remain";
 
 /// The form in which names are compared: however the letters are written.
 pub fn key(name: &str) -> String {
@@ -271,7 +271,7 @@ mod tests {
             assert!(check_name(name).is_err(), "{name:?}");
         }
         let again = first().with(&Change::Add { user: "ANNA".into(), role: Role::Viewer, hash: "h".into() });
-        assert_eq!(again.unwrap_err(), "there is a user ANNA already");
+        assert_eq!(again.unwrap_err(), "user ANNA already exists");
     }
 
     #[test]

@@ -63,7 +63,7 @@ impl Callers {
         let user = self.counted_as(user, now);
         let caller = self.users.entry(user).or_default();
         if !caller.attaches.take(now) {
-            return Err("too many terminals of this user have attached just now, wait a moment".to_owned());
+            return Err("too many terminals of this user have attached recently, wait a moment".to_owned());
         }
         if TERMINALS_OF_USER_MAX <= caller.terminals && !host {
             return Err(format!("this user has {TERMINALS_OF_USER_MAX} terminals, no more can attach"));

@@ -82,12 +82,12 @@ fn short(what: &str, text: &str, max: usize) -> Result<(), String> {
 
 fn of_alarms(def: &PlantDef, alarm_command: &AlarmCommand) -> Result<(), String> {
     match alarm_command {
-        AlarmCommand::AcknowledgeAll { seen } => {
-            let (many, count) = (seen.len(), def.alarms.len());
+        AlarmCommand::AcknowledgeAll { alarms } => {
+            let (many, count) = (alarms.len(), def.alarms.len());
             if count < many {
                 return Err(format!("{many} alarms, this plant has {count}"));
             }
-            seen.iter().try_for_each(|(id, _)| alarm(def, *id))
+            alarms.iter().try_for_each(|(id, _)| alarm(def, *id))
         }
         AlarmCommand::Silence => Ok(()),
         AlarmCommand::Acknowledge { alarm: id, .. }

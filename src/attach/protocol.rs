@@ -141,7 +141,7 @@ pub enum ProtocolError {
         max: usize,
     },
     /// Nothing that this protocol knows.
-    #[error("{bytes} bytes that are no {expected}")]
+    #[error("{bytes} bytes are not a {expected}")]
     Malformed {
         /// How many there were.
         bytes: usize,

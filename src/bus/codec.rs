@@ -15,7 +15,7 @@ use crate::plant::{
     visible::is_printable,
 };
 
-/// The number that the words of a point hold; `None` for what is no number: BCD with a digit above 9, NaN, infinity.
+/// The number that the words of a point hold; `None` for what is not a number: BCD with a digit above 9, NaN, infinity.
 /// A 64-bit integer beyond 2^53 is rounded to the nearest `f64`, by one part in 10^16 at most. `words` has [`Point::len`]
 /// words.
 #[expect(clippy::cast_possible_truncation, reason = "each kind takes the bits of its own width")]

@@ -354,7 +354,7 @@ fn loopback_words(findings: &[Finding], sent: u32) -> String {
     let (least, most) = (ms(replies.iter().min()), ms(replies.iter().max()));
     let refused = findings.iter().any(|finding| matches!(finding, Finding::Failed { fault: Fault::Exception(_), .. }));
     match replies.len() {
-        0 if refused => "the unit answers, but does not have loopbacks: line and unit work".to_owned(),
+        0 if refused => "the unit responds, but does not support loopback: line and unit work".to_owned(),
         0 => format!("none of {sent} came back"),
         back => format!("{back} of {sent} came back, {least:.1} to {most:.1} ms"),
     }

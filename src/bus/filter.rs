@@ -20,10 +20,10 @@ pub enum FilterError {
     #[error("found `{0}`, expected unit N, fc N, tx, rx, error, or bytes in hex such as 03EA")]
     Word(String),
     /// `unit` or `fc` twice: no frame has two of them.
-    #[error("{0} stands there twice, and no frame has two")]
+    #[error("{0} is given twice, and no frame has two")]
     Twice(&'static str),
     /// `unit` or `fc` without its number.
-    #[error("found `{found}` behind {word}, expected a number from 0 to 255, or 0x00 to 0xFF")]
+    #[error("found `{found}` after {word}, expected a number from 0 to 255, or 0x00 to 0xFF")]
     Number {
         /// `unit` or `fc`.
         word: &'static str,
@@ -165,8 +165,8 @@ mod tests {
             assert!(error.starts_with(words), "{error}");
         };
         says("unti 1", "found `unti`, expected unit N, fc N, tx, rx, error, or bytes in hex");
-        says("unit", "found `nothing` behind unit, expected a number from 0 to 255");
-        says("fc 0x100", "found `0x100` behind fc, expected");
+        says("unit", "found `nothing` after unit, expected a number from 0 to 255");
+        says("fc 0x100", "found `0x100` after fc, expected");
         says("3EA", "found `3EA`, expected");
     }
 }

@@ -23,7 +23,7 @@ pub enum HexInputError {
     )]
     Empty,
     /// A character that means nothing here.
-    #[error("position {position}: `{found}` is no hex digit, expected 0–9 or A–F")]
+    #[error("position {position}: `{found}` is not a hex digit, expected 0–9 or A–F")]
     NotHex {
         /// Where.
         position: usize,
@@ -31,7 +31,7 @@ pub enum HexInputError {
         found: char,
     },
     /// Half a byte.
-    #[error("position {position}: `{found}` has an odd count of hex digits, expected two a byte")]
+    #[error("position {position}: `{found}` has an odd number of hex digits, expected two per byte")]
     OddDigits {
         /// Where the digits begin.
         position: usize,
@@ -228,13 +228,13 @@ mod tests {
         says(" \n", "found nothing");
         says(":", "found nothing");
         says("- ,", "found nothing");
-        says("01 03 0G", "position 8: `G` is no hex digit, expected 0–9 or A–F");
-        says("TX 01 0Z", "position 8: `Z` is no hex digit");
-        says("01 03 000", "position 7: `000` has an odd count of hex digits, expected two a byte");
-        says("0x", "position 3: `` has an odd count");
-        says(":01G3", "position 4: `G` is no hex digit");
-        says(":010", "position 2: `010` has an odd count of hex digits");
-        says("hello", "position 1: `h` is no hex digit");
+        says("01 03 0G", "position 8: `G` is not a hex digit, expected 0–9 or A–F");
+        says("TX 01 0Z", "position 8: `Z` is not a hex digit");
+        says("01 03 000", "position 7: `000` has an odd number of hex digits, expected two per byte");
+        says("0x", "position 3: `` has an odd number");
+        says(":01G3", "position 4: `G` is not a hex digit");
+        says(":010", "position 2: `010` has an odd number of hex digits");
+        says("hello", "position 1: `h` is not a hex digit");
         says(&"00".repeat(261), "too long: 261 bytes, expected 260 at most");
         says(&format!(":{}", "00".repeat(256)), "too long: 515 characters, expected 513 at most");
         assert!(parse(&"00".repeat(257), Some(Framing::Rtu)).is_err());

@@ -73,18 +73,18 @@ pub(super) fn comm_status(status: u16) -> &'static str {
 /// What a technician does about an exception.
 pub fn advice(code: u8) -> &'static str {
     match code {
-        0x01 => "the device does not know this function: use another one (06 instead of 16, 04 instead of 03)",
+        0x01 => "the device does not support this function: use another one (06 instead of 16, 04 instead of 03)",
         0x02 => {
-            "no such address, or the block runs past the last one: check the register map and off-by-one, read less"
+            "no such address, or the block extends past the last one: check the register map and off-by-one, read fewer registers"
         }
-        0x03 => "value or count not allowed: check the range of the value and the device's limit of words a request",
-        0x04 => "the device failed while doing it: look at the device, do not repeat a write blindly",
-        0x05 => "accepted, takes longer: wait and read the result later",
-        0x06 => "the device is busy: ask again later",
-        0x08 => "the device's memory is damaged: ask once more, then service",
-        0x0A => "the gateway has no way to this unit: check the gateway's settings and the unit id",
-        0x0B => "the device behind the gateway does not answer: check its power, wiring, unit number and baud rate",
-        _ => "not in the standard: see the manual of the device",
+        0x03 => "value or count not allowed: check the value range and the device's limit of registers per request",
+        0x04 => "the device failed while executing the request: check the device before you repeat a write",
+        0x05 => "accepted, still processing: read the result later",
+        0x06 => "the device is busy: retry later",
+        0x08 => "memory parity error in the device: retry once, then have it serviced",
+        0x0A => "the gateway has no path to this unit: check its settings and the unit address",
+        0x0B => "the device behind the gateway does not respond: check its power, wiring, unit address and baud rate",
+        _ => "not a standard code: see the manual of the device",
     }
 }
 

@@ -19,10 +19,10 @@ pub enum RequestError {
     #[error("unit {0} is reserved on serial lines, expected 1–247, or 0 for a broadcast")]
     Unit(u8),
     /// A broadcast that wants an answer.
-    #[error("no unit answers a broadcast: unit 0 takes writes only")]
+    #[error("no unit responds to a broadcast: unit 0 accepts writes only")]
     ReadFromAll,
     /// An exception cannot be asked for.
-    #[error("function {0} / 0x{0:02X} is an exception, no request")]
+    #[error("function {0} / 0x{0:02X} is an exception, not a request")]
     Exception(u8),
     /// Fewer or more bytes than the function has.
     #[error("{got} bytes of unit and PDU, function {function} / 0x{function:02X} has {expected}")]
@@ -45,7 +45,7 @@ pub enum RequestError {
         most: u16,
     },
     /// The block runs past the last address.
-    #[error("{what}: {count} from address {address} / 0x{address:04X} run past 65535 / 0xFFFF")]
+    #[error("{what}: {count} from address {address} / 0x{address:04X} extend past 65535 / 0xFFFF")]
     PastTheEnd {
         /// `to read` or `to write`.
         what: &'static str,
@@ -157,7 +157,7 @@ mod tests {
             let words: Vec<String> = check_request(message, Framing::Rtu).iter().map(ToString::to_string).collect();
             assert_eq!(words, expect, "{}", frame::hex(message));
         };
-        says(&[0, 3, 0, 0, 0, 1], &["no unit answers a broadcast: unit 0 takes writes only"]);
+        says(&[0, 3, 0, 0, 0, 1], &["no unit responds to a broadcast: unit 0 accepts writes only"]);
         says(&[0, 6, 0, 0, 0, 1], &[]);
         says(&[248, 6, 0, 0, 0, 1], &["unit 248 is reserved on serial lines, expected 1–247, or 0 for a broadcast"]);
         says(&[1, 1, 0, 0, 0x07, 0xD0], &[]);
@@ -166,7 +166,7 @@ mod tests {
         says(&[1, 3, 0, 0, 0, 126], &["count 126 to read, expected 1–125"]);
         says(&[1, 4, 0, 0, 0, 0], &["count 0 to read, expected 1–125"]);
         says(&[1, 3, 0xFF, 0xFF, 0, 1], &[]);
-        says(&[1, 3, 0xFF, 0xFF, 0, 2], &["to read: 2 from address 65535 / 0xFFFF run past 65535 / 0xFFFF"]);
+        says(&[1, 3, 0xFF, 0xFF, 0, 2], &["to read: 2 from address 65535 / 0xFFFF extend past 65535 / 0xFFFF"]);
         says(&[1, 5, 0, 0, 0, 1], &["coil value 0001, expected FF00 (on) or 0000 (off)"]);
         says(&[1, 5, 0, 0, 0xFF, 0], &[]);
         says(&[1, 0x0F, 0, 0x13, 0, 0x0A, 2, 0xCD, 1], &[]);
@@ -185,7 +185,7 @@ mod tests {
         );
         says(&[1, 3, 0, 0], &["4 bytes of unit and PDU, function 3 / 0x03 has 6"]);
         says(&[1], &["1 byte, expected unit and function at least"]);
-        says(&[1, 0x83, 2], &["function 131 / 0x83 is an exception, no request"]);
+        says(&[1, 0x83, 2], &["function 131 / 0x83 is an exception, not a request"]);
         says(&[1, 0x41, 2], &["function 65 / 0x41 is not in the standard"]);
         assert_eq!(check_request(&[0, 3, 0, 0, 0, 1], Framing::Mbap), []);
         assert_eq!(check_request(&[255, 3, 0, 0, 0, 1], Framing::Mbap), []);

@@ -67,19 +67,19 @@ pub fn advice(fault: Fault) -> &'static str {
             "check supply, cable and unit address of the device, then baud rate, parity and mode of the line (c), then its timeout"
         }
         Fault::Crc { .. } | Fault::Lrc { .. } | Fault::NotHex(_) | Fault::Truncated { .. } => {
-            "check parity and baud rate, wires A and B, terminators at both ends and noise; two devices may have one address"
+            "check parity and baud rate, wires A and B, terminators at both ends and noise; check for a duplicate address"
         }
         Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
-            "an answer to something else: raise the timeout of the line (c), look for a second master or one address used twice"
+            "response to another request: increase the timeout of the line (c), check for a second master or a duplicate address"
         }
         Fault::OutOfSync => {
-            "look for a second master on the line, one address used twice, or a repeater that sends each answer again"
+            "check for a second master on the line, a duplicate address, or a repeater that repeats each response"
         }
         Fault::NotANumber => {
-            "the registers came well but hold no number of this type: check type, word order and address in the profile"
+            "the registers were received correctly but do not hold a value of this type: check type, word order and address in the profile"
         }
         Fault::Exception(code) => names::advice(code.0),
-        Fault::NotConnected => "check that the port or host is there and that no other program has it; settings: c",
+        Fault::NotConnected => "check that the port or host exists and that no other program uses it; settings: c",
         Fault::BackedOff => "it is retried at growing intervals; find out why it stopped responding",
     }
 }

@@ -143,7 +143,7 @@ fn verify(args: VerifyArgs) -> Result<(), CliError> {
             (summary, Some(sealed))
         }
     };
-    let found = if summary.entries == 0 { "empty: nothing was ever recorded in it" } else { "whole" };
+    let found = if summary.entries == 0 { "empty: no entry was ever recorded" } else { "whole" };
     say(&format!("{}: {found}", path.display()));
     summary_lines(&summary, &def).iter().for_each(|line| say(line));
     sealed.iter().for_each(|sealed| say(&sealed_line(sealed, &def)));
@@ -170,7 +170,7 @@ fn summary_lines(summary: &Summary, def: &PlantDef) -> Vec<String> {
     ];
     lines.extend(summary.span.map(|(first, last)| format!("from       {} to {}", local(first, def), local(last, def))));
     if summary.torn {
-        lines.push("torn       behind the last line stands the beginning of another one".to_owned());
+        lines.push("torn       an incomplete line follows the last one".to_owned());
     }
     lines
 }

@@ -104,7 +104,7 @@ fn verdict_words(admission: &Admission) -> Vec<String> {
     }
     let consequence = match (admission.factor, admission.critical.fits()) {
         (Some(factor), true) if factor < 1.05 => {
-            "some polls will start late; those of alarm inputs go first if they are late again and again".into()
+            "some polls will start late; polls of alarm inputs take precedence if they are late repeatedly".into()
         }
         (Some(factor), true) => format!(
             "polls of alarm inputs keep their period; identification is left out, process values are read every {factor:.1} periods"
@@ -149,7 +149,7 @@ mod tests {
         def.tags.iter_mut().for_each(|tag| tag.poll = Poll::Every(std::time::Duration::from_millis(80)));
         let text = describe(&def, LineId(0)).join("\n");
         for part in [
-            "too much: the polls want",
+            "overloaded: the polls need",
             "then: polls of alarm inputs keep their period",
             "process values are read every",
         ] {

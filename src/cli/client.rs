@@ -91,7 +91,7 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
             let _ = session.snapshots.wait_for(|snapshot| !is_withheld(snapshot)).await;
         }
     };
-    let silent = |_| CliError::Failed("the station says nothing".to_owned());
+    let silent = |_| CliError::Failed("no reply from the station".to_owned());
     tokio::time::timeout(LOGIN_SEEN_MAX, seen).await.map_err(silent)?;
     Ok((session, Some(password)))
 }
@@ -122,7 +122,7 @@ impl ActionArgs {
 
 /// Appended to an outcome that could not be recorded.
 pub fn recorded_words(recorded: bool) -> &'static str {
-    if recorded { "" } else { " (not recorded: the disk of the station does not take it)" }
+    if recorded { "" } else { " (not recorded: the station cannot write to its disk)" }
 }
 
 /// Warns where an action was done but not recorded.
@@ -149,9 +149,7 @@ fn password(user: &str) -> Result<String, CliError> {
     let line = line.trim_end_matches(['\r', '\n']);
     if line.is_empty() {
         // Not even tried: it would count as a wrong one.
-        return Err(CliError::Usage(
-            "no password given: type it, or give it as the first line of standard input".into(),
-        ));
+        return Err(CliError::Usage("no password: enter it, or pass it as the first line of standard input".into()));
     }
     Ok(line.to_owned())
 }

@@ -56,7 +56,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         };
     }
     if std::io::stdin().is_terminal() {
-        say_error("one frame a line, Ctrl-D ends");
+        say_error("one frame per line, Ctrl-D ends");
     }
     lines(std::io::stdin().lock(), framing)
 }

@@ -31,7 +31,7 @@ pub struct Args {
     /// Run without the operator of the scenario: what happens when no action is taken
     #[arg(long)]
     no_operator: bool,
-    /// Only the verdict, not what happens on the way
+    /// Print only the verdict
     #[arg(long)]
     quiet: bool,
 }

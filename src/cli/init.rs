@@ -24,7 +24,7 @@ pub fn stopping() {
 
 fn notify(states: &[NotifyState]) {
     if let Err(error) = sd_notify::notify(states) {
-        tracing::warn!(%error, "the init system does not listen");
+        tracing::warn!(%error, "cannot notify the init system");
     }
 }
 

@@ -43,7 +43,7 @@ impl LogFile {
         let file = match appender(path) {
             Err(error @ CliError::Io { .. }) => {
                 // Without standard error there is no place to say it.
-                let _ = writeln!(io::stderr(), "sightglass: {error}; there is no log until that works");
+                let _ = writeln!(io::stderr(), "sightglass: {error}; no log until this is corrected");
                 None
             }
             opened => Some(opened?),

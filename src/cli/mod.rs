@@ -39,7 +39,7 @@ use crate::{
 
 const EXIT_CODES: &str = "\
 Exit codes:
-  0  done, or left by the operator
+  0  done, or quit by the operator
   1  failed while running, or what was checked is wrong (the message says why)
   2  wrong arguments, errors in a profile, or bytes that cannot be read
   3  the history is in use by another process, or a station of this plant runs already
@@ -134,7 +134,7 @@ enum CliError {
     Usage(String),
     #[error(transparent)]
     History(#[from] HistoryError),
-    #[error("{0}\nthat is no station of this user that can be asked; stop it first")]
+    #[error("{0}\nit is not a station of this user that can be queried; stop it first")]
     InUse(HistoryError),
     #[error(transparent)]
     Users(UsersError),
@@ -146,9 +146,9 @@ enum CliError {
     Failed(String),
     #[error("{0}\nstart one: `sightglass run PLANT`; or try it out: `sightglass demo`")]
     NotRunning(String),
-    #[error("the audit log is whole, but {0}")]
+    #[error("the audit log is intact, but {0}")]
     NotCompared(String),
-    #[error("the station has ended by itself, see the log")]
+    #[error("the station stopped unexpectedly, see the log")]
     StationGone,
     #[error("{what}: {error}")]
     Io { what: String, error: std::io::Error },

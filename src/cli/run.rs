@@ -26,7 +26,7 @@ use super::{
 const ANSWER: Duration = Duration::from_millis(200);
 
 /// Why a station that is one process with its terminal is not reloaded.
-const LEAVE: &str = "leave this terminal and start it again";
+const LEAVE: &str = "quit this terminal and start it again";
 
 /// A plant that is checked, and the file that its settings can be saved into.
 type Plant = (PlantDef, Option<PlantFile>);
@@ -134,7 +134,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
 
 /// The socket of a plant, before anything else: it also keeps a second station of the plant away.
 fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
-    let path = find::Places::here().socket(&def.name).map_err(CliError::io("cannot make a socket"))?;
+    let path = find::Places::here().socket(&def.name).map_err(CliError::io("cannot create a socket"))?;
     serve::listen(&path).map_err(CliError::from)
 }
 
@@ -168,7 +168,7 @@ async fn handle_lifecycle(
 /// Waits for the end of the station while a plant file is loaded.
 async fn stopped(lifecycle: &mut mpsc::Receiver<LifecycleRequest>) {
     while let Some(LifecycleRequest::Reload(reply)) = lifecycle.recv().await {
-        drop(reply.send(Err("the plant file is being loaded already".to_owned())));
+        drop(reply.send(Err("the plant file is already being loaded".to_owned())));
     }
 }
 
@@ -331,7 +331,7 @@ mod tests {
                 tokio::task::yield_now().await;
             }
             sender.send(LifecycleRequest::Reload(second)).await.expect("the station listens");
-            assert!(refused.await.is_ok_and(|answer| answer.is_err_and(|why| why.contains("loaded already"))));
+            assert!(refused.await.is_ok_and(|answer| answer.is_err_and(|why| why.contains("already being loaded"))));
             sender.send(LifecycleRequest::Stop).await.expect("the station listens");
             while sender.capacity() < sender.max_capacity() {
                 tokio::task::yield_now().await;

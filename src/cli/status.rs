@@ -101,22 +101,22 @@ fn line_words(state: &LineState) -> String {
     match state {
         LineState::Connecting => "connecting".to_owned(),
         LineState::Connected => "connected".to_owned(),
-        LineState::Disconnected => "closed by an operator".to_owned(),
-        LineState::Testing => "given to a test".to_owned(),
+        LineState::Disconnected => "disconnected by an operator".to_owned(),
+        LineState::Testing => "in use by a test".to_owned(),
         LineState::Waiting { why, .. } => format!("not connected: {why}"),
     }
 }
 
 fn device_word(state: DeviceState) -> &'static str {
     match state {
-        DeviceState::Unknown => "not asked yet",
+        DeviceState::Unknown => "not polled yet",
         DeviceState::Answering => "answers",
         DeviceState::Failing(_) => "fails",
-        DeviceState::Down { .. } => "does not answer",
+        DeviceState::Down { .. } => "not responding",
     }
 }
 
-/// The same and more: times are UTC, numbers are in the tag's unit, `null` is "not known".
+/// The same and more: times are UTC, numbers are in the tag's unit, `null` is "unknown".
 fn in_json(snapshot: &Snapshot) -> Value {
     let def = &snapshot.def;
     // What is not authorised is `null`, never 0.
@@ -134,7 +134,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
     let devices = def.devices.iter().zip(&snapshot.devices).map(|(device, status)| {
         json!({
             "name": device.name, "unit": device.unit, "state": device_word(status.state),
-            "answering": status.state == DeviceState::Answering,
+            "responding": status.state == DeviceState::Answering,
             "ne107": status.diagnosis.map(|reason| reason.to_string()),
             "reply_ms": status.reply.map(|reply| reply.as_secs_f64() * 1e3),
             "ok": count(status.ok), "failed": count(status.failed),

@@ -167,19 +167,19 @@ pub enum HistoryError {
     #[error("history: {}", words::plain(.0))]
     Engine(String),
     /// The file is something else: it is left alone.
-    #[error("{path} is not a history, and is left alone: give another name, best one that ends in .duckdb")]
+    #[error("{path} is not a history and is not changed: use another name, best one that ends in .duckdb")]
     Foreign {
         /// The file.
         path: String,
     },
     /// There is nothing to read: no station has written here.
-    #[error("no history at {path}: has the station of this plant ever run here?")]
+    #[error("no history at {path}: did the station of this plant ever run here?")]
     Missing {
         /// The file.
         path: String,
     },
     /// The answer would be longer than is safe to hold; a shorter period is answered.
-    #[error("too much for one answer: {rows} rows, at most {max}; choose a shorter period")]
+    #[error("too much for one query: {rows} rows, at most {max}; choose a shorter period")]
     TooManyRows {
         /// Rows that the query means.
         rows: u64,
@@ -193,7 +193,7 @@ pub enum HistoryError {
     #[error("the history is not open")]
     NotOpen,
     /// The answer was not ready in the time that a query may take.
-    #[error("no answer within {seconds} s; choose a shorter period")]
+    #[error("no result within {seconds} s; choose a shorter period")]
     TooLong {
         /// That time.
         seconds: u64,

@@ -3,7 +3,7 @@
 /// What stands in the way, by the words of the engine or of the system: the first that is found counts.
 const CAUSES: [(&str, &str); 12] = [
     ("No space left", "the disk is full"),
-    ("Disk quota exceeded", "the disk quota is used up"),
+    ("Disk quota exceeded", "the disk quota is exhausted"),
     ("Read-only file system", "the disk is read-only"),
     ("Permission denied", "no permission for its files"),
     ("Too many open files", "too many files are open"),

@@ -135,7 +135,7 @@ impl fmt::Display for Verdict {
             Verdict::Fits => f.write_str(t!("every poll meets its period")),
             Verdict::TooMuch { utilisation } => {
                 let share = format!("{:.1}", utilisation * 100.0);
-                f.write_str(&t!("too much: the polls want {share} % of the line's time", share))
+                f.write_str(&t!("overloaded: the polls need {share} % of the line's time", share))
             }
             Verdict::Blocked(overload) => overload.fmt(f),
         }
@@ -152,7 +152,7 @@ impl fmt::Display for OverloadInterval {
         let others = if *more > 0 { t!(" and {more} more", more) } else { String::new() };
         let (span, demand, name, cost) = (ms(*span), ms(*demand), &blocker.name, ms(blocker.cost));
         let when =
-            t!("in {span} the line must carry {demand}: while {name} ({cost}) is read", span, demand, name, cost);
+            t!("in {span} the line must transfer {demand}: while {name} ({cost}) is read", span, demand, name, cost);
         f.write_str(&match due.len() + more {
             1 => t!("{when}, {due_polls}{others} cannot meet its period", when, due_polls, others),
             _ => t!("{when}, {due_polls}{others} cannot meet their period", when, due_polls, others),
@@ -164,24 +164,24 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Warning::NoParityOneStopBit => f.write_str(t!(
-                "no parity and one stop bit: a disturbed character is noticed less surely; the standard wants E or O, or two stop bits"
+                "no parity and one stop bit: fewer errors are detected; the standard requires E or O, or two stop bits"
             )),
             Warning::TimeoutBelowAnswer { timeout, answer, poll } => {
                 let (timeout, answer) = (ms(*timeout), ms(*answer));
                 f.write_str(&t!(
-                    "timeout {timeout} is shorter than an answer takes on the wire: {poll} needs {answer}",
+                    "timeout {timeout} is shorter than a response takes on the wire: {poll} needs {answer}",
                     timeout,
                     poll,
                     answer
                 ))
             }
             Warning::NoRoomForWrites { share } => f.write_str(&t!(
-                "less than {share} % of the time is left for writes: polls are stretched while an operator works",
+                "less than {share} % of the time is left for writes: poll periods stretch during operator writes",
                 share = format!("{:.0}", share * 100.0)
             )),
-            Warning::SerialServer => f.write_str(t!(
-                "a serial server: the time on the line behind it is not known here and not counted"
-            )),
+            Warning::SerialServer => {
+                f.write_str(t!("a serial server: the time on the line behind it is unknown and not counted"))
+            }
         }
     }
 }

@@ -55,9 +55,9 @@ impl CommandKind {
     /// The same in the plant's own time: what names an alarm by the instant that a snapshot showed.
     pub fn unshift(&mut self, by: SignedDuration) {
         match self {
-            CommandKind::Alarm(AlarmCommand::Acknowledge { seen, .. }) => shift(seen, -by),
-            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen }) => {
-                *seen = seen.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
+            CommandKind::Alarm(AlarmCommand::Acknowledge { annunciated_at, .. }) => shift(annunciated_at, -by),
+            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms }) => {
+                *alarms = alarms.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
             }
             _ => {}
         }

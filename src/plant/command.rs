@@ -225,7 +225,7 @@ pub enum Refusal {
         max: String,
     },
     /// A bound, the decimals or the present value is not known, so the write cannot be checked.
-    #[error("{}", t!("{what} is not known", what = .0))]
+    #[error("{}", t!("{what} is unknown", what = .0))]
     Unknown(String),
     /// Not one of the values of the enumeration.
     #[error("{}", t!("not one of the values of this tag"))]
@@ -243,7 +243,7 @@ pub enum Refusal {
     #[error("{}", t!("a write to this tag is under way"))]
     UnderWay,
     /// It still waited when a stop of the same tag came, and would have undone it.
-    #[error("{}", t!("a stop came before it, nothing was sent"))]
+    #[error("{}", t!("cancelled by a stop, nothing was sent"))]
     Overtaken,
     /// An interlock of the plant file blocks it now.
     #[error("{}", t!("interlock: {what}", what = .0))]
@@ -258,10 +258,10 @@ pub enum Refusal {
     #[error("{}", t!("changed since you confirmed"))]
     ChangedSince,
     /// A step of a restore would overwrite an unknown value.
-    #[error("{}", t!("not known now"))]
+    #[error("{}", t!("unknown now"))]
     NotKnownNow,
     /// The settings of the line changed during a restore.
-    #[error("{}", t!("the settings of the line were changed meanwhile"))]
+    #[error("{}", t!("the settings of the line have changed in the meantime"))]
     LineChanged,
     /// The device was not read in time before a restore.
     #[error("{}", t!("the device could not be read within {what} s", what = .0))]
@@ -290,7 +290,7 @@ pub enum NotConfirmed {
     #[error("{}", t!("{what}; it may have taken effect", what = .0))]
     NotAnswered(Fault),
     /// No valid answer, and the device holds another value.
-    #[error("{}", t!("no answer, not applied: the device holds {what}", what = .0))]
+    #[error("{}", t!("no response, not applied: the device has {what}", what = .0))]
     NotApplied(f64),
     /// Read back, and different.
     #[error("{}", t!("read back {what}", what = .0))]

@@ -123,7 +123,7 @@ pub struct Scan {
 impl Scan {
     fn check(&self) -> Result<(), String> {
         if self.last < self.first {
-            return Err(format!("units {} to {}: the first is the greater one", self.first, self.last));
+            return Err(format!("units {} to {}: the first is greater than the last", self.first, self.last));
         }
         if !(TIMEOUT_MIN..=WAIT_MAX).contains(&self.timeout) {
             return Err("timeout of the scan: expected 10 to 10000 ms".into());

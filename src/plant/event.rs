@@ -128,7 +128,7 @@ pub enum WriteResult {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum Fault {
     /// No complete response before the deadline.
-    #[error("{}", t!("no answer in time"))]
+    #[error("{}", t!("response timeout"))]
     Timeout,
     /// The check did not fit.
     #[error("{}", t!("CRC error: got {got}, computed {computed}", got = format!("{:04X}", .got), computed = format!("{:04X}", .computed)))]
@@ -150,7 +150,7 @@ pub enum Fault {
     #[error("{}", t!("character {what} in an ASCII frame, expected a hexadecimal digit", what = format!("{:02X}", .0)))]
     NotHex(u8),
     /// The frame ended too early.
-    #[error("{}", t!("answer cut short: {got} of {expected} bytes", got = .got, expected = .expected))]
+    #[error("{}", t!("incomplete response: {got} of {expected} bytes", got = .got, expected = .expected))]
     Truncated {
         /// Bytes received.
         got: u16,
@@ -158,7 +158,7 @@ pub enum Fault {
         expected: u16,
     },
     /// Another unit answered.
-    #[error("{}", t!("answer from unit {got}, asked unit {asked}", got = .got, asked = .asked))]
+    #[error("{}", t!("response from unit {got}, expected unit {asked}", got = .got, asked = .asked))]
     WrongUnit {
         /// Unit in the answer.
         got: u8,
@@ -166,7 +166,7 @@ pub enum Fault {
         asked: u8,
     },
     /// The answer is to another function.
-    #[error("{}", t!("answer to function {got} / 0x{got_hex}, asked {asked} / 0x{asked_hex}", got = .got, got_hex = format!("{:02X}", .got), asked = .asked, asked_hex = format!("{:02X}", .asked)))]
+    #[error("{}", t!("response to function {got} / 0x{got_hex}, expected {asked} / 0x{asked_hex}", got = .got, got_hex = format!("{:02X}", .got), asked = .asked, asked_hex = format!("{:02X}", .asked)))]
     WrongFunction {
         /// Function in the answer.
         got: u8,
@@ -174,7 +174,7 @@ pub enum Fault {
         asked: u8,
     },
     /// The answer has another length than was asked for.
-    #[error("{}", t!("answer with {got} data bytes, asked {asked}", got = .got, asked = .asked))]
+    #[error("{}", t!("response with {got} data bytes, expected {asked}", got = .got, asked = .asked))]
     WrongLength {
         /// Data bytes in the answer.
         got: u16,
@@ -188,7 +188,7 @@ pub enum Fault {
     #[error("{}", t!("unsolicited frames: responses are not reliable"))]
     OutOfSync,
     /// The answer is good, but the registers hold no number of the tag's type (a BCD digit above 9, NaN).
-    #[error("{}", t!("the registers hold no number of this type"))]
+    #[error("{}", t!("the registers do not hold a value of this type"))]
     NotANumber,
     /// The device responded with an exception.
     #[error("{0}")]
@@ -197,7 +197,7 @@ pub enum Fault {
     #[error("{}", t!("line not connected"))]
     NotConnected,
     /// The device is left alone (it has failed, or is saving its settings); nothing was sent.
-    #[error("{}", t!("device in backoff, try again later"))]
+    #[error("{}", t!("device in backoff, retry later"))]
     BackedOff,
 }
 

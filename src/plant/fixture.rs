@@ -100,7 +100,7 @@ pub fn plant() -> PlantDef {
                 Condition::Limit { level: Level::High, limit: 75.0, deadband: 1.0 },
                 Duration::from_secs(2),
             ),
-            alarm(SILENT, Subject::Device(TIC), Condition::NotAnswering, Duration::ZERO),
+            alarm(SILENT, Subject::Device(TIC), Condition::NotResponding, Duration::ZERO),
         ],
         alarm_rules: Default::default(),
         logic: Default::default(),

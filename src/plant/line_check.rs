@@ -57,8 +57,8 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
             check(!named, "host", "a TCP line needs a host".into(), "expected a name or an address");
             // More than one colon is an address of IPv6.
             let with_port = host.matches(':').count() == 1;
-            check(with_port, "host", format!("`{host}` is no host"), "expected it alone, the port is tcp_port");
-            check(*port == 0, "tcp_port", "there is no TCP port 0".into(), "expected 1 to 65535, usually 502");
+            check(with_port, "host", format!("`{host}` is no host"), "expected the host alone, the port is tcp_port");
+            check(*port == 0, "tcp_port", "TCP port 0 does not exist".into(), "expected 1 to 65535, usually 502");
         }
     }
     let known = match &line.transport {
@@ -66,7 +66,7 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
         Transport::Tcp { framing, .. } => *framing != Framing::Ascii,
     };
     check(!known, "mode", format!("{} is no mode of a line", line.transport.mode()), "expected RTU, ASCII or TCP");
-    let short = "no device answers within so little time";
+    let short = "too short: no device responds within this time";
     check(line.timeout < TIMEOUT_MIN, "timeout_ms", short.into(), "expected at least 10 ms");
     for (key, span) in [
         ("timeout_ms", line.timeout),
@@ -74,9 +74,9 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
         ("frame_timeout_ms", line.idle),
         ("turnaround_ms", line.turnaround),
     ] {
-        check(WAIT_MAX < span, key, "too long: nothing else is sent meanwhile".into(), "expected at most 10000 ms");
+        check(WAIT_MAX < span, key, "too long: the line is blocked for this time".into(), "expected at most 10000 ms");
     }
-    let short = "answers come in pieces further apart than this";
+    let short = "too short: responses may arrive in fragments";
     check(line.idle < Duration::from_millis(2), "frame_timeout_ms", short.into(), "expected at least 2 ms");
     all
 }

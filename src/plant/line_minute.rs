@@ -88,7 +88,7 @@ fn since(stats: &RequestStats, before: Option<&RequestStats>) -> RequestStats {
 
 /// Earlier reports of a line, to count the difference.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct LineWatch {
+pub struct LineMinuteTracker {
     /// The running minute, and the totals at its beginning.
     minute: Option<(i64, Arc<LineReport>)>,
     /// The totals ten to twenty minutes ago, and those of at most ten minutes ago.
@@ -99,7 +99,7 @@ pub struct LineWatch {
 /// "Lately" reaches back once to twice as far, seconds.
 const LATELY_S: i64 = 600;
 
-impl LineWatch {
+impl LineMinuteTracker {
     /// Time passes. At the end of a minute: its figures.
     pub fn tick(&mut self, at: Timestamp, line: &str, report: &Arc<LineReport>) -> Option<LineMinute> {
         match &self.newer {
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn every_minute_is_told_once_at_its_end() {
-        let mut watch = LineWatch::default();
+        let mut watch = LineMinuteTracker::default();
         let mut minutes = Vec::new();
         for second in 30..250 {
             let report = Arc::new(report(second as u64, 10, 0));
@@ -216,8 +216,8 @@ mod tests {
 
     #[test]
     fn lately_forgets_what_was_long_ago() {
-        let mut watch = LineWatch::default();
-        let lately = |watch: &LineWatch, report: &LineReport| watch.lately(report, TIC).timeouts;
+        let mut watch = LineMinuteTracker::default();
+        let lately = |watch: &LineMinuteTracker, report: &LineReport| watch.lately(report, TIC).timeouts;
         let bad = Arc::new(report(100, 10, 50));
         watch.tick(at(0), "L1", &Arc::new(report(0, 10, 0)));
         watch.tick(at(300), "L1", &bad);

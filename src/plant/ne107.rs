@@ -96,22 +96,22 @@ impl Reason {
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Reason::LineClosed => f.write_str(t!("line closed by an operator")),
-            Reason::LineTesting => f.write_str(t!("a test has the line")),
+            Reason::LineClosed => f.write_str(t!("line disconnected by an operator")),
+            Reason::LineTesting => f.write_str(t!("line in use by a test")),
             Reason::NotConnected => f.write_str(t!("line not connected")),
-            Reason::Down => f.write_str(t!("not answering")),
-            Reason::Settling => f.write_str(t!("left alone after an action")),
+            Reason::Down => f.write_str(t!("not responding")),
+            Reason::Settling => f.write_str(t!("pause after an action")),
             Reason::Slow { p99, timeout } => f.write_str(&t!(
-                "answers take {p99} of {timeout} ms",
+                "responses take {p99} of {timeout} ms",
                 p99 = p99.as_millis(),
                 timeout = timeout.as_millis()
             )),
             Reason::Failing { failed, of } => f.write_str(&t!("{failed} of {of} requests failed", failed, of)),
             Reason::NoValues => f.write_str(t!("responds without valid values")),
             Reason::Corrupt { corrupt, of } => {
-                f.write_str(&t!("{corrupt} of {of} answers corrupt or repeated", corrupt, of))
+                f.write_str(&t!("{corrupt} of {of} responses corrupt or repeated", corrupt, of))
             }
-            Reason::Late(count) => f.write_str(&t!("{count} answers came too late", count)),
+            Reason::Late(count) => f.write_str(&t!("{count} late responses", count)),
             Reason::MemoryParity(count) => f.write_str(&t!("memory parity error ({count})", count)),
         }
     }
@@ -230,19 +230,19 @@ mod tests {
         check(&LineState::Connected, UP, false, &well, "");
         check(&LineState::Connected, DeviceState::Unknown, false, &RequestStats::default(), "");
         check(&LineState::Connecting, DeviceState::Unknown, false, &RequestStats::default(), "");
-        check(&LineState::Connected, DOWN, false, &well, "F not answering");
+        check(&LineState::Connected, DOWN, false, &well, "F not responding");
         check(&waiting, DOWN, false, &well, "F line not connected");
-        check(&LineState::Disconnected, DeviceState::Unknown, false, &well, "C line closed by an operator");
-        check(&LineState::Testing, DeviceState::Unknown, false, &well, "C a test has the line");
-        check(&LineState::Connected, UP, true, &well, "C left alone after an action");
-        check(&LineState::Connected, DOWN, true, &well, "C left alone after an action");
+        check(&LineState::Disconnected, DeviceState::Unknown, false, &well, "C line disconnected by an operator");
+        check(&LineState::Testing, DeviceState::Unknown, false, &well, "C line in use by a test");
+        check(&LineState::Connected, UP, true, &well, "C pause after an action");
+        check(&LineState::Connected, DOWN, true, &well, "C pause after an action");
     }
 
     #[test]
     fn late_and_missing_answers_are_out_of_specification() {
         let check = |lately: &RequestStats, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
         check(&stats(1_000, 200, &[]), "");
-        check(&stats(1_000, 260, &[]), "S answers take 260 of 300 ms");
+        check(&stats(1_000, 260, &[]), "S responses take 260 of 300 ms");
         check(&stats(10, 260, &[]), "");
         check(&stats(94, 12, &[Fault::Timeout; 6]), "");
         check(&stats(93, 12, &[Fault::Timeout; 7]), "S 7 of 64 requests failed");
@@ -262,9 +262,9 @@ mod tests {
         let check = |lately: &RequestStats, expect: &str| check(&LineState::Connected, UP, false, lately, expect);
         let crc = Fault::Crc { got: 1, computed: 2 };
         check(&stats(199, 12, &[crc]), "");
-        check(&stats(198, 12, &[crc, crc]), "M 2 of 200 answers corrupt or repeated");
-        check(&RequestStats { retries: 1, ..stats(100, 12, &[]) }, "M 1 of 100 answers corrupt or repeated");
-        check(&RequestStats { late: 1, ..stats(100, 12, &[]) }, "M 1 answers came too late");
+        check(&stats(198, 12, &[crc, crc]), "M 2 of 200 responses corrupt or repeated");
+        check(&RequestStats { retries: 1, ..stats(100, 12, &[]) }, "M 1 of 100 responses corrupt or repeated");
+        check(&RequestStats { late: 1, ..stats(100, 12, &[]) }, "M 1 late responses");
         check(&stats(100, 12, &[Fault::Exception(ExceptionCode(0x08))]), "M memory parity error (1)");
         check(&stats(100, 12, &[Fault::Exception(ExceptionCode(0x06))]), "");
     }

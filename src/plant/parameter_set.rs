@@ -77,7 +77,7 @@ pub fn check_name(name: &str) -> Result<(), String> {
         return Err(format!("at most {NAME_MAX} characters"));
     }
     if name.trim() != name {
-        return Err("no blank at its beginning or end".to_owned());
+        return Err("no space at its beginning or end".to_owned());
     }
     if name.starts_with('.') {
         return Err("no dot at its beginning".to_owned());

@@ -21,7 +21,7 @@ pub struct ProgramDef {
     pub halt: Option<f64>,
     /// The value that stops it.
     pub off: f64,
-    /// Chooses which steps are run.
+    /// Chooses steps to run.
     pub pattern: Option<TagId>,
     /// First and last step, from 0, of each pattern, by the pattern's value; empty: every step is always run.
     pub patterns: Vec<(usize, usize)>,

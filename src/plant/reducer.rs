@@ -21,7 +21,7 @@ use super::{
     def::{LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     interlock::ActuatorTracker,
-    line_minute::LineWatch,
+    line_minute::LineMinuteTracker,
     parameter_set::StoredSet,
     process_image::ProcessImage,
     program::ProgramWatch,
@@ -30,7 +30,7 @@ use super::{
     snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
     station::StationFaults,
     traffic::Exchange,
-    tuning::TuningWatch,
+    tuning::TuningTracker,
 };
 
 pub use restore::SetWork;
@@ -78,7 +78,7 @@ pub struct Plant {
     watch: ActuatorTracker,
     lines: Vec<LineStatus>,
     /// Earlier reports, by [`LineId`].
-    watches: Vec<LineWatch>,
+    watches: Vec<LineMinuteTracker>,
     devices: Vec<DeviceStatus>,
     /// The last request for each tag, by [`TagId`].
     source_frames: Arc<Vec<Option<Arc<Exchange>>>>,
@@ -92,7 +92,7 @@ pub struct Plant {
     /// Number of the last command that a restore sent.
     numbers: u32,
     /// Auto-tuning and program, by device.
-    tunings: Vec<TuningWatch>,
+    tunings: Vec<TuningTracker>,
     programs: Vec<ProgramWatch>,
 }
 
@@ -107,7 +107,7 @@ impl Plant {
             commands: CommandTracker::new(def.clone()),
             watch: ActuatorTracker::default(),
             lines: vec![LineStatus::default(); def.lines.len()],
-            watches: vec![LineWatch::default(); def.lines.len()],
+            watches: vec![LineMinuteTracker::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
             source_frames: Arc::new(vec![None; def.tags.len()]),
             history: HistoryStatus::default(),
@@ -115,7 +115,7 @@ impl Plant {
             sets: Arc::default(),
             restores: Vec::new(),
             numbers: 0,
-            tunings: vec![TuningWatch::default(); def.devices.len()],
+            tunings: vec![TuningTracker::default(); def.devices.len()],
             programs: vec![ProgramWatch::default(); def.devices.len()],
             def,
             at,

@@ -27,24 +27,24 @@ keyword_enum! {
         /// Nothing has been read since the station started.
         NotRead = 1 => "not read yet",
         /// The device did not answer the last request in time.
-        Timeout = 2 => "no answer in time",
+        Timeout = 2 => "response timeout",
         /// The answer did not survive the line (CRC, length, wrong unit or function).
-        Corrupt = 3 => "answer corrupt",
+        Corrupt = 3 => "corrupt response",
         /// The device refused the request with an exception.
         Exception = 4 => "refused by the device",
         /// Older than three (uncertain) or ten (bad) poll periods.
-        Stale = 5 => "too old",
+        Stale = 5 => "stale",
         /// The device has stopped answering.
-        DeviceDown = 6 => "device not answering",
+        DeviceDown = 6 => "device not responding",
         /// The port or connection is gone or was closed by the operator.
         NotConnected = 7 => "line not connected",
         /// The device itself says that the measurement failed (status word, sentinel value).
         SensorFault = 8 => "sensor fault",
         /// A value that this one needs (decimals, unit, range) is not known.
-        Unscaled = 9 => "scale not known",
+        Unscaled = 9 => "scale unknown",
         // 10 was never stored.
         /// The station was not running.
-        StationOff = 11 => "station was off",
+        StationOff = 11 => "station not running",
         /// There is a value, but no user who may see it is logged in here. Never stored.
         NotAuthorised = 12 => "not authorised: log in",
         /// It was stored, but the file is damaged there. Never stored.
@@ -52,7 +52,7 @@ keyword_enum! {
     }
 }
 
-/// `good`, `uncertain: too old`, `bad: no answer in time`.
+/// `good`, `uncertain: stale`, `bad: response timeout`.
 impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -185,8 +185,8 @@ impl Snapshot {
     /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
     pub fn acknowledge_all(&self) -> Option<CommandKind> {
         let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
-        let seen: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
-        (!seen.is_empty()).then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen }))
+        let alarms: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
+        (!alarms.is_empty()).then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms }))
     }
     /// The details of a fault of the station, as of the last time it was active.
     pub fn fault_details(&self, alarm: AlarmId) -> &str {
@@ -223,7 +223,7 @@ pub struct LineStatus {
 /// A device as it stands.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct DeviceStatus {
-    /// Answering or not.
+    /// Responding or not.
     pub state: DeviceState,
     /// Time of the last answer, from last byte sent to first byte received.
     pub reply: Option<Duration>,
@@ -288,7 +288,7 @@ impl ActiveAlarm {
     }
     /// The command to acknowledge it, as it is seen here.
     pub fn acknowledge(&self) -> CommandKind {
-        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: self.id, seen: self.annunciated_at })
+        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: self.id, annunciated_at: self.annunciated_at })
     }
 }
 

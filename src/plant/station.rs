@@ -79,17 +79,17 @@ impl StationFault {
         match self {
             StationFault::NotRecording => [
                 "the disk is full or read-only, the history is used by another process, or its folder is missing",
-                "values, alarms and actions wait in memory; what exceeds the buffer, or a power failure, loses them",
-                "read the details in the banner, free the disk or the file; recording resumes by itself",
+                "values, alarms and actions are buffered in memory; a full buffer or a power failure loses them",
+                "read the details in the banner, free the disk or the file; recording resumes automatically",
             ],
             StationFault::RecordsLost => [
                 "the buffer was full: the disk was too slow, or the history did not record for too long",
-                "trends and reports have a gap; values and alarms on the screen are right",
-                "note the time in the handover; look for the cause of the slow or full disk",
+                "trends and reports have a gap; values and alarms on the screen are correct",
+                "note the time in the handover; find the cause of the slow or full disk",
             ],
             StationFault::HistoryDamaged => [
-                "a power failure, a failing disk, or a file that was changed, moved or removed by hand",
-                "a part of the past is missing; recording goes on in a good file",
+                "a power failure, a failing disk, or a file that was changed, moved or removed manually",
+                "a part of the history is missing; recording continues in a new file",
                 "keep the file that was set aside; check the disk (SMART) and the power supply",
             ],
             StationFault::DiskSpace => [
@@ -98,18 +98,18 @@ impl StationFault {
                 "move old reports and set-aside files away, or give the history a larger disk",
             ],
             StationFault::AuditLog => [
-                "the disk is full or read-only, or the file or its sealing key was changed, moved or removed by hand",
-                "actions are carried out, but are not on record, or could be changed unnoticed, until it is repaired",
-                "free the disk; run `sightglass audit verify`; restore the sealing key, or make one with `audit key`",
+                "the disk is full or read-only, or the file or its sealing key was changed, moved or removed manually",
+                "actions are executed, but not recorded, or their records could be changed unnoticed, until it is repaired",
+                "free the disk; run `sightglass audit verify`; restore the sealing key, or create one with `audit key`",
             ],
             StationFault::AlarmState => [
                 "the disk is full or read-only",
                 "after a restart, acknowledged alarms may be unacknowledged again",
-                "free the disk; saving resumes by itself",
+                "free the disk; saving resumes automatically",
             ],
             StationFault::UsersFile => [
-                "the file is damaged, missing, or not readable for the station",
-                "login is closed; polling and alarms go on",
+                "the file is damaged, missing, or not readable by the station",
+                "login is disabled; polling and alarms continue",
                 "restore the users file from a backup and reload the station",
             ],
             StationFault::Clock => [

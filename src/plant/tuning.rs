@@ -81,7 +81,7 @@ impl Tuning {
 
 /// Watches one device for auto-tuning.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct TuningWatch {
+pub struct TuningTracker {
     on: Option<bool>,
     /// The latest one.
     pub tuning: Option<Arc<Tuning>>,
@@ -96,7 +96,7 @@ pub enum Noticed {
     Ended,
 }
 
-impl TuningWatch {
+impl TuningTracker {
     /// Takes the samples of a device as they stand at `at`; `span` is the range of PV.
     pub fn take(
         &mut self,
@@ -205,7 +205,7 @@ mod tests {
     }
 
     /// PV, AT (`None`: not known) and P at a second.
-    fn take(watch: &mut TuningWatch, at: i64, pv: f64, tune: Option<f64>, p: f64) -> Noticed {
+    fn take(watch: &mut TuningTracker, at: i64, pv: f64, tune: Option<f64>, p: f64) -> Noticed {
         let sample = |tag: TagId| match tag {
             PV => Sample::good(pv, second(at)),
             SV => Sample::good(70.0, second(at)),
@@ -217,14 +217,14 @@ mod tests {
 
     #[test]
     fn swings_are_counted_beside_old_and_new_parameters() {
-        let mut watch = TuningWatch::default();
+        let mut watch = TuningTracker::default();
         take(&mut watch, 0, 60.0, Some(0.0), 5.0);
         assert_eq!(watch.tuning, None);
         let swing = [(1, 60.0), (2, 65.0), (3, 72.0), (4, 71.9), (5, 72.4), (6, 69.0), (7, 68.0), (8, 73.0), (9, 70.0)];
         for (at, pv) in swing {
             assert_eq!(take(&mut watch, at, pv, Some(1.0), 5.0), Noticed::Nothing);
         }
-        let extrema = |watch: &TuningWatch| -> Vec<(f64, bool)> {
+        let extrema = |watch: &TuningTracker| -> Vec<(f64, bool)> {
             watch
                 .tuning
                 .iter()
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_silent_controller_neither_begins_nor_ends_a_tuning() {
-        let mut watch = TuningWatch::default();
+        let mut watch = TuningTracker::default();
         take(&mut watch, 0, 60.0, Some(1.0), 5.0);
         assert!(watch.tuning.as_ref().is_some_and(|tuning| !tuning.seen), "it was on when first read");
         take(&mut watch, 1, 60.0, None, 5.0);

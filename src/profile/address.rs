@@ -28,7 +28,7 @@ pub(super) fn locate(location: &At<Location>, scheme: Scheme, problems: &mut Pro
         }
         (Location::Name(name), Scheme::Modbus) => {
             let problem = problems.add(location.at, format!("`{name}` is not an address"));
-            problem.label("expected a number, 0-based as it is sent");
+            problem.label("expected a number, 0-based as on the wire");
             if memory(name).is_some() {
                 problem.help("for octal addresses of KOYO and AutomationDirect write scheme = \"directlogic\" at the top of the profile");
             }

@@ -72,7 +72,7 @@ fn check_generated(tables: &[At<AlarmTable>], name: &str, generated: &str, probl
         let same = subject.is_some_and(|subject| subject.value == name);
         if let Some(text) = table.message.as_ref().filter(|text| same && text.value == generated) {
             let problem = problems.add(text.at, format!("duplicate alarm `{generated}` of {name}"));
-            problem.label("the station adds one of this name by itself: expected another text");
+            problem.label("the station adds an alarm of this name: expected another message");
         }
     }
 }
@@ -82,7 +82,7 @@ pub(super) fn rules(file: &PlantFile, problems: &mut Problems) -> AlarmRules {
     let usual = AlarmRules::default();
     let Some(table) = file.alarm_rules.as_ref().map(|table| &table.value) else { return usual };
     if let Some(max) = table.shelve_max.filter(|max| !(SHELVE_MIN..=SHELVE_MAX).contains(&max.value)) {
-        problems.add(max.at, "not a time to shelve alarms for").label("expected \"1min\" to \"7 days\"");
+        problems.add(max.at, "not a valid shelving time").label("expected \"1min\" to \"7 days\"");
     }
     AlarmRules {
         shelve_max: table.shelve_max.value_or(usual.shelve_max),
@@ -101,7 +101,7 @@ fn alarm(
     let time = |time: Option<At<Duration>>| time.value_or(Duration::ZERO);
     let flag = |flag: Option<At<bool>>| flag.value_or(false);
     if let Some(re_alarm) = table.re_alarm.filter(|re_alarm| re_alarm.value < Duration::from_secs(60)) {
-        let problem = problems.add(re_alarm.at, "an alarm that reminds so soon is a nuisance");
+        let problem = problems.add(re_alarm.at, "too short: re-alarming so soon is a nuisance");
         problem.label("expected at least \"1min\"");
     }
     AlarmDef {
@@ -171,11 +171,11 @@ fn not_answering(device: &DeviceDef) -> AlarmDef {
                 "{} has no power, its cable is open, or its unit address or serial parameters differ",
                 device.name
             ),
-            effect: "its values are unknown and it cannot be operated from here".to_owned(),
-            action: "look at the device itself; then at supply, cable, terminator and the Bus tab".to_owned(),
+            effect: "its values are unknown and it cannot be operated".to_owned(),
+            action: "check the device; then supply, cable, terminator and the Bus tab".to_owned(),
             response_time: Some(Duration::from_secs(600)),
         },
-        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), Condition::NotAnswering, NO_VALUES)
+        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), Condition::NotResponding, NO_VALUES)
     }
 }
 
@@ -187,8 +187,8 @@ fn overloaded(line: &LineDef) -> AlarmDef {
         on_delay: Duration::from_secs(10),
         guidance: Guidance {
             cause: format!("{} is polled more often than it can carry, or its devices answer more slowly", line.name),
-            effect: "alarm inputs are read on time, other values less often; no device is at fault".to_owned(),
-            action: "see the Bus tab; poll less often, raise the baud rate, or divide the line".to_owned(),
+            effect: "alarm inputs are polled on time, other values less often; no device is faulty".to_owned(),
+            action: "see the Bus tab; poll less often, increase the baud rate, or split the line".to_owned(),
             response_time: None,
         },
         ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::Overloaded, OVERLOADED)

@@ -96,14 +96,14 @@ pub(super) fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) 
         }
         (None, Some(device), None) => {
             let id = defs.device(device, problems)?;
-            no_condition(table, "device", "not answering, or with `ne107` a signal", problems);
+            no_condition(table, "device", "not responding, or with `ne107` a signal", problems);
             let condition =
-                table.ne107.map_or(Condition::NotAnswering, |ne107| Condition::Health { signal: ne107.value });
+                table.ne107.map_or(Condition::NotResponding, |ne107| Condition::Health { signal: ne107.value });
             Some((Subject::Device(id), condition))
         }
         (None, None, Some(line)) => {
             let id = defs.line(line, problems)?;
-            no_condition(table, "line", "not connected, or with `overloaded` too much to do", problems);
+            no_condition(table, "line", "not connected, or with `overloaded` overloaded", problems);
             let overloaded = table.overloaded.value_or(false);
             let condition = if overloaded { Condition::Overloaded } else { Condition::NotConnected };
             Some((Subject::Line(id), condition))
@@ -166,7 +166,7 @@ fn condition(table: &AlarmTable, tag: &TagDef, defs: &Defs, problems: &mut Probl
     }
     if let Some(lasts) = table.no_change {
         let Some(deadband) = table.deadband else {
-            let problem = problems.add(lasts.at, "`no_change` needs a `deadband`").label("what is no change?");
+            let problem = problems.add(lasts.at, "`no_change` needs a `deadband`").label("how much is no change?");
             problem.help("a little more than the noise of the value, or 0");
             return None;
         };
@@ -226,7 +226,7 @@ fn rate_over(table: &AlarmTable, rate: At<f64>, problems: &mut Problems) -> Opti
         return None;
     };
     if rate.value == 0.0 {
-        problems.add(rate.at, "a limit of 0 always holds").label("expected more than 0, or less for a fall");
+        problems.add(rate.at, "a limit of 0 always holds").label("expected above 0, or below 0 for a falling value");
         return None;
     }
     let deadband = deadband(table, rate.at, problems)?;

@@ -25,7 +25,7 @@ pub(super) fn with_line(text: &str, settings: &LineDef) -> Result<String, String
     // The editor and the reader know the file each in their own way: what counts is what is read next time.
     match reread(&edited, settings) {
         Some(read) if read == *settings => Ok(edited),
-        Some(_) | None => Err("the file would be read otherwise than these settings; nothing was written".to_owned()),
+        Some(_) | None => Err("the file would not be read as these settings; nothing was written".to_owned()),
     }
 }
 
@@ -97,7 +97,7 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
 }
 
 fn set(table: &mut dyn TableLike, settings: &LineDef) -> Result<(), String> {
-    let entries = entries(settings).ok_or("a plant file has no word for this mode")?;
+    let entries = entries(settings).ok_or("a plant file has no keyword for this mode")?;
     let others: &[&str] = match settings.transport {
         Transport::Serial { .. } => &TCP,
         Transport::Tcp { .. } => &SERIAL,

@@ -109,7 +109,7 @@ impl<'a> Reader<'a, '_> {
         self.depth += 1;
         let at = self.peek().map_or(self.end, |token| token.at);
         if DEPTH_MAX < self.depth {
-            self.problems.add(at, "too many parentheses inside each other").label("too deep");
+            self.problems.add(at, "parentheses nested too deeply").label("too deep");
             return None;
         }
         let expr = if self.takes("not") {

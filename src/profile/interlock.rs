@@ -38,9 +38,7 @@ fn interlock(
     let off = stops.contains(&value) || (stops.is_empty() && value == 0.0);
     if let Some(refuse) = table.refuse.filter(|refuse| refuse.value && off) {
         let problem = problems.add(refuse.at, "switching off is never refused");
-        problem
-            .label("expected refuse = false")
-            .help("a stop must always be possible; the operator is warned all the same");
+        problem.label("expected refuse = false").help("a stop must always be possible; the operator is still warned");
     }
     let refuse = table.refuse.value_or(!off && !stops.is_empty());
     Some(InterlockDef { tag: tag.id, value, of: of.id, when, message: text(&table.message), refuse })

@@ -47,8 +47,8 @@ fn incomplete(table: &AlarmTable, problems: &mut Problems) {
     let message = format!("{} has no {}", name(table), missing.join(", "));
     let problem = problems.warn(place(table), message);
     problem.label("not complete").help(match missing.contains(&"`action`") {
-        true => "an alarm without an operator action is no alarm: leave it out, or say what to do",
-        false => "say what may be wrong, what follows, what to do and within what time",
+        true => "an alarm needs an operator action: add one, or remove the alarm",
+        false => "give the likely cause, the effect, the action and the response time",
     });
 }
 
@@ -179,7 +179,7 @@ mod tests {
         );
         check(
             &alarm(HOT).replace("stop it", " "),
-            &["has no `action` (not complete; an alarm without an operator action"],
+            &["has no `action` (not complete; an alarm needs an operator action"],
         );
         check(&alarm(HOT).replace("response_time = \"10min\"\n", ""), &["has no `response_time`"]);
     }

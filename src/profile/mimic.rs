@@ -251,7 +251,7 @@ pub(super) fn trends(tables: &[At<TrendTable>], defs: &Defs, problems: &mut Prob
         let pens = table.pens.iter().filter_map(|pen| {
             let scale = pen.value.scale.map(|scale| (scale.value[0], scale.value[1]));
             if let Some(at) = pen.value.scale.filter(|scale| scale.value[0] >= scale.value[1]) {
-                problems.add(at.at, "the scale is empty or upside down").label("expected [low, high]");
+                problems.add(at.at, "the scale is empty or reversed").label("expected [low, high]");
             }
             let tag: TagId = defs.tag_id(&pen.value.tag, problems)?;
             Some(Pen { tag, scale })

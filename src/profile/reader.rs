@@ -81,7 +81,7 @@ pub(crate) fn parse(file: &str, bytes: &[u8], problems: &mut Problems) -> Option
         let span = error.span().unwrap_or(0..0);
         problems
             .add(Span { source, start: span.start, end: span.end.max(span.start) }, error.message())
-            .label("here the TOML breaks");
+            .label("TOML syntax error here");
     }
     if errors.is_empty() && table.is_empty() {
         problems
@@ -131,7 +131,7 @@ fn check_text(text: &str, at: Span, problems: &mut Problems) {
 
 fn report_hidden(letter: char, at: Span, problems: &mut Problems) {
     let message = format!("the character U+{:04X} is not shown, or turns the direction of writing", u32::from(letter));
-    problems.add(at, message).label("expected only characters that are seen");
+    problems.add(at, message).label("expected only visible characters");
 }
 
 fn table_of(table: &DeTable<'_>, source: usize) -> Table {
@@ -174,7 +174,7 @@ impl<'a> Fields<'a> {
         for layer in layers {
             let unknown = layer.table.iter().filter(|(word, _)| !known.contains(&word.as_str()));
             for (word, (at, _)) in unknown.take(UNKNOWN_MAX) {
-                let problem = problems.add(*at, format!("unknown key `{word}` in {what}")).label("not known here");
+                let problem = problems.add(*at, format!("unknown key `{word}` in {what}")).label("unknown here");
                 renamed::offer(problem, what, word, known);
             }
         }

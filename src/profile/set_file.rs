@@ -44,7 +44,7 @@ impl Value for Moment {
             Node::Whole(_) | Node::Number(_) | Node::Flag(_) | Node::Array(_) | Node::Table(_) => None,
         };
         if parsed.is_none() {
-            problems.add(at, "this is not an instant").label("expected 2026-11-21T07:02:31Z");
+            problems.add(at, "not a time").label("expected 2026-11-21T07:02:31Z");
         }
         parsed.map(Moment)
     }
@@ -60,13 +60,13 @@ pub fn text_of_set(set: &ParameterSet, def: &PlantDef) -> String {
     out.push_str(&format!("saved = {}\nby = {}\n", set.saved, quoted(&set.by)));
     if !set.missing.is_empty() {
         let names: Vec<String> = set.missing.iter().map(|name| quoted(name)).collect();
-        out.push_str("# Could not be read when the set was saved, and is left alone when it is restored.\n");
+        out.push_str("# Could not be read when the set was saved; not written when the set is restored.\n");
         out.push_str(&format!("missing = [{}]\n", names.join(", ")));
     }
     out.push_str(&units_table(set));
     if !set.given.is_empty() {
         out.push_str(
-            "\n# Must be the same in a device that takes this set, else the values mean something else.\n[given]\n",
+            "\n# Must be the same in a device that uses this set, otherwise the values have another meaning.\n[given]\n",
         );
         out.extend(set.given.iter().map(|value| row(value, find(&value.tag), "")));
     }
@@ -126,7 +126,7 @@ fn values(table: &At<Raw>, tags: &[&TagDef], settings: bool, problems: &mut Prob
             continue;
         };
         if settings && !tags[place].in_sets {
-            let problem = problems.add(*at, format!("`{short}` is no setting"));
+            let problem = problems.add(*at, format!("`{short}` is not a setting"));
             problem.label("expected a setting, not a command or a measurement: leave it out");
             continue;
         }
@@ -157,9 +157,8 @@ fn units_table(set: &ParameterSet) -> String {
     if set.units.is_empty() {
         return String::new();
     }
-    let mut out = String::from(
-        "\n# What the values are measured in. A device that takes this set must measure alike.\n[units]\n",
-    );
+    let mut out =
+        String::from("\n# Units of the values. A device that uses this set must have the same units.\n[units]\n");
     let mut units: Vec<&String> = set.units.values().collect();
     units.sort();
     units.dedup();

@@ -126,7 +126,7 @@ fn a_silent_device_always_raises_an_alarm() {
     let plant = tank();
     for device in &plant.devices {
         let silent = |alarm: &&crate::plant::def::AlarmDef| {
-            alarm.subject == Subject::Device(device.id) && alarm.condition == Condition::NotAnswering
+            alarm.subject == Subject::Device(device.id) && alarm.condition == Condition::NotResponding
         };
         assert_eq!(plant.alarms.iter().filter(silent).count(), 1, "{}", device.name);
     }

@@ -93,7 +93,10 @@ fn motion(table: &SimulateTable, scope: &Scope, problems: &mut Problems) -> Opti
     }
     stray(table, !sources.is_empty(), problems);
     if let [(first, _), (second, _), ..] = sources[..] {
-        problems.add(second, "a value can go one way only").label("keep one of them").also(first, "the other");
+        problems
+            .add(second, "a value cannot be limited in two ways")
+            .label("keep one of them")
+            .also(first, "the other");
     }
     let (_, source) = sources.into_iter().next()?;
     let when =
@@ -212,7 +215,7 @@ mod tests {
         check_wrong("oscillate = [5, 1]", &["oscillate from 5 to 1 has no room", "expected [lowest, highest]"]);
         check_wrong("follow = 'DP', rate = 0", &["a rate is how much a second, above 0"]);
         check_wrong("follow = 'DP', rate = 1, lag = '5s'", &["`rate` and `lag` exclude each other"]);
-        check_wrong("follow = 'DP', oscillate = [0, 1]", &["a value can go one way only"]);
+        check_wrong("follow = 'DP', oscillate = [0, 1]", &["a value cannot be limited in two ways"]);
         check_wrong("gain = 2", &["`gain` says nothing without a source such as `follow`"]);
         check_wrong("start = 3, period = '1min'", &["`period` says nothing without `oscillate`"]);
         check_wrong("pulse = '0s'", &["pulse takes some time"]);

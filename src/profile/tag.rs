@@ -193,7 +193,7 @@ fn table(row: &TagTable, named: Option<Table>, problems: &mut Problems) -> Optio
         (Some(written), Some(named)) if written.value != named => {
             let problem =
                 problems.add(written.at, format!("this address is a {}, not a {}", named.word(), written.value.word()));
-            problem.label("leave it out: the address says it");
+            problem.label("leave it out: the address defines it");
             None
         }
         (Some(written), _) => Some(written.value),
@@ -209,7 +209,7 @@ fn table(row: &TagTable, named: Option<Table>, problems: &mut Problems) -> Optio
 fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) -> bool {
     let words = point.len();
     if u32::from(point.address) + u32::from(words) > 0x1_0000 {
-        problems.add(at, "the value reaches past the last address").label("the last is 65535");
+        problems.add(at, "the value extends past the last address").label("the last is 65535");
         return false;
     }
     if words > 1 && !point.address.is_multiple_of(limits.alignment.max(1)) {
@@ -318,11 +318,11 @@ fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
     }
     if let Some(order) = row.order.filter(|order| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba)) {
-        let problem = problems.add(order.at, "the words of a text are never reversed");
+        let problem = problems.add(order.at, "the words of a text cannot be reversed");
         problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
     }
     if point.table.is_bits() {
-        problems.add(row.at, "a text lies in registers").label("expected table = \"holding\" or \"input\"");
+        problems.add(row.at, "a text needs registers").label("expected table = \"holding\" or \"input\"");
     }
     if let Some(access) = row.access.filter(|access| access.value != Access::Read) {
         problems.add(access.at, "a text can only be read").label("expected access = \"r\"");

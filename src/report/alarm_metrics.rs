@@ -22,7 +22,7 @@ pub struct Row {
     pub target: String,
     /// `at most 300`; empty if there is none.
     pub limit: String,
-    /// `good`, `beyond target`, `over limit` or `too few` or `watched < 1 h` to evaluate.
+    /// `good`, `beyond target`, `over limit` or `insufficient data`.
     pub verdict: &'static str,
     /// Decimals to print.
     #[serde(skip)]
@@ -120,7 +120,7 @@ pub fn metrics_text(figures: &PeriodMetrics, def: &PlantDef, period: &Period) ->
         }));
     }
     lines.push(String::new());
-    lines.push("targets and limits: ISA-18.2 for one operator, meant for 30 days or more".into());
+    lines.push("targets and limits: ISA-18.2, per operator, for periods of 30 days or more".into());
     lines.join("\n")
 }
 
@@ -201,16 +201,16 @@ Water tank, alarms of morning 2026-11-21
 2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00: 24 alarms
 
 measure                              figure  target        limit         verdict
-alarms a day                           72.0  at most 150   at most 300   good
-alarms an hour                          3.0  at most 6     at most 12    good
-alarms in 10 min                        0.5  at most 1     at most 2     good
+alarms per day                         72.0  at most 150   at most 300   good
+alarms per hour                         3.0  at most 6     at most 12    good
+alarms per 10 min                       0.5  at most 1     at most 2     good
 10-min windows above 10 (%)             2.1  below 1                     beyond target
-most in a 10-min window                  12  at most 10                  beyond target
+peak in a 10-min window                  12  at most 10                  beyond target
 time in flood (%)                       2.1  below 1                     beyond target
-share of the ten most frequent (%)    100.0  at most 5                   beyond target
+share of the 10 most frequent (%)     100.0  at most 5                   beyond target
 chattering alarms                         1  at most 0                   beyond target
 fleeting alarms                           0  at most 0                   good
-active over 24 h (most at once)           0  below 5                     good
+active over 24 h (peak)                   0  below 5                     good
 priority critical (%)                   0.0  below 1                     good
 priority high (%)                      25.0  at most 5                   beyond target
 priority medium (%)                    12.5  at most 15                  good
@@ -220,14 +220,14 @@ frequent       18  =PLC-1  not responding
 frequent        6  TIC-1.PV  temperature high
 chattering         TIC-1.PV  temperature high
 
-targets and limits: ISA-18.2 for one operator, meant for 30 days or more";
+targets and limits: ISA-18.2, per operator, for periods of 30 days or more";
         assert_eq!(text, expect);
         let short = PeriodMetrics { watched: std::time::Duration::from_secs(5_460), ..figures() };
         let short = metrics_text(&short, &plant("Asia/Bangkok", &THREE), &period);
         assert!(short.contains(": 24 alarms; a station ran for 1 h 31 min\n"), "{short}");
         let none = metrics_text(&PeriodMetrics::default(), &plant("Asia/Bangkok", &THREE), &period);
         assert!(
-            none.contains("alarms a day                              —  at most 150   at most 300   watched < 1 h"),
+            none.contains("alarms per day                            —  at most 150   at most 300   insufficient data"),
             "{none}"
         );
     }

@@ -24,7 +24,7 @@ pub struct Column {
 }
 
 /// The table: time with offset, then of each tag the value, with its unit in the header, and the quality: `good`,
-/// `bad: no answer in time`, or `none` where nothing was stored. A value that is not good is left out. The first row is one
+/// `bad: response timeout`, or `none` where nothing was stored. A value that is not good is left out. The first row is one
 /// interval after `from`: a value belongs to the instant at which it was known.
 pub fn export_csv(
     def: &PlantDef,
@@ -86,8 +86,8 @@ mod tests {
         let german = CsvDialect { separator: ';', decimal: ',', bom: false };
         let bytes = export_csv(&def, from, Duration::from_millis(1_500), &columns, german);
         let expect = "time;TIC-1.PV °C;TIC-1.PV quality;'=RUN;'=RUN quality\r\n\
-            2026-11-21T06:00:01.500+07:00;20,0;good;;uncertain: too old\r\n\
-            2026-11-21T06:00:03.000+07:00;;bad: no answer in time;;none\r\n";
+            2026-11-21T06:00:01.500+07:00;20,0;good;;uncertain: stale\r\n\
+            2026-11-21T06:00:03.000+07:00;;bad: response timeout;;none\r\n";
         assert_eq!(String::from_utf8(bytes).as_deref(), Ok(expect));
     }
 }

@@ -37,7 +37,7 @@ pub enum PeriodError {
     #[error("`{0}` is not a time: expected local 2026-11-21T06:00, or with offset 2026-11-21T06:00+07:00")]
     NotATime(String),
     /// The period lies in the future.
-    #[error("{0} has not begun yet")]
+    #[error("{0} has not started yet")]
     NotBegun(String),
     /// It ends before it begins, or at once.
     #[error("the period is empty: from {from} to {to}")]
@@ -193,11 +193,11 @@ mod tests {
         for (typed, words) in [
             ((Some("nite"), None, None), "no shift `nite`: expected last, current, morning, afternoon, night"),
             ((Some("night@20.11."), None, None), "`20.11.` is not a date: expected YYYY-MM-DD"),
-            ((Some("night@2026-11-21"), None, None), "night 2026-11-21 has not begun yet"),
+            ((Some("night@2026-11-21"), None, None), "night 2026-11-21 has not started yet"),
             ((None, Some("six"), None), "`six` is not a time: expected local 2026-11-21T06:00"),
             ((None, Some("2026-11-20T06:00+banana"), None), "is not a time"),
             ((None, Some("2026-11-21T08:00"), Some("2026-11-21T07:00")), "the period is empty"),
-            ((None, Some("2026-11-22"), Some("2026-11-23")), "period has not begun yet"),
+            ((None, Some("2026-11-22"), Some("2026-11-23")), "period has not started yet"),
             ((None, None, Some("2026-11-22")), "--to needs --from"),
             ((Some("last"), Some("2026-11-22"), None), "either --shift or --from"),
         ] {

@@ -10,7 +10,7 @@ use super::rig::Rig;
 use super::slave::Unit;
 use crate::plant::number::{to_i32, to_u16, to_u32};
 
-/// Set value of all experiments, in °C.
+/// Setpoint of all experiments, in °C.
 pub const SV_C: i32 = 70;
 /// Length of each recording.
 pub const RECORDING: Duration = Duration::from_secs(3600);

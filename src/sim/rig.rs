@@ -65,7 +65,7 @@ pub struct RigState {
     pub probe_c: f64,
     /// The controller's process value in °C.
     pub pv_c: f64,
-    /// The controller's set value in use in °C.
+    /// The controller's setpoint in use in °C.
     pub sv_c: f64,
     /// The controller's output in percent.
     pub mv_percent: f64,

@@ -85,7 +85,7 @@ impl BlockingJobs {
                 match done {
                     Ok((_, (job, outcome))) => Done::Job(job, outcome),
                     Err(error) => {
-                        tracing::error!(%error, "looking at a password ended badly");
+                        tracing::error!(%error, "a password check failed");
                         let job = job.expect("every piece of work that is begun is noted");
                         Done::Job(job, Outcome::Failed("internal error, see the log".to_owned()))
                     }
@@ -99,8 +99,8 @@ impl BlockingJobs {
         self.saving.as_ref()?;
         let ended = tokio::time::timeout(SAVING_MAX, saved(&mut self.saving)).await;
         Some(ended.unwrap_or_else(|_| {
-            tracing::error!("the disk does not take the users: left behind");
-            Err("the disk does not answer: it may or may not be written".to_owned())
+            tracing::error!("the disk does not accept the users file: task abandoned");
+            Err("the disk does not respond: the file may or may not be written".to_owned())
         }))
     }
 }
@@ -111,7 +111,7 @@ async fn saved(saving: &mut Option<JoinHandle<Result<(), String>>>) -> Result<()
     let result = work.await;
     *saving = None;
     result.unwrap_or_else(|error| {
-        tracing::error!(%error, "writing the users down ended badly");
+        tracing::error!(%error, "writing the users file failed");
         Err("internal error, see the log".to_owned())
     })
 }

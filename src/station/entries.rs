@@ -65,7 +65,7 @@ fn with_change(entry: ActionRecord, (old, new): Change) -> ActionRecord {
 /// The system clock was set, from `old` to `new`.
 pub(super) fn clock_step(old: Timestamp, new: Timestamp) -> ActionRecord {
     let text = |at: Timestamp| at.strftime("%Y-%m-%dT%H:%M:%SZ").to_string().into();
-    with_change(entry(new, "clock step", "system clock", "done: followed at once"), (Some(text(old)), text(new)))
+    with_change(entry(new, "clock step", "system clock", "done: applied at once"), (Some(text(old)), text(new)))
 }
 
 /// The last entry of a station.

@@ -35,7 +35,7 @@ fn line_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
         let words = match new {
             LineState::Connecting => return None,
             LineState::Connected => "connected".into(),
-            LineState::Disconnected => "closed by an operator".into(),
+            LineState::Disconnected => "disconnected by an operator".into(),
             LineState::Testing => "not polled: used by a test".into(),
             // Every failed try would be a line; the first says it all.
             LineState::Waiting { .. } if before.lines[index].lost_since.is_some() => return None,
@@ -56,7 +56,7 @@ fn device_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
             DeviceState::Down { .. } if after.line(device.line).state != LineState::Connected => {}
             DeviceState::Down { .. } if !matches!(old, DeviceState::Down { .. }) => {
                 let why = after.device(device.id).last_fault.map(|(_, fault)| format!(": {fault}")).unwrap_or_default();
-                lines.push(format!("device {} (unit {}): not answering{why}", device.name, device.unit));
+                lines.push(format!("device {} (unit {}): not responding{why}", device.name, device.unit));
             }
             DeviceState::Answering if was_down => {
                 lines.push(format!("device {} (unit {}): answers", device.name, device.unit));
@@ -101,7 +101,7 @@ fn alarm_word(old: AlarmState, new: AlarmState) -> &'static str {
         {
             "acknowledged"
         }
-        AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => "returned to normal, waits for a reset",
+        AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => "returned to normal, reset required",
         AlarmState::Shelved => "shelved",
         AlarmState::SuppressedByDesign => "suppressed by design",
         AlarmState::OutOfService => "out of service",
@@ -174,7 +174,7 @@ mod tests {
         });
         assert_eq!(
             log(&plant),
-            ["device TIC-1 (unit 1): not answering: no answer in time", "alarm 2 RAISED: TIC-1 alarm 1"]
+            ["device TIC-1 (unit 1): not responding: response timeout", "alarm 2 RAISED: TIC-1 alarm 1"]
         );
         for (second, why) in [(4, "gone"), (6, "still gone")] {
             let state = LineState::Waiting { why: why.into(), retry_at: at(second + 1) };

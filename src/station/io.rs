@@ -94,7 +94,7 @@ pub fn start_guarded(options: Options) -> Result<Station, HistoryError> {
         Ok(users) => AccessControl::with_users(def, users, host),
         // Login is closed: a damaged file is not an empty one. Values and alarms go on.
         Err(error) => {
-            tracing::error!(%error, "login is closed");
+            tracing::error!(%error, "login is disabled");
             AccessControl::closed(def, &error.to_string(), host)
         }
     };
@@ -231,7 +231,7 @@ impl Station {
         drop((acceptor, commands, lifecycle));
         for task in tasks {
             if let Err(error) = task.await {
-                tracing::error!(%error, "a task of the station ended badly");
+                tracing::error!(%error, "a task of the station failed");
             }
         }
         // The last records are on their way; each thread ends when it has stored them, the audit log before the history.
@@ -244,7 +244,7 @@ impl Station {
         };
         let ended = tokio::task::spawn_blocking(ended).await;
         ended.unwrap_or_else(|error| {
-            tracing::error!(%error, "the history did not end well");
+            tracing::error!(%error, "the history did not close cleanly");
             None
         })
     }

@@ -17,7 +17,7 @@
 //! | history: removed or replaced | noticed at the next commit, a new file is begun | acknowledged |
 //! | disk nearly full | alarm before the first failure | space is free again |
 //! | audit log, alarm-state file | what is done is shown as "not recorded" | retried each second; then recorded |
-//! | users file: damaged, missing | login is closed; for a missing one only the station's own user makes the first Supervisor | restored, and the station restarted |
+//! | users file: damaged, missing | login is disabled; for a missing one only the station's own user makes the first Supervisor | restored, and the station restarted |
 //! | system clock: set | followed at once, recorded; ages, delays and shelvings do not move | acknowledged |
 //! | memory, CPU: too many queries | three at a time, two of one terminal, 20 s each, on connections of their own; a full queue of samples is counted as lost | the queue empties |
 //! | line: cable, port | its values become bad, the port is opened again with backoff; a line alarm | answers come |

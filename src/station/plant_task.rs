@@ -195,13 +195,13 @@ impl PlantTask {
         if self.saving.is_some() {
             match timeout(FILES_MAX, saved(&mut self.saving)).await {
                 Ok(saved) => self.on_saved(saved),
-                Err(_) => tracing::error!("the disk of the plant file does not answer: left behind"),
+                Err(_) => tracing::error!("the disk of the plant file does not respond: task abandoned"),
             }
         }
         if self.filing.is_some() {
             match timeout(FILES_MAX, filed(&mut self.filing)).await {
                 Ok(done) => self.on_filed(done),
-                Err(_) => tracing::error!("the folder of the parameter sets does not answer: left behind"),
+                Err(_) => tracing::error!("the folder of the parameter sets does not respond: task abandoned"),
             }
         }
         let ended = self.plant.on_stop();
@@ -231,7 +231,7 @@ impl PlantTask {
             audit.compare(chain_hashes);
         }
         if !steps.is_empty() {
-            tracing::info!(steps = steps.len(), "the state of the alarms is taken from the journal");
+            tracing::info!(steps = steps.len(), "the alarm state is restored from the journal");
             self.plant.restore(&steps);
             self.record(Vec::new(), steps);
         }

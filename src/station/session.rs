@@ -69,6 +69,6 @@ impl Session {
     pub async fn request(&self, request: SessionRequest) -> Result<Durability, String> {
         let (reply, answer) = oneshot::channel();
         self.send(Request::SessionRequest(request, reply))?;
-        answer.await.unwrap_or_else(|_| Err("the station has ended".to_owned()))
+        answer.await.unwrap_or_else(|_| Err("the station has stopped".to_owned()))
     }
 }

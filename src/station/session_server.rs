@@ -95,7 +95,7 @@ impl SessionAcceptor {
         let terminal = self.terminals.fetch_add(1, Ordering::Relaxed) + 1;
         let (status_sender, status) = watch::channel(Arc::new(SessionStatus::default()));
         if let Err(error) = self.attach_requests.try_send(AttachRequest { terminal, peer, status: status_sender }) {
-            tracing::error!(%error, "a terminal was not let in");
+            tracing::error!(%error, "a terminal was refused");
         }
         let (snapshots, requests) = (self.snapshots.clone(), self.requests.clone());
         Session { snapshots, status, requests, terminal }
@@ -267,7 +267,7 @@ impl SessionServer {
                 }
                 Effect::HangUp(terminal, why) => {
                     // The audit log holds it, in bounded rate; attempts without end must not fill this one.
-                    tracing::debug!(terminal, why, "a terminal was sent away");
+                    tracing::debug!(terminal, why, "a terminal was disconnected");
                     if let Some(end) = self.terminals.remove(&terminal) {
                         end.send_replace(Arc::new(SessionStatus {
                             gone: Some(why.into()),

@@ -47,7 +47,7 @@ pub(super) async fn run(
             backoff.reset();
         }
         let retry_at = clock.now() + backoff.fail().mul_f64(clock.speed());
-        tracing::error!(line = def.line(line).name, "the task of a line has panicked and is started again");
+        tracing::error!(line = def.line(line).name, "a line task has panicked and is restarted");
         let state = LineState::Waiting { why: "internal error, see the log".to_owned(), retry_at };
         let words = format!("line {} was started again; see the log", def.line(line).name);
         let (fault, occurred) = (StationFault::LineTask, FaultState::Occurred(words.into()));

@@ -118,8 +118,8 @@ async fn a_damaged_users_file_closes_only_the_login() {
     std::fs::write(&users, &good[..good.len() / 2]).unwrap();
     let (alarmed, login, first) = without_users(&history).await;
     assert!(alarmed, "polling and alarms go on");
-    assert!(login.is_err_and(|why| why.starts_with("login is closed: ")), "a damaged file is not an empty one");
-    assert!(first.is_err_and(|why| why.starts_with("login is closed: ")), "and no first Supervisor is made");
+    assert!(login.is_err_and(|why| why.starts_with("login is disabled: ")), "a damaged file is not an empty one");
+    assert!(first.is_err_and(|why| why.starts_with("login is disabled: ")), "and no first Supervisor is made");
     assert_eq!(std::fs::read(&users).unwrap(), good[..good.len() / 2], "it is left as it is");
     std::fs::remove_file(&users).unwrap();
     let (alarmed, login, first) = without_users(&history).await;

@@ -127,7 +127,7 @@ fn too_small(model: &Model, cx: &ViewContext, frame: &mut Frame) {
         Some(Modal::Confirm(confirm)) if confirm.is_quit() => {
             let y = if area.height > 2 { 2 } else { area.height.saturating_sub(1) };
             canvas.run(0, y, area.width, ' ', cx.theme.normal());
-            canvas.text(0, y, &cx.theme.enter(t!("Quit? ⏎ quit  Esc stay")), cx.theme.strong());
+            canvas.text(0, y, &cx.theme.enter(t!("Quit? ⏎ quit  Esc cancel")), cx.theme.strong());
         }
         Some(_) | None => {
             canvas.text(0, 2, t!("q quit"), cx.theme.dim());
@@ -200,11 +200,11 @@ pub fn pending_label(cx: &ViewContext, pending: &PendingCommand) -> (String, Sty
     };
     let (words, trouble) = match (&status.command.kind, &status.outcome) {
         // The line has taken it; what comes of it stands on the bus tab.
-        (CommandKind::Test(..), Outcome::Verified) => (t!("begun").to_owned(), false),
+        (CommandKind::Test(..), Outcome::Verified) => (t!("started").to_owned(), false),
         (CommandKind::StopTest(_), Outcome::Verified) => (t!("done").to_owned(), false),
         // Whether they are the right ones only the devices can tell.
         (CommandKind::Configure(_), Outcome::Verified) => (t!("in use").to_owned(), false),
-        (CommandKind::SaveSettings(_), Outcome::Verified) => (t!("written into the plant file").to_owned(), false),
+        (CommandKind::SaveSettings(_), Outcome::Verified) => (t!("saved to plant file").to_owned(), false),
         // The line has been asked to; only the device tells whether it answers.
         (CommandKind::Refresh(_), Outcome::Verified) => (t!("requested").to_owned(), false),
         // Nothing was written that could be read back.

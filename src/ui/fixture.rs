@@ -232,9 +232,9 @@ fn start(tag: &str) -> f64 {
 /// `tech1`, who may do everything.
 pub fn session() -> Arc<crate::access::SessionStatus> {
     use crate::{
-        access::{SessionStatus, Who},
+        access::{LoggedInUser, SessionStatus},
         plant::role::Role,
     };
-    let who = Who { user: "tech1".into(), role: Role::Supervisor, must_change: false };
+    let who = LoggedInUser { user: "tech1".into(), role: Role::Supervisor, must_change: false };
     Arc::new(SessionStatus { who: Some(who), view: true, password_chars_min: 15, ..SessionStatus::default() })
 }

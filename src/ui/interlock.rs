@@ -49,12 +49,12 @@ pub fn is_refused(cx: &ViewContext, tag: TagId, value: f64) -> bool {
 /// All there is to say before a value is written, with its look.
 pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, Style)> {
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
-    let gone = gone.map(|why| (t!("! Nothing can be written now. {why}", why), cx.theme.trouble()));
+    let gone = gone.map(|why| (t!("! Writing is not possible now. {why}", why), cx.theme.trouble()));
     let locks =
         cx.def().logic.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_text(cx, lock));
     let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
-        rows.push((t!("This is not sent: it would have no effect.").to_owned(), cx.theme.strong()));
+        rows.push((t!("Not sent: it would have no effect.").to_owned(), cx.theme.strong()));
     }
     if let Some(words) = unmet_text(cx, tag) {
         rows.push((format!("! {words}"), cx.theme.strong()));
@@ -72,7 +72,7 @@ pub fn key_text(cx: &ViewContext, tag: TagId) -> Option<String> {
         return None;
     }
     Some(t!(
-        "First {name} := {format}; it stays so.",
+        "First writes {name} := {format}; it keeps this value.",
         name = cx.def().tag(key).name,
         format = cx.snapshot.format(key, turned)
     ))
@@ -85,7 +85,7 @@ pub fn interlock_text(cx: &ViewContext, lock: &InterlockDef) -> Option<(String, 
     match (lock.status(cx.snapshot.sample(lock.of)), lock.when) {
         (InterlockStatus::Free, _) => None,
         (InterlockStatus::Blocked, InterlockCondition::Bit(_)) => {
-            Some((t!("{mark} {message}: {name} says so", mark, message = lock.message, name), cx.theme.strong()))
+            Some((t!("{mark} {message}: bit set in {name}", mark, message = lock.message, name), cx.theme.strong()))
         }
         (
             InterlockStatus::Blocked,
@@ -117,7 +117,7 @@ pub fn unmet_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     let (need, state) = unmet(cx, actuator)?;
     let now = match cx.snapshot.sample(need).good_value() {
         Some(now) => t!("is {format}", format = cx.snapshot.format(need, now)),
-        None => t!("is not known").to_owned(),
+        None => t!("is unknown").to_owned(),
     };
     Some(t!(
         "effective in {format} only ({name} {now})",
@@ -132,9 +132,9 @@ fn sequence_text(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let sequences = &cx.def().logic.sequences;
     if let Some(sequence) = sequences.iter().find(|sequence| sequence.auto == Some((tag, value))) {
         return vec![match (value::is_on(cx, sequence.run), cx.snapshot.text(sequence.step)) {
-            (Some(true), Some(step)) => t!("The sequence goes on with {step} and works the outputs.", step),
-            (Some(false), _) => t!("The sequence works the outputs once it is started.").to_owned(),
-            (Some(true) | None, _) => t!("The sequence works the outputs; where it is, is not known.").to_owned(),
+            (Some(true), Some(step)) => t!("The sequence continues with {step} and controls the outputs.", step),
+            (Some(false), _) => t!("The sequence controls the outputs once it is started.").to_owned(),
+            (Some(true) | None, _) => t!("The sequence controls the outputs; its step is unknown.").to_owned(),
         }];
     }
     let Some(sequence) = sequences.iter().find(|sequence| sequence.run == tag) else { return Vec::new() };
@@ -150,16 +150,16 @@ fn sequence_text(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let by_itself = sequence.auto.map(|(auto, state)| (cx.snapshot.sample(auto).good_value(), state, auto));
     match by_itself {
         Some((Some(now), state, _)) if now != state => {
-            vec![t!("In manual no step starts: the commands by hand act from now on.").to_owned()]
+            vec![t!("In MANUAL no step starts: manual commands act from now on.").to_owned()]
         }
         Some((None, _, auto)) => {
-            vec![t!("Whether steps start is not known: {name} is not known.", name = cx.def().tag(auto).name)]
+            vec![t!("Unknown whether steps start: {name} is unknown.", name = cx.def().tag(auto).name)]
         }
         Some(_) | None => vec![t!("The sequence starts with {step}.", step = step(sequence.first))],
     }
 }
 
-/// `Off go: pump RUN, fill valve OPEN.`
+/// `Switched off: pump RUN, fill valve OPEN.`
 fn switched_off(cx: &ViewContext) -> String {
     let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output);
     let (mut on, mut unknown) = (Vec::new(), Vec::new());
@@ -171,11 +171,14 @@ fn switched_off(cx: &ViewContext) -> String {
             None => unknown.push(def.short.clone()),
         }
     }
-    let mut words =
-        if on.is_empty() { t!("No output is on.").to_owned() } else { t!("Off go: {join}.", join = on.join(", ")) };
+    let mut words = if on.is_empty() {
+        t!("No output is on.").to_owned()
+    } else {
+        t!("Switched off: {join}.", join = on.join(", "))
+    };
     if !unknown.is_empty() {
         words = t!(
-            "{replace} Not known: {join}.",
+            "{replace} Unknown: {join}.",
             replace = words.replace("No output is on.", "No output is known to be on."),
             join = unknown.join(", ")
         );
@@ -183,7 +186,7 @@ fn switched_off(cx: &ViewContext) -> String {
     words
 }
 
-/// What the commands by hand will change at once when this value lets them act.
+/// What the manual commands will change at once when this value lets them act.
 fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let sample = |tag: TagId| cx.snapshot.sample(tag).good_value();
     let acts = |actuator: &&ActuatorDef| {
@@ -212,9 +215,9 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
         }
     }
     vec![if changes.is_empty() {
-        t!("The commands by hand take over; no output changes.").to_owned()
+        t!("Manual commands take over; no output changes.").to_owned()
     } else {
-        t!("The commands by hand take over: {join}.", join = changes.join(", "))
+        t!("Manual commands take over: {join}.", join = changes.join(", "))
     }]
 }
 
@@ -263,7 +266,7 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
         Some((outcome, Some(true))) if obeys(cx, actuator) => {
             let word = match outcome {
                 Outcome::NotConfirmed(_) => t!("accepted"),
-                Outcome::Unchanged => t!("as it was"),
+                Outcome::Unchanged => t!("unchanged"),
                 _ => t!("done"),
             };
             return Some((format!("{} {word}", theme.pick("✓", t!("ok"))), theme.normal()));
@@ -292,7 +295,7 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     match unmet_text(cx, actuator.command) {
         Some(words) => rows.push((t!("mode"), format!("{mode}: {words}"), theme.strong())),
         None if modes.is_empty() => {}
-        None => rows.push((t!("mode"), t!("{mode}: the command acts", mode), theme.normal())),
+        None => rows.push((t!("mode"), t!("{mode}: command effective", mode), theme.normal())),
     }
     let locks = logic.interlocks.iter().filter(|lock| lock.tag == actuator.command);
     rows.extend(locks.filter_map(|lock| interlock_text(cx, lock)).map(|(words, style)| (t!("blocked"), words, style)));

@@ -73,13 +73,13 @@ impl Options {
 #[derive(Debug, thiserror::Error)]
 pub enum UiError {
     /// Standard input or output is no terminal, or a dumb one.
-    #[error("no terminal here: run in a terminal, or use --headless to run without screens")]
+    #[error("no terminal: run in a terminal, or use --headless to run without screens")]
     NotATerminal,
     /// The terminal has gone or does not take what it is sent.
-    #[error("the terminal has gone: {0}")]
+    #[error("the terminal is closed: {0}")]
     Lost(#[from] io::Error),
     /// No snapshot will come any more.
-    #[error("the station has ended")]
+    #[error("the station has stopped")]
     StationGone,
 }
 
@@ -230,7 +230,9 @@ impl Loop {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         let waiting = tokio::spawn(async move {
             let answer = match sent {
-                Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
+                Ok(()) => {
+                    answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the history is closed".to_owned())))
+                }
                 Err(_) => Err(HistoryError::Engine("too busy, repeated later".to_owned())),
             };
             // A terminal that has left needs no answer.

@@ -179,12 +179,12 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(code(KeyCode::BackTab), "", "previous tab", Global::Previous),
     Key::new(char('a'), "", "acknowledge the selected or most urgent alarm", Global::Acknowledge),
     Key::new(char('A'), "", "acknowledge all alarms (asks first)", Global::AcknowledgeAll),
-    Key::new(code(KeyCode::Esc), "", "close a window; take a failure off the screen; a page back", Global::Dismiss),
-    Key::new(ctrl('k'), "", "lock this terminal; works in every window too", Global::Lock),
-    Key::new(ctrl('s'), "", "silence what sounds now; nothing is acknowledged", Global::Silence),
+    Key::new(code(KeyCode::Esc), "", "close a window; dismiss a message; previous page", Global::Dismiss),
+    Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
+    Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
     Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
     Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),
-    Key::new(char('q'), "quit", "quit (asks first, and says what stops with it)", Global::Quit),
+    Key::new(char('q'), "quit", "quit (asks first, and lists what stops)", Global::Quit),
     Key::new(char('?'), "help", "all keys", Global::Help),
 ];
 

@@ -50,7 +50,7 @@ impl Model {
     pub(super) fn send_command(&mut self, command: Command, credentials: Option<Credentials>) -> Option<Effect> {
         self.commands_sent = self.commands_sent.wrapping_add(1);
         let id = CommandId { terminal: self.terminal, number: self.commands_sent };
-        let undelivered = self.session.gone.as_ref().map(|_| Arc::from(t!("the station has gone")));
+        let undelivered = self.session.gone.as_ref().map(|_| Arc::from(t!("the station is disconnected")));
         let changed_at = self.clock.phase;
         let expected_value = command.expected_value.or_else(|| self.snapshot.expected_value(&command.kind));
         let command = Command { id, run: self.snapshot.run, expected_value, ..command };

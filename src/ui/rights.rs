@@ -21,7 +21,7 @@ pub fn words(role: Role) -> &'static str {
     match role {
         Role::Viewer => t!("view everything: process, curves, alarms, reports"),
         Role::Technician => t!("view everything, control the process, acknowledge alarms, write reports"),
-        Role::Supervisor => t!("do everything: also users, the audit list, line settings, tests, stopping the station"),
+        Role::Supervisor => t!("do everything: also users, audit log, line settings, tests, stopping the station"),
     }
 }
 

@@ -247,8 +247,7 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     model.plants = model.plants.wrapping_add(1);
     let words = vec![
         t!("The plant file changed").to_owned(),
-        t!("The station has taken up another plant file. What was open here is closed; nothing of it was sent.")
-            .to_owned(),
+        t!("The station has loaded another plant file. Open windows were closed; nothing was sent.").to_owned(),
     ];
     with_tabs(model, |tabs, cx| {
         tabs.login.on_session_status(cx);

@@ -115,7 +115,7 @@ impl Theme {
     pub fn running(&self) -> Style {
         self.strong()
     }
-    /// A set value, marked on bars and curves.
+    /// A setpoint, marked on bars and curves.
     pub fn set_value(&self) -> Style {
         self.fg((150, 170, 190), 110, Color::Cyan)
     }

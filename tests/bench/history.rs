@@ -21,7 +21,7 @@ use sightglass::{
     report::Period,
 };
 
-/// Tags of the tank: temperatures and outputs that change, set values and switches that rarely do.
+/// Tags of the tank: temperatures and outputs that change, setpoints and switches that rarely do.
 const CHANGING: u16 = 8;
 const TAGS: u16 = 24;
 const WEEK: i64 = 7 * 86_400;

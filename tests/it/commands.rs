@@ -132,7 +132,7 @@ fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
     let shift = ["alarms", "tank", "--stats", "--history", history, "--shift", "morning@2026-03-02"];
     let (code, out, err) = run(&shift);
     assert_eq!(code, Some(0), "{err}");
-    for words in ["3 alarms", "alarms a day", "at most 150", "chattering", "temperature high", "too few"] {
+    for words in ["3 alarms", "alarms per day", "at most 150", "chattering", "temperature high", "insufficient data"] {
         assert!(out.contains(words), "no `{words}` in:\n{out}");
     }
     let (code, out, err) = run(&[&shift[..], &["--json"]].concat());
@@ -168,7 +168,7 @@ fn a_frame_is_told_in_words() {
     let (code, _, err) = run(&["frame", "01"]);
     assert_eq!((code, err.as_str()), (Some(2), "sightglass: `frame` is now `decode`\n"));
     let (code, _, err) = run(&["decode", "01 0G"]);
-    assert!(code == Some(2) && err.contains("position 5: `G` is no hex digit"), "{err}");
+    assert!(code == Some(2) && err.contains("position 5: `G` is not a hex digit"), "{err}");
 }
 
 /// Two good lines and a bad one between them: all are told, and scripts see that one was bad.
@@ -186,7 +186,7 @@ fn frames_of_a_log_come_from_standard_input() {
     let Output { status, stdout, stderr } = child.wait_with_output().unwrap();
     let (out, err) = (String::from_utf8(stdout).unwrap(), String::from_utf8(stderr).unwrap());
     assert_eq!(status.code(), Some(2), "{out}{err}");
-    assert!(err.contains("line 2: position 1: `h` is no hex digit") && err.contains("1 of 3 lines"), "{err}");
+    assert!(err.contains("line 2: position 1: `h` is not a hex digit") && err.contains("1 of 3 lines"), "{err}");
     // The answer has the addresses of the request before it.
     assert!(out.contains("41004 / 0x03EB") && out.contains("65534 or -2"), "{out}");
     assert!(out.lines().all(|line| line.chars().count() <= 80), "{out}");

@@ -108,7 +108,7 @@ fn a_mute_line_is_not_a_missing_one() {
             .env("XDG_STATE_HOME", folder.path()),
     );
     station.wait_for("line L1: connected");
-    station.wait_for("TIC-1 (unit 1): not answering");
+    station.wait_for("TIC-1 (unit 1): not responding");
     station.wait_for("RAISED: TIC-1");
     station.signal("INT");
     assert_eq!(station.end(), Some(0));

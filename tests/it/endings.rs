@@ -127,12 +127,12 @@ fn a_terminal_says_that_its_station_was_killed_or_stopped_and_comes_back_when_it
             let stopped = place.run(&["stop"]);
             assert!(stopped.status.success(), "{}", String::from_utf8_lossy(&stopped.stderr));
         }
-        terminal.wait_for("STATION GONE");
+        terminal.wait_for("STATION LOST");
         println!("attached, station gone (killed: {kill}): said after {} ms", started.elapsed().as_millis());
         assert_eq!(station.end(), if kill { None } else { Some(0) });
         station = place.station();
         let again = Instant::now();
-        terminal.wait_gone("STATION GONE");
+        terminal.wait_gone("STATION LOST");
         println!("attached, station started again: back after {} ms", again.elapsed().as_millis());
         terminal.keys("4");
         terminal.wait_for("FUJI");
@@ -141,7 +141,7 @@ fn a_terminal_says_that_its_station_was_killed_or_stopped_and_comes_back_when_it
     }
     // Without its station it can be left as well.
     station.signal("KILL");
-    terminal.wait_for("STATION GONE");
+    terminal.wait_for("STATION LOST");
     let (code, took) = end(&mut terminal, Way::Key("q"));
     println!("attached, station gone, q: exit {code} after {} ms", took.as_millis());
     assert_eq!(code, 0);

@@ -55,11 +55,11 @@ use crate::{
 
 /// Rounds, unless `SIGHTGLASS_KILLS` says how many.
 const ROUNDS: u64 = 10;
-/// Set values are written in turn below and above the limit of [`ALARM`], in tenths of a degree, within so many tenths.
+/// Setpoints are written in turn below and above the limit of [`ALARM`], in tenths of a degree, within so many tenths.
 const VALUES: [u64; 2] = [500, 610];
 const SPREAD: u64 = 90;
 /// An alarm that half of the writes raise.
-const ALARM: &str = "set value above 60";
+const ALARM: &str = "setpoint above 60";
 const ALARM_TOML: &str = r#"
 [[alarm]]
 tag = "TIC-1.SV"
@@ -67,7 +67,7 @@ high = 60.0
 deadband = 0.1
 on_delay = "0s"
 priority = "low"
-message = "set value above 60"
+message = "setpoint above 60"
 cause = "a write of this test"
 effect = "none"
 action = "acknowledge"

@@ -138,10 +138,10 @@ fn a_faulty_answer_is_never_shown_as_a_value() {
     let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY, CUT], "rtu", cable.ends[0].to_str().unwrap());
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
     for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
-        check(&said, &[(tag, "---- bad: device not answering")]);
+        check(&said, &[(tag, "---- bad: device not responding")]);
     }
     for (unit, why) in
-        [("LATE", "no answer in time"), ("CORRUPT", "CRC error"), ("SILENT", "no answer in time"), ("CUT", "cut short")]
+        [("LATE", "response timeout"), ("CORRUPT", "CRC error"), ("SILENT", "response timeout"), ("CUT", "cut short")]
     {
         assert!(said.iter().any(|line| line.contains(unit) && line.contains(why)), "{unit} {why}: {}", said.join("\n"));
     }
@@ -157,7 +157,7 @@ fn a_faulty_answer_in_ascii_is_never_shown_as_a_value() {
     let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY, CUT], "ascii", cable.ends[0].to_str().unwrap());
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
     for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
-        check(&said, &[(tag, "---- bad: device not answering")]);
+        check(&said, &[(tag, "---- bad: device not responding")]);
     }
     assert!(said.iter().any(|line| line.contains("CORRUPT") && line.contains("LRC error")), "{}", said.join("\n"));
 }
@@ -171,7 +171,7 @@ fn a_faulty_answer_in_rtu_over_tcp_is_never_shown_as_a_value() {
     let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY, CUT], "rtu-over-tcp", &place);
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
     for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
-        check(&said, &[(tag, "---- bad: device not answering")]);
+        check(&said, &[(tag, "---- bad: device not responding")]);
     }
 }
 
@@ -227,7 +227,7 @@ fn a_faulty_answer_over_tcp_is_never_shown_as_a_value() {
     let _slave = slave(&python, "tcp", &port.to_string());
     let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, NOISY], "tcp", &format!("127.0.0.1:{port}"));
     check(&said, &[("WELL.N", "10 good"), ("NOISY.N", "510 good")]);
-    check(&said, &[("CORRUPT.N", "---- bad: device not answering"), ("SILENT.N", "---- bad: device not answering")]);
+    check(&said, &[("CORRUPT.N", "---- bad: device not responding"), ("SILENT.N", "---- bad: device not responding")]);
 }
 
 /// Its registers hold their address, so the ones from 16706 (0x4142) on read as `ABAC…`, two characters each.

@@ -103,13 +103,13 @@ fn of_command(kind: &CommandKind) -> Row {
 
 fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
     let (alarm, device, line) = (AlarmId(0), DeviceId(0), LineId(0));
-    let seen = Timestamp::UNIX_EPOCH;
+    let at = Timestamp::UNIX_EPOCH;
     let scan = |serials| Diagnostic::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
     let set = ParameterSet {
         name: "none".into(),
         device: "another".into(),
         profile: "another".into(),
-        saved: seen,
+        saved: at,
         by: "tom".into(),
         given: Vec::new(),
         values: Vec::new(),
@@ -119,8 +119,8 @@ fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
     let (from, changes) = ("none".into(), Vec::new());
     vec![
         CommandKind::Write { tag: def.tag_named("TIC-1.SV").unwrap(), value: 60.0 + person as f64 },
-        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, seen }),
-        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen: Arc::from([(alarm, seen)]) }),
+        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, annunciated_at: at }),
+        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Arc::from([(alarm, at)]) }),
         CommandKind::Alarm(AlarmCommand::Silence),
         CommandKind::Alarm(AlarmCommand::Reset(alarm)),
         CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: Duration::from_secs(60) }),
@@ -229,7 +229,7 @@ fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
             ("unlock terminal", ["not locked", "not locked", "not locked", "not locked", DONE, "not locked"])
         }
         SessionRequest::Active => ("", [DONE; 6]),
-        SessionRequest::FirstSupervisor { .. } => ("add user", ["users exist already"; 6]),
+        SessionRequest::FirstSupervisor { .. } => ("add user", ["users already exist"; 6]),
         SessionRequest::ChangePassword { .. } => ("change password", ["log in", SHORT, SHORT, SHORT, "unlock", SHORT]),
         SessionRequest::AddUser { .. } => ("add user", SUPERVISOR),
         SessionRequest::SetRole { .. } => ("set role", SUPERVISOR),

@@ -1,4 +1,4 @@
-//! A whole shift in virtual time: the real station on the simulated plant, an alarm, a changed set value, and a report
+//! A whole shift in virtual time: the real station on the simulated plant, an alarm, a changed setpoint, and a report
 //! that an independent reader checks.
 
 use std::{path::Path, process::Command, sync::Arc, time::Duration};

@@ -43,7 +43,7 @@ impl AccessControl {
         let number = command.id.number;
         if session.last_command.is_some_and(|last| number <= last) {
             // Its outcome would be taken for that of the command that had the number first.
-            return self.undelivered(command.id, "this command has the number of an earlier one, give it again");
+            return self.undelivered(command.id, "this command repeats an earlier number: send it again");
         }
         session.last_command = Some(number);
         if !session.locked {

@@ -17,7 +17,7 @@ const JOBS_KEPT: usize = 8;
 /// The reply when there are more.
 pub(super) const BUSY: &str = "the station is busy with other logins, try again";
 /// The reply when a password was right, but the session or the stored hash has changed since.
-const CHANGED: &str = "the login here or the password was changed meanwhile, try again";
+const CHANGED: &str = "the login or the password has changed in the meantime, try again";
 
 /// Number of a password job.
 pub type JobId = u64;

@@ -11,10 +11,10 @@ use super::{
     passed,
     session_status::LOCK_NEAR,
 };
-use crate::access::{Secret, Who, user};
+use crate::access::{LoggedInUser, Secret, user};
 
 const NO_LOGIN: &str = "this station does not require login";
-const NO_PASSWORD: &str = "the operating system says who you are here, there is no password to ask for";
+const NO_PASSWORD: &str = "the operating system identifies you here; no password is needed";
 
 impl AccessControl {
     pub(super) fn login(&mut self, asker: Asker, user: &str, password: Secret, at: Timestamp) -> Vec<Effect> {
@@ -45,14 +45,14 @@ impl AccessControl {
             return Vec::new();
         }
         let mut effects = self.log_out(asker.terminal, "done: another user logs in", at);
-        let who = Who { user: user.name.clone(), role: user.role, must_change: user.must_change };
+        let who = LoggedInUser { user: user.name.clone(), role: user.role, must_change: user.must_change };
         effects.extend(self.log_in(asker.terminal, who, at));
         effects.push(asker.done());
         effects
     }
 
     /// Starts a login session.
-    pub(super) fn log_in(&mut self, terminal: u32, who: Who, at: Timestamp) -> Vec<Effect> {
+    pub(super) fn log_in(&mut self, terminal: u32, who: LoggedInUser, at: Timestamp) -> Vec<Effect> {
         let utc = self.utc(at);
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let name = who.user.clone();
@@ -113,7 +113,7 @@ impl AccessControl {
                 self.publish_status(asker.terminal, &mut effects);
                 effects
             }
-            Some(session) if session.locked => asker.refused("this terminal is locked already"),
+            Some(session) if session.locked => asker.refused("this terminal is already locked"),
             Some(_) | None => asker.refused(LOG_IN_FIRST),
         }
     }

@@ -41,7 +41,7 @@ impl AccessControl {
                 Some("this tag requires your own password")
             }
             (Reauthentication::Password, Some(_)) if session.trusted => {
-                Some("this tag requires a password, and you have none here")
+                Some("this tag requires a password, and your account has none")
             }
             (Reauthentication::SecondUser, None | Some(Credentials { user: None, .. })) => {
                 Some("this tag requires a second user")

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{Peer, passed};
 use crate::{
-    access::{RateLimit, Who},
+    access::{LoggedInUser, RateLimit},
     plant::command::CommandId,
 };
 
@@ -28,7 +28,7 @@ pub struct SessionState {
     /// Since when.
     pub since: Timestamp,
     /// The logged-in user.
-    pub who: Option<Who>,
+    pub who: Option<LoggedInUser>,
     /// Goes up with each login and logout here.
     pub login_number: u64,
     /// Known by the operating system, without a password.
@@ -69,7 +69,7 @@ impl SessionState {
     }
 
     /// The user, unless the terminal is locked.
-    pub fn acting(&self) -> Option<&Who> {
+    pub fn acting(&self) -> Option<&LoggedInUser> {
         self.who.as_ref().filter(|_| !self.locked)
     }
 
@@ -82,7 +82,7 @@ impl SessionState {
     }
 
     /// A user has logged in.
-    pub fn enter(&mut self, who: Who, at: Timestamp) {
+    pub fn enter(&mut self, who: LoggedInUser, at: Timestamp) {
         (self.who, self.locked, self.trusted, self.active) = (Some(who), false, false, at);
         self.login_number += 1;
     }

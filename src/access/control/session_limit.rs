@@ -49,7 +49,7 @@ impl AccessControl {
             return Err(format!("{there} terminals{whose} are attached, no more may be"));
         };
         let mut effects = self.close(longest, at);
-        let why = "closed: no login here for a long time, and another terminal needed the session".to_owned();
+        let why = "closed: no login for a long time, and another terminal needed the session".to_owned();
         effects.push(Effect::HangUp(longest, why));
         Ok(effects)
     }

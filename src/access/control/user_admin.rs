@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     access::{
-        Secret, SessionRequest, Users, Who,
+        LoggedInUser, Secret, SessionRequest, Users,
         audit_log::USERS_FILE,
         password,
         user::{self, Change},
@@ -81,7 +81,7 @@ impl AccessControl {
             return Err("only the user who started the station creates the first Supervisor".to_owned());
         }
         if self.users.as_ref().is_none_or(|users| !users.is_empty()) {
-            return Err("users exist already".to_owned());
+            return Err("users already exist".to_owned());
         }
         self.new_password(asker, password, Change::First { user, hash: NO_HASH.into() })
     }
@@ -89,12 +89,12 @@ impl AccessControl {
     fn change_own(&mut self, asker: Asker, old: Secret, new: Secret, at: Timestamp) -> Result<Vec<Effect>, String> {
         let session = self.session(asker.terminal)?;
         if session.trusted {
-            return Err("the operating system says who you are here, there is no password to change".to_owned());
+            return Err("the operating system identifies you here; there is no password to change".to_owned());
         }
         let user = session.acting().ok_or("log in, or unlock this terminal, first")?.user.clone();
         password::check(&new.0, &user, self.def.access.password_chars_min)?;
         if password::one_form(&new.0) == password::one_form(&old.0) {
-            return Err("this is the present password, choose another one".to_owned());
+            return Err("this is the current password, choose another one".to_owned());
         }
         self.verify_password(asker.terminal, &user.clone(), old, JobPurpose::Change { asker, user, new }, at)
     }
@@ -242,16 +242,16 @@ impl AccessControl {
         }
         match change {
             Change::First { user, .. } => {
-                let who = Who { user: user.clone(), role: Role::Supervisor, must_change: false };
+                let who = LoggedInUser { user: user.clone(), role: Role::Supervisor, must_change: false };
                 self.log_in(terminal, who, at)
             }
             Change::Add { .. } | Change::Disable(_, false) => Vec::new(),
-            Change::Role(..) => self.log_out_everywhere(name, None, "done: has another role now", at),
-            Change::Disable(_, true) => self.log_out_everywhere(name, None, "done: was disabled", at),
-            Change::Delete(_) => self.log_out_everywhere(name, None, "done: was deleted", at),
+            Change::Role(..) => self.log_out_everywhere(name, None, "done: role changed", at),
+            Change::Disable(_, true) => self.log_out_everywhere(name, None, "done: user disabled", at),
+            Change::Delete(_) => self.log_out_everywhere(name, None, "done: user deleted", at),
             Change::Password { must_change, .. } => {
                 let own = (!must_change).then_some(terminal);
-                let effects = self.log_out_everywhere(name, own, "done: has another password now", at);
+                let effects = self.log_out_everywhere(name, own, "done: password changed", at);
                 let session = own.and_then(|own| self.sessions.get_mut(&own));
                 if let Some(who) = session.and_then(|session| session.who.as_mut()) {
                     who.must_change = false;

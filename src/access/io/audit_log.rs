@@ -238,7 +238,7 @@ impl AuditLog {
         }
         // The records are on disk; a note that is behind is no reason to write them twice.
         if let Err(error) = self.note(last) {
-            tracing::warn!(%error, "the last entry of the audit log could not be noted");
+            tracing::warn!(%error, "the last entry of the audit log could not be recorded");
         }
         Ok(())
     }
@@ -252,7 +252,7 @@ impl AuditLog {
 fn own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     let file = options.mode(0o600).custom_flags(rustix::fs::OFlags::NOFOLLOW.bits() as i32).open(path)?;
     if !file.metadata()?.is_file() {
-        return Err(io::Error::other("it is no file"));
+        return Err(io::Error::other("not a file"));
     }
     Ok(file)
 }

@@ -36,8 +36,8 @@ pub fn random<const BYTES: usize>() -> Result<[u8; BYTES], String> {
     let filled = rustix::rand::getrandom(&mut random, rustix::rand::GetRandomFlags::empty());
     match filled {
         Ok(bytes) if bytes == BYTES => Ok(random),
-        Ok(_) => Err("the system gives no random numbers".to_owned()),
-        Err(error) => Err(format!("the system gives no random numbers: {error}")),
+        Ok(_) => Err("the system provides no random numbers".to_owned()),
+        Err(error) => Err(format!("the system provides no random numbers: {error}")),
     }
 }
 

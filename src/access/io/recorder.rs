@@ -198,7 +198,10 @@ impl Recorder {
         // The last chance of what could not be written until now.
         self.write();
         if !self.pending.is_empty() {
-            tracing::error!(actions = self.pending.len(), "the station ends, and these are not in the audit log");
+            tracing::error!(
+                actions = self.pending.len(),
+                "the station stops, and these entries are not in the audit log"
+            );
         }
         self.seal(self.clock.utc());
         status.send_replace(self.status());

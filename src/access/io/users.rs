@@ -31,7 +31,7 @@ pub enum UsersError {
         why: String,
     },
     /// It says something that cannot be.
-    #[error("{path}:{line}:{column}: {why}; login is closed until the file is repaired or restored from a backup")]
+    #[error("{path}:{line}:{column}: {why}; login is disabled until the file is repaired or restored from a backup")]
     Wrong {
         /// The file.
         path: String,
@@ -52,7 +52,7 @@ pub fn read(path: &Path) -> Result<Users, UsersError> {
         file => file.map_err(|error| unreadable(error.to_string()))?,
     };
     if !file.metadata().map_err(|error| unreadable(error.to_string()))?.is_file() {
-        return Err(unreadable("it is no file".to_owned()));
+        return Err(unreadable("not a file".to_owned()));
     }
     let mut bytes = Vec::new();
     file.take(BYTES_MAX + 1).read_to_end(&mut bytes).map_err(|error| unreadable(error.to_string()))?;
@@ -110,9 +110,9 @@ fn parse(text: &str) -> Result<Users, (usize, String)> {
         let row = row.into_inner();
         user::check_name(row.name.get_ref()).map_err(|why| (row.name.span().start, why))?;
         let checked = password::check_hash(row.password.get_ref());
-        checked.map_err(|expected| (row.password.span().start, format!("this is no hash, {expected}")))?;
+        checked.map_err(|expected| (row.password.span().start, format!("not a hash, {expected}")))?;
         let last_login = row.last_login.map(|time| {
-            let wrong = (time.span().start, "found no time, expected one as 2026-05-01T12:00:00Z".to_owned());
+            let wrong = (time.span().start, "not a time, expected for example 2026-05-01T12:00:00Z".to_owned());
             time.get_ref().parse().map_err(|_| wrong)
         });
         users.push(User {
@@ -180,9 +180,9 @@ mod tests {
             (HEAD.to_owned(), (1, 1), "no user found"),
             (good[..good.len() / 2].to_owned(), (6, 101), "expected"),
             (good.replace("\"supervisor\"", "\"boss\""), (5, 8), "boss"),
-            (good.replace("\"supervisor\"", "\"viewer\""), (3, 1), "at least one supervisor"),
-            (good.replace("สมชาย", "ANNA"), (9, 1), "there is a user ANNA already"),
-            (good.replacen("argon2id", "md5", 1), (6, 12), "this is no hash"),
+            (good.replace("\"supervisor\"", "\"viewer\""), (3, 1), "at least one enabled supervisor"),
+            (good.replace("สมชาย", "ANNA"), (9, 1), "user ANNA already exists"),
+            (good.replacen("argon2id", "md5", 1), (6, 12), "not a hash"),
             (good.replacen("must_change", "must_chance", 1), (13, 1), "must_chance"),
         ];
         for (text, place, expected) in damaged {

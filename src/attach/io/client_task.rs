@@ -92,7 +92,7 @@ impl ClientTask {
                 None => Disconnected::Left,
             };
             let Disconnected::Gone(why) = end else { return };
-            tracing::warn!(why, "the station has gone");
+            tracing::warn!(why, "the station is disconnected");
             self.status_sender.send_modify(|status| {
                 *status = Arc::new(SessionStatus { gone: Some(why.into()), ..SessionStatus::clone(status) });
             });

@@ -50,13 +50,13 @@ pub enum AttachError {
     #[error("{0}")]
     Refused(String),
     /// It listens, but says nothing.
-    #[error("the station says nothing for {} s", WELCOME_MAX.as_secs())]
+    #[error("no reply from the station for {} s", WELCOME_MAX.as_secs())]
     Silent,
     /// What it says is no welcome, or it has closed.
-    #[error("the station is not understood: {0}")]
+    #[error("malformed message from the station: {0}")]
     Wire(#[from] WireError),
     /// What it says first does not fit together.
-    #[error("the station is not understood: {0}")]
+    #[error("malformed message from the station: {0}")]
     OtherPlant(#[from] OtherPlant),
 }
 

@@ -78,13 +78,13 @@ pub enum ConnectionEnd {
     #[error("{0}")]
     Wire(#[from] WireError),
     /// It does not read.
-    #[error("has taken nothing for {0:?}")]
+    #[error("has received nothing for {0:?}")]
     Stuck(Duration),
     /// It may not stay, or the station has ended.
-    #[error("sent away by the station")]
+    #[error("disconnected by the station")]
     SentAway,
     /// The station has ended.
-    #[error("the station has ended")]
+    #[error("the station has stopped")]
     StationGone,
     /// The station has another plant now.
     #[error("the plant file was reloaded")]
@@ -150,7 +150,9 @@ impl Inbound {
             // The station closes a terminal when all handles of its session are dropped.
             drop(session);
             let answer = match sent {
-                Ok(()) => answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the store has gone".to_owned()))),
+                Ok(()) => {
+                    answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the history is closed".to_owned())))
+                }
                 Err(why) => Err(HistoryError::Engine(why)),
             };
             // The terminal may have gone.
@@ -173,7 +175,7 @@ impl Inbound {
         let replies = self.replies.clone();
         tokio::spawn(async move {
             let answer = match sent {
-                Ok(()) => answer.await.unwrap_or_else(|_| Err("the station has ended".to_owned())),
+                Ok(()) => answer.await.unwrap_or_else(|_| Err("the station has stopped".to_owned())),
                 Err(why) => Err(why),
             };
             // The terminal may have gone.
@@ -202,7 +204,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         match timeout(STATUS_WAIT_MAX, self.session.status.changed()).await {
             Ok(Ok(())) => {}
             Ok(Err(_)) => return Err(ConnectionEnd::SentAway),
-            Err(_) => tracing::warn!(terminal = self.session.terminal, "a terminal got no session status"),
+            Err(_) => tracing::warn!(terminal = self.session.terminal, "no session status for a terminal"),
         }
         let welcome = HandshakeReply { run, terminal: self.session.terminal, def: self.def.clone() };
         let welcome = protocol::encode(&(Handshake::current(), welcome), NEWS_BYTES_MAX);
@@ -334,7 +336,7 @@ mod tests {
         say(&mut far, &query(1)).await;
         let mut query = next_question(&mut requests).await;
         drop(far);
-        assert!(is_cancelled(&mut query).await, "the history still works on it");
+        assert!(is_cancelled(&mut query).await, "the history is still working on it");
         assert!(matches!(served.await.unwrap(), ConnectionEnd::Wire(_)));
     }
 
@@ -356,7 +358,7 @@ mod tests {
         // One that was never asked, and one that is being answered.
         say(&mut far, &ClientMessage::Cancel { ticket: 99 }).await;
         say(&mut far, &ClientMessage::Cancel { ticket: 2 }).await;
-        assert!(is_cancelled(&mut asked[1]).await, "the history still works on it");
+        assert!(is_cancelled(&mut asked[1]).await, "the history is still working on it");
         assert!(!asked[0].reply.is_closed() && !asked[2].reply.is_closed(), "others are not touched");
         let mut next = next_question(&mut requests).await;
         assert!(!is_cancelled(&mut next).await);

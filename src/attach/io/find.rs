@@ -108,7 +108,7 @@ fn require_own(folder: &Path) -> io::Result<()> {
     if is_own {
         return Ok(());
     }
-    let why = "not a folder of this user alone; remove it";
+    let why = "not a folder owned by this user alone; remove it";
     Err(named(folder, io::Error::new(io::ErrorKind::PermissionDenied, why)))
 }
 

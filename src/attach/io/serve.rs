@@ -99,7 +99,7 @@ impl Folder {
         }
         match Folder::of(socket)? {
             found if found.owner == self.owner => Ok(()),
-            _ => Err(failed(folder)(io::Error::new(io::ErrorKind::PermissionDenied, "belongs to another user now"))),
+            _ => Err(failed(folder)(io::Error::new(io::ErrorKind::PermissionDenied, "now belongs to another user"))),
         }
     }
 }
@@ -241,7 +241,7 @@ impl Listener {
                 accepted = self.socket.accept() => match accepted {
                     Ok((stream, _)) => connections.on_connection(stream),
                     Err(error) => {
-                        tracing::error!(%error, "no connection could be taken");
+                        tracing::error!(%error, "a connection could not be accepted");
                         tokio::time::sleep(ACCEPT_PAUSE).await;
                     }
                 },
@@ -257,11 +257,11 @@ impl Listener {
         }
         match self.again(locked) {
             Ok(()) => {
-                tracing::warn!(path = %self.path.display(), "the socket or its lock was removed: made again");
+                tracing::warn!(path = %self.path.display(), "the socket or its lock was removed: created again");
                 self.troubled = false;
             }
             Err(error) if !self.troubled => {
-                tracing::error!(%error, "the socket or its lock was removed and cannot be made again yet");
+                tracing::error!(%error, "the socket or its lock was removed and cannot be created again yet");
                 self.troubled = true;
             }
             Err(_) => {}
@@ -311,7 +311,7 @@ impl Connections<'_> {
             Ok(counted_as) => counted_as,
             Err(why) => {
                 if self.callers.may_log(user, now) {
-                    tracing::warn!(%from, why, "a terminal was sent away");
+                    tracing::warn!(%from, why, "a terminal was disconnected");
                 }
                 // Nothing was sent before, so the socket has room for one line.
                 let _ = write.try_write(&rejection(why));
@@ -321,7 +321,7 @@ impl Connections<'_> {
         let session = self.acceptor.attach(peer);
         let (terminal, snapshots) = (session.terminal, self.snapshots.clone());
         if self.callers.may_log(user, now) {
-            tracing::info!(terminal, %from, "a terminal has attached");
+            tracing::info!(terminal, %from, "terminal attached");
         }
         self.serving.spawn(async move {
             let why = connection::serve(read, write, session, snapshots).await;
@@ -332,13 +332,13 @@ impl Connections<'_> {
     fn on_left(&mut self, Left { user, counted_as, terminal, from, why }: Left) {
         self.callers.detach(counted_as);
         if self.callers.may_log(user, self.now()) {
-            tracing::info!(terminal, %from, %why, "a terminal has gone");
+            tracing::info!(terminal, %from, %why, "terminal detached");
         }
     }
 
     fn log_left_out(&mut self) {
         for (user, lines) in self.callers.unlogged(self.now()) {
-            tracing::warn!(user, lines, "connections of this user: lines were left out");
+            tracing::warn!(user, lines, "connections of this user: log lines omitted");
         }
     }
 }

@@ -21,7 +21,7 @@ pub enum WireError {
     #[error("closed by the other end")]
     Closed,
     /// A message had begun and did not end.
-    #[error("half a message, then nothing for {} s", MESSAGE_MAX.as_secs())]
+    #[error("incomplete message, then nothing for {} s", MESSAGE_MAX.as_secs())]
     Half,
     /// What came is no message.
     #[error(transparent)]

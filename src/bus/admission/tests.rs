@@ -87,7 +87,7 @@ fn a_long_poll_in_the_way_of_a_fast_one_is_named() {
     def.tags[fixture::PV.index()].poll = Poll::Every(Duration::from_millis(200));
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
     let words = admission.verdict.to_string();
-    for part in ["in 30.1 ms the line must carry", "PLC-1 coil 3072 every 30 ms", "is read", "its period"] {
+    for part in ["in 30.1 ms the line must transfer", "PLC-1 coil 3072 every 30 ms", "is read", "its period"] {
         assert!(words.contains(part), "no {part:?} in {words:?}");
     }
 }

@@ -99,7 +99,7 @@ fn loopbacks_are_counted() {
     assert_eq!(verdict(&none), "none of 3 came back");
     let diagnostic = Diagnostic::Loopback { unit: 1, data: 0, count: 3 };
     let without = run(diagnostic, |_| Err(Fault::Exception(ExceptionCode(1))));
-    assert!(verdict(&without).starts_with("the unit answers"), "{}", verdict(&without));
+    assert!(verdict(&without).starts_with("the unit responds"), "{}", verdict(&without));
 }
 
 #[test]

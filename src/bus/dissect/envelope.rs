@@ -111,7 +111,7 @@ fn in_ascii(bytes: &[u8]) -> Envelope {
             after.push(field(start, end, "digits", format!("\"{}\"", bytes[start..end].escape_ascii())));
             fault = Some(match bytes[start..end].iter().position(|digit| !digit.is_ascii_hexdigit()) {
                 Some(at) => {
-                    format!("`{}` at character {} is no hex digit", bytes[start + at].escape_ascii(), start + at + 1)
+                    format!("`{}` at character {} is not a hex digit", bytes[start + at].escape_ascii(), start + at + 1)
                 }
                 None => format!("odd count of hex digits: {}", why),
             });
@@ -121,7 +121,7 @@ fn in_ascii(bytes: &[u8]) -> Envelope {
     if end < bytes.len() {
         let right = &bytes[end..] == b"\r\n";
         after.push(field(end, bytes.len(), "end", if right { "CR LF" } else { "must be CR LF" }.into()));
-    } else if before.len() == 1 && matches!(&fault, Some(words) if words.contains("cut short")) {
+    } else if before.len() == 1 && matches!(&fault, Some(words) if words.contains("incomplete")) {
         fault = Some("CR LF missing at the end".into());
     }
     Envelope { framing, message, offset: start, step: 2, before, after, fault }

@@ -105,7 +105,7 @@ impl<'r, 'a> Fields<'r, 'a> {
                     self.reader.wrong(format!("byte count says {}, expected 6 or more", self.bytes));
                 }
                 let count = self.bytes.saturating_sub(6);
-                self.reader.bytes("events", count, |_| "one byte an event, the latest first".into())?;
+                self.reader.bytes("events", count, |_| "one byte per event, latest first".into())?;
             }
             Item::ServerId => {
                 let label = |bytes: &[u8]| format!("{}, run state FF on, 00 off", text(bytes));

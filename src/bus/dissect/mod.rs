@@ -169,9 +169,11 @@ impl Readings {
         let mbap = envelope.framing == Some(Framing::Mbap);
         let same = match message.get(1) {
             Some(code @ 0..=0x7F) => match pdu::function(*code) {
-                Some(function) if function.echoes => Some("the answer repeats the request: these bytes may be either"),
+                Some(function) if function.echoes => {
+                    Some("the response repeats the request: these bytes may be either")
+                }
                 Some(_) => None,
-                None => Some("the standard has no such function: request and answer look the same"),
+                None => Some("not a standard function: request and response look the same"),
             },
             Some(_) | None => None,
         };
@@ -243,7 +245,7 @@ fn read_message(reader: &mut Reader, mbap: bool, direction: Direction, asked: Op
 fn unit_words(unit: u8, mbap: bool) -> String {
     match unit {
         0 | 255 if mbap => format!("{unit}, the device itself, no gateway"),
-        0 => "0, broadcast: all obey, none answers".into(),
+        0 => "0, broadcast: all execute, none responds".into(),
         1..=247 => format!("{unit}"),
         248..=255 if mbap => format!("{unit}"),
         248..=255 => format!("{unit}, reserved on serial lines (1–247)"),

@@ -20,7 +20,7 @@ pub(super) fn read(reader: &mut Reader, function: u8, direction: Direction, aske
     match (pdu::function(function), direction) {
         (None, Direction::Answer) if 0x80 <= function => exception(reader),
         (None, Direction::Request) if 0x80 <= function => {
-            reader.wrong(format!("function {function} / 0x{function:02X} is an exception, no request"));
+            reader.wrong(format!("function {function} / 0x{function:02X} is an exception, not a request"));
             None
         }
         (None, _) => unknown(reader, function),

@@ -95,7 +95,7 @@ fn unit_0_is_a_broadcast_on_a_serial_line_only() {
     let message = [0, 6, 0, 1, 0, 3];
     let rtu = dissect(&with_crc(&message), None, None, None);
     assert_eq!(rtu.summary, "broadcast write register 40002 = 3 (0x0001, 0x0003)");
-    assert!(rtu.fields[0].words.contains("none answers"));
+    assert!(rtu.fields[0].words.contains("none responds"));
     assert!(dissect(&with_mbap(1, &message), None, None, None).fields[3].words.contains("the device itself"));
 }
 
@@ -110,7 +110,7 @@ fn what_may_be_two_things_says_so() {
     let dissection = check("01 06 03 EA 00 32", "", "unit 1 write register 41003 = 50 (0x03EA, 0x0032)");
     assert_eq!(
         (dissection.direction, dissection.also.as_deref()),
-        (None, Some("the answer repeats the request: these bytes may be either"))
+        (None, Some("the response repeats the request: these bytes may be either"))
     );
     // Eight bytes that begin 01 01 03: a request from 00769, or 24 coils.
     let dissection = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
@@ -128,7 +128,7 @@ fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
     assert_eq!(verdict(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got A5 BB, computed A5 BA");
     assert_eq!(verdict(b":010303EA00010F\r\n"), "LRC error: got 0F, computed 0E");
     assert_eq!(verdict(b":010303EA00010E"), "CR LF missing at the end");
-    assert_eq!(verdict(b":01G303EA00010E\r\n"), "`G` at character 4 is no hex digit");
+    assert_eq!(verdict(b":01G303EA00010E\r\n"), "`G` at character 4 is not a hex digit");
     assert_eq!(verdict(&[1, 3, 3, 0xEA, 0]), "cut short: 1 byte of count missing");
     assert_eq!(verdict(&[1, 3, 4, 0, 1]), "cut short: 2 bytes of register 2 missing");
     assert_eq!(verdict(&[1, 6, 0, 1, 0, 1, 9]), "1 byte too many");
@@ -140,7 +140,7 @@ fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
     assert!(swapped.fields.last().unwrap().words.starts_with("bytes swapped: A5 BA is right"));
     let asked = [1, 3, 0, 0, 0, 1];
     let answer = dissect(&with_crc(&[2, 3, 2, 0, 1]), None, None, Some(&asked));
-    assert_eq!(answer.verdict, "answer from unit 2, asked unit 1");
+    assert_eq!(answer.verdict, "response from unit 2, expected unit 1");
 }
 
 #[test]

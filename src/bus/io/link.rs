@@ -125,7 +125,7 @@ impl Link {
             Ok(Err(code)) => Err(Fault::Exception(ExceptionCode(code.into())).into()),
             // The frame was whole and checked, so its content is what the other side got wrong.
             Err(error) => {
-                tracing::warn!(unit, %error, "an answer that cannot be read");
+                tracing::warn!(unit, %error, "an unreadable response");
                 Err(Fault::WrongEcho.into())
             }
         }

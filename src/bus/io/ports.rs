@@ -52,7 +52,7 @@ pub fn why_not(path: &str, error: &tokio_serial::Error) -> String {
 
 fn known_words() -> String {
     match list().as_slice() {
-        [] => "this machine has no serial port now".into(),
+        [] => "this machine has no serial port".into(),
         ports => format!("there are: {}", ports.join(", ")),
     }
 }
@@ -85,7 +85,7 @@ fn holder(path: &str) -> Option<String> {
     let found = processes.map(|process| process.path()).find(|folder| is_process(folder) && holds(folder))?;
     let id = found.file_name()?.to_string_lossy().into_owned();
     if id == own {
-        return Some("this program itself, on another line".into());
+        return Some("this program, on another line".into());
     }
     let name = fs::read_to_string(found.join("comm")).ok()?;
     Some(format!("{} (process {id})", name.trim()))
@@ -100,7 +100,7 @@ mod tests {
     fn the_holder_of_a_port_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let path = file.path().display().to_string();
-        assert_eq!(holder(&path).as_deref(), Some("this program itself, on another line"));
+        assert_eq!(holder(&path).as_deref(), Some("this program, on another line"));
         assert_eq!(holder("/dev/no-such-port"), None);
     }
 

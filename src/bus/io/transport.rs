@@ -133,7 +133,7 @@ fn notice_silence(stream: &TcpStream) -> Result<(), rustix::io::Errno> {
 fn tcp_words(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::ConnectionRefused => "refused (is the device on, is the TCP port right?)".into(),
-        io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => "no way to this address".into(),
+        io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => "no route to this address".into(),
         _ => error.to_string(),
     }
 }

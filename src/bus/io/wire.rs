@@ -191,7 +191,7 @@ impl Wire {
         if let Some(rest @ [_, ..]) = bytes.get(taken..) {
             match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(rest)).await {
                 Ok(written) => written.map_err(|error| LinkError::Gone(error.to_string()))?,
-                Err(_) => return Err(LinkError::Gone("the port takes no bytes".into())),
+                Err(_) => return Err(LinkError::Gone("the port accepts no bytes".into())),
             }
         }
         let sent_at = Instant::now();

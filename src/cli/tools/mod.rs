@@ -174,7 +174,7 @@ pub fn exchange_lines(exchange: &Exchange) -> Vec<String> {
         vec![format!("TX {}", shown(&exchange.request, exchange.framing)), format!("   {}", request.summary)];
     if exchange.answer.is_empty() {
         lines.push(match exchange.outcome {
-            Ok(()) => "   no answer is expected".to_owned(),
+            Ok(()) => "   no response is expected".to_owned(),
             Err(fault) => format!("RX {fault}"),
         });
         return lines;

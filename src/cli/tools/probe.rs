@@ -57,9 +57,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     };
     let wrong = faults().find(|fault| fault.is_corrupt());
     Err(CliError::Failed(match (faults().any(|fault| matches!(fault, Fault::Exception(_))), wrong) {
-        (true, _) => "the unit is there, but does not give that".to_owned(),
+        (true, _) => "the unit responds, but does not support that".to_owned(),
         (false, Some(fault)) => format!("something answers, but wrongly: {fault}"),
-        (false, None) => "the unit does not answer".to_owned(),
+        (false, None) => "the unit does not respond".to_owned(),
     }))
 }
 

@@ -89,7 +89,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// What an answer is, in words; `Err` for bytes that are none.
 fn verdict(framing: Framing, request: &[u8], bytes: &[u8]) -> Result<String, String> {
     if framing == Framing::Mbap && frame::mbap(bytes) == frame::Mbap::Broken {
-        return Err("no header of Modbus TCP".to_owned());
+        return Err("no Modbus TCP header".to_owned());
     }
     match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(request, &answer)) {
         Ok(()) => Ok("ok".to_owned()),
@@ -115,7 +115,7 @@ fn refuse(message: &[u8], framing: Framing, args: &Args) -> Result<(), CliError>
         errors = vec![format!("wrong CRC: found {got_low:02X} {got_high:02X}, expected {low:02X} {high:02X}")];
     }
     if framing != Framing::Mbap && message.first() == Some(&0) && errors.is_empty() {
-        errors.push("unit 0 is a broadcast: every unit on the line obeys it and none answers".into());
+        errors.push("unit 0 is a broadcast: every unit on the line executes it and none responds".into());
     }
     if errors.is_empty() {
         return Ok(());

@@ -59,7 +59,7 @@ pub fn missing(noted: &Noted, now_open: &LastCommit) -> Option<String> {
     let noted = match noted {
         Noted::Nothing => return None,
         Noted::Unreadable => {
-            return Some("the note of the last commit cannot be read: whether records are missing is unknown".into());
+            return Some("the record of the last commit cannot be read: whether records are missing is unknown".into());
         }
         Noted::Commit(noted) => noted,
     };

@@ -180,7 +180,7 @@ impl Store {
         }
         store.register_tags().map_err(failed)?;
         if store.ids.contains(&None) {
-            let words = "the file has known 65536 tags, more cannot be numbered: begin a new one";
+            let words = "the file has 65536 tags, no more are possible: start a new one";
             return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
         }
         store.read_last_commit().map_err(failed)?;

@@ -137,12 +137,12 @@ impl Reader {
                         let _ = writer.try_send(Request::Unreadable(what));
                     }
                     if let Err(error @ HistoryError::Engine(_)) = &answer {
-                        tracing::warn!(?error, "a query is not answered");
+                        tracing::warn!(?error, "a query has no reply");
                     }
                     answer
                 }
                 Ok(Err(panic)) => {
-                    tracing::error!(%panic, "a query ended badly");
+                    tracing::error!(%panic, "a query failed");
                     Err(HistoryError::Engine("internal error, see the log".to_owned()))
                 }
                 Err(why) => {

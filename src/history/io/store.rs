@@ -173,7 +173,7 @@ impl Store {
     /// Writes the last commit down beside the database. Without that a cut log would go unnoticed, nothing else.
     pub(super) fn note_last_commit(&self) {
         if let Err(error) = last::write(&self.path, &self.last.get()) {
-            tracing::warn!(%error, "the last commit is not noted beside the history");
+            tracing::warn!(%error, "the last commit is not recorded beside the history");
         }
     }
 

@@ -190,7 +190,7 @@ impl Writer {
     fn fail(&mut self, error: &HistoryError) {
         let words = Some(error.words());
         if self.failing != words {
-            tracing::error!(?error, "the history takes no records");
+            tracing::error!(?error, "the history accepts no records");
         }
         self.failing = words;
     }
@@ -232,7 +232,7 @@ impl Writer {
             store.try_clone().inspect_err(|error| tracing::error!(%error, "queries cannot be answered")).ok()
         });
         if reader.try_send(handed).is_err() {
-            tracing::error!("the reader of the history does not take the store");
+            tracing::error!("the reader of the history does not accept the store");
         }
     }
 
@@ -256,7 +256,7 @@ impl Writer {
             }
         }
         if !self.pending.is_empty() {
-            tracing::error!(records = self.pending.len(), "the history took nothing until the end: records lost");
+            tracing::error!(records = self.pending.len(), "the history accepted nothing until the end: records lost");
         }
         self.status.lost += self.pending.len() as u64;
         self.pending.clear();

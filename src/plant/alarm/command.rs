@@ -22,17 +22,17 @@ pub const NOTE_CHARS_MAX: usize = 500;
 /// nothing is shelved or put out of service.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum AlarmCommand {
-    /// Acknowledge one alarm, as it was seen.
+    /// Acknowledge one alarm, as the operator saw it.
     Acknowledge {
         /// Which.
         alarm: AlarmId,
-        /// When what was seen was annunciated; what was raised or reminded of later stays unacknowledged.
-        seen: Timestamp,
+        /// When the operator's view of it was annunciated: an alarm annunciated later stays unacknowledged.
+        annunciated_at: Timestamp,
     },
-    /// Acknowledge all of these, as they were seen.
+    /// Acknowledge all of these, as the operator saw them.
     AcknowledgeAll {
-        /// Which, and when what was seen was annunciated.
-        seen: Arc<[(AlarmId, Timestamp)]>,
+        /// Which, and when each was annunciated.
+        alarms: Arc<[(AlarmId, Timestamp)]>,
     },
     /// End the sound of what sounds now.
     Silence,
@@ -96,16 +96,16 @@ pub enum AlarmRefusal {
     #[error("{}", t!("out of service"))]
     OutOfService,
     /// It is in service.
-    #[error("{}", t!("in service already"))]
+    #[error("{}", t!("already in service"))]
     InService,
 }
 
 impl AlarmManager {
-    /// Acknowledges one alarm as it was `seen`.
+    /// Acknowledges an alarm, unless it was annunciated again after `annunciated_at`.
     pub fn acknowledge(
         &mut self,
         id: AlarmId,
-        seen: Timestamp,
+        annunciated_at: Timestamp,
         note: &OperatorNote,
     ) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
@@ -113,7 +113,7 @@ impl AlarmManager {
         if !machine.state().needs_acknowledgement() {
             return Err(AlarmRefusal::NothingToAcknowledge);
         }
-        if machine.annunciated_at.is_some_and(|annunciated| annunciated != seen) {
+        if machine.annunciated_at.is_some_and(|latest| latest != annunciated_at) {
             return Err(AlarmRefusal::RaisedSince);
         }
         let reason = note.reason.clone().filter(|reason| !reason.trim().is_empty());

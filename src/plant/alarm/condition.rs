@@ -31,7 +31,7 @@ pub enum Condition {
     /// The value has changed so often (2 to 100), by more than the deadband each time, `within` a time.
     Changes { count: u32, within: Duration, deadband: f64 },
     /// The device does not answer, or gives no values.
-    NotAnswering,
+    NotResponding,
     /// The device has this signal of NE 107.
     Health { signal: Signal },
     /// The line is not connected although it should be.
@@ -106,7 +106,7 @@ impl Condition {
                 Traits { looks_back: true, ..none }
             }
             Condition::Bit { .. }
-            | Condition::NotAnswering
+            | Condition::NotResponding
             | Condition::Health { .. }
             | Condition::NotConnected
             | Condition::Overloaded
@@ -124,7 +124,7 @@ struct Traits {
     sign: &'static str,
 }
 
-/// What a condition is evaluated by. `None` is "not known now".
+/// What a condition is evaluated by. `None` is "unknown now".
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
     /// The good value of the tag, in its unit.
@@ -252,7 +252,7 @@ pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memo
             let watched = within <= now.saturating_sub(*memory.since.get_or_insert(now));
             (busy || !active || watched).then_some(busy)
         }
-        Condition::NotAnswering
+        Condition::NotResponding
         | Condition::Health { .. }
         | Condition::NotConnected
         | Condition::Overloaded

@@ -163,16 +163,16 @@ pub const METRIC_TARGETS: [MetricTarget; 14] = {
         MetricTarget { measure, words, target, limit }
     }
     [
-        goal(PerDay, "alarms a day", AtMost(150.0), Some(AtMost(300.0))),
-        goal(PerHour, "alarms an hour", AtMost(6.0), Some(AtMost(12.0))),
-        goal(PerWindow, "alarms in 10 min", AtMost(1.0), Some(AtMost(2.0))),
+        goal(PerDay, "alarms per day", AtMost(150.0), Some(AtMost(300.0))),
+        goal(PerHour, "alarms per hour", AtMost(6.0), Some(AtMost(12.0))),
+        goal(PerWindow, "alarms per 10 min", AtMost(1.0), Some(AtMost(2.0))),
         goal(WindowsOver, "10-min windows above 10 (%)", Below(1.0), None),
-        goal(Most, "most in a 10-min window", AtMost(10.0), None),
+        goal(Most, "peak in a 10-min window", AtMost(10.0), None),
         goal(Flood, "time in flood (%)", Below(1.0), None),
-        goal(Top, "share of the ten most frequent (%)", AtMost(5.0), None),
+        goal(Top, "share of the 10 most frequent (%)", AtMost(5.0), None),
         goal(Chattering, "chattering alarms", AtMost(0.0), None),
         goal(Fleeting, "fleeting alarms", AtMost(0.0), None),
-        goal(Stale, "active over 24 h (most at once)", Below(5.0), None),
+        goal(Stale, "active over 24 h (peak)", Below(5.0), None),
         goal(Share(Priority::Critical), "priority critical (%)", Below(1.0), None),
         goal(Share(Priority::High), "priority high (%)", AtMost(5.0), None),
         goal(Share(Priority::Medium), "priority medium (%)", AtMost(15.0), None),
@@ -190,10 +190,8 @@ keyword_enum! {
         Beyond => "beyond target",
         /// Beyond the limit.
         Over => "over limit",
-        /// There is too little to evaluate.
-        TooFew => "too few",
-        /// A station ran for too little time, see [`WATCHED_MIN`].
-        TooShort => "watched < 1 h",
+        /// Too few alarms, or less than [`WATCHED_MIN`] of running time.
+        InsufficientData => "insufficient data",
     }
 }
 
@@ -222,11 +220,11 @@ impl MetricTarget {
     /// How a figure stands against it; `None` is a figure that could not be formed.
     pub fn verdict(&self, figures: &PeriodMetrics) -> Verdict {
         if self.measure.kind() == MetricKind::Rate && figures.watched < WATCHED_MIN {
-            return Verdict::TooShort;
+            return Verdict::InsufficientData;
         }
-        let Some(value) = figures.value(self.measure) else { return Verdict::TooFew };
+        let Some(value) = figures.value(self.measure) else { return Verdict::InsufficientData };
         if self.measure.kind() == MetricKind::Share && figures.annunciated() < SHARED_MIN {
-            Verdict::TooFew
+            Verdict::InsufficientData
         } else if self.target.holds(value) {
             Verdict::Good
         } else if self.limit.is_some_and(|limit| !limit.holds(value)) {
@@ -304,9 +302,9 @@ mod tests {
         assert_eq!(hours(2).value(Metric::PerHour), Some(12.0));
         assert_eq!(verdict(&hours(1), Metric::PerHour), Verdict::Over);
         let short = PeriodMetrics { watched: Duration::from_secs(3_599), ..hours(1) };
-        assert_eq!(verdict(&short, Metric::PerHour), Verdict::TooShort);
+        assert_eq!(verdict(&short, Metric::PerHour), Verdict::InsufficientData);
         assert_eq!(verdict(&short, Metric::Most), Verdict::Good, "that much is certain");
-        assert_eq!(verdict(&hours(0), Metric::PerDay), Verdict::TooShort);
+        assert_eq!(verdict(&hours(0), Metric::PerDay), Verdict::InsufficientData);
     }
 
     #[test]
@@ -319,8 +317,8 @@ mod tests {
         for priority in Priority::ALL {
             assert_eq!(verdict(&urgent, Metric::Share(priority)), Verdict::Beyond, "{}", priority.word());
         }
-        assert_eq!(verdict(&figures([0, 19, 0, 0]), Metric::Share(Priority::High)), Verdict::TooFew);
-        assert_eq!(verdict(&figures([0; 4]), Metric::Share(Priority::Low)), Verdict::TooFew);
+        assert_eq!(verdict(&figures([0, 19, 0, 0]), Metric::Share(Priority::High)), Verdict::InsufficientData);
+        assert_eq!(verdict(&figures([0; 4]), Metric::Share(Priority::Low)), Verdict::InsufficientData);
     }
 
     #[test]

@@ -64,8 +64,8 @@ pub fn alarm_action(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static s
     };
     match alarm_command {
         AlarmCommand::Acknowledge { alarm, .. } => ("acknowledge", name(alarm), None),
-        AlarmCommand::AcknowledgeAll { seen } => {
-            let target = if let [(one, _)] = &**seen { name(one) } else { format!("{} alarms", seen.len()) };
+        AlarmCommand::AcknowledgeAll { alarms } => {
+            let target = if let [(one, _)] = &**alarms { name(one) } else { format!("{} alarms", alarms.len()) };
             ("acknowledge", target, None)
         }
         AlarmCommand::Silence => ("silence", "alarms".into(), None),

@@ -32,16 +32,16 @@ pub enum Problem {
     #[error("the set is for {set}, this device is {device}")]
     OtherProfile { set: String, device: String },
     /// The device has no such setting.
-    #[error("{0} is no setting of this device")]
+    #[error("{0} is not a setting of this device")]
     NoSetting(String),
     /// A tag that the set rests on has another value in the device.
     #[error("{tag} is {device} in the device, {set} in the set: the values mean something else")]
     OtherGround { tag: String, set: String, device: String },
     /// A value that must be known is not.
-    #[error("{0} is not known now")]
+    #[error("{0} is unknown now")]
     Unknown(String),
     /// It would change how other values are scaled or what they are measured in.
-    #[error("{0} differs, and other values rest on it: set it by hand first")]
+    #[error("{0} differs, and other values depend on it: set it manually first")]
     Ground(String),
     /// Outside the limits that the device would then have.
     #[error("{tag} {value} is outside {min} … {max}")]
@@ -104,7 +104,7 @@ fn other_ground(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: T
         if now.is_some_and(|now| same(tag, given.value, now, trusted)) {
             return None;
         }
-        let device = now.map_or_else(|| "not known".to_owned(), |now| words(tag, now));
+        let device = now.map_or_else(|| "unknown".to_owned(), |now| words(tag, now));
         Some(Problem::OtherGround { tag: given.tag.clone(), set: words(tag, given.value), device })
     });
     wrong.chain(other_units(def, device, set, trusted)).collect()
@@ -124,7 +124,7 @@ fn other_units<'a>(
         if now == Some(wanted) || tag.unit_from.as_ref().is_some_and(|(from, _)| is_given(*from)) {
             return None;
         }
-        let device = now.map_or("not known", |unit| if unit.is_empty() { "none" } else { unit });
+        let device = now.map_or("unknown", |unit| if unit.is_empty() { "none" } else { unit });
         Some(Problem::OtherGround {
             tag: format!("the unit of {}", tag.short),
             set: wanted.clone(),

@@ -88,8 +88,8 @@ fn what_cannot_be_written_is_told_before_anything_is() {
     check(&with("SV", 101.), &["SV 101 is outside 0 … 100"]);
     check(&with("SV-H", 600.), &["SV-H 600 is outside 0 … 500"]);
     check(&with("CTRL", 7.), &["CTRL has no value 7"]);
-    check(&with("RUN", 1.), &["RUN is no setting of this device"]);
-    check(&with("NOPE", 1.), &["NOPE is no setting of this device"]);
+    check(&with("RUN", 1.), &["RUN is not a setting of this device"]);
+    check(&with("NOPE", 1.), &["NOPE is not a setting of this device"]);
     let fahrenheit = ParameterSet { given: vec![SetValue { tag: "P-F".into(), value: 1.0 }], ..good.clone() };
     check(&fahrenheit, &["P-F is °C in the device, °F in the set: the values mean something else"]);
     let foreign = ParameterSet { profile: "other".into(), ..good.clone() };

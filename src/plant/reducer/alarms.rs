@@ -36,9 +36,11 @@ impl Plant {
         let manager = &mut self.alarm_manager;
         let one = |record: Result<AlarmRecord, AlarmRefusal>| record.map(|record| vec![record]);
         let done = match alarm_command {
-            AlarmCommand::Acknowledge { alarm, seen } => one(manager.acknowledge(alarm, seen, &note)),
-            AlarmCommand::AcknowledgeAll { seen } => {
-                let each = seen.iter().map(|(alarm, seen)| manager.acknowledge(*alarm, *seen, &note));
+            AlarmCommand::Acknowledge { alarm, annunciated_at } => {
+                one(manager.acknowledge(alarm, annunciated_at, &note))
+            }
+            AlarmCommand::AcknowledgeAll { alarms } => {
+                let each = alarms.iter().map(|(alarm, since)| manager.acknowledge(*alarm, *since, &note));
                 let (steps, outcome) = together(each);
                 effects.records.extend(steps.into_iter().map(Record::Alarm));
                 return outcome;

@@ -51,7 +51,7 @@ impl Plant {
                     return Some(Outcome::Refused(Refusal::NotSaved(why)));
                 }
                 if set.values.is_empty() {
-                    let why = "no setting of the device is known now".to_owned();
+                    let why = "no setting of the device could be read".to_owned();
                     return Some(Outcome::Refused(Refusal::NotSaved(why)));
                 }
                 effects.sets =

@@ -42,7 +42,7 @@ impl Value for f64 {
             _ => return wrong_type(value, at, "a number", problems),
         };
         if !number.is_finite() {
-            problems.add(at, "not a number that can be used").label("expected a finite number");
+            problems.add(at, "not a usable number").label("expected a finite number");
         }
         Some(number).filter(|number| number.is_finite())
     }

@@ -99,10 +99,10 @@ fn a_spoiled_file_tells_line_found_and_expected() {
     check(&format!("{head}SW = 70\n"), &["winter.toml:6:1: unknown setting `SW`", "did you mean `SV`?"]);
     check(
         &format!("{head}FIX = 1\nAT = 1\n"),
-        &["winter.toml:6:1: `FIX` is no setting", "winter.toml:7:1: `AT` is no setting"],
+        &["winter.toml:6:1: `FIX` is not a setting", "winter.toml:7:1: `AT` is not a setting"],
     );
     check(&format!("{head}CTRL = \"FUZY\"\n"), &["winter.toml:6:8: `FUZY` is not a state", "did you mean `FUZZY`?"]);
-    check(&format!("{head}SV = 7O\n"), &["winter.toml:6:", "here the TOML breaks"]);
+    check(&format!("{head}SV = 7O\n"), &["winter.toml:6:", "TOML syntax error here"]);
     check(&format!("{head}SV = true\nP = [1]\n"), &["winter.toml:7:5: found an array, expected a number or a word"]);
     check(
         &head.replace("fuji_pxr", "fuji_pxg"),

@@ -25,7 +25,7 @@ fn the_alarm_of_an_overloaded_line_may_be_written() {
     check("[mimic]", &own.replace("true", "false"), &["only a `line` can be overloaded", "expected `true`"]);
     check("[mimic]", &own.replace("line = \"L1\"", "device = \"D1\""), &["only a `line` can be overloaded"]);
     let own = own.replace("overloaded = true\n", "").replace("slow", "line overloaded");
-    check("[mimic]", &own, &["duplicate alarm `line overloaded` of L1", "expected another text"]);
+    check("[mimic]", &own, &["duplicate alarm `line overloaded` of L1", "expected another message"]);
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn two_alarms_of_one_name_are_refused() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\nmessage = \"hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:36:11]", "duplicate alarm `hot` of D1.T", "first here"]);
     let own = "[[alarm]]\ndevice = \"D1\"\nne107 = \"F\"\npriority = \"low\"\nmessage = \"not responding\"\n[mimic]";
-    check("[mimic]", own, &["duplicate alarm `not responding` of D1", "expected another text"]);
+    check("[mimic]", own, &["duplicate alarm `not responding` of D1", "expected another message"]);
 }
 
 #[test]
@@ -48,11 +48,11 @@ fn every_condition_says_what_it_lacks() {
         ("no_update = \"30s\"\nover = \"1min\"", "`over` belongs to `rate`"),
         ("bit = 3", "D1.T has no bit 3"),
         ("high = 80.0\nclass = \"proces\"", "did you mean `process`?"),
-        ("high = 80.0\nre_alarm = \"5s\"", "an alarm that reminds so soon is a nuisance"),
+        ("high = 80.0\nre_alarm = \"5s\"", "too short: re-alarming so soon is a nuisance"),
     ] {
         check("high = 80.0", condition, &[expect]);
     }
-    check("[mimic]", "[alarms]\nshelve_max = \"1s\"\n\n[mimic]", &["not a time to shelve alarms for"]);
+    check("[mimic]", "[alarms]\nshelve_max = \"1s\"\n\n[mimic]", &["not a valid shelving time"]);
     check("tag = \"D1.T\"\nhigh = 80.0\ndeadband = 1.0", "line = \"L9\"", &["unknown line `L9`", "did you mean `L1`?"]);
 }
 
@@ -91,7 +91,7 @@ fn errors_of_enabled_when_are_shown_at_their_place() {
         check("high = 80.0", &format!("high = 80.0\nenabled_when = '{words}'"), expect);
     }
     let deep = format!("{}D1.T > 5", "not ".repeat(50));
-    check("high = 80.0", &format!("high = 80.0\nenabled_when = '{deep}'"), &["too many parentheses"]);
+    check("high = 80.0", &format!("high = 80.0\nenabled_when = '{deep}'"), &["parentheses nested too deeply"]);
 }
 
 #[test]

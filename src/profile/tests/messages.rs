@@ -13,7 +13,7 @@ fn a_file_that_is_no_toml_is_told_from_one_that_is_wrong() {
     check(b"", &["small.toml is empty"]);
     check(b"# nothing\n\n", &["small.toml is empty"]);
     check(b"title = \"K\xE4se\"\n", &["small.toml is not UTF-8", "[small.toml:1:11]", "byte 0xE4"]);
-    check(b"title = \"a\"\nline = [\n", &["small.toml:2:", "here the TOML breaks"]);
+    check(b"title = \"a\"\nline = [\n", &["small.toml:2:", "TOML syntax error here"]);
     check(b"title = \"a\"\ntitle = \"b\"\n", &["small.toml:2:1", "duplicate key"]);
 }
 

@@ -185,7 +185,7 @@ impl Dl06 {
         }
     }
 
-    /// Takes V2004 over, within its bounds; what is no number there is put right again.
+    /// Takes V2004 over, within its bounds; what is not a number there is put right again.
     fn take_fill(&mut self) {
         let written = self.memory.word(V_FILL).ok().and_then(from_bcd);
         self.fill_dl = written.unwrap_or(self.fill_dl).clamp(FILL_DL.0, FILL_DL.2);

@@ -67,7 +67,7 @@ pub(super) const ROWS: [Row; 18] = [
         "silent",
         TargetKind::Unit,
         "The unit has no power, the wrong address or baud rate, or its wire is off.",
-        "Its values are uncertain at once and bad after three failed requests, when its alarm \"not answering\" comes; \
+        "Its values are uncertain at once and bad after three failed requests, when its alarm \"not responding\" comes; \
          other units go on. Whether the unit still works its process cannot be known from here.",
         "Inspect the unit; treat all it controls as unknown.",
     ),
@@ -103,7 +103,7 @@ pub(super) const ROWS: [Row; 18] = [
         "exception",
         TargetKind::Unit,
         "The unit understands and refuses: no such register, busy, or its own failure.",
-        "Values are bad with the exception as their cause. The unit counts as answering, so its alarm \"not answering\" \
+        "Values are bad with the exception as their cause. The unit counts as answering, so its alarm \"not responding\" \
          does not come.",
         "Press w on a value and read why it is bad; the code says what the unit objects to.",
     )
@@ -131,7 +131,7 @@ pub(super) const ROWS: [Row; 18] = [
         "word order",
         TargetKind::Value,
         "The unit was replaced or set to another word order.",
-        "The bits are good and mean another number. It is refused only where it is no number or outside of the range \
+        "The bits are good and mean another number. It is refused only where it is not a number or outside of the range \
          of the tag; what happens to be inside is shown as good.",
         "After a replacement compare one value with the face of the unit; set `order` in the profile.",
     ),
@@ -157,7 +157,7 @@ pub(super) const ROWS: [Row; 18] = [
         "SV-1 stuck open",
         TargetKind::Process,
         "SV-1 does not close: TK-1 runs empty into TK-3.",
-        "The PLC shows what it commands (SHUT), not where the valve is. Flow out of TK-1 and a falling level show \
+        "The PLC shows what it commands (CLOSED), not where the valve is. Flow out of TK-1 and a falling level show \
          that it is open.",
         "Stop; close the hand valve under TK-1.",
     ),
@@ -175,7 +175,7 @@ pub(super) const ROWS: [Row; 18] = [
         "SV-2 stuck open",
         TargetKind::Process,
         "SV-2 does not close: TK-2 runs into TK-1.",
-        "The PLC shows SHUT, but there is flow in and the level rises to its alarm.",
+        "The PLC shows CLOSED, but there is flow in and the level rises to its alarm.",
         "Close the hand valve under TK-2 before TK-1 overflows.",
     ),
     row(

@@ -97,7 +97,7 @@ pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: Fault) -> 
         |line, unit| device_at(def, line, unit).is_some_and(|device| part(def, device.id) == Some(Part::Controller));
     let why = match (target, fault) {
         (FaultTarget::Line(line), _) if over_mbap(def, line) => {
-            "is no serial line: TCP itself repairs what the wire corrupts"
+            "is not a serial line: TCP itself repairs what the wire corrupts"
         }
         (FaultTarget::Process, _) if def.simulation.as_deref() != Some(SIMULATION) => "is not simulated",
         // The thesis's controller reports a broken sensor in its fault word.

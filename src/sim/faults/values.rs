@@ -213,7 +213,7 @@ mod tests {
         TagDef { access, bad_if: vec![0x7FFF], ..TagDef::new(TagId(0), DeviceId(0), "D-1.T", point) }
     }
 
-    /// A float at 10, a set value at 12, a sensor at 13, all in one block, and a measured bit.
+    /// A float at 10, a setpoint at 12, a sensor at 13, all in one block, and a measured bit.
     fn values() -> Values {
         let tags = [
             TagDef { bad_if: Vec::new(), ..tag(Table::Holding, 10, DataType::F32, Access::Read) },

@@ -194,7 +194,7 @@ impl Task {
                 let command = Command::on(&snapshot, id, kind);
                 let status = CommandStatus::new(command, "operator of the drill", snapshot.at);
                 if commands.try_send(status).is_err() {
-                    tracing::error!("the station has not taken a command of the drill");
+                    tracing::error!("the station has not accepted a command of the drill");
                 }
             }
         }

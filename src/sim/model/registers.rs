@@ -102,7 +102,7 @@ impl Model {
         Model::new(self.chart.clone())
     }
 
-    /// What the registers hold for a tag, in its unit; `None` for a tag of another device or what is no number.
+    /// What the registers hold for a tag, in its unit; `None` for a tag of another device or what is not a number.
     pub fn value(&self, tag: TagId) -> Option<f64> {
         let tag = self.chart.tag(tag)?;
         let raw = codec::decode(tag.point, &self.words(tag)?)?;

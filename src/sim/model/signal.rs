@@ -67,7 +67,7 @@ impl SignalGenerator {
             (Source::Oscillation { range, period }, true) => Some(oscillate(*range, *period, step.at, self.seed)),
             (Source::Of(operation, tags), true) => made(*operation, tags, values),
         };
-        // A source that is no number now (a tag of another device) leaves the value where it is.
+        // A source that is not a number now (a tag of another device) leaves the value where it is.
         let Some(target) = target else { return self.exact };
         let target = if runs { target * motion.gain + motion.offset } else { target };
         match motion.pace {

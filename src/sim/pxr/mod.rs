@@ -128,7 +128,7 @@ impl Pxr {
         self.pv_c
     }
 
-    /// Set value in use in °C.
+    /// Setpoint in use in °C.
     pub fn sv_c(&self) -> f64 {
         self.sv_c
     }

@@ -1,4 +1,4 @@
-//! The ramp/soak programme: a set value that moves by itself through up to eight steps.
+//! The ramp/soak programme: a setpoint that moves by itself through up to eight steps.
 
 use crate::plant::number::to_u16;
 
@@ -71,7 +71,7 @@ pub struct Program {
 const END: u16 = 17;
 
 impl Program {
-    /// The set value in use, or `None` when the SV of the face holds. The first ramp begins at PV.
+    /// The setpoint in use, or `None` when the SV of the face holds. The first ramp begins at PV.
     pub fn step(&mut self, dt_s: f64, command: ProgramCommand, plan: &Plan, pv_c: f64) -> Option<f64> {
         match command {
             ProgramCommand::Off => *self = Program::default(),
@@ -143,7 +143,7 @@ mod tests {
             let command = if program.ended() { ProgramCommand::End } else { ProgramCommand::Run };
             sv_c = program.step(0.5, command, &plan, 20.0);
         }
-        let sv_c = sv_c.expect("a running programme has a set value");
+        let sv_c = sv_c.expect("a running programme has a setpoint");
         assert!((sv_c - expect.0).abs() < 1e-6 && program.position() == expect.1, "{at_s} s: {sv_c} {program:?}");
     }
 

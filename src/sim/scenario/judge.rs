@@ -255,7 +255,7 @@ impl Mark {
                 ExpectationStatus::Missed(format!("shown as good and wrong from {}{}", clock(at), value(number)))
             }
             (Expectation::Within { .. } | Expectation::True(..), _, None) if over && !self.seen => {
-                ExpectationStatus::Missed("not evaluated: the simulator does not know the value".to_owned())
+                ExpectationStatus::Missed("not evaluated: the simulator has no such value".to_owned())
             }
             (Expectation::NoAlarm(_) | Expectation::Within { .. } | Expectation::True(..), _, None) if over => {
                 ExpectationStatus::Met(now)

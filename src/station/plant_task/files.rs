@@ -11,7 +11,7 @@ use crate::{
 
 /// Said where there is nothing to save into.
 const NO_FILE: &str =
-    "this plant is part of the program; write it to a file with `sightglass profiles NAME` and start that";
+    "this plant is built into the program; write it to a file with `sightglass profiles NAME` and start that file";
 
 /// The plant file on its way to the disk, and for whom.
 pub(super) struct Saving {
@@ -62,7 +62,7 @@ impl PlantTask {
         let (written, sets) = match done {
             Ok(done) => done,
             // The command times out, which its operator sees.
-            Err(error) => return tracing::error!(%error, "the work with the sets ended badly"),
+            Err(error) => return tracing::error!(%error, "the parameter set task failed"),
         };
         self.plant.on_sets(sets);
         if let Some((command, result)) = written {
@@ -97,7 +97,7 @@ impl PlantTask {
                 result
             }
             Err(error) => {
-                tracing::error!(%error, "saving settings ended badly");
+                tracing::error!(%error, "saving settings failed");
                 Err("internal error, see the log".to_owned())
             }
         };

@@ -109,12 +109,12 @@ fn blind_text(model: &Model, cx: &ViewContext) -> Option<String> {
     let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
         LineState::Connected => None,
         LineState::Disconnected => Some(t!("{name} disconnected", name = line.name)),
-        LineState::Testing => Some(t!("{name} given to a test", name = line.name)),
+        LineState::Testing => Some(t!("{name} in use by a test", name = line.name)),
         LineState::Connecting | LineState::Waiting { .. } => Some(t!("{name} not connected", name = line.name)),
     });
     let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
     let devices = devices.filter_map(|device| match snapshot.device(device.id).state {
-        DeviceState::Down { .. } => Some(t!("{name} not answering", name = device.name)),
+        DeviceState::Down { .. } => Some(t!("{name} not responding", name = device.name)),
         DeviceState::Answering | DeviceState::Failing(_)
             if snapshot.device(device.id).diagnosis == Some(Reason::NoValues) =>
         {
@@ -133,8 +133,8 @@ fn not_judged(why: &str) -> String {
 /// Why nothing is heard of the station.
 fn silent_text(model: &Model) -> Option<String> {
     match &model.session.gone {
-        Some(why) => Some(t!("station gone, {why}", why)),
-        None => (model.clock.silent >= SILENCE).then(|| t!("station silent").to_owned()),
+        Some(why) => Some(t!("station disconnected: {why}", why)),
+        None => (model.clock.silent >= SILENCE).then(|| t!("station not responding").to_owned()),
     }
 }
 

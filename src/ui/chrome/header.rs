@@ -28,7 +28,7 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, String, Style)> {
     let theme = cx.theme;
     let time = if let Some(gone) = model.gone() {
-        (0, t!("STATION GONE {gone} s: reconnecting", gone = gone.as_secs()), theme.trouble())
+        (0, t!("STATION LOST {gone} s: reconnecting", gone = gone.as_secs()), theme.trouble())
     } else if model.clock.silent >= SILENCE {
         (0, t!("STATION SILENT {running}", running = running(model.clock.silent)), theme.trouble())
     } else {

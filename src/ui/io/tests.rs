@@ -10,7 +10,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use tokio::sync::watch;
 
 use super::*;
-use crate::access::{SessionStatus, Who};
+use crate::access::{LoggedInUser, SessionStatus};
 use crate::{plant::role::Role, station::Request};
 use crate::{
     plant::{
@@ -36,7 +36,7 @@ fn on_the_pty() {
     runtime.block_on(async {
         let (publish, snapshots) = watch::channel(Fixture::alarm().snapshot());
         let (requests, mut taken) = mpsc::channel(8);
-        let who = Who { user: "tech1".into(), role: Role::Supervisor, must_change: false };
+        let who = LoggedInUser { user: "tech1".into(), role: Role::Supervisor, must_change: false };
         let (_told, status) =
             watch::channel(Arc::new(SessionStatus { who: Some(who), view: true, ..SessionStatus::default() }));
         tokio::spawn(async move {

@@ -65,7 +65,7 @@ impl Confirm {
         let ends = match leaving {
             Leaving::Station => t!("Polling and alarms stop too: the station runs in this terminal."),
             Leaving::Demo => t!("The demonstration ends: its simulated plant, polling and alarms stop."),
-            Leaving::Terminal => t!("Only this terminal closes. Polling and alarms go on."),
+            Leaving::Terminal => t!("Only this terminal closes. Polling and alarms continue."),
         };
         Confirm::new(Intent::Quit, t!("quit"), vec![t!("Quit?").to_owned(), ends.to_owned()])
     }
@@ -150,13 +150,13 @@ impl Confirm {
                 AlarmCommand::Reset(_) => t!("reset"),
                 AlarmCommand::Shelve { .. } => t!("shelve"),
                 AlarmCommand::Unshelve(_) => t!("unshelve"),
-                AlarmCommand::OutOfService(_) => t!("put out of service"),
-                AlarmCommand::InService(_) => t!("put in service"),
+                AlarmCommand::OutOfService(_) => t!("take out of service"),
+                AlarmCommand::InService(_) => t!("return to service"),
             },
             Intent::Command(CommandKind::Refresh(_)) => t!("refresh"),
             Intent::Command(CommandKind::Connect(_, true)) => t!("connect"),
             Intent::Command(CommandKind::Connect(_, false)) => t!("disconnect"),
-            Intent::Command(CommandKind::Configure(_)) => t!("use these settings"),
+            Intent::Command(CommandKind::Configure(_)) => t!("apply these settings"),
             Intent::Command(CommandKind::SaveSettings(_)) => t!("save"),
             Intent::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => t!("scan"),
             Intent::Command(CommandKind::Test(..)) => t!("send"),
@@ -279,7 +279,7 @@ impl Confirm {
             form.view(cx, canvas, y);
             let y = y + form.rows();
             if self.waiting {
-                canvas.text(0, y, t!("asking the station …"), cx.theme.dim());
+                canvas.text(0, y, t!("waiting for the station …"), cx.theme.dim());
             }
             let room = canvas.width();
             for (n, words) in self.problem.iter().flat_map(|words| wrap(words, room)).enumerate() {

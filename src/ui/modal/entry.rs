@@ -88,8 +88,8 @@ impl Entry {
     /// What cannot be in a number is not shown, it might be a secret; the number is not written either.
     fn reject(&mut self, c: char) {
         self.line.miss();
-        let named = if c.is_control() || c.is_whitespace() { t!("a blank").to_owned() } else { format!("\"{c}\"") };
-        self.problem = Some(t!("{named} is no part of a number; Ctrl-U empties the line", named));
+        let named = if c.is_control() || c.is_whitespace() { t!("a space").to_owned() } else { format!("\"{c}\"") };
+        self.problem = Some(t!("{named} is not part of a number; Ctrl-U clears the line", named));
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {

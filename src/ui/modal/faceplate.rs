@@ -108,7 +108,7 @@ impl Faceplate {
         let confirm = match missing {
             Some((need, state)) => {
                 let words = t!(
-                    "{name} has no effect now. This comes first; then t again for the command itself.",
+                    "{name} has no effect now. Change this first, then press t again for the command.",
                     name = cx.def().tag(command).name
                 );
                 Confirm::from_faceplate(cx, need, state, Some(words), self)
@@ -163,7 +163,7 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     let poll = match def.poll {
         Poll::Every(period) => t!("every {period} s", period = period.as_secs_f64()),
         Poll::Once => t!("once, and on refresh").to_owned(),
-        Poll::Never => t!("never by itself").to_owned(),
+        Poll::Never => t!("on request only").to_owned(),
     };
     let access = match def.access {
         Access::Read => t!("read only"),
@@ -226,10 +226,10 @@ fn command_of(cx: &ViewContext, tag: TagId) -> Option<TagId> {
 pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let status = cx.snapshot.device(device);
     match status.state {
-        DeviceState::Unknown => t!("not asked yet").to_owned(),
+        DeviceState::Unknown => t!("not polled yet").to_owned(),
         DeviceState::Answering => match status.reply {
             Some(reply) => t!("OK, {reply} ms", reply = reply.as_millis()),
-            None => t!("answering").to_owned(),
+            None => t!("OK").to_owned(),
         },
         DeviceState::Failing(n) => t!("failing, {n} in a row", n),
         DeviceState::Down { since } => {
@@ -246,7 +246,7 @@ pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> Str
 pub fn retry_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
     match report.and_then(|report| report.retry_at(device)) {
-        Some(at) if cx.now < at => t!(", retry in {ceil} s", ceil = between(cx.now, at).as_secs_f64().ceil()),
+        Some(at) if cx.now < at => t!(", retry {ceil} s", ceil = between(cx.now, at).as_secs_f64().ceil()),
         Some(_) => t!(", retrying").to_owned(),
         None => String::new(),
     }
@@ -261,8 +261,8 @@ pub fn line_state_text(cx: &ViewContext, line: crate::plant::def::LineId) -> Str
             Some(strain) => strain.trim_start_matches("line overloaded: ").to_owned(),
             None => t!("connected").to_owned(),
         },
-        LineState::Disconnected => t!("closed by an operator").to_owned(),
-        LineState::Testing => t!("a test has it").to_owned(),
+        LineState::Disconnected => t!("disconnected by an operator").to_owned(),
+        LineState::Testing => t!("in use by a test").to_owned(),
         LineState::Waiting { why, .. } => t!("not connected: {why}", why),
     }
 }

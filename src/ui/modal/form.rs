@@ -203,7 +203,7 @@ impl Form {
                     let style = if here { theme.focus() } else { theme.strong() };
                     let end = canvas.text(x, y, translate(role.word()), style);
                     if here {
-                        canvas.text(end + 2, y, theme.pick(t!("← → another"), t!("left/right another")), theme.dim());
+                        canvas.text(end + 2, y, theme.pick(t!("← → change"), t!("left/right change")), theme.dim());
                     }
                 }
                 What::Text(line) => draw(cx, canvas, (x, y), line, here),

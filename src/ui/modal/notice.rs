@@ -26,7 +26,7 @@ impl Notice {
         let def = cx.def().device(device);
         let why = Notice::why_unreachable(cx, device)?;
         let words =
-            vec![t!("{name} is not answering", name = def.name), why, t!("Nothing can be written now.").to_owned()];
+            vec![t!("{name} is not responding", name = def.name), why, t!("Writing is not possible now.").to_owned()];
         Some(Notice { title: def.name.clone(), words })
     }
 
@@ -36,11 +36,11 @@ impl Notice {
         let line = &cx.def().line(def.line).name;
         let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
             (LineState::Disconnected, _) => t!("Line {line} was disconnected by an operator.", line),
-            (LineState::Testing, _) => t!("A test has line {line} for itself (tab Bus).", line),
+            (LineState::Testing, _) => t!("Line {line} is in use by a test (tab Bus).", line),
             (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why),
-            (LineState::Connecting, _) => t!("Line {line} is being connected.", line),
+            (LineState::Connecting, _) => t!("Line {line} is connecting.", line),
             (LineState::Connected, DeviceState::Down { since }) => {
-                t!("Nothing heard since {clock}.", clock = clock(since, &cx.def().time_zone))
+                t!("No data received since {clock}.", clock = clock(since, &cx.def().time_zone))
             }
             (LineState::Connected, DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_)) => {
                 return None;

@@ -23,9 +23,9 @@ pub fn is_numeric(c: char) -> bool {
 pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
     let text = text.trim();
     if text.is_empty() {
-        return Err(t!("type a number").to_owned());
+        return Err(t!("enter a number").to_owned());
     }
-    let (number, typed) = parse(text).ok_or_else(|| t!("\"{text}\" is no number", text))?;
+    let (number, typed) = parse(text).ok_or_else(|| t!("\"{text}\" is not a number", text))?;
     // Zeros count: where no decimals are taken, `1,000` and `1.000` mean a thousand to their author, and are refused.
     let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
     if typed > decimals {
@@ -38,7 +38,7 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
     let value = match number {
         Number::Whole(value) => value,
         Number::Step(by) => {
-            stepped(cx, tag, by).ok_or(t!("the present value is not known: type the new value without a sign"))?
+            stepped(cx, tag, by).ok_or(t!("the current value is unknown: enter the new value without a sign"))?
         }
     };
     let Some((min, max)) = cx.snapshot.range(tag) else { return Ok(value) };
@@ -47,7 +47,7 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
     match (inside(value), inside(held)) {
         (false, _) => Err(t!("outside {range_text}", range_text = range_text(cx, tag))),
         (true, false) => Err(t!(
-            "the device would hold {plain}, outside {range_text}",
+            "the device would store {plain}, outside {range_text}",
             plain = plain(held),
             range_text = range_text(cx, tag)
         )),
@@ -86,7 +86,7 @@ pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> 
     let step = plain(cx.snapshot.step(tag));
     (!same).then(|| {
         t!(
-            "{format} → the device holds steps of {step}: {plain}",
+            "{format} → the resolution of the device is {step}: {plain}",
             format = cx.snapshot.format(tag, value),
             step,
             plain = plain(held)
@@ -102,7 +102,7 @@ pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let share = step.zip(cx.snapshot.range(tag)).map(|(step, (min, max))| (step, step / (max - min)));
     let large = share.filter(|(_, share)| STEP_MAX < *share);
     let large = large.map(|(step, share)| {
-        t!("! a step of {text}, {share} % of the range", text = text(step), share = format!("{:.0}", share * 100.0))
+        t!("! a change of {text}, {share} % of the range", text = text(step), share = format!("{:.0}", share * 100.0))
     });
     let faceplate = cx.def().device(cx.def().tag(tag).device).faceplate.as_ref();
     let process = faceplate.filter(|faceplate| faceplate.sv == tag).map(|faceplate| faceplate.pv);
@@ -145,7 +145,7 @@ pub fn range_text(cx: &ViewContext, tag: TagId) -> String {
             .trim_end()
             .to_owned()
         }
-        None => t!("range not known").to_owned(),
+        None => t!("range unknown").to_owned(),
     }
 }
 
@@ -213,10 +213,10 @@ mod tests {
         check("3,5", Ok(3.5));
         check("=3,5 ", Ok(3.5));
         check("70.50", Err("at most 1 decimal"));
-        check("", Err("type a number"));
+        check("", Err("enter a number"));
         for text in ["7-0", "7OO", "1e1", "1e5", "7 0", "1,0.5", "1.0.5", "inf", "NaN", "-", "=", "+", ".", "0x10", "๗"]
         {
-            check(text, Err(&format!("\"{text}\" is no number")));
+            check(text, Err(&format!("\"{text}\" is not a number")));
         }
         check("70.55", Err("at most 1 decimal"));
         check("1,000", Err("at most 1 decimal"));
@@ -239,7 +239,7 @@ mod tests {
         fixture.samples[sv.index()] = Sample::bad(Cause::Timeout, now());
         assert_eq!(
             checked(&fixture, "+5"),
-            Err("the present value is not known: type the new value without a sign".to_owned())
+            Err("the current value is unknown: enter the new value without a sign".to_owned())
         );
         assert_eq!(checked(&fixture, "75"), Ok(75.0));
     }
@@ -250,7 +250,7 @@ mod tests {
         let sv = fixture.tag("TIC-1.SV");
         let def = &mut fixture.def.tags[sv.index()];
         (def.scale, def.max) = (0.5, Some(Bound::Fixed(99.8)));
-        let why = "the device would hold 100, outside range 0.0 … 99.8 °C";
+        let why = "the device would store 100, outside range 0.0 … 99.8 °C";
         assert_eq!(checked(&fixture, "99.8"), Err(why.to_owned()));
         assert_eq!(checked(&fixture, "99.7"), Ok(99.7));
     }
@@ -262,7 +262,7 @@ mod tests {
         let asked = |value: f64| with_cx(&fixture.snapshot(), |cx| (asks(cx, sv, value), worries(cx, sv, value)));
         assert_eq!(asked(65.0), (false, Vec::new()));
         let (again, why) = asked(5.0);
-        assert!(again && why[0].starts_with("! a step of 65.0 °C, 54 % of the range"), "{why:?}");
+        assert!(again && why[0].starts_with("! a change of 65.0 °C, 54 % of the range"), "{why:?}");
         let (again, why) = asked(72.0);
         assert!(again && why[0].contains("at the alarm limit of TIC-1.PV temperature high (72.0 °C)"), "{why:?}");
         let (_, why) = asked(73.0);

@@ -64,7 +64,7 @@ impl Reason {
         let choose = (1 < self.choices.len()).then(|| Hint::of("↑↓", t!("select")));
         let other = self
             .other()
-            .map(|time| Hint::of(t!("Tab"), if time.typing { t!("type the reason") } else { t!("type the time") }));
+            .map(|time| Hint::of(t!("Tab"), if time.typing { t!("enter the reason") } else { t!("enter the time") }));
         let (enter, escape) = (Hint::of("⏎", self.verb), Hint::of(t!("Esc"), t!("cancel")));
         [enter].into_iter().chain(choose).chain(other).chain([escape]).collect()
     }
@@ -143,7 +143,7 @@ impl Reason {
             Some(t!("reason required").to_owned())
         } else if self.time.as_ref().is_some_and(|time| typed_time(&words, time.max).is_ok()) {
             // Typed for the time, while another one was selected.
-            Some(t!("a time is not a reason: select \"other\" to type a time").to_owned())
+            Some(t!("a time is not a reason: select \"other\" to enter a time").to_owned())
         } else {
             rights::missing(cx, &kind)
         };
@@ -183,7 +183,7 @@ impl Reason {
             }
             y += 1;
         }
-        canvas.text(0, y, if self.needed { t!("reason:") } else { t!("note, if there is one:") }, theme.dim());
+        canvas.text(0, y, if self.needed { t!("reason:") } else { t!("note (optional):") }, theme.dim());
         self.line.view(theme, &mut canvas, 0, y + 1);
         let problem = self.problem.clone().or_else(|| rights::missing(cx, &self.choices[self.chosen].1));
         for (n, line) in wrap(&problem.unwrap_or_default(), room).iter().take(2).enumerate() {
@@ -207,7 +207,7 @@ struct Time {
 /// `45`, `45 min`, `1.5 h`, `1:30`: a time of at most `max`, a bare number in minutes.
 fn typed_time(text: &str, max: Duration) -> Result<Duration, String> {
     let text = text.trim();
-    let wrong = || t!("\"{text}\" is no time: 45 min, 1.5 h or 1:30", text);
+    let wrong = || t!("\"{text}\" is not a time: 45 min, 1.5 h or 1:30", text);
     let number = |text: &str| text.trim().replacen(',', ".", 1).parse::<f64>().ok();
     let minutes = match text.split_once(':') {
         Some((hours, minutes)) => {
@@ -253,12 +253,12 @@ mod tests {
             (" 0:05 ", minutes(5)),
             ("8h", minutes(480)),
             ("9h", Err("at most 8 h".to_owned())),
-            ("1:75", Err("\"1:75\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
-            ("0", Err("\"0\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
-            ("-5", Err("\"-5\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("1:75", Err("\"1:75\" is not a time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("0", Err("\"0\" is not a time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("-5", Err("\"-5\" is not a time: 45 min, 1.5 h or 1:30".to_owned())),
             ("1e9", Err("at most 8 h".to_owned())),
-            ("NaN", Err("\"NaN\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
-            ("", Err("\"\" is no time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("NaN", Err("\"NaN\" is not a time: 45 min, 1.5 h or 1:30".to_owned())),
+            ("", Err("\"\" is not a time: 45 min, 1.5 h or 1:30".to_owned())),
         ] {
             assert_eq!(typed_time(text, max), lasts, "{text}");
         }

@@ -173,7 +173,7 @@ impl Settings {
             rows.extend(wrap(&why, room).into_iter().map(|row| (row, theme.trouble())));
         }
         if let Some(before) = &cx.snapshot.line(self.line).settings_before {
-            let words = t!("tried out; before: {difference}", difference = difference(used, before));
+            let words = t!("under test; before: {difference}", difference = difference(used, before));
             rows.extend(wrap(&words, room).into_iter().map(|row| (row, theme.normal())));
         }
         rows
@@ -197,7 +197,7 @@ impl Settings {
     }
 
     fn query(&self, cx: &ViewContext, used: &LineDef, action: &SettingsAction) -> String {
-        let restart = t!("Polling restarts; values are bad until the devices answer.");
+        let restart = t!("Polling restarts; values are bad until the devices respond.");
         match action {
             SettingsAction::Apply(new) => {
                 t!("Apply {difference}? {restart}", difference = difference(used, new), restart)
@@ -210,7 +210,7 @@ impl Settings {
                 let doubt = if well { String::new() } else { format!("! {answer} ") };
                 let title = &cx.def().title;
                 t!(
-                    "{doubt}Write {whole} into the plant file of {title}? Everything else in it stays.",
+                    "{doubt}Save {whole} to the plant file of {title}? The rest of the file is not changed.",
                     doubt,
                     whole = whole(used),
                     title
@@ -229,14 +229,14 @@ impl Settings {
     fn ask_apply(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let (used, new) = (in_use(cx, self.line), self.draft.settings()?);
         if new == *used {
-            return Err(t!("these settings are in use; change one first").to_owned());
+            return Err(t!("these settings are active already; change one first").to_owned());
         }
         Ok(Some(SettingsAction::Apply(Box::new(new))))
     }
 
     fn ask_revert(&mut self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let before = cx.snapshot.line(self.line).settings_before.as_ref();
-        let before = before.ok_or(t!("nothing to revert: no other settings were applied"))?;
+        let before = before.ok_or(t!("nothing to revert: the settings were not changed"))?;
         self.draft = Draft::of(before);
         Ok(Some(SettingsAction::Revert(Box::new(LineDef::clone(before)))))
     }
@@ -244,10 +244,10 @@ impl Settings {
     fn ask_save(&self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let used = in_use(cx, self.line);
         if self.draft.settings()? != *used {
-            return Err(t!("only settings in use are saved: apply these first (⏎)").to_owned());
+            return Err(t!("only active settings can be saved: apply these first (⏎)").to_owned());
         }
         if cx.snapshot.line(self.line).settings_before.is_none() {
-            return Err(t!("nothing to save: these settings are in the plant file").to_owned());
+            return Err(t!("nothing to save: the plant file has these settings").to_owned());
         }
         Ok(Some(SettingsAction::Save))
     }
@@ -298,9 +298,9 @@ fn whole(settings: &LineDef) -> String {
 fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
     let name = &cx.def().line(line).name;
     match &cx.snapshot.line(line).state {
-        LineState::Connecting => (t!("{name} is being connected", name), true),
+        LineState::Connecting => (t!("{name} is connecting", name), true),
         LineState::Disconnected => (t!("{name} is disconnected: connect it with L on tab 4", name), false),
-        LineState::Testing => (t!("a test has {name} for itself", name), true),
+        LineState::Testing => (t!("{name} is in use by a test", name), true),
         LineState::Waiting { why, .. } => (t!("{name} is not connected: {why}", name, why), false),
         LineState::Connected => {
             let devices = cx.def().devices.iter().filter(|device| device.line == line);

@@ -69,15 +69,15 @@ pub struct UserForm {
 impl UserForm {
     /// An empty form.
     pub fn new(purpose: Purpose) -> UserForm {
-        let twice = || [Field::secret(t!("password")), Field::secret(t!("password again"))];
+        let twice = || [Field::secret(t!("password")), Field::secret(t!("repeat password"))];
         let fields = match &purpose {
             Purpose::First => [Field::name(t!("name"))].into_iter().chain(twice()).collect(),
             Purpose::Login => vec![Field::name(t!("name")), Field::secret(t!("password"))],
             Purpose::Change(given) => {
-                let present = given.is_none().then(|| Field::secret(t!("present password")));
+                let present = given.is_none().then(|| Field::secret(t!("current password")));
                 present
                     .into_iter()
-                    .chain([Field::secret(t!("new password")), Field::secret(t!("new one again"))])
+                    .chain([Field::secret(t!("new password")), Field::secret(t!("repeat new password"))])
                     .collect()
             }
             Purpose::Unlock(_) => vec![Field::secret(t!("password"))],
@@ -275,7 +275,7 @@ impl UserForm {
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let keys: Vec<String> = self.hints().iter().map(|hint| format!("{} {}", hint.key, hint.label)).collect();
-        let keys = cx.theme.enter(&t!("{join}   Esc leave", join = keys.join("   ")));
+        let keys = cx.theme.enter(&t!("{join}   Esc cancel", join = keys.join("   ")));
         let inner = self.form.width().max(width(&keys)).clamp(40, body.width.saturating_sub(8).clamp(40, 72));
         let problem = self.problem_text(cx).map_or(1, |words| to_u16(wrap(&words, inner).len()));
         let height = to_u16(self.rows(cx, inner).len()) + self.form.rows() + problem + 2;

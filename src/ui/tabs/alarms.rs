@@ -135,8 +135,8 @@ impl TabView for Alarms {
         let alarm = self.selected(cx);
         let can = |label: &str| match label {
             "reset" => alarm.is_some_and(|alarm| alarm.state.is_latched()),
-            "unfold" => alarm.is_some_and(|alarm| alarm.first_out.is_some()),
-            "put back" => self
+            "expand" => alarm.is_some_and(|alarm| alarm.first_out.is_some()),
+            "return" => self
                 .suppressed(cx)
                 .is_some_and(|suppressed| matches!(suppressed.state, AlarmState::Shelved | AlarmState::OutOfService)),
             _ => true,
@@ -145,7 +145,7 @@ impl TabView for Alarms {
         hints.iter_mut().filter(|hint| !can(&hint.label)).for_each(|hint| hint.label.clear());
         // The first of these must not fall off a narrow footer.
         hints.sort_by_key(|hint| match hint.label.as_str() {
-            "ack" | "all" | "search" | "list" | "put back" | "hand over" | "take over" => 0,
+            "ack" | "all" | "search" | "list" | "return" | "hand over" | "take over" => 0,
             "reset" => 1,
             "view" => 2,
             _ => 3,

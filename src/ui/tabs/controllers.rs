@@ -152,7 +152,7 @@ impl TabView for Controllers {
         // On the page of a device there is no room left for a key that every operator tries anyway.
         if !matches!(self.page, Page::List | Page::Device) {
             let place = hints.iter().position(|hint| hint.key == "⏎").map_or(hints.len(), |enter| enter + 1);
-            hints.insert(place, Hint::new("Esc", t!("back"), t!("a page back")));
+            hints.insert(place, Hint::new("Esc", t!("back"), t!("previous page")));
         }
         // What the device cannot do is not offered; the help has it all the same.
         for hint in hints.iter_mut().filter(|hint| lacks(&hint.label)) {

@@ -23,7 +23,7 @@ pub enum Action {
 
 /// Keys of this tab while a user is logged in; a form takes every letter.
 const KEYS: &[Key<Action>] = &[
-    Key::new(char('p'), "password", "choose another password for yourself", Action::Password),
+    Key::new(char('p'), "password", "change your password", Action::Password),
     Key::new(char('k'), "lock", "lock this terminal, as Ctrl-K does on every tab", Action::Lock),
     Key::new(char('o'), "log out", "log out of this terminal", Action::Leave),
 ];
@@ -76,7 +76,7 @@ impl TabView for Login {
                 }
                 if form.answered(cx, answer) {
                     if matches!(form.purpose, Purpose::Change(_)) {
-                        self.outcome = Some(Ok(t!("The new password is in force.")));
+                        self.outcome = Some(Ok(t!("The password is changed.")));
                     }
                     self.changing = false;
                     self.form = None;

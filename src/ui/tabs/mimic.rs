@@ -33,9 +33,9 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Up), "", "", Action::Move(0, -1)),
     Key::new(code(KeyCode::Down), "", "", Action::Move(0, 1)),
     Key::new(code(KeyCode::Enter), "open", "faceplate of the selected item", Action::Open),
-    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
+    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
     Key::new(char('C'), "commands", "all valves, pumps and heaters with their commands", Action::Actuators),
-    Key::new(char('M'), "", "motion of agitators and arrows off and on", Action::Motion),
+    Key::new(char('M'), "", "animation of agitators and arrows on or off", Action::Motion),
 ];
 
 /// The small trends are asked again after so many seconds (real time).

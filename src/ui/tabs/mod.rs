@@ -190,7 +190,7 @@ tabs! {
     Controllers controllers controllers::Controllers: "Controllers", "controllers";
     Reports reports reports::Reports: "Reports", "reports";
     Bus bus bus::Bus: "Bus", "bus: lines, frames, tests";
-    Users users users::Users: "Users", "users and audit list: for a Supervisor";
+    Users users users::Users: "Users", "users and audit log: for a Supervisor";
     Faults faults faults::Faults: "Faults", "faults: of a simulated plant only";
 }
 

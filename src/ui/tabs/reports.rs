@@ -38,14 +38,14 @@ pub enum Action {
 
 /// Keys of this tab.
 const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "earlier", "the shift before", Action::Shift(-1)),
-    Key::new(code(KeyCode::Right), "later", "the shift after", Action::Shift(1)),
-    Key::new(char('l'), "running", "the shift that is running", Action::Running),
+    Key::new(code(KeyCode::Left), "earlier", "previous shift", Action::Shift(-1)),
+    Key::new(code(KeyCode::Right), "later", "next shift", Action::Shift(1)),
+    Key::new(char('l'), "running", "current shift", Action::Running),
     Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
     Key::new(char('e'), "export", "write the report as CSV", Action::Export).needs(Role::Technician),
     Key::new(char(';'), "format", "CSV with , and . or with ; and ,", Action::Dialect),
     Key::new(char('u'), "", "refresh the figures", Action::Refresh),
-    Key::new(char('w'), "", "why its values are what they are now", Action::Why),
+    Key::new(char('w'), "", "explain its current values", Action::Why),
 ];
 
 fn table() -> Vec<Key<Action>> {
@@ -229,7 +229,7 @@ impl Reports {
     /// Writes exactly the figures that are shown.
     fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(report) = &self.report.value else {
-            self.export = Export::Failed(t!("nothing to write yet").to_owned());
+            self.export = Export::Failed(t!("nothing to export yet").to_owned());
             return Vec::new();
         };
         if self.outgoing.is_some() {

@@ -39,8 +39,8 @@ const LIST: &[Key<Action>] = &[
     Key::new(char('r'), "role", "another role for the selected user", Action::Role),
     Key::new(char('d'), "disable", "disable or enable the selected user (clears a lockout)", Action::Disable),
     Key::new(char('p'), "password", "a new first password for the selected user", Action::Reset),
-    Key::new(char('x'), "delete", "remove the selected user (asks for the name)", Action::Delete),
-    Key::new(char('j'), "audit list", "everything that was done, by whom, from where", Action::Audit),
+    Key::new(char('x'), "delete", "delete the selected user (asks for the name)", Action::Delete),
+    Key::new(char('j'), "audit log", "all operator actions: what, by whom, from where", Action::Audit),
 ];
 
 fn list_keys() -> Vec<Key<Action>> {
@@ -154,7 +154,7 @@ impl Users {
             // Only a Supervisor sees this page: a station with users has at least one.
             (Action::Add, None) => {
                 let words = [
-                    t!("This station keeps no users."),
+                    t!("This station has no users."),
                     t!("A demonstration needs no login; a station started with `sightglass run` has users."),
                 ];
                 let notice = Notice::new(t!("add a user"), words.map(str::to_owned).to_vec());

@@ -45,9 +45,9 @@ fn an_unreachable_device_is_named_before_anything_is_typed() {
     let mut silent = Fixture::normal();
     silent.devices[0].state = DeviceState::Down { since: fixture::now() };
     for keys in ["s", "4⏎↓⏎", "4⏎f", "4⏎T", "4⏎S"] {
-        check(&silent, keys, "TIC-1 is not answering");
+        check(&silent, keys, "TIC-1 is not responding");
     }
-    check(&Fixture::line_down(), "r", "PLC-1 is not answering");
+    check(&Fixture::line_down(), "r", "PLC-1 is not responding");
     let mut closed = Fixture::normal();
     closed.line.state = LineState::Disconnected;
     check(&closed, "s", "Line L1 was disconnected by an operator.");
@@ -76,7 +76,7 @@ fn a_screen_too_small_to_see_takes_no_commands() {
     let mut model = small("3↓↓");
     assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "the banner's");
     type_keys(&mut model, "q");
-    assert!(screen(&mut model, 50, 10).contains("Quit? ⏎ quit  Esc stay"));
+    assert!(screen(&mut model, 50, 10).contains("Quit? ⏎ quit  Esc cancel"));
     assert_eq!(type_keys(&mut model, "⎋"), []);
     assert_eq!(type_keys(&mut model, "q⏎"), [Effect::Quit]);
 }

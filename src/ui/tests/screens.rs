@@ -198,7 +198,7 @@ fn nobody_says_no_alarms_who_cannot_see_them() {
     check(waiting, "alarms not evaluated: L1 not connected");
     let mut model = model(&Fixture::normal(), Theme::FULL);
     update(&mut model, Msg::Tick { silent: Duration::from_secs(7) });
-    assert!(screen(&mut model, 80, 24).contains("alarms not evaluated: station silent"));
+    assert!(screen(&mut model, 80, 24).contains("alarms not evaluated: station not responding"));
     let mut model = super::model(&Fixture::alarm(), Theme::FULL);
     update(&mut model, Msg::Tick { silent: Duration::from_secs(3) });
     let shown = screen(&mut model, 80, 24);
@@ -277,7 +277,7 @@ fn what_is_too_narrow_for_all_words_overlaps_none() {
 fn a_device_tells_its_letter_beside_its_name() {
     for (diagnosis, expect) in [
         (None, "✓ OK, 12 ms"),
-        (Some(Reason::Down), "✗F failure: not answering"),
+        (Some(Reason::Down), "✗F failure: not responding"),
         (Some(Reason::LineClosed), "▼C function check:"),
         (Some(Reason::Failing { failed: 9, of: 64 }), "?S out of specification:"),
         (Some(Reason::Late(2)), "◆M maintenance required:"),

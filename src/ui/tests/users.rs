@@ -11,7 +11,7 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use super::{assert_acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys};
 use crate::{
     access::{
-        Credentials, Durability, SessionRequest, SessionStatus, Who,
+        Credentials, Durability, LoggedInUser, SessionRequest, SessionStatus,
         session_request::{SessionRow, UserRow},
     },
     history::{Answer, Query},
@@ -39,7 +39,7 @@ fn closed() -> SessionStatus {
 
 fn person(user: &str, role: Role) -> SessionStatus {
     SessionStatus {
-        who: Some(Who { user: user.into(), role, must_change: false }),
+        who: Some(LoggedInUser { user: user.into(), role, must_change: false }),
         idle_lock: Some(Duration::from_secs(900)),
         ..(*fixture::session()).clone()
     }
@@ -118,7 +118,7 @@ fn a_password_is_never_shown_and_a_wrong_one_has_a_wait() {
     let effects = type_keys(&mut model, "anna⏎horse 1q?⏎");
     let expect = SessionRequest::Login { user: "anna".to_owned(), password: "horse 1q?".into() };
     assert_eq!(sent_request(&effects), Some(&expect));
-    shows(&mut model, "asking the station");
+    shows(&mut model, "waiting for the station");
     assert_eq!(type_keys(&mut model, "⏎⏎"), [], "while the answer is awaited");
     assert!(!screen(&mut model, 80, 24).contains("horse") && !format!("{model:?}").contains("horse"));
     answer(&mut model, Err("wrong name or password; wait 8 s"));

@@ -6,13 +6,13 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::{model, screen, sent_kind, type_keys};
 use crate::{
-    access::{SessionStatus, Who},
+    access::{LoggedInUser, SessionStatus},
     plant::{alarm::AlarmCommand, command::CommandKind, role::Role},
     ui::{Leaving, Model, Msg, fixture::Fixture, fixture::session, modal::Modal, tabs::Tab, theme::Theme, update},
 };
 
 fn sits(model: &mut Model, role: Role) {
-    let who = Who { user: "tom".into(), role, must_change: false };
+    let who = LoggedInUser { user: "tom".into(), role, must_change: false };
     update(model, Msg::SessionStatus(Arc::new(SessionStatus { who: Some(who), ..(*session()).clone() })));
 }
 
@@ -21,7 +21,7 @@ fn quitting_says_what_ends_in_each_way_to_run() {
     for (leaving, words) in [
         (Leaving::Station, "Polling and alarms stop too"),
         (Leaving::Demo, "The demonstration ends"),
-        (Leaving::Terminal, "Only this terminal closes. Polling and alarms go on."),
+        (Leaving::Terminal, "Only this terminal closes. Polling and alarms continue."),
     ] {
         for in_window in [false, true] {
             let mut model = model(&Fixture::normal(), Theme::FULL);
@@ -73,7 +73,7 @@ fn a_form_is_not_opened_for_a_user_who_may_not_send_it() {
 fn a_station_without_users_says_so_before_the_form() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     type_keys(&mut model, "7n");
-    assert!(screen(&mut model, 80, 24).contains("This station keeps no users."));
+    assert!(screen(&mut model, 80, 24).contains("This station has no users."));
     assert!(matches!(model.modal, Some(Modal::Notice(_))), "{:?}", model.modal);
 }
 
@@ -96,9 +96,9 @@ fn long_guidance() -> Fixture {
     let mut fixture = Fixture::alarm();
     let guidance = &mut fixture.def.alarms[0].guidance;
     guidance.cause =
-        "the set value was raised while the inlet valve is open, or the relay of the heater sticks and heats on".into();
+        "the setpoint was raised while the inlet valve is open, or the relay of the heater sticks and heats on".into();
     guidance.action =
-        "lower the set value or stop the sequence; check the lamp of the relay; open the drain by hand if the \
+        "lower the setpoint or stop the sequence; check the lamp of the relay; open the drain by hand if the \
         level rises; tell the shift supervisor once the temperature is above 75 degrees for good"
             .into();
     fixture
@@ -109,7 +109,7 @@ fn guidance_takes_the_rows_that_the_list_leaves_empty() {
     let mut model = model(&long_guidance(), Theme::FULL);
     type_keys(&mut model, "3");
     let shown = screen(&mut model, 80, 24);
-    for words in ["heats on", "lower the set value", "75 degrees for good", "go to"] {
+    for words in ["heats on", "lower the setpoint", "75 degrees for good", "go to"] {
         assert!(shown.contains(words), "{words} is missing:\n{shown}");
     }
 }
@@ -121,7 +121,7 @@ fn enter_on_an_alarm_opens_guidance_then_the_faceplate() {
     assert!(matches!(model.modal, Some(Modal::Guidance(_))), "{:?}", model.modal);
     for (width, height) in [(80, 24), (60, 20)] {
         let shown = screen(&mut model, width, height);
-        for words in ["lower the set value", "respond within"] {
+        for words in ["lower the setpoint", "respond within"] {
             assert!(shown.contains(words), "{words} is missing:\n{shown}");
         }
         type_keys(&mut model, "↓↓↓↓↓↓↓↓");

@@ -69,7 +69,7 @@ pub fn line_trend(cx: &ViewContext, canvas: &mut Canvas, minutes: &[LineMinute])
     let room = canvas.width().saturating_sub(NAME + FIGURES);
     let columns = columns(minutes, cx.now, usize::from(room));
     let Some(last) = minutes.last() else {
-        canvas.text(0, 0, t!("no minute of this line is stored yet"), theme.dim());
+        canvas.text(0, 0, t!("no history of this line yet"), theme.dim());
         return;
     };
     let failed: Vec<Option<f64>> = columns.iter().map(|column| column.and_then(|column| column.failed)).collect();
@@ -87,7 +87,7 @@ pub fn line_trend(cx: &ViewContext, canvas: &mut Canvas, minutes: &[LineMinute])
         canvas.text(0, y, &pad(name, NAME), theme.dim());
         let x = canvas.text(NAME, y, &curve, style);
         let figures = t!(
-            " {pad_left} now {pad_left2} most",
+            " {pad_left} now {pad_left2} peak",
             pad_left = pad_left(&percent(now), 8),
             pad_left2 = pad_left(&percent(Some(most)), 7)
         );
@@ -153,8 +153,8 @@ mod tests {
             day.map(|ago| minute(ago, 60, if (600..660).contains(&ago) { 6 } else { 0 }, 0.5)).collect();
         let rows = shown(&minutes);
         // A column is 55 minutes: two lie wholly in the absence.
-        assert_eq!(rows[0], "errors  ▁▁▁▁▁▁▁▁▁▁▁▁▁▁██▁▁  ▁▁▁▁▁▁    0.0 % now    10 % most");
-        assert_eq!(rows[1], "busy    ▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅  ▅▅▅▅▅▅     50 % now    50 % most");
+        assert_eq!(rows[0], "errors  ▁▁▁▁▁▁▁▁▁▁▁▁▁▁██▁▁  ▁▁▁▁▁▁    0.0 % now    10 % peak");
+        assert_eq!(rows[1], "busy    ▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅▅  ▅▅▅▅▅▅     50 % now    50 % peak");
         assert_eq!(rows[2], "        14:02      02:02     14:02");
     }
 
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn nothing_stored_is_said_and_nothing_asked_is_no_error() {
-        assert_eq!(shown(&[])[0], "no minute of this line is stored yet");
+        assert_eq!(shown(&[])[0], "no history of this line yet");
         let closed: Vec<LineMinute> = (0..60).rev().map(|ago| minute(ago, 0, 0, 0.0)).collect();
         assert!(shown(&closed)[0].contains("– now"), "{:?}", shown(&closed));
     }

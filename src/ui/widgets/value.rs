@@ -79,7 +79,7 @@ impl Shown {
     pub fn with_unit(&self) -> String {
         if self.unit.is_empty() { self.text.clone() } else { format!("{} {}", self.text, self.unit) }
     }
-    /// All of it: `72.4? °C 12s`, `---- device not answering`.
+    /// All of it: `72.4? °C 12s`, `---- device not responding`.
     pub fn whole(&self) -> String {
         if self.note.is_empty() { self.with_unit() } else { format!("{} {}", self.with_unit(), self.note) }
     }
@@ -122,7 +122,7 @@ mod tests {
         check(Some("PXR4TAY1"), Quality::Good, 20, "PXR4TAY1");
         check(Some("PXR4TAY1"), Quality::Good, 5, "PXR4…");
         check(Some(""), Quality::Good, 20, "\"\" empty text");
-        check(None, Quality::Bad(Cause::Timeout), 30, "---- no answer in time");
+        check(None, Quality::Bad(Cause::Timeout), 30, "---- response timeout");
         check(Some("PXR4"), Quality::Uncertain(Cause::Timeout), 5, "PXR4?");
     }
 

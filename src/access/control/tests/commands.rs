@@ -24,7 +24,7 @@ fn a_command_with_a_used_number_is_reported_undelivered() {
     }
     let reply = bench.undelivered(1);
     assert_eq!(reply.iter().map(|(number, _)| *number).collect::<Vec<_>>(), [7, 4]);
-    assert!(reply[0].1.contains("number of an earlier one"));
+    assert!(reply[0].1.contains("repeats an earlier number"));
     bench.open(2, "b");
     bench.login(2, "boss", BOSS).unwrap();
     bench.last_command = 6;

@@ -213,7 +213,7 @@ impl Link {
         }
         let bytes = std::mem::take(&mut self.transactions.outbox);
         if std::mem::replace(&mut self.transactions.sending, true) {
-            return Err(LinkError::Gone("a request was cut short, the stream is out of sync".into()));
+            return Err(LinkError::Gone("a request was incomplete, the stream is out of sync".into()));
         }
         let sent_at = self.wire.put(&bytes).await?;
         self.transactions.sending = false;
@@ -314,7 +314,7 @@ impl Link {
         if !expired.is_empty() && self.transactions.is_cut_short() {
             self.wire.record(false, self.transactions.inbox[..].into(), Cow::Borrowed("cut short"));
             // The rest may come later and would stand before the next header.
-            return Err(LinkError::Gone("an answer was cut short, the stream is out of sync".into()));
+            return Err(LinkError::Gone("a response was incomplete, the stream is out of sync".into()));
         }
         for request in expired {
             if self.transactions.silence_at <= request.sent_at {

@@ -126,7 +126,7 @@ impl Task<'_> {
                 Ok(true)
             }
             BusRequest::Write(WriteJob { urgent: true, .. }) => {
-                self.end_diagnostic("ended by an urgent stop").await?;
+                self.end_diagnostic("cancelled by an urgent stop").await?;
                 self.requests.put_first(request);
                 Ok(false)
             }

@@ -108,7 +108,7 @@ async fn a_stop_cuts_a_scan_short_and_goes_out_at_once() {
         let (after, result, state) = stop_during_scan(serials).await;
         assert_eq!(result, WriteResult::ReadBack(10.0), "{words}");
         assert!(after < 200 * MS, "{words}: after {after:?}");
-        assert_eq!(state, DiagnosticState::Failed("ended by an urgent stop".into()), "{words}");
+        assert_eq!(state, DiagnosticState::Failed("cancelled by an urgent stop".into()), "{words}");
     }
 }
 

@@ -156,7 +156,7 @@ fn a_restart_continues_and_the_time_in_between_is_a_gap() {
     assert_eq!(by_10_s[3], Some(28.0));
     assert_eq!(by_10_s[4..10], [None; 6]);
     assert_eq!(by_10_s[10], Some(40.0));
-    // 31 s of the set value, then nothing.
+    // 31 s of the setpoint, then nothing.
     assert!((series(&store, SV, 0, 100, 1).good - 0.31).abs() < 1e-9);
     // Opening once more adds nothing: the curve of SV has ended already.
     drop(store);

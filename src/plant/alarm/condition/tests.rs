@@ -59,7 +59,7 @@ fn a_deviation_from_an_unknown_set_value_is_unknown() {
 fn silence_is_judged_by_the_device_alone() {
     for ill in [Some(true), Some(false), None] {
         let facts = Facts { ill, ..Facts::default() };
-        assert_eq!(holds(Condition::NotAnswering, facts, false, &mut Memory::default(), Duration::ZERO), ill);
+        assert_eq!(holds(Condition::NotResponding, facts, false, &mut Memory::default(), Duration::ZERO), ill);
     }
 }
 

@@ -234,12 +234,12 @@ fn a_value_changed_during_a_restore_is_not_overwritten() {
         let (tags, fault) = (vec![HIGH], Fault::Timeout);
         drop(plant.on_event(Event::Failed { at: at(1), device: TIC, tags, fault, exchange: None }));
     };
-    check(&silent, "anna write TIC-1.SV-H refused: not known now");
+    check(&silent, "anna write TIC-1.SV-H refused: unknown now");
     let other_line = |plant: &mut Plant| {
         let line = plant.def.line(plant.def.device(TIC).line).clone();
         drop(command(plant, 7, CommandKind::Configure(Box::new(line))));
     };
-    check(&other_line, "anna write TIC-1.SV-H refused: the settings of the line were changed meanwhile");
+    check(&other_line, "anna write TIC-1.SV-H refused: the settings of the line have changed in the meantime");
 }
 
 #[test]

@@ -145,7 +145,7 @@ fn a_value_is_judged_by_what_is_shown_and_by_what_is_so() {
     check(Expectation::Good(PV), &[(12, bad, 50.0), (13, good(50.0), 50.0)], met(13));
     check(within, &[(12, bad, 89.0)], met(20));
     check(within, &[(12, good(70.0), 91.0)], ExpectationStatus::Missed("left at 00:12: 91.0".to_owned()));
-    let unknown = ExpectationStatus::Missed("not evaluated: the simulator does not know the value".to_owned());
+    let unknown = ExpectationStatus::Missed("not evaluated: the simulator has no such value".to_owned());
     check(within, &[], unknown);
     // A moment's difference is the way from probe to screen; a lasting one is a wrong value shown as a right one.
     let wrong = |second| (second, good(50.0), 60.0);

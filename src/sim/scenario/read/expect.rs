@@ -84,7 +84,7 @@ fn expected(table: &ExpectTable, def: &PlantDef, problems: &mut Problems) -> Opt
             if let Some(tolerance) = table.tolerance.filter(|tolerance| tolerance.value < 0.0) {
                 problems
                     .add(tolerance.at, format!("found {}, expected 0 or more", tolerance.value))
-                    .label("how far it may be off");
+                    .label("tolerance of the comparison");
                 return None;
             }
             let tolerance = table.tolerance.map_or(0.0, |tolerance| tolerance.value);

@@ -61,7 +61,7 @@ pub(super) fn alarm(
         _ => {
             let all = texts().map(|text| format!("`{text}`")).collect::<Vec<_>>().join(", ");
             let problem = problems.add(subject.at, format!("{} has several alarms", subject.value));
-            problem.label("say which by `text`").help(format!("text is one of {all}"));
+            problem.label("select one by `message`").help(format!("text is one of {all}"));
             None
         }
     }

@@ -129,7 +129,7 @@ impl Draft {
     pub fn settings(&self) -> Result<LineDef, String> {
         let missed = [&self.port, &self.host, &self.tcp_port, &self.timeout, &self.gap];
         if missed.iter().any(|line| line.missed()) {
-            return Err(t!("not all of a text was taken; Ctrl-U empties it").to_owned());
+            return Err(t!("the text was cut; Ctrl-U clears it").to_owned());
         }
         let settings = LineDef {
             transport: self.transport()?,
@@ -152,7 +152,8 @@ impl Draft {
         };
         let tcp = |framing| {
             let text = self.tcp_port.text();
-            let port = text.trim().parse().map_err(|_| t!("\"{text}\" is no TCP port, expected 1 to 65535", text))?;
+            let port =
+                text.trim().parse().map_err(|_| t!("\"{text}\" is not a TCP port, expected 1 to 65535", text))?;
             Ok(Transport::Tcp { host: self.host.text().trim().to_owned(), port, framing })
         };
         match self.mode {
@@ -266,6 +267,6 @@ fn next<T: Copy + PartialEq>(all: &[T], now: T, by: isize) -> T {
 fn millis(name: &str, line: &Line) -> Result<Duration, String> {
     let text = line.text();
     let number =
-        text.trim().parse().map_err(|_| t!("{name} \"{text}\" is no whole number of milliseconds", name, text));
+        text.trim().parse().map_err(|_| t!("{name} \"{text}\" is not a whole number of milliseconds", name, text));
     number.map(Duration::from_millis)
 }

@@ -69,10 +69,10 @@ fn what_is_chosen_is_what_is_sent() {
 #[test]
 fn what_cannot_be_is_told_before_anything_is_sent() {
     for (keys, expect) in [
-        ("⏎", "these settings are in use"),
+        ("⏎", "these settings are active already"),
         ("↓→", "Modbus RTU always has 8 data bits"),
         ("↑↑→→⏎", "a TCP line needs a host"),
-        ("↓↓↓↓999⏎", "too long: nothing else is sent meanwhile"),
+        ("↓↓↓↓999⏎", "too long: the line is blocked for this time"),
         ("u", "nothing to revert"),
         ("S", "nothing to save"),
         ("→S", "apply these first"),

@@ -9,11 +9,11 @@ impl UserForm {
         match &self.purpose {
             Purpose::First => t!("create"),
             Purpose::Login => t!("log in"),
-            Purpose::Change(_) => t!("change it"),
+            Purpose::Change(_) => t!("change password"),
             Purpose::Unlock(_) => t!("unlock"),
             Purpose::Add => t!("add"),
-            Purpose::Reset(_) => t!("set it"),
-            Purpose::Role(_) => t!("change it"),
+            Purpose::Reset(_) => t!("set password"),
+            Purpose::Role(_) => t!("change password"),
             Purpose::Disable(_, true) => t!("disable"),
             Purpose::Disable(_, false) => t!("enable"),
             Purpose::Delete(_) => t!("delete"),
@@ -53,8 +53,7 @@ impl UserForm {
 
     pub(super) fn words(&self, cx: &ViewContext) -> Vec<String> {
         let least = cx.session.password_chars_min;
-        let rule =
-            t!("A password has at least {least} characters. A phrase is good, in any language, Thai too.", least);
+        let rule = t!("At least {least} characters. Best a phrase, in any language, also Thai.", least);
         let first = t!("It must be changed at the first login.").to_owned();
         let own = |user: &Arc<str>| cx.session.who.as_ref().is_some_and(|who| who.user == *user);
         let you = |user: &Arc<str>| {
@@ -64,13 +63,13 @@ impl UserForm {
         };
         match &self.purpose {
             Purpose::First => vec![
-                t!("No users exist. Create the first Supervisor account: it may do everything, and adds the others.")
+                t!("No users exist. Create the first Supervisor account: it has all rights and adds the other users.")
                     .to_owned(),
                 rule,
             ],
             Purpose::Login => Vec::new(),
             Purpose::Change(Some(_)) => {
-                vec![t!("Another user set your present password: choose one that only you know.").to_owned(), rule]
+                vec![t!("Another user set your current password: choose one that only you know.").to_owned(), rule]
             }
             Purpose::Change(None) => vec![rule],
             Purpose::Unlock(_) => vec![t!("Process and alarms stay visible. Your open window is kept.").to_owned()],
@@ -81,10 +80,10 @@ impl UserForm {
                 let words = t!("{user} is logged out everywhere and cannot log in until enabled again.", user);
                 you(user).map(str::to_owned).into_iter().chain([words]).collect()
             }
-            Purpose::Disable(user, false) => vec![t!("{user} may log in again; a lockout ends too.", user)],
+            Purpose::Disable(user, false) => vec![t!("{user} can log in again; this also clears a lockout.", user)],
             Purpose::Delete(user) => {
                 let words = t!(
-                    "{user} is removed; all that {user} did stays in the audit log. Type the name to be sure.",
+                    "{user} is deleted; the actions of {user} stay in the audit log. Type the name to confirm.",
                     user
                 );
                 you(user).map(str::to_owned).into_iter().chain([words]).collect()
@@ -100,7 +99,7 @@ impl UserForm {
 
     pub(super) fn problem_text(&self, cx: &ViewContext) -> Option<String> {
         if self.waiting {
-            return Some(t!("asking the station …").to_owned());
+            return Some(t!("waiting for the station …").to_owned());
         }
         let (words, _) = self.problem.as_ref()?;
         Some(match (seconds(words), self.wait(cx)) {

@@ -23,11 +23,11 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     let mut rows = value::value_rows(cx, def, exchange, found.as_ref());
     let label = if def.is_text() { t!("text") } else { t!("number") };
     rows.push(Row::new(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
-    rows.push(Row::new(t!("where"), wire::place(cx, def, device), cx.theme.normal()));
+    rows.push(Row::new(t!("address"), wire::place(cx, def, device), cx.theme.normal()));
     rows.push(Row::new("", wire::point(def), cx.theme.normal()));
     let dissection = exchange.map(|exchange| wire::exchange_rows(cx, def, exchange, found.as_ref(), room, &mut rows));
     if exchange.is_none() {
-        rows.push(Row::new(t!("asked"), wire::never_asked(cx, def).to_owned(), cx.theme.normal()));
+        rows.push(Row::new(t!("request"), wire::never_asked(cx, def).to_owned(), cx.theme.normal()));
     }
     rows.extend(service::device_rows(cx, def, device, exchange));
     rows.extend(service::poll_rows(cx, def));

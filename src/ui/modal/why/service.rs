@@ -58,13 +58,13 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
     let line = cx.snapshot.line(cx.def().device(def.device).line);
     let Some(report) = &line.report else { return Vec::new() };
     if report.refused.contains(&def.id) {
-        return vec![Row::new(t!("poll"), t!("asked no more: the device refuses this address"), cx.theme.trouble())];
+        return vec![Row::new(t!("poll"), t!("no longer polled: the device refuses this address"), cx.theme.trouble())];
     }
     let Some(poll) = report.poll_of(def.id) else { return Vec::new() };
     let period = match poll.poll {
         Poll::Every(period) => t!("every {span}", span = span(period)),
         Poll::Once => t!("once, and on refresh").to_owned(),
-        Poll::Never => t!("never by itself").to_owned(),
+        Poll::Never => t!("on request only").to_owned(),
     };
     let next = poll.next.map(|next| match between(cx.now, next) {
         Duration::ZERO => t!(", due now").to_owned(),
@@ -85,7 +85,7 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
     if let Some(p99) = poll.stats.jitter.p99() {
         text += &t!(", jitter {span}", span = span(p99));
     }
-    text += &t!(", costs {span}", span = span(poll.cost));
+    text += &t!(", takes {span}", span = span(poll.cost));
     vec![Row::new(
         t!("poll"),
         text,
@@ -97,13 +97,11 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
 pub(super) fn line_words(cx: &ViewContext, state: &LineState) -> Option<String> {
     match state {
         LineState::Connected => None,
-        LineState::Connecting => Some(t!("being connected").to_owned()),
+        LineState::Connecting => Some(t!("connecting").to_owned()),
         LineState::Disconnected => Some(t!("disconnected by an operator").to_owned()),
-        LineState::Testing => Some(t!("a test has it for itself").to_owned()),
-        LineState::Waiting { why, retry_at } => Some(t!(
-            "not connected: {why}; tried again in {running}",
-            why,
-            running = running(between(cx.now, *retry_at))
-        )),
+        LineState::Testing => Some(t!("in use by a test").to_owned()),
+        LineState::Waiting { why, retry_at } => {
+            Some(t!("not connected: {why}; retry in {running}", why, running = running(between(cx.now, *retry_at))))
+        }
     }
 }

@@ -52,10 +52,10 @@ pub(super) fn value_rows(
     let mut rows = vec![Row::new(t!("value"), format!("{}  {quality}", shown.with_unit()), shown.style)];
     let Some(cause) = sample.quality.cause().filter(|_| def.access != Access::Write) else { return rows };
     if let Some(because) = because(cx, def, cause, exchange, found) {
-        rows.push(Row::new(t!("because"), because, cx.theme.normal()));
+        rows.push(Row::new(t!("cause"), because, cx.theme.normal()));
     }
     if let Some(advice) = advice(cx, def, cause, exchange) {
-        rows.push(Row::new(t!("to do"), advice, cx.theme.strong()));
+        rows.push(Row::new(t!("action"), advice, cx.theme.strong()));
     }
     rows
 }
@@ -81,7 +81,7 @@ fn because(
             match (exchange.and_then(|exchange| exchange.outcome.err()), def.quality_from) {
                 (Some(Fault::NotANumber), _) => Some(Fault::NotANumber.to_string()),
                 (_, Some((word, mask))) => Some(t!(
-                    "{words_of} (bits 0x{mask} any bit set = fault)",
+                    "{words_of} (bits 0x{mask}: any bit set = fault)",
                     words_of = words_of(word),
                     mask = format!("{mask:X}")
                 )),
@@ -95,8 +95,10 @@ fn because(
             Decimals::Fixed(_) => None,
         },
         Cause::Stale => match def.poll {
-            Poll::Every(period) => Some(t!("read every {span}, and not for longer than that", span = span(period))),
-            Poll::Once | Poll::Never => Some(t!("it is not read by itself").to_owned()),
+            Poll::Every(period) => {
+                Some(t!("polled every {span}, but not read for longer than that", span = span(period)))
+            }
+            Poll::Once | Poll::Never => Some(t!("it is read on request only").to_owned()),
         },
         // The verdict on the last answer says it all.
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown => None,
@@ -121,9 +123,11 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
         Cause::Exception => fault.or(last).and_then(of),
         Cause::SensorFault if fault == Some(Fault::NotANumber) => of(Fault::NotANumber),
         Cause::SensorFault => Some(t!("check the sensor, its wires and the input range of the device").to_owned()),
-        Cause::Unscaled => Some(t!("make the other value good first; w on it says why it is not").to_owned()),
+        Cause::Unscaled => Some(t!("correct the other value first: press w on it for the cause").to_owned()),
         Cause::Stale => match def.poll {
-            Poll::Every(_) => Some(t!("the line may be overloaded: see missed reads below, poll slower").to_owned()),
+            Poll::Every(_) => {
+                Some(t!("the line may be overloaded: see missed polls below, poll less often").to_owned())
+            }
             Poll::Once | Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),
         },
         Cause::NotRead => match def.poll {
@@ -142,10 +146,10 @@ fn text(cx: &ViewContext, def: &TagDef, found: Option<&Found>) -> String {
         (Some(text), Some(found), _) => {
             let hex: Vec<String> = found.words.iter().map(|word| format!("{word:04X}")).collect();
             let odd = text.contains(codec::UNPRINTABLE);
-            let note = if odd { t!(", · stands for a byte that cannot be printed") } else { "" };
+            let note = if odd { t!(", · = unprintable byte") } else { "" };
             t!("\"{text}\"{note}, from {join}", text, note, join = hex.join(" "))
         }
-        (_, _, Some(text)) => t!("\"{text}\", earlier answer", text),
+        (_, _, Some(text)) => t!("\"{text}\", earlier response", text),
         (..) => t!("none").to_owned(),
     }
 }
@@ -165,7 +169,7 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     let hex = found.map(|found| found.words.iter().map(|word| format!(" {word:04X}")).collect::<String>());
     let Some(raw) = from_answer.or(shown) else {
         return match hex {
-            Some(hex) => t!("none:{hex} is no {kind}", hex, kind = def.point.kind),
+            Some(hex) => t!("none:{hex} is not a valid {kind}", hex, kind = def.point.kind),
             None => t!("none").to_owned(),
         };
     };
@@ -191,7 +195,7 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
         Decimals::Fixed(_) => {}
     }
     if from_answer.is_none() && exchange.is_some() {
-        words += t!(", earlier answer");
+        words += t!(", earlier response");
     }
     words
 }

@@ -42,7 +42,7 @@ pub(super) fn exchange_rows(
     };
     let hex = |label, text: String, style| Row { label, text: text.trim_start().to_owned(), style, wraps: false };
     for (n, text) in frame(&exchange.request, None).into_iter().enumerate() {
-        rows.push(hex(if n == 0 { t!("asked") } else { "" }, text, theme.normal()));
+        rows.push(hex(if n == 0 { t!("request") } else { "" }, text, theme.normal()));
     }
     let at = clock(exchange.at, &cx.def().time_zone);
     // What was good then says nothing of now.
@@ -50,24 +50,25 @@ pub(super) fn exchange_rows(
     rows.push(Row::new("", format!("{}, at {at}", request.summary), theme.dim()));
     if exchange.answer.is_empty() {
         let timeout = settings(cx, def).timeout;
-        rows.push(Row::new(t!("answer"), t!("none within {span}", span = span(timeout)), theme.trouble()));
+        rows.push(Row::new(t!("response"), t!("none within {span}", span = span(timeout)), theme.trouble()));
     } else {
         for (n, text) in frame(&exchange.answer, found.map(|found| &found.range)).into_iter().enumerate() {
-            rows.push(hex(if n == 0 { t!("answer") } else { "" }, text, theme.normal()));
+            rows.push(hex(if n == 0 { t!("response") } else { "" }, text, theme.normal()));
         }
         rows.push(Row { wraps: false, ..Row::new("", answer.summary.clone(), theme.dim()) });
     }
     let reply = exchange.reply.map(|reply| t!(", after {span}", span = span(reply))).unwrap_or_default();
-    let tries = if 1 < exchange.tries { t!(", second try: the first answer was corrupt") } else { t!(", first try") };
+    let tries =
+        if 1 < exchange.tries { t!(", second attempt: the first response was corrupt") } else { t!(", first attempt") };
     let (verdict, style) = match exchange.outcome {
         Ok(()) if old => {
             let ago = running(between(exchange.at, cx.now));
-            (t!("ok, but {ago} ago: no good answer since", ago), theme.trouble())
+            (t!("ok {ago} ago, no good response since", ago), theme.trouble())
         }
         Ok(()) => (t!("ok").to_owned(), theme.normal()),
         Err(fault) => (fault.to_string(), theme.trouble()),
     };
-    rows.push(Row::new(t!("verdict"), format!("{verdict}{reply}{tries}"), style));
+    rows.push(Row::new(t!("result"), format!("{verdict}{reply}{tries}"), style));
     (request, answer)
 }
 
@@ -80,7 +81,7 @@ pub(super) fn every_byte(
     room: u16,
 ) -> Vec<Row> {
     let mut rows = Vec::new();
-    let frames = [(t!("asked"), request, None), (t!("answer"), answer, found.map(|found| &found.range))];
+    let frames = [(t!("request"), request, None), (t!("response"), answer, found.map(|found| &found.range))];
     for (label, dissection, marked) in frames.into_iter().take(if exchange.answer.is_empty() { 1 } else { 2 }) {
         let heading = t!("{label}, byte by byte", label);
         rows.push(Row { label: "", text: heading, style: cx.theme.strong(), wraps: false });
@@ -99,9 +100,9 @@ pub(super) fn every_byte(
 
 pub(super) fn never_asked(cx: &ViewContext, def: &TagDef) -> &'static str {
     match (def.access, def.poll, &cx.snapshot.line(cx.def().device(def.device).line).state) {
-        (Access::Write, ..) => t!("never: it can only be written"),
-        (_, Poll::Never, _) => t!("never: it is not read by itself"),
-        (_, _, LineState::Connected) => t!("not yet: its turn has not come"),
+        (Access::Write, ..) => t!("never: write only"),
+        (_, Poll::Never, _) => t!("never: read on request only"),
+        (_, _, LineState::Connected) => t!("not yet: not polled so far"),
         (_, _, LineState::Connecting | LineState::Waiting { .. } | LineState::Disconnected | LineState::Testing) => {
             t!("not yet: nothing could be sent")
         }

@@ -59,8 +59,8 @@ pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a Ac
     if NAMED < waiting.len() {
         notes.push(t!("… and {count} more", count = waiting.len() - NAMED));
     }
-    let seen = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
-    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen });
+    let alarms = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
+    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms });
     let title = t!("acknowledge all");
     if needed {
         notes.insert(0, asked);
@@ -80,7 +80,7 @@ pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
     if let Some(rest) = rest.filter(|rest| !rest.is_zero() && *rest <= max) {
         times.push((t!("rest of the shift, {running}", running = running(rest)), rest));
     }
-    let notes = vec![name(cx, alarm), t!("It is not annunciated for this time, and comes back by itself:").to_owned()];
+    let notes = vec![name(cx, alarm), t!("Not annunciated for this time, then unshelved automatically:").to_owned()];
     let kind = CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: max });
     let window = Modal::Reason(Box::new(Reason::shelve(notes, alarm, times, max)));
     vec![Notice::or(cx, t!("shelve an alarm"), &kind, window)]
@@ -88,9 +88,9 @@ pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
 
 /// Asks why an alarm is taken out of service.
 pub fn out_of_service(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
-    let notes = vec![name(cx, alarm), t!("It is not annunciated until it is put back in service.").to_owned()];
+    let notes = vec![name(cx, alarm), t!("Not annunciated until it is returned to service.").to_owned()];
     let kind = CommandKind::Alarm(AlarmCommand::OutOfService(alarm));
-    let reason = Reason::new(t!("out of service"), t!("put out of service"), notes, kind.clone(), true);
+    let reason = Reason::new(t!("out of service"), t!("take out of service"), notes, kind.clone(), true);
     vec![Notice::or(cx, t!("out of service"), &kind, Modal::Reason(Box::new(reason)))]
 }
 
@@ -101,7 +101,7 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
         return open(Modal::Confirm(Confirm::command(t!("reset a latched alarm"), name(cx, alarm.id), kind)));
     }
     let why = match alarm.state.is_active() && cx.def().alarm(alarm.id).latch {
-        true => t!("Its cause lasts: it can be reset once that is gone."),
+        true => t!("Its condition is still active: reset it when it has cleared."),
         false => t!("It does not latch: there is nothing to reset."),
     };
     open(Modal::Notice(Notice::new(t!("reset"), vec![name(cx, alarm.id), why.to_owned()])))
@@ -111,15 +111,15 @@ pub fn reset(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
 pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction> {
     let (title, alarm_command) = match suppressed.state {
         AlarmState::Shelved => (t!("unshelve"), AlarmCommand::Unshelve(suppressed.id)),
-        AlarmState::OutOfService => (t!("put in service"), AlarmCommand::InService(suppressed.id)),
+        AlarmState::OutOfService => (t!("return to service"), AlarmCommand::InService(suppressed.id)),
         AlarmState::SuppressedByDesign => {
-            let words = t!("It is suppressed by design, and comes back when its enabling condition holds again.");
+            let words = t!("Suppressed by design; it returns when its enabling condition is true again.");
             return open(Modal::Notice(Notice::new(t!("suppressed"), vec![words.to_owned()])));
         }
         // Every other state is annunciated.
         _ => return Vec::new(),
     };
-    let holds = suppressed.active.then(|| t!("Its condition holds: it will be annunciated at once.").to_owned());
+    let holds = suppressed.active.then(|| t!("Its condition is active: it will be annunciated at once.").to_owned());
     let kind = CommandKind::Alarm(alarm_command);
     let confirm = Confirm::command(title, name(cx, suppressed.id), kind.clone());
     vec![Notice::or(cx, title, &kind, Modal::Confirm(confirm.with_notes(holds)))]
@@ -127,21 +127,24 @@ pub fn put_back(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Vec<UiAction>
 
 /// Asks for what the next shift should know.
 pub fn hand_over() -> Vec<UiAction> {
-    let notes = vec![t!("What the next shift should know besides what stands on this page:").to_owned()];
+    let notes = vec![t!("Notes for the next shift, in addition to this page:").to_owned()];
     let reason = Reason::new(t!("hand over"), t!("hand over"), notes, CommandKind::HandOver, false);
     open(Modal::Reason(Box::new(reason)))
 }
 
 /// Says that a handover takes two.
 pub fn own_handover() -> Vec<UiAction> {
-    let words = [t!("You have handed over yourself."), t!("Another person reads this page and takes the plant over.")];
+    let words = [
+        t!("You cannot take over what you handed over yourself."),
+        t!("Another user reads this page and takes over the plant."),
+    ];
     open(Modal::Notice(Notice::new(t!("take over"), words.map(str::to_owned).to_vec())))
 }
 
 /// Asks whether the user takes the plant over.
 pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     let who = cx.session.who.as_ref().map_or("–", |who| &who.user);
-    let words = t!("{who} has read this page and takes the plant over.", who);
+    let words = t!("{who} has read this page and takes over the plant.", who);
     open(Modal::Confirm(Confirm::command(t!("take over"), words, CommandKind::TakeOver)))
 }
 

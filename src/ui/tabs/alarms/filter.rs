@@ -8,7 +8,7 @@ use crate::plant::{
 use crate::ui::tabs::prelude::*;
 
 /// What may be typed, for the entry window.
-pub const FORMS: &str = "words of tag, text, state or who acknowledged:  TIC-1 high   unack   anna";
+pub const FORMS: &str = "words of tag, message, state or user:  TIC-1 high   unack   anna";
 
 /// A filter; what is empty lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

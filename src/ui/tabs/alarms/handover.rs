@@ -121,7 +121,7 @@ impl Handover {
             section(t!("failed in this shift"), of(|row| is_failed(row) && is_change(row)), true);
             section(t!("changed in this shift"), of(|row| !is_failed(row) && is_change(row)), false);
             if actions.len() >= ROWS {
-                section(t!("the oldest actions are left out"), Vec::new(), true);
+                section(t!("the oldest actions are omitted"), Vec::new(), true);
             }
         }
         lines
@@ -145,7 +145,7 @@ impl Handover {
         lines.push(match taken {
             Some(row) => (t!("taken over {when} by {by}", when = when(row), by = row.by), theme.strong()),
             None if is_own(cx, note) => {
-                (t!("not taken over yet: another person does, with o").to_owned(), theme.trouble())
+                (t!("not taken over yet: another user takes over with o").to_owned(), theme.trouble())
             }
             None => (t!("not taken over yet: o takes over").to_owned(), theme.trouble()),
         });
@@ -216,14 +216,14 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
     let lines = def.lines.iter().flat_map(|line| {
         let status = snapshot.line(line.id);
         let state = match status.state {
-            LineState::Disconnected => Some(t!("closed by an operator").to_owned()),
-            LineState::Testing => Some(t!("given to a test").to_owned()),
+            LineState::Disconnected => Some(t!("disconnected by an operator").to_owned()),
+            LineState::Testing => Some(t!("in use by a test").to_owned()),
             LineState::Waiting { .. } | LineState::Connecting => {
                 status.lost_since.map(|since| t!("not connected since {clock}", clock = clock(since, zone)))
             }
             LineState::Connected => None,
         };
-        let tried = status.settings_before.as_ref().map(|_| t!("settings on trial, not saved").to_owned());
+        let tried = status.settings_before.as_ref().map(|_| t!("settings under test, not saved").to_owned());
         state.into_iter().chain(tried).map(|words| format!("{} {words}", line.name))
     });
     let devices = def.devices.iter().filter_map(|device| {
@@ -244,7 +244,11 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
     });
     let stubborn = def.logic.actuators.iter().enumerate().filter_map(|(n, actuator)| {
         let lasts = snapshot.watch.disobeys(&def.logic, n, cx.now)?;
-        Some(t!("{name} has not obeyed for {running}", name = def.tag(actuator.output).name, running = running(lasts)))
+        Some(t!(
+            "{name} has not followed its command for {running}",
+            name = def.tag(actuator.output).name,
+            running = running(lasts)
+        ))
     });
     lines.chain(devices).chain(sequences).chain(stubborn).collect()
 }

@@ -16,7 +16,7 @@ const SEARCHED_ROWS: usize = 2_000;
 /// How often it is queried again, real time.
 const EVERY_S: f64 = 5.0;
 /// What may be typed, for the entry window.
-pub const FORMS: &str = "words of tag, text, user; a time or a day:  TIC-1 anna   06:00-14:00   2026-11-20";
+pub const FORMS: &str = "words of tag, message, user; a time or a day:  TIC-1 anna   06:00-14:00   2026-11-20";
 
 /// State of the page.
 #[derive(Debug, Default)]
@@ -101,7 +101,7 @@ impl Journal {
             what.push(t!("\"{typed}\": {count} of {all}, / changes it", typed = self.typed(), count = rows.len(), all));
         }
         if alarms.len() >= self.limit() || actions.len() >= self.limit() {
-            what.push(t!("the oldest left out").to_owned());
+            what.push(t!("the oldest omitted").to_owned());
         }
         if let times @ 1.. = cx.snapshot.history.epoch {
             let often = if times == 1 { t!("once").to_owned() } else { t!("{times} times", times) };
@@ -115,8 +115,8 @@ impl Journal {
             let answered = self.alarms.value.is_some() || self.actions.value.is_some();
             let words = match (answered, self.words.is_empty()) {
                 (false, _) => t!("collecting data"),
-                (true, true) => t!("Nothing happened."),
-                (true, false) => t!("Nothing found."),
+                (true, true) => t!("No entries."),
+                (true, false) => t!("No matching entries."),
             };
             canvas.text(6, 2, words, theme.normal());
             return;

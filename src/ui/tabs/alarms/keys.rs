@@ -63,23 +63,23 @@ const MOVE: [Row; 6] = motions!("select", Action::Move);
 
 const VIEWS: [Row; 3] = [
     Key::new(char('v'), "view", "next view: active, suppressed, system, journal, metrics, handover", Action::View(1)),
-    Key::new(char('V'), "", "view before", Action::View(-1)),
+    Key::new(char('V'), "", "previous view", Action::View(-1)),
     Key::new(char('b'), "", "bell for new alarms on or off", Action::Bell),
 ];
 
 const ACTIONS: [Row; 9] = [
     Key::new(char('n'), "note", "acknowledge with a note", Action::Note).needs(Role::Technician),
     Key::new(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve).needs(Role::Technician),
-    Key::new(char('/'), "filter", "show only alarms with these words; Esc shows all again", Action::Words),
+    Key::new(char('/'), "filter", "show only alarms with these words; Esc: show all", Action::Words),
     Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage)
         .needs(Role::Technician),
-    Key::new(char(' '), "unfold", "show or fold away the consequences of a first-out group", Action::Fold),
-    Key::new(char('r'), "reset", "reset a latched alarm whose cause is gone (asks first)", Action::Reset)
+    Key::new(char(' '), "expand", "show or hide the consequences of a first-out group", Action::Fold),
+    Key::new(char('r'), "reset", "reset a latched alarm whose condition has cleared (asks first)", Action::Reset)
         .needs(Role::Technician),
     Key::new(
         char('o'),
         "out of service",
-        "take the alarm out of service until it is put back, with a reason",
+        "take the alarm out of service until it is returned, with a reason",
         Action::OutOfService,
     )
     .needs(Role::Supervisor),
@@ -92,36 +92,36 @@ const AREA: [Row; 1] = [Key::new(char('g'), "", "filter: next area", Action::Are
 const OPEN: [Row; 1] = [Key::new(
     code(KeyCode::Enter),
     "guidance",
-    "the guidance in full; ⏎ again: the faceplate of what the alarm watches",
+    "full guidance; ⏎ again: the faceplate of the alarm source",
     Action::Open,
 )];
 
 const GO: [Row; 5] = [
-    Key::new(char('m'), "", "go to the mimic, with what the alarm watches selected", Action::Mimic),
-    Key::new(char('t'), "", "go to the trend at the moment of the alarm", Action::Trend),
+    Key::new(char('m'), "", "go to the mimic, with the source of the alarm selected", Action::Mimic),
+    Key::new(char('t'), "", "go to the trend at the time of the alarm", Action::Trend),
     Key::new(char('c'), "", "go to the controller of the alarm", Action::Controller),
-    Key::new(char('j'), "journal", "journal of what the alarm watches", Action::Journal),
-    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
+    Key::new(char('j'), "journal", "journal of the alarm source", Action::Journal),
+    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
 ];
 
 const BACK: [Row; 1] =
-    [Key::new(char('u'), "put back", "unshelve, or return to service", Action::PutBack).needs(Role::Technician)];
+    [Key::new(char('u'), "return", "unshelve, or return to service", Action::PutBack).needs(Role::Technician)];
 
 const SEARCH: [Row; 2] = [
-    Key::new(char('/'), "search", "search by words of tag, text, user; and by time: 06:00-14:00", Action::Words),
+    Key::new(char('/'), "search", "search by words of tag, message, user; and by time: 06:00-14:00", Action::Words),
     Key::new(char('j'), "list", "back to the list", Action::Journal),
 ];
 
 const SHIFT: [Row; 3] = [
-    Key::new(code(KeyCode::Left), "", "the shift before", Action::Shift(-1)),
-    Key::new(code(KeyCode::Right), "shift", "the shift after", Action::Shift(1)),
-    Key::new(char('l'), "now", "the present", Action::Now),
+    Key::new(code(KeyCode::Left), "", "previous shift", Action::Shift(-1)),
+    Key::new(code(KeyCode::Right), "shift", "next shift", Action::Shift(1)),
+    Key::new(char('l'), "now", "present", Action::Now),
 ];
 
 const HANDOVER: [Row; 2] = [
-    Key::new(char('n'), "hand over", "hand the plant over to the next shift, with a note", Action::HandOver)
+    Key::new(char('n'), "hand over", "hand over the plant to the next shift, with a note", Action::HandOver)
         .needs(Role::Technician),
-    Key::new(char('o'), "take over", "take the plant over from the shift before", Action::TakeOver)
+    Key::new(char('o'), "take over", "take over the plant from the previous shift", Action::TakeOver)
         .needs(Role::Technician),
 ];
 

@@ -86,7 +86,7 @@ impl Metrics {
             draw::lines(&mut side, &self.bad_actors(cx), Scroll::default());
         }
         let last = height.saturating_sub(1);
-        let words = t!("ISA-18.2, one operator, meant for 30 days or more");
+        let words = t!("ISA-18.2, per operator, for periods of 30 days or more");
         let more = if more > 0 { t!("{more} more below", more) } else { String::new() };
         let end = width.saturating_sub(1);
         canvas.text(1, last, &fit_words(words, end.saturating_sub(3 + text::width(&more))), theme.dim());
@@ -96,7 +96,7 @@ impl Metrics {
     /// The table, and below it the bad actors unless they stand beside it.
     fn lines(&self, cx: &ViewContext, width: u16) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
-        let head = line(cx.theme, [t!("measure"), t!("figure"), t!("target"), t!("limit"), t!("verdict")]);
+        let head = line(cx.theme, [t!("measure"), t!("figure"), t!("target"), t!("limit"), t!("result")]);
         let mut lines = vec![(head, cx.theme.dim())];
         for (goal, row) in METRIC_TARGETS.iter().zip(alarm_metrics::rows(figures)) {
             let value = row.value.map_or("–".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
@@ -106,7 +106,7 @@ impl Metrics {
                 Verdict::Good => cx.theme.normal(),
                 Verdict::Beyond => cx.theme.strong(),
                 Verdict::Over => cx.theme.trouble(),
-                Verdict::TooFew | Verdict::TooShort => cx.theme.dim(),
+                Verdict::InsufficientData => cx.theme.dim(),
             };
             lines.push((text, style));
         }
@@ -121,7 +121,7 @@ impl Metrics {
     fn bad_actors(&self, cx: &ViewContext) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
         let all = figures.annunciated().max(1) as f64;
-        let mut lines = vec![(t!("alarms to look into").to_owned(), cx.theme.dim())];
+        let mut lines = vec![(t!("alarms to investigate").to_owned(), cx.theme.dim())];
         let style = cx.theme.normal();
         for bad_actor in alarm_metrics::bad_actors(figures) {
             let share = bad_actor.raised.map(|raised| format!("{raised:>5} {:>3.0} %", raised as f64 * 100.0 / all));

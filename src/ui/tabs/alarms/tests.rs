@@ -239,8 +239,8 @@ fn the_handover_tells_what_the_next_shift_must_know() {
     fixture.set("PLC-1.AUTO", 0.0);
     let note = "Pump P-1 draws too much current; electrician comes at 16:00.";
     let rows = vec![
-        action(40, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
-        action(45, "anna", "write", "TIC-1.SV", "failed: no answer in time", None),
+        action(40, "anna", "write", "TIC-1.SV", "failed: response timeout", None),
+        action(45, "anna", "write", "TIC-1.SV", "failed: response timeout", None),
         action(50, "anna", "unlock terminal", "anna", "done", None),
         action(60, "anna", "acknowledge", "TIC-1.PV temperature high", "verified", None),
         action(100, "anna", "write", "TIC-1.SV", "verified", None),
@@ -262,9 +262,9 @@ fn the_handover_tells_what_the_next_shift_must_know() {
             assert!(!picture.contains("unlock terminal"), "no change of the plant: {picture}");
             assert!(picture.contains("2× TIC-1.SV"), "what failed alike stands once: {picture}");
             // Whoever hands over does not take over from himself.
-            assert!(picture.contains("another person does, with o"), "{picture}");
+            assert!(picture.contains("another user takes over with o"), "{picture}");
             type_keys(&mut model, "o");
-            assert!(screen(&mut model, 120, 40).contains("You have handed over yourself."));
+            assert!(screen(&mut model, 120, 40).contains("You cannot take over what you handed over yourself."));
             assert_eq!(sent_kind(&type_keys(&mut model, "⏎⏎")), None);
         }
     }
@@ -297,17 +297,17 @@ fn the_filter_in_force_is_written_and_hides_nothing_silently() {
     assert!(!picture.lines().skip(4).any(|line| line.contains("temperature high")), "{picture}");
     type_keys(&mut model, "f");
     assert!(screen(&mut model, 80, 24).contains("critical  \"plc-1\": 0 of 3 shown"), "{}", screen(&mut model, 80, 24));
-    assert!(screen(&mut model, 80, 24).contains("No alarm fits the filter."));
+    assert!(screen(&mut model, 80, 24).contains("No alarm matches the filter."));
     type_keys(&mut model, "⎋");
     assert!(screen(&mut model, 80, 24).contains("3 shown"));
     // What the filter hides is not acknowledged by A.
     type_keys(&mut model, "/level⏎A");
     let effects = type_keys(&mut model, "⏎");
     let low = &Fixture::alarm().alarms[2];
-    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = sent_kind(&effects) else {
+    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms })) = sent_kind(&effects) else {
         panic!("{effects:?}")
     };
-    assert_eq!(**seen, [(low.id, low.raised_at)]);
+    assert_eq!(**alarms, [(low.id, low.raised_at)]);
 }
 
 #[test]
@@ -316,13 +316,13 @@ fn a_page_acknowledges_only_what_was_on_the_screen() {
     screen(&mut model, 80, 24);
     type_keys(&mut model, "p");
     let effects = type_keys(&mut model, "⏎");
-    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { seen })) = sent_kind(&effects) else {
+    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms })) = sent_kind(&effects) else {
         panic!("{effects:?}")
     };
     let picture = screen(&mut model, 80, 24);
     let on_screen = picture.lines().filter(|line| line.contains("UNACK ") || line.contains("LATCHED ")).count();
     // The banner is one of those lines.
-    assert_eq!(seen.len() + 1, on_screen, "{picture}");
+    assert_eq!(alarms.len() + 1, on_screen, "{picture}");
 }
 
 #[test]

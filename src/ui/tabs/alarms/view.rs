@@ -109,9 +109,9 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     canvas.text(1, 1, &columns.row(names), theme.dim());
     if rows.is_empty() {
         let words = match all {
-            0 if tab.page == Page::System => t!("No system alarm is active. j shows what was."),
-            0 => t!("No alarm is active. j shows what was."),
-            _ => t!("No alarm fits the filter. Esc shows all again."),
+            0 if tab.page == Page::System => t!("No active system alarms. j: journal."),
+            0 => t!("No active alarms. j: journal."),
+            _ => t!("No alarm matches the filter. Esc: show all."),
         };
         canvas.text(6, 3, words, theme.normal());
         return;
@@ -179,12 +179,12 @@ fn filter_line(
         words.push(t!("FILTER {describe}: {shown} of {all} shown, Esc shows all", describe, shown, all));
     }
     if folded > 0 {
-        words.push(t!("{folded} folded, space unfolds", folded));
+        words.push(t!("{folded} grouped, space: expand", folded));
     }
     if tab.filter.is_off() && words.is_empty() && all > 0 {
         let sorted = match rows.iter().any(|row| row.first || row.under) {
             true => t!("grouped under the first-out alarm"),
-            false => t!("the most urgent first"),
+            false => t!("most urgent first"),
         };
         words.push(t!("{all} shown, {sorted}", all, sorted));
     }
@@ -198,9 +198,9 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let all: &[SuppressedAlarm] = &cx.snapshot.suppressed;
-    canvas.text(1, 0, t!("Evaluated and journaled, but not annunciated. u puts back."), theme.dim());
+    canvas.text(1, 0, t!("Evaluated and journaled, but not annunciated. u: unsuppress."), theme.dim());
     if all.is_empty() {
-        canvas.text(6, 2, t!("No alarm is suppressed."), theme.normal());
+        canvas.text(6, 2, t!("No suppressed alarms."), theme.normal());
         return;
     }
     let place =
@@ -264,7 +264,7 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
     ]
 }
 
-/// `1st temperature high > 72.0 +14 more, 3 unack`: how many are folded under it, and an acknowledgement that is not on
+/// `First-out temperature high > 72.0 +14 more, 3 unack`: how many are folded under it, and an acknowledgement that is not on
 /// disk, are never cut off.
 fn what_text(cx: &ViewContext, row: &Row, room: u16) -> String {
     let mark = match (row.first, row.under) {

@@ -103,7 +103,7 @@ impl Ring {
 
     /// Asks for the filter.
     pub fn ask_filter(&self) -> UiAction {
-        let hint = t!("unit 1   fc 3   tx   rx   error   03EA (bytes); all must hold; empty: all frames");
+        let hint = t!("unit 1   fc 3   tx   rx   error   03EA (bytes); all must match; empty: all frames");
         UiAction::Open(Modal::Prompt(Prompt::new(t!("filter frames"), hint, &self.filter.to_string())))
     }
 
@@ -124,7 +124,7 @@ impl Ring {
         let frames: Vec<Frame> = self.shown().into_iter().cloned().collect();
         self.saved.clear();
         if frames.is_empty() {
-            self.saved.push(Err(t!("there is no frame to save").to_owned()));
+            self.saved.push(Err(t!("no frames to save").to_owned()));
             return Vec::new();
         }
         let stamp = draw::local(cx, cx.now, "%Y-%m-%d-%H%M%S");
@@ -166,7 +166,7 @@ impl Ring {
         let notice = self.notice();
         let room = usize::from(height).saturating_sub(1 + notice.len());
         if shown.is_empty() {
-            canvas.text(1, 2, t!("no frame yet, or none that passes the filter"), theme.dim());
+            canvas.text(1, 2, t!("no frames, or none that match the filter"), theme.dim());
         }
         let place = ring.place(&shown);
         let first = list::first(place, shown.len(), room);

@@ -37,39 +37,39 @@ pub enum Action {
 
 /// Keys of every page.
 const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "the page before", Action::Turn(-1)),
-    Key::new(code(KeyCode::Right), "page", "the next page", Action::Turn(1)),
+    Key::new(code(KeyCode::Left), "", "previous page", Action::Turn(-1)),
+    Key::new(code(KeyCode::Right), "page", "next page", Action::Turn(1)),
     Key::new(char('L'), "", "page Line", Action::Show(Page::Line)),
     Key::new(char('P'), "", "page Plan", Action::Show(Page::Plan)),
     Key::new(char('F'), "", "page Frames", Action::Show(Page::Frames)),
     Key::new(char('T'), "", "page Test", Action::Show(Page::Test)),
-    Key::new(char('n'), "", "the next line of the plant", Action::NextLine),
+    Key::new(char('n'), "", "next line of the plant", Action::NextLine),
 ];
 /// Keys of the first page.
 const LINE_KEYS: &[Key<Action>] = &[
-    Key::new(char('r'), "retry", "ask devices that do not answer now", Action::Retry).needs(Role::Technician),
+    Key::new(char('r'), "retry", "retry devices that do not respond, now", Action::Retry).needs(Role::Technician),
     Key::new(char('c'), "settings", "communication settings of the line", Action::Settings),
 ];
 const PLAN_KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "tags", "the tags of the block", Action::Open),
-    Key::new(char('w'), "why", "why the values of the block are what they are", Action::Why),
+    Key::new(char('w'), "why", "explain the values of the block", Action::Why),
 ];
 const FRAMES_KEYS: &[Key<Action>] = &[
     Key::new(char(' '), "pause", "pause or resume", Action::Freeze),
     Key::new(code(KeyCode::Enter), "decode", "every byte of the frame", Action::Open),
     Key::new(char('f'), "filter", "filter frames", Action::Filter),
-    Key::new(char('x'), "save", "write them as text and for Wireshark", Action::Save),
+    Key::new(char('x'), "save", "save them as text and for Wireshark", Action::Save),
 ];
 const TEST_KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "start", "start the selected test", Action::Open).needs(Role::Technician),
-    Key::new(char('t'), "", "type bytes and send them", Action::Try(Tried::Bytes)),
-    Key::new(char('f'), "", "a request by its fields", Action::Try(Tried::Request)),
+    Key::new(char('t'), "", "enter bytes and send them", Action::Try(Tried::Bytes)),
+    Key::new(char('f'), "", "build a request from its fields", Action::Try(Tried::Request)),
     Key::new(char('b'), "", "browse registers", Action::Try(Tried::Registers)),
     Key::new(char('l'), "", "loopback", Action::Try(Tried::Loopback)),
     Key::new(char('i'), "", "identify a device", Action::Try(Tried::Identify)),
     Key::new(char('s'), "", "scan for units", Action::Try(Tried::Scan)),
-    Key::new(char('r'), "again", "the last test once more", Action::Again).needs(Role::Technician),
-    Key::new(char('x'), "stop", "stop the test at work", Action::Stop).needs(Role::Technician),
+    Key::new(char('r'), "again", "repeat the last test", Action::Again).needs(Role::Technician),
+    Key::new(char('x'), "stop", "stop the running test", Action::Stop).needs(Role::Technician),
 ];
 
 /// The keys of a page: those of every page first.

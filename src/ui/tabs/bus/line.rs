@@ -30,7 +30,7 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
     let Some(report) = at.report else {
-        rows.push(plain(t!("nothing received from this line yet"), cx.theme.trouble()));
+        rows.push(plain(t!("no data from this line yet"), cx.theme.trouble()));
         return rows;
     };
     rows.extend(load(cx, report, width));
@@ -71,7 +71,7 @@ fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
         vec![plain(line.transport.to_string(), theme.strong()), value(cx, t!("timeout"), &ms(line.timeout))];
     if let Some(serial) = line.transport.serial() {
         parts.push(value(cx, t!("silence"), &ms(serial.silence().max(line.gap))));
-        parts.push(value(cx, t!("end of answer"), &ms(line.idle)));
+        parts.push(value(cx, t!("end of response"), &ms(line.idle)));
     }
     let lamp = |on: bool| if on { theme.pick("●", "@") } else { theme.pick("○", "o") };
     let counters = &at.status.counters;
@@ -80,7 +80,7 @@ fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     };
     let (tx, rx) = (recent(counters.last_tx), recent(counters.last_rx));
     let deaf = tx && !rx;
-    let nothing = if deaf { t!(" nothing comes back") } else { "" };
+    let nothing = if deaf { t!(" no response") } else { "" };
     let lamps = t!("TX {lamp} RX {lamp2}{value}", lamp = lamp(tx), lamp2 = lamp(rx), value = nothing);
     parts.push(plain(lamps, if deaf { theme.trouble() } else { theme.normal() }));
     flow(t!("settings"), theme.dim(), width, parts)
@@ -105,7 +105,7 @@ fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     let parts = [
         value(cx, t!("blocks"), &plan.blocks.to_string()),
         value(cx, t!("worst-case scan time"), &t!("{ms}, measured {measured}", ms = ms(plan.round), measured)),
-        value(cx, t!("load at worst"), &format!("{:.0} %", plan.load * 100.0)),
+        value(cx, t!("worst-case load"), &format!("{:.0} %", plan.load * 100.0)),
         count(cx, t!("missed"), report.counters.missed, missed_lately(report)),
     ];
     flow(t!("cycle"), cx.theme.dim(), width, parts)
@@ -148,10 +148,10 @@ fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Ve
     let mut parts = vec![
         plain(grouped(counters.requests), cx.theme.normal()),
         value(cx, t!("ok"), &grouped(counters.ok)),
-        count(t!("no answer"), counters.timeouts),
+        count(t!("timeouts"), counters.timeouts),
         count(t!("corrupt"), counters.corrupt),
     ];
-    let kinds = [(t!("check"), sum.check), (t!("length"), sum.length), (t!("not ours"), sum.foreign)];
+    let kinds = [(t!("check"), sum.check), (t!("length"), sum.length), (t!("foreign"), sum.foreign)];
     parts.extend(kinds.into_iter().filter(|(_, times)| 0 < *times).map(|(name, times)| count(name, times)));
     parts.push(count(t!("refused"), counters.exceptions));
     for (code, times) in &sum.exceptions {
@@ -262,8 +262,8 @@ fn devices(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec
 
 fn state(cx: &ViewContext, device: &DeviceDef) -> String {
     match cx.snapshot.device(device.id).state {
-        DeviceState::Unknown => t!("not asked").to_owned(),
-        DeviceState::Answering => t!("answering").to_owned(),
+        DeviceState::Unknown => t!("not polled").to_owned(),
+        DeviceState::Answering => t!("OK").to_owned(),
         DeviceState::Failing(times) => t!("failing {times}×", times),
         DeviceState::Down { since } => {
             let (running, retry_text) = (running(between(since, cx.now)), retry_text(cx, device.id));

@@ -142,7 +142,7 @@ fn every(poll: Poll) -> String {
         Poll::Every(period) if period.subsec_nanos() == 0 => format!("{} s", period.as_secs()),
         Poll::Every(period) => ms(period),
         Poll::Once => t!("once").to_owned(),
-        Poll::Never => t!("asked").to_owned(),
+        Poll::Never => t!("request").to_owned(),
     }
 }
 
@@ -155,7 +155,7 @@ fn summary(report: &LineReport) -> (String, bool) {
     let (blocks, admission) = (report.polls.len(), &report.admission);
     let load = admission.utilisation * 100.0;
     let words = t!(
-        "{blocks} {plural} take {load} % of the line at worst",
+        "{blocks} {plural}, worst-case load {load} %",
         blocks,
         plural = plural(blocks, t!("block"), t!("blocks")),
         load = format!("{load:.0}")
@@ -167,11 +167,11 @@ fn summary(report: &LineReport) -> (String, bool) {
         }
     };
     match &admission.verdict {
-        Verdict::Fits => (t!("{words}: they fit{refused}", words, refused), false),
+        Verdict::Fits => (t!("{words}: all periods are kept{refused}", words, refused), false),
         Verdict::TooMuch { .. } => (t!("! {words}: OVERLOADED, polls skipped{refused}", words, refused), true),
         Verdict::Blocked(overload) => {
             let blocker = &overload.blocker.name;
-            (t!("! {words}: some come late behind {blocker}{refused}", words, blocker, refused), true)
+            (t!("! {words}: some are delayed by {blocker}{refused}", words, blocker, refused), true)
         }
     }
 }
@@ -195,7 +195,7 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
         .map_or(t!("no polling delay").to_owned(), |late| t!("polling delay at most {ms}", ms = ms(late)));
     let dead = report.admission.dead_cost(poll.device);
     let dead = dead.map_or(String::new(), |cost| {
-        t!("; while {name} is dead a probe costs {ms}", name = device.name, ms = ms(cost))
+        t!("; while {name} does not respond, a probe takes {ms}", name = device.name, ms = ms(cost))
     });
     let mut lines = vec![
         t!(

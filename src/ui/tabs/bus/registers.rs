@@ -66,7 +66,7 @@ impl Registers {
     fn values(&self, cx: &ViewContext) -> (BTreeMap<u16, u16>, String, bool) {
         let run = cx.snapshot.lines.get(self.line.index()).and_then(|line| line.test.as_ref());
         let Some(run) = run.filter(|run| run.diagnostic == self.diagnostic()) else {
-            return (BTreeMap::new(), t!("asked, nothing came yet").to_owned(), false);
+            return (BTreeMap::new(), t!("requested, no response yet").to_owned(), false);
         };
         let mut words = BTreeMap::new();
         let mut fault = None;
@@ -190,7 +190,7 @@ fn pair_text(words: [u16; 2], order: ByteOrder) -> String {
     let point = |kind| Point { table: Table::Holding, address: 0, kind, order, field: None };
     let number = |kind| codec::decode(point(kind), &words);
     let whole = |kind| number(kind).map_or("–".to_owned(), |value| format!("{value:.0}"));
-    let float = number(DataType::F32).map_or(t!("no number").to_owned(), |value| {
+    let float = number(DataType::F32).map_or(t!("not a number").to_owned(), |value| {
         let value = to_f32(value);
         let plain = value == 0.0 || (1e-4..1e7).contains(&value.abs());
         if plain { format!("{value}") } else { format!("{value:e}") }
@@ -209,6 +209,6 @@ mod tests {
         check(ByteOrder::Cdab, "17096        17096  2.3957e-41");
         check(ByteOrder::Badc, "3359768576   -935198720  -198656");
         check(ByteOrder::Dcba, "51266        51266  7.1839e-41");
-        assert!(pair_text([0x7FC0, 0], ByteOrder::Abcd).ends_with("no number"));
+        assert!(pair_text([0x7FC0, 0], ByteOrder::Abcd).ends_with("not a number"));
     }
 }

@@ -82,7 +82,7 @@ impl Form {
             Tried::Loopback => vec![unit, text(t!("times"), "10")],
             Tried::Identify => vec![unit],
             Tried::Scan => {
-                let mut settings = vec![t!("as the line has now: {transport}", transport = at.settings.transport)];
+                let mut settings = vec![t!("current settings: {transport}", transport = at.settings.transport)];
                 if at.settings.transport.serial().is_some() {
                     settings.push(t!("all baud rates and parities; polling pauses").to_owned());
                 }
@@ -150,7 +150,7 @@ impl Form {
     }
 
     fn start(&self, cx: &ViewContext) -> Result<Vec<UiAction>, String> {
-        let at = Place::of(cx, self.line).ok_or(t!("this line has gone"))?;
+        let at = Place::of(cx, self.line).ok_or(t!("this line no longer exists"))?;
         let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
         if self.fields.iter().any(missed) {
             return Err(t!("the text was cut; Ctrl-U clears a field").to_owned());
@@ -198,12 +198,12 @@ impl Form {
             }
             Tried::Loopback => {
                 let (unit, count) = (unit(0)?, to_u16(number(&self.text(1), t!("times"), 1..=1_000)?));
-                let words = t!("sends a word to unit {unit} and waits for the same word, {count} times", unit, count);
+                let words = t!("sends a word to unit {unit} and expects it back, {count} times", unit, count);
                 (Diagnostic::Loopback { unit, data: 0xA537, count }, vec![words])
             }
             Tried::Identify => {
                 let unit = unit(0)?;
-                let words = t!("asks unit {unit} for its maker, product and version; else for its server id", unit);
+                let words = t!("reads vendor, product and version of unit {unit}, or else its server id", unit);
                 (Diagnostic::Identify { unit }, vec![words])
             }
             Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?)?,
@@ -212,14 +212,14 @@ impl Form {
 
     fn build_scan(&self, line: &LineDef, first: u8, last: u8) -> Result<Built, String> {
         if last < first {
-            return Err(t!("from unit {first} to unit {last}: the first is the greater one", first, last));
+            return Err(t!("from unit {first} to unit {last}: the first is greater than the last", first, last));
         }
         let timeout = Duration::from_millis(to_u64(number(&self.text(3), t!("wait ms"), 10..=10_000)?));
         let serials = if self.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
         let (units, settings) = (u32::from(last - first) + 1, to_u32(serials.len().max(1)));
         let longest = ms(timeout * units * settings);
         let words = t!(
-            "{units} units, {settings} settings: about {longest}, if no unit answers. Any answer counts, also an exception.",
+            "{units} units, {settings} settings: about {longest} if no unit responds. Any response counts, also an exception.",
             units,
             settings,
             longest

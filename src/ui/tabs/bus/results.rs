@@ -18,10 +18,7 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let theme = cx.theme;
     let room = width.saturating_sub(3);
     let Some(run) = &at.status.test else {
-        return vec![plain(
-            t!("nothing tried yet: ⏎ starts the selected test; polling goes on meanwhile"),
-            theme.dim(),
-        )];
+        return vec![plain(t!("no test run yet: ⏎ starts the selected test; polling continues"), theme.dim())];
     };
     let mut rows = heading(cx, run);
     let bare = matches!(run.diagnostic, Diagnostic::Send(_));
@@ -41,7 +38,7 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
                 let reply =
                     exchange.reply.map_or("–".to_owned(), |reply| t!("{short_ms} ms", short_ms = short_ms(reply)));
                 rows.push(match exchange.outcome {
-                    Ok(()) => plain(t!("✓ came back after {reply}", reply), theme.normal()),
+                    Ok(()) => plain(t!("✓ returned after {reply}", reply), theme.normal()),
                     Err(fault) => plain(format!("✗ {fault}"), theme.trouble()),
                 });
             }
@@ -74,7 +71,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
     let theme = cx.theme;
     let at = clock(run.started, &cx.def().time_zone);
     let (state, style) = match &run.state {
-        DiagnosticState::Running => (t!("at work").to_owned(), theme.strong()),
+        DiagnosticState::Running => (t!("running").to_owned(), theme.strong()),
         DiagnosticState::Done => (t!("done").to_owned(), theme.normal()),
         DiagnosticState::Cancelled => (t!("STOPPED").to_owned(), theme.trouble()),
         DiagnosticState::Failed(why) => (t!("FAILED: {why}", why), theme.trouble()),
@@ -122,7 +119,7 @@ fn came_back(
         return vec![plain(t!("sent to all units; a broadcast has no response"), theme.normal())];
     }
     if bytes.is_empty() {
-        return vec![plain(t!("✗ nothing came back within {ms}", ms = ms(at.settings.timeout)), theme.trouble())];
+        return vec![plain(t!("✗ no response within {ms}", ms = ms(at.settings.timeout)), theme.trouble())];
     }
     let asked = match &run.diagnostic {
         Diagnostic::Send(sent) => dissect::message_of(sent, framing),
@@ -139,7 +136,7 @@ fn came_back(
     let refused = dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
     let (mark, style) = match (dissection.verdict.as_str(), refused) {
         ("ok", false) => (t!("✓ ok").to_owned(), theme.normal()),
-        ("ok", true) => (t!("✗ the device refuses").to_owned(), theme.trouble()),
+        ("ok", true) => (t!("✗ refused by the device").to_owned(), theme.trouble()),
         (verdict, _) => (format!("✗ {verdict}"), theme.trouble()),
     };
     rows.push(plain(format!("{mark}{reply}"), style));

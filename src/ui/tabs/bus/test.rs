@@ -54,14 +54,16 @@ impl Tried {
     /// Its key, its name and what it is for.
     fn words(self) -> [&'static str; 3] {
         match self {
-            Tried::Bytes => ["t", t!("type bytes"), t!("hex of a request: what it means at once, its check added")],
+            Tried::Bytes => ["t", t!("type bytes"), t!("hex of a request, decoded as you type; its check is added")],
             Tried::Request => {
                 ["f", t!("request by fields"), t!("unit, function, address (41003 or 0x03EA), count or value")]
             }
-            Tried::Registers => ["b", t!("browse registers"), t!("hex, numbers, 32 bits and float in all four orders")],
-            Tried::Loopback => ["l", t!("loopback"), t!("08 / 0x08: does the line carry what is sent, and how fast")],
-            Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: maker, product, version of a device")],
-            Tried::Scan => ["s", t!("scan for units"), t!("who answers, with these or with all serial settings")],
+            Tried::Registers => {
+                ["b", t!("browse registers"), t!("hex, numbers, 32 bits and float in all four byte orders")]
+            }
+            Tried::Loopback => ["l", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
+            Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
+            Tried::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
         }
     }
 }
@@ -165,9 +167,9 @@ pub fn closed(at: &Place) -> Option<String> {
     let name = &at.settings.name;
     match &at.status.state {
         LineState::Connected | LineState::Testing => None,
-        LineState::Connecting => Some(t!("line {name} is being connected: nothing can be sent yet", name)),
+        LineState::Connecting => Some(t!("line {name} is connecting: nothing can be sent yet", name)),
         LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why)),
-        LineState::Disconnected => Some(t!("line {name} is closed: connect it first (tab 4, L)", name)),
+        LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (tab 4, L)", name)),
     }
 }
 
@@ -188,7 +190,7 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
 fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
     match diagnostic {
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Some(t!(
-            "Polling of {name} pauses while other settings are tried, and its alarms are not evaluated. Start the scan?",
+            "Polling of {name} pauses while other settings are tested, and its alarms are not evaluated. Start the scan?",
             name = at.settings.name
         )),
         Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
@@ -203,15 +205,15 @@ fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
             match (whole, broadcast, only_reads(&dissection.message)) {
                 (true, false, true) => None,
                 (true, true, _) => Some(t!(
-                    "{summary}. Every device of the line obeys, none answers. Send it?",
+                    "{summary}. Broadcast: every device executes it, none responds. Send it?",
                     summary = dissection.summary
                 )),
                 (true, false, false) => Some(t!(
-                    "{summary}. This is past all limits of the plant file and is not read back. Send it?",
+                    "{summary}. This bypasses all limits of the plant file and is not read back. Send it?",
                     summary = dissection.summary
                 )),
                 (false, ..) => Some(t!(
-                    "These bytes are no good request: {verdict}. Send {hex} all the same?",
+                    "These bytes are not a valid request: {verdict}. Send {hex} anyway?",
                     verdict = dissection.verdict,
                     hex = hex(bytes)
                 )),

@@ -174,7 +174,7 @@ fn typed_bytes_are_told_at_once_and_never_act_as_keys() {
 fn bytes_go_out_as_typed_where_no_check_is_wanted() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt⇥01 03 03 EA 00 01 00 00⏎");
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("These bytes are no good request: CRC"), "{shown}");
+    assert!(shown.contains("These bytes are not a valid request: CRC"), "{shown}");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None, "a second Enter sends nothing");
     let effects = type_keys(&mut model, "y");
     assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, Diagnostic::Send(vec![1, 3, 3, 0xEA, 0, 1, 0, 0]))));
@@ -183,10 +183,10 @@ fn bytes_go_out_as_typed_where_no_check_is_wanted() {
 #[test]
 fn writes_and_broadcasts_are_asked_first() {
     for (typed, bytes, words) in [
-        ("01 06 03 EA 00 32", vec![1, 6, 3, 0xEA, 0, 0x32], "This is past all limits of the plant file"),
-        ("00 06 03 EA 00 32", vec![0, 6, 3, 0xEA, 0, 0x32], "Every device of the line obeys, none answers."),
-        ("01 08 00 01 00 00", vec![1, 8, 0, 1, 0, 0], "This is past all limits"),
-        ("00 03 03 EA 00 01", vec![0, 3, 3, 0xEA, 0, 1], "no unit answers a broadcast"),
+        ("01 06 03 EA 00 32", vec![1, 6, 3, 0xEA, 0, 0x32], "This bypasses all limits of the plant file"),
+        ("00 06 03 EA 00 32", vec![0, 6, 3, 0xEA, 0, 0x32], "Broadcast: every device executes it, none responds."),
+        ("01 08 00 01 00 00", vec![1, 8, 0, 1, 0, 0], "This bypasses all limits"),
+        ("00 03 03 EA 00 01", vec![0, 3, 3, 0xEA, 0, 1], "no unit responds to a broadcast"),
     ] {
         let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tt{typed}"));
         let before = screen(&mut model, 80, 24);
@@ -215,7 +215,7 @@ fn a_request_is_built_of_fields_with_either_kind_of_address() {
     check(&format!("↓→→→→↓{clear}41003↓{clear}-2"), &[1, 6, 3, 0xEA, 0xFF, 0xFE]);
     let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tf↓↓{clear}31003⏎"));
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("31003 is of the table input, this is holding"), "{shown}");
+    assert!(shown.contains("31003 belongs to the table input, this is holding"), "{shown}");
 }
 
 #[test]
@@ -226,7 +226,7 @@ fn a_closed_line_says_so_instead_of_sending() {
         let mut model = bus(&fixture, Theme::FULL, "");
         assert_eq!(sent_kind(&type_keys(&mut model, keys)), None, "{keys}");
         let shown = screen(&mut model, 80, 24);
-        assert!(shown.contains("line L1 is closed: connect it first"), "{keys}:\n{shown}");
+        assert!(shown.contains("line L1 is disconnected: connect it first"), "{keys}:\n{shown}");
     }
 }
 
@@ -235,7 +235,7 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Ts↓↓→");
     insta::assert_snapshot!("window_scan", screen(&mut model, 80, 24));
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);
-    assert!(screen(&mut model, 80, 24).contains("Polling of L1 pauses while other settings are tried"));
+    assert!(screen(&mut model, 80, 24).contains("Polling of L1 pauses while other settings are tested"));
     let effects = type_keys(&mut model, "y");
     let Some(CommandKind::Test(_, diagnostic @ Diagnostic::Scan(scan))) = sent_kind(&effects) else {
         panic!("{effects:?}")
@@ -267,8 +267,8 @@ fn what_came_back_is_described() {
         let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
         assert!(shown.contains(words), "{words} is missing:\n{shown}");
     };
-    check(Finding::Bytes { bytes: Vec::new(), reply: None }, "✗ nothing came back within 300 ms");
-    check(Finding::Bytes { bytes: with_crc(&[1, 0x83, 2]), reply }, "✗ the device refuses   after 12.4 ms");
+    check(Finding::Bytes { bytes: Vec::new(), reply: None }, "✗ no response within 300 ms");
+    check(Finding::Bytes { bytes: with_crc(&[1, 0x83, 2]), reply }, "✗ refused by the device   after 12.4 ms");
     check(Finding::Bytes { bytes: vec![1, 3, 2, 0, 0xC8, 0, 0], reply }, "✗ CRC");
 }
 
@@ -294,7 +294,7 @@ fn loopback_and_identification_are_described() {
     let findings = vec![exchange(Ok(())), exchange(Err(Fault::Timeout)), verdict];
     fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 2, 2, findings));
     let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
-    for words in ["✓ came back after 12 ms", "✗ no answer in time", "1 of 2 came back"] {
+    for words in ["✓ returned after 12 ms", "✗ response timeout", "1 of 2 came back"] {
         assert!(shown.contains(words), "{words} is missing:\n{shown}");
     }
     let object = Finding::Object { name: "VendorName".to_owned(), text: "FUJI".to_owned() };

@@ -85,14 +85,14 @@ fn connect(cx: &ViewContext, line: LineId) -> Confirm {
     if cx.snapshot.line(line).state == LineState::Disconnected {
         return Confirm::command(
             t!("connect {name}", name),
-            t!("Open line {name} and read its devices again?", name),
+            t!("Connect line {name} and poll its devices again?", name),
             CommandKind::Connect(line, true),
         );
     }
     let devices: Vec<&str> =
         cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
     let words = t!(
-        "Close line {name}? {join} will be read no more, and their alarms cannot be seen.",
+        "Disconnect line {name}? {join} will not be polled, and their alarms not evaluated.",
         name,
         join = devices.join(", ")
     );

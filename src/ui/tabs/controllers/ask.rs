@@ -38,7 +38,7 @@ pub fn query(
         notes.push(t!("… and {count} more, as listed", count = changes.len() - shown));
     }
     if !set.missing.is_empty() {
-        notes.push(t!("not in the set, stay as they are: {names}", names = names(&set.missing, ROOM - 35)));
+        notes.push(t!("not in the set, not changed: {names}", names = names(&set.missing, ROOM - 35)));
     }
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
@@ -74,7 +74,7 @@ fn warnings(def: &PlantDef, changes: &[Change]) -> Vec<String> {
         // The last line is kept for how many more there are.
         if room < lines.len() + text.len() + usize::from(n + 1 < count) {
             let tags = count - n;
-            lines.push(t!("… and {tags} more that ask before a write: see their own windows", tags));
+            lines.push(t!("… and {tags} more that ask for confirmation: see their own windows", tags));
             break;
         }
         lines.extend(text);

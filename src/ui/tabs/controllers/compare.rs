@@ -76,7 +76,7 @@ impl Compare {
             return Err(notice);
         }
         let Some((set, plan)) = self.source.set(cx).zip(self.plan(cx, device)) else {
-            return words(vec![t!("{words} is not there any more", words = self.source.words(cx))]);
+            return words(vec![t!("{words} no longer exists", words = self.source.words(cx))]);
         };
         let changes = match plan {
             Ok(changes) if changes.is_empty() => {
@@ -99,7 +99,7 @@ impl Compare {
         let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
         let x = canvas.text(1, 0, &format!("{} → {}", self.source.words(cx), device.name), theme.focus());
         let Some(plan) = self.plan(cx, device) else {
-            canvas.text(1, 2, t!("it is not there any more"), theme.trouble());
+            canvas.text(1, 2, t!("it no longer exists"), theme.trouble());
             return;
         };
         let run = self.at_work(cx, device);
@@ -141,7 +141,7 @@ impl Compare {
         let differ = rows.iter().filter(|row| row.set.is_some() && !row.same).count();
         let silent = rows.iter().filter(|row| row.set.is_none()).count();
         let silent = if silent > 0 { t!(", {silent} not in the set", silent) } else { String::new() };
-        let hidden = if shown.len() < rows.len() { t!(" (= shows all)") } else { "" };
+        let hidden = if shown.len() < rows.len() { t!(" (=: show all)") } else { "" };
         t!("{differ} differ, {same} the same{silent}{hidden}", differ, same, silent, hidden)
     }
 
@@ -153,10 +153,10 @@ impl Compare {
             (Some(step), Some(_)) => match (&step.outcome, step.command) {
                 (Some(outcome), _) => outcome_words(outcome),
                 (None, Some(_)) => (t!("writing …").to_owned(), false),
-                (None, None) => (t!("waits").to_owned(), false),
+                (None, None) => (t!("waiting").to_owned(), false),
             },
             _ if row.set.is_none() => (t!("not in the set").to_owned(), false),
-            _ if row.device.is_none() => (t!("not known now").to_owned(), true),
+            _ if row.device.is_none() => (t!("unknown now").to_owned(), true),
             _ if row.same => (t!("same").to_owned(), false),
             _ => (t!("differs").to_owned(), false),
         };
@@ -182,13 +182,13 @@ fn run_text(cx: &ViewContext, device: &DeviceDef, run: &Restore) -> (String, boo
     let (at, by) = (moment(run.at, cx.now, &cx.def().time_zone), &run.by);
     match run.state {
         State::Reading if run.stopping => (t!("stopping: nothing is written yet").to_owned(), true),
-        State::Reading => (t!("reading the device first …   x stops it").to_owned(), false),
+        State::Reading => (t!("reading the device first …   x stops").to_owned(), false),
         State::Running if run.stopping => (t!("stopping: {done} of {all} written", done, all), true),
-        State::Running => (t!("writing: {done} of {all} written and verified   x stops it", done, all), false),
+        State::Running => (t!("writing: {done} of {all} written and verified   x stops", done, all), false),
         State::Done => {
             let fix = device.actions.iter().find(|action| action.saves);
-            let fix = fix.map_or(String::new(), |action| t!("   f {name} keeps them", name = action.name));
-            (t!("{all} of {all} written and verified, begun {at} by {by}{fix}", all, at, by, fix), false)
+            let fix = fix.map_or(String::new(), |action| t!("   f {name} stores them", name = action.name));
+            (t!("{all} of {all} written and verified, started {at} by {by}{fix}", all, at, by, fix), false)
         }
         State::Failed if run.refused.is_some() => {
             let why = run.refused.as_ref().map_or(String::new(), ToString::to_string);
@@ -202,7 +202,7 @@ fn run_text(cx: &ViewContext, device: &DeviceDef, run: &Restore) -> (String, boo
             (t!("STOPPED after {done} of {all}, {at}; {why}", done, all, at, why), true)
         }
         State::Stopped => {
-            (t!("STOPPED by an operator: {done} of {all} written and verified, begun {at}", done, all, at), true)
+            (t!("STOPPED by an operator: {done} of {all} written and verified, started {at}", done, all, at), true)
         }
     }
 }

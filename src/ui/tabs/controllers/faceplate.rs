@@ -102,7 +102,7 @@ fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool
             }
             (0, y + 1, canvas.width())
         } else {
-            let words = ends.map_or(t!("range not known").to_owned(), |(low, high)| format!("{low} … {high}"));
+            let words = ends.map_or(t!("range unknown").to_owned(), |(low, high)| format!("{low} … {high}"));
             let words = apart.unwrap_or(words);
             let wide = canvas.width().saturating_sub(5 + values + 1 + 18);
             canvas.text(5 + values + wide + 1, y, &words, cx.theme.dim());
@@ -119,7 +119,7 @@ fn ends(cx: &ViewContext, tag: TagId) -> Option<(String, String)> {
     Some((text(min), format!("{} {}", text(max), cx.snapshot.unit(tag)).trim_end().to_owned()))
 }
 
-/// `├███████──▼──┃──┤`: filled up to the value; the set value as a triangle, alarm limits as bars; of SV only the
+/// `├███████──▼──┃──┤`: filled up to the value; the setpoint as a triangle, alarm limits as bars; of SV only the
 /// triangle, on a track that is dotted where it may not be set. Without a good value there is no filling.
 fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId, scale: TagId) {
     let theme = cx.theme;
@@ -205,11 +205,14 @@ pub fn tuning_text(cx: &ViewContext, faceplate: &Faceplate, tuning: &Tuning) -> 
         let turns = tuning.extrema.iter().rev().take(4).rev();
         let arrow = |high| if high { cx.theme.pick("↑", "^") } else { cx.theme.pick("↓", "v") };
         let turns: Vec<String> = turns.map(|turn| format!("{}{}", arrow(turn.high), number(turn.pv))).collect();
-        let swings =
-            if turns.is_empty() { t!("no swing yet").to_owned() } else { t!("swings {join}", join = turns.join(" ")) };
+        let swings = if turns.is_empty() {
+            t!("no oscillation yet").to_owned()
+        } else {
+            t!("oscillation {join}", join = turns.join(" "))
+        };
         let period = tuning.period().map_or(String::new(), |period| t!(", {period} s each", period = period.as_secs()));
         let known = faceplate.tune.is_some_and(|tune| cx.snapshot.sample(tune).good_value().is_some());
-        let how = if known { t!("AUTO-TUNING") } else { t!("not known now; AUTO-TUNING when last read") };
+        let how = if known { t!("AUTO-TUNING") } else { t!("unknown now; AUTO-TUNING when last read") };
         return vec![
             t!("{how} {least}{elapsed}{around} (T stops)", how, least, elapsed, around),
             format!("{swings}{period}"),

@@ -65,7 +65,7 @@ pub enum ProgramCommand {
     Run,
     /// Stand still.
     Hold,
-    /// Back to the fixed set value.
+    /// Back to the fixed setpoint.
     Off,
 }
 
@@ -76,12 +76,11 @@ const GUIDE: Key<Action> =
 const REFRESH: Key<Action> = Key::new(
     char('u'),
     "refresh",
-    "read all parameters of the device now; retry it at once if it does not answer",
+    "read all parameters of the device now; retry it at once if it does not respond",
     Action::Refresh,
 )
 .needs(Role::Technician);
-const WHY: Key<Action> =
-    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why);
+const WHY: Key<Action> = Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why);
 const ACTIONS: Key<Action> =
     Key::new(char('f'), "actions", "actions of the device (save to memory)", Action::Actions).needs(Role::Technician);
 const LINE: Key<Action> =
@@ -107,7 +106,7 @@ const DEVICE_FIRST: &[Key<Action>] = &[
     Key::new(code(KeyCode::Right), "device", "next device", Action::Device(1)),
 ];
 const DEVICE: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "edit", "change the parameter, or look at a read-only one", Action::Open)
+    Key::new(code(KeyCode::Enter), "edit", "change the parameter, or view a read-only one", Action::Open)
         .needs(Role::Technician),
     Key::new(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
     Key::new(char('s'), "sets", "parameter sets: save, compare, restore, copy", Action::Sets),
@@ -117,7 +116,7 @@ const DEVICE: &[Key<Action>] = &[
     WHY,
     REFRESH,
     Key::new(char('/'), "find", "show only parameters with some words in name or meaning", Action::Find),
-    Key::new(char('d'), "defaults", "mark what differs from the maker's default", Action::Defaults),
+    Key::new(char('d'), "defaults", "mark differences from the factory default", Action::Defaults),
     Key::new(char('S'), "standby", "run or standby, if the device has it", Action::Run).needs(Role::Technician),
     LINE,
     SETTINGS,
@@ -131,7 +130,7 @@ const PROGRAM: &[Key<Action>] = &[
     Key::new(
         char('r'),
         "run",
-        "run the program, or go on after a hold (asks first)",
+        "run the program, or resume after a hold (asks first)",
         Action::Control(ProgramCommand::Run),
     )
     .needs(Role::Technician),
@@ -139,8 +138,8 @@ const PROGRAM: &[Key<Action>] = &[
         .needs(Role::Technician),
     Key::new(char('o'), "off", "stop the program (asks first)", Action::Control(ProgramCommand::Off))
         .needs(Role::Technician),
-    Key::new(char('t'), "pattern", "which steps are run", Action::Pattern).needs(Role::Technician),
-    Key::new(char('m'), "mode", "what happens at the end and at power-on", Action::Mode).needs(Role::Technician),
+    Key::new(char('t'), "pattern", "steps to run", Action::Pattern).needs(Role::Technician),
+    Key::new(char('m'), "mode", "behavior at the end and at power-on", Action::Mode).needs(Role::Technician),
     REFRESH,
     GUIDE,
     WHY,
@@ -154,18 +153,18 @@ const SETS: &[Key<Action>] = &[
 const COMPARE: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "restore", "write what differs to the device (asks first)", Action::Open)
         .needs(Role::Technician),
-    Key::new(char('x'), "stop", "stop after the write under way", Action::Stop).needs(Role::Technician),
-    Key::new(char('='), "all", "show what is the same too, or hide it", Action::All),
-    Key::new(char('t'), "turn", "copy the other way round", Action::Turnaround),
+    Key::new(char('x'), "stop", "stop after the current write", Action::Stop).needs(Role::Technician),
+    Key::new(char('='), "all", "show or hide equal settings", Action::All),
+    Key::new(char('t'), "reverse", "copy in the other direction", Action::Turnaround),
     ACTIONS,
     REFRESH,
     GUIDE,
 ];
 const READ: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "the page before", Action::Turn(-1)),
-    Key::new(code(KeyCode::Right), "page", "the next page", Action::Turn(1)),
-    Key::new(code(KeyCode::Up), "", "the page before", Action::Turn(-1)),
-    Key::new(code(KeyCode::Down), "", "the next page", Action::Turn(1)),
+    Key::new(code(KeyCode::Left), "", "previous page", Action::Turn(-1)),
+    Key::new(code(KeyCode::Right), "page", "next page", Action::Turn(1)),
+    Key::new(code(KeyCode::Up), "", "previous page", Action::Turn(-1)),
+    Key::new(code(KeyCode::Down), "", "next page", Action::Turn(1)),
 ];
 
 /// The keys of a page.

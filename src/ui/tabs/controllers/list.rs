@@ -66,7 +66,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
     }
 }
 
-/// `31 devices   2 not answering   1 with alarms`.
+/// `31 devices   2 not responding   1 with alarms`.
 fn summary(cx: &ViewContext) -> String {
     let devices = &cx.def().devices;
     let down = devices.iter().filter(|device| {
@@ -78,7 +78,7 @@ fn summary(cx: &ViewContext) -> String {
         1 => t!("1 device").to_owned(),
         n => t!("{n} devices", n),
     };
-    for (count, what) in [(down.count(), t!("not answering")), (alarmed, t!("with alarms"))] {
+    for (count, what) in [(down.count(), t!("not responding")), (alarmed, t!("with alarms"))] {
         if count > 0 {
             words.push_str(&format!("   {count} {what}"));
         }
@@ -111,7 +111,7 @@ fn heading(columns: &Columns, style: Style) -> Cells {
         value("SV"),
         value("MV"),
         (t!("mode").to_owned(), Columns::MODE, style),
-        (pad_left(t!("answer"), Columns::REPLY), Columns::REPLY, style),
+        (pad_left(t!("reply"), Columns::REPLY), Columns::REPLY, style),
     ]
 }
 
@@ -207,9 +207,9 @@ fn state(cx: &ViewContext, device: DeviceId) -> (String, String, Style) {
     match (status.diagnosis, status.state) {
         (Some(reason), _) => (signal_mark(reason.signal()), reason.to_string(), cx.theme.trouble()),
         (None, DeviceState::Answering) => ("✓".to_owned(), t!("good").to_owned(), cx.theme.dim()),
-        (None, DeviceState::Unknown) => ("?".to_owned(), t!("not asked yet").to_owned(), cx.theme.dim()),
+        (None, DeviceState::Unknown) => ("?".to_owned(), t!("not polled yet").to_owned(), cx.theme.dim()),
         (None, DeviceState::Failing(n)) => ("✗".to_owned(), t!("failing, {n} in a row", n), cx.theme.trouble()),
-        (None, DeviceState::Down { .. }) => ("✗".to_owned(), t!("not answering").to_owned(), cx.theme.trouble()),
+        (None, DeviceState::Down { .. }) => ("✗".to_owned(), t!("not responding").to_owned(), cx.theme.trouble()),
     }
 }
 

@@ -54,7 +54,7 @@ fn heading(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &
 /// `RUN, ramp 2, 03:12 of 10 min`.
 fn now_text(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> String {
     let command = value::show(cx, program.command).text;
-    let Some(place) = place(cx, program) else { return t!("{command}, position not known", command) };
+    let Some(place) = place(cx, program) else { return t!("{command}, position unknown", command) };
     let (what, length) = match place {
         ProgramPosition::Off => return command,
         ProgramPosition::Ended => return t!("{command}, ended", command),
@@ -140,7 +140,7 @@ struct Segment {
     place: ProgramPosition,
 }
 
-/// The way of the set value, from PV as it is now; `None` while a part of it is not known.
+/// The way of the setpoint, from PV as it is now; `None` while a part of it is not known.
 fn segments(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Option<Vec<Segment>> {
     let (first, last) = chosen(cx, program)?;
     let trusted = |tag: TagId| cx.snapshot.sample(tag).good_value();
@@ -161,7 +161,7 @@ fn segments(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> Optio
 fn curve(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
     let theme = cx.theme;
     let Some(segments) = segments(cx, device, program) else {
-        canvas.text(0, 0, t!("no curve: a target or time of the program is not known"), theme.dim());
+        canvas.text(0, 0, t!("no curve: a target or time of the program is unknown"), theme.dim());
         return;
     };
     let total: f64 = segments.iter().map(|segment| segment.minutes).sum();

@@ -78,8 +78,8 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected:
     canvas.text(1, 2, &draw::columns(COLUMNS, names), theme.dim());
     if all.is_empty() {
         let words = match settings {
-            0 => t!("this device has no settings that a set could hold"),
-            _ => t!("no set yet: n saves what the device holds now"),
+            0 => t!("this device has no settings for a set"),
+            _ => t!("no sets yet: n saves the current settings"),
         };
         canvas.text(1, 4, words, theme.normal());
     }
@@ -134,7 +134,7 @@ pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
         [] => t!("all {count} settings, for example: winter", count = set.values.len()),
         missing => {
             let names = fit_words(&missing.join(" "), 40);
-            t!("{count} settings; not known now, so left out: {names}", count = set.values.len(), names)
+            t!("{count} settings; unknown now and omitted: {names}", count = set.values.len(), names)
         }
     }
 }
@@ -147,7 +147,7 @@ pub fn replace_text(cx: &ViewContext, there: &StoredSet) -> String {
             let saved = draw::local(cx, set.saved, "%Y-%m-%d %H:%M");
             let (device, profile, by) = (&set.device, &set.profile, &set.by);
             t!(
-                "There is a set {name} already: of {device}, profile {profile}, saved {saved} by {by}. Replace it?",
+                "The set {name} exists already: of {device}, profile {profile}, saved {saved} by {by}. Replace it?",
                 name,
                 device,
                 profile,
@@ -155,7 +155,7 @@ pub fn replace_text(cx: &ViewContext, there: &StoredSet) -> String {
                 by
             )
         }
-        Err(_) => t!("There is a file {name}.toml already that is no usable set. Replace it?", name),
+        Err(_) => t!("The file {name}.toml exists already and is not a valid set. Replace it?", name),
     }
 }
 

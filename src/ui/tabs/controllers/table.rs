@@ -60,7 +60,8 @@ impl Table {
         let names = ["", t!("parameter"), t!("value"), "", t!("range"), t!("default"), t!("age"), t!("meaning")];
         canvas.text(1, 0, &columns.row(names), theme.dim());
         if tags.is_empty() {
-            let words = if self.filter.is_empty() { t!("this device has no values") } else { t!("no parameter fits") };
+            let words =
+                if self.filter.is_empty() { t!("this device has no values") } else { t!("no matching parameter") };
             canvas.text(1, 1, words, theme.dim());
             return 0;
         }

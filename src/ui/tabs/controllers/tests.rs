@@ -71,8 +71,8 @@ fn assert_seen(name: &str, fixture: &Fixture, theme: Theme, keys: &str) {
 }
 
 fn tuning(fixture: &Fixture, ended: bool) -> Tuning {
-    use crate::plant::tuning::TuningWatch;
-    let mut watch = TuningWatch::default();
+    use crate::plant::tuning::TuningTracker;
+    let mut watch = TuningTracker::default();
     let device = &fixture.def.devices[0];
     let faceplate = device.faceplate.as_ref().expect("a controller");
     let began = fixture::now() - SignedDuration::from_secs(754);
@@ -175,7 +175,7 @@ fn a_restore_shows_each_write_and_where_it_stopped() {
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "4⏎s↓⏎");
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("reading the device first …   x stops it"), "{shown}");
+    assert!(shown.contains("reading the device first …   x stops"), "{shown}");
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn an_old_restore_hides_nothing_of_what_the_device_holds() {
     let page = shown(&fixture);
     let row = page.lines().find(|line| line.starts_with(" P ")).unwrap_or_default().to_owned();
     assert!(row.contains("5.0 %") && row.contains("7.7 %") && row.contains("differs"), "{page}");
-    assert!(page.contains("in the device") && page.contains("3 of 3 written and verified, begun"), "{page}");
+    assert!(page.contains("in the device") && page.contains("3 of 3 written and verified, started"), "{page}");
     // A set of the same name that was saved later is another set: nothing of it was ever written.
     let later = fixture.sets[1].set.clone().expect("a good set");
     let saved = fixture::now() + SignedDuration::from_secs(60);
@@ -221,7 +221,7 @@ fn only_an_action_that_saves_is_advised_after_a_restore() {
         let mut model = model(&fixture, Theme::FULL);
         type_keys(&mut model, "4⏎s↓⏎");
         let shown = screen(&mut model, 80, 24);
-        assert_eq!((shown.contains("f FIX keeps them"), shown.contains("STOP")), (advised, false), "{shown}");
+        assert_eq!((shown.contains("f FIX stores them"), shown.contains("STOP")), (advised, false), "{shown}");
     };
     check(vec![stop.clone(), fix], true);
     check(vec![stop], false);
@@ -250,7 +250,8 @@ fn a_restore_asks_what_each_of_its_writes_would_have_asked() {
     assert!(few.contains("! not verified: TM1R TM1S TM2R") && few.contains("write and verify"), "{few}");
     // However many there are, the keys of the window stay on the screen, and what is left out is said to be.
     let many = shown(&["SV", "P", "I", "SV-1", "SV-2"]);
-    for words in ["number 0", "number 1", "… and 3 more that ask before a write", "! not verified", "write and verify"]
+    for words in
+        ["number 0", "number 1", "… and 3 more that ask for confirmation", "! not verified", "write and verify"]
     {
         assert!(many.contains(words), "{words} in {many}");
     }

@@ -47,7 +47,7 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
 /// The heading of the form; on a locked terminal it names the user who locked it.
 fn heading(cx: &ViewContext, title: &str) -> String {
     match &cx.session.who {
-        Some(who) if cx.session.locked => t!("{title} as another person than {user}", title, user = who.user),
+        Some(who) if cx.session.locked => t!("{title} as a user other than {user}", title, user = who.user),
         Some(_) | None => title.to_owned(),
     }
 }
@@ -83,8 +83,8 @@ fn who(login: &Login, cx: &ViewContext, canvas: &mut Canvas, y: u16) -> u16 {
         y += 1;
     }
     let lock = match cx.session.idle_lock {
-        Some(idle) => t!("This terminal locks itself after {running} without a key.", running = running(idle)),
-        None => t!("This terminal does not lock itself.").to_owned(),
+        Some(idle) => t!("This terminal locks after {running} without a key.", running = running(idle)),
+        None => t!("This terminal does not lock automatically.").to_owned(),
     };
     canvas.text(0, y, &lock, theme.dim());
     y + 1

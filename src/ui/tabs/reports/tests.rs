@@ -125,7 +125,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         alarm(12, high, "TIC-1.PV", "temperature high", AlarmEvent::Raised, None),
         alarm(31, high, "TIC-1.PV", "temperature high", AlarmEvent::Acknowledged, Some("tech1")),
         alarm(53, high, "TIC-1.PV", "temperature high", AlarmEvent::ReturnedToNormal, None),
-        alarm(80, low, "PLC-1", "not answering", AlarmEvent::Raised, None),
+        alarm(80, low, "PLC-1", "not responding", AlarmEvent::Raised, None),
         alarm(95, high, "TIC-1.PV", "temperature high", AlarmEvent::Raised, None),
     ];
     let action = ActionRecord {

@@ -47,7 +47,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('g'), "group", "next group of pens", Action::Group),
     Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
     Key::new(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
-    Key::new(char('w'), "why", "why the value is what it is: quality, scaling, bytes", Action::Why),
+    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
     Key::new(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
     Key::new(char('u'), "rate", "refresh interval of the curves: 0.5, 1, 2, 5, 10 s", Action::Rate),
     Key::new(code(KeyCode::Enter), "", "in the list of values: show its curve", Action::Open),

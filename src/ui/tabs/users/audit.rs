@@ -35,10 +35,10 @@ pub enum Part {
 const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "open", "entry details", Action::Open),
     Key::new(char('/'), "search", "only rows with some words", Action::Search(Part::Words)),
-    Key::new(char('b'), "by", "only what a user did", Action::Search(Part::Who)),
+    Key::new(char('b'), "by", "only actions of a user", Action::Search(Part::Who)),
     Key::new(char('w'), "what", "only an action: write, login …", Action::Search(Part::Action)),
     Key::new(char('t'), "time", "another day or period", Action::Search(Part::Time)),
-    Key::new(char('c'), "all", "search nothing, show the last week", Action::Everything),
+    Key::new(char('c'), "all", "clear the search, show the last 7 days", Action::Everything),
     Key::new(char('j'), "users", "the list of users", Action::Back),
 ];
 
@@ -152,7 +152,7 @@ impl Audit {
         let theme = cx.theme;
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let columns = canvas.width();
-        let x = canvas.text(1, 0, t!("Audit list  "), theme.strong());
+        let x = canvas.text(1, 0, t!("Audit log  "), theme.strong());
         let room = columns.saturating_sub(x + 1);
         match &self.rows.trouble {
             Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
@@ -162,8 +162,7 @@ impl Audit {
         let names = draw::columns(widths(columns), names);
         canvas.text(1, 1, &format!("{names} {}", t!("old → new, outcome")), theme.dim());
         if self.rows().is_empty() {
-            let words =
-                if self.rows.value.is_some() { t!("Nothing of this is on record.") } else { t!("collecting data") };
+            let words = if self.rows.value.is_some() { t!("No matching entries.") } else { t!("collecting data") };
             canvas.text(2, 3, words, theme.dim());
             return;
         }
@@ -176,7 +175,7 @@ impl Audit {
 
     /// `last 7 days   by anna   more than 1000: choose a time`.
     fn summary(&self) -> String {
-        let time = self.period.as_ref().map_or(t!("the last 7 days").to_owned(), |period| period.name.clone());
+        let time = self.period.as_ref().map_or(t!("last 7 days").to_owned(), |period| period.name.clone());
         let part = |name: &str, text: &str| (!text.is_empty()).then(|| format!("{name} \"{text}\""));
         let parts = [part(t!("by"), &self.who), part(t!("action"), &self.action), part(t!("with"), &self.words)];
         let count = match self.rows().len() {

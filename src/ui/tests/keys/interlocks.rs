@@ -38,7 +38,7 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("old AUTO  →  new MANUAL"), "{shown}");
     assert!(shown.contains("PLC-1.MAN.P-1 has no effect now"), "{shown}");
-    assert!(shown.contains("The commands by hand take over; no output changes."), "{shown}");
+    assert!(shown.contains("Manual commands take over; no output changes."), "{shown}");
     let command = CommandKind::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0 };
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "back where it was asked from");
@@ -90,7 +90,7 @@ fn a_line_that_goes_down_under_the_question_is_told_in_it() {
     type_keys(&mut model, "t");
     update(&mut model, Msg::Snapshot(Fixture::line_down().snapshot()));
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("! Nothing can be written now. Line L1 is not connected"), "{shown}");
+    assert!(shown.contains("! Writing is not possible now. Line L1 is not connected"), "{shown}");
     // Asked while it is down, there is nothing to confirm.
     let mut model = faceplate(&Fixture::line_down(), "PLC-1.P-1");
     type_keys(&mut model, "t");
@@ -116,7 +116,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     assert!(screen(&mut model, 80, 24).contains(reason));
     type_keys(&mut model, "t");
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains(reason) && shown.contains("This is not sent"), "{shown}");
+    assert!(shown.contains(reason) && shown.contains("Not sent"), "{shown}");
     assert!(!shown.contains("write and verify"), "no key is offered that does nothing");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎y")), None);
     // The tank is emptied while the query stands: then it may be sent.
@@ -144,7 +144,7 @@ fn a_key_that_is_sent_first_is_named_before_it_is() {
         let mut model = faceplate(&fixture, "PLC-1.P-1");
         type_keys(&mut model, "t");
         let shown = screen(&mut model, 80, 24);
-        assert_eq!(shown.contains("First PLC-1.P-1 := RUN; it stays so."), told, "{now}: {shown}");
+        assert_eq!(shown.contains("First writes PLC-1.P-1 := RUN; it keeps this value."), told, "{now}: {shown}");
     }
 }
 
@@ -156,7 +156,7 @@ fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "r");
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("The sequence stops in HEAT.") && shown.contains("Off go: P-1 RUN."), "{shown}");
+    assert!(shown.contains("The sequence stops in HEAT.") && shown.contains("Switched off: P-1 RUN."), "{shown}");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&stop));
     // Also while nobody knows whether it runs.
     let run = fixture.tag("PLC-1.RUN");
@@ -182,7 +182,7 @@ fn a_stop_need_not_wait_for_a_window_to_close() {
 fn the_sequence_says_where_it_goes_on() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
-    for (run, words) in [(1.0, "goes on with HEAT"), (0.0, "once it is started")] {
+    for (run, words) in [(1.0, "continues with HEAT"), (0.0, "once it is started")] {
         fixture.set("PLC-1.RUN", run);
         let mut model = model(&fixture, Theme::FULL);
         type_keys(&mut model, "m");
@@ -195,7 +195,7 @@ fn the_sequence_says_where_it_goes_on() {
 fn a_start_says_what_it_begins_with() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.RUN", 0.0);
-    for (auto, words) in [(1.0, "The sequence starts with FILL."), (0.0, "In manual no step starts")] {
+    for (auto, words) in [(1.0, "The sequence starts with FILL."), (0.0, "In MANUAL no step starts")] {
         fixture.set("PLC-1.AUTO", auto);
         let mut model = model(&fixture, Theme::FULL);
         type_keys(&mut model, "r");

@@ -33,13 +33,13 @@ fn what_is_typed_is_what_is_written_or_refused() {
     check("s63,5⏎", Ok(63.5));
     check("s+1⏎", Ok(71.0));
     check("s+5⏎", Err("beyond the alarm limit of TIC-1.PV temperature high (72.0 °C)"));
-    check("s3,5⏎", Err("a step of 66.5 °C, 55 % of the range"));
+    check("s3,5⏎", Err("a change of 66.5 °C, 55 % of the range"));
     check("s3,5⏎⏎", Ok(3.5));
-    check("s7OO", Err("\"O\" is no part of a number"));
+    check("s7OO", Err("\"O\" is not part of a number"));
     check("s7OO⏎", Err("the text was cut"));
     check("s1e5⏎", Err("the text was cut"));
-    check("s7 0", Err("a blank is no part of a number"));
-    check("s7-0⏎", Err("\"7-0\" is no number"));
+    check("s7 0", Err("a space is not part of a number"));
+    check("s7-0⏎", Err("\"7-0\" is not a number"));
     check(&format!("s{}⏎", "7".repeat(70)), Err("the text was cut"));
 }
 
@@ -65,7 +65,7 @@ fn a_rounded_number_is_shown_rounded_before_it_is_written() {
     let mut model = model(&fixture, Theme::FULL);
     assert_eq!(sent_kind(&type_keys(&mut model, "s72.3⏎")), None);
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("72.3 → the device holds steps of 0.5: 72.5"), "{shown}");
+    assert!(shown.contains("72.3 → the resolution of the device is 0.5: 72.5"), "{shown}");
     assert!(shown.contains("new 72.5 °C"), "{shown}");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::Write { tag: sv, value: 72.5 }));
 }

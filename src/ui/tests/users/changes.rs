@@ -8,7 +8,7 @@ fn refused_credentials_are_asked_again_in_their_window() {
     let mut model = with(&fixture, person("anna", Role::Technician));
     let effects = type_keys(&mut model, "s65⏎hors⏎");
     let Some(Effect::Command(first, _)) = effects.last() else { panic!("no command: {effects:?}") };
-    shows(&mut model, "asking the station");
+    shows(&mut model, "waiting for the station");
     assert_eq!(type_keys(&mut model, "1q⏎"), [], "while the answer is awaited");
     let told = |request: &Command, outcome: Outcome| {
         let mut snapshot = fixture.snapshot();
@@ -41,12 +41,12 @@ fn a_station_that_has_gone_is_shown_and_takes_no_commands() {
     for _ in 0..8 {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
     }
-    shows(&mut model, "STATION GONE 4 s: reconnecting");
-    shows(&mut model, "alarms not evaluated: station gone, the socket was closed");
+    shows(&mut model, "STATION LOST 4 s: reconnecting");
+    shows(&mut model, "alarms not evaluated: station disconnected: the socket was closed");
     type_keys(&mut model, "0");
     assert_eq!(model.tabs.shown, Tab::Login);
     type_keys(&mut model, "4⏎u");
-    shows(&mut model, "NOT SENT: the station has gone");
+    shows(&mut model, "NOT SENT: the station is disconnected");
     change_session(&mut model, |session| session.gone = None);
     assert!(!screen(&mut model, 80, 24).contains("GONE"));
 }

@@ -63,7 +63,7 @@ fn a_locked_terminal_looks_and_does_nothing() {
     type_keys(&mut model, "⎋3");
     type_keys(&mut model, "a");
     ctrl(&mut model, 'o');
-    shows(&mut model, "log in as another person than anna");
+    shows(&mut model, "log in as a user other than anna");
     let effects = type_keys(&mut model, "boris⏎battery⏎");
     assert_eq!(
         sent_request(&effects),

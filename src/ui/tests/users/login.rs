@@ -72,7 +72,7 @@ fn a_password_given_by_somebody_else_is_changed_before_anything() {
     type_keys(&mut model, "anna⏎given by boris⏎");
     answer(&mut model, Ok(()));
     change_session(&mut model, |session| {
-        session.who = Some(Who { user: "anna".into(), role: Role::Technician, must_change: true });
+        session.who = Some(LoggedInUser { user: "anna".into(), role: Role::Technician, must_change: true });
         session.view = true;
     });
     type_keys(&mut model, "1");

@@ -25,7 +25,7 @@ pub fn valve(
 ) {
     let theme = cx.theme;
     let on = value::is_on(cx, tag);
-    let word = word(cx, tag, (t!("OPEN"), t!("SHUT")));
+    let word = word(cx, tag, (t!("OPEN"), t!("CLOSED")));
     let (shape, style) = match on {
         Some(true) => (theme.pick("▶◀", "><"), theme.running()),
         Some(false) => (theme.pick("▷◁", "||"), theme.normal()),

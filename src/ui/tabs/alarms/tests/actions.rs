@@ -41,7 +41,7 @@ fn the_footer_offers_what_can_be_done_with_the_selected_row() {
     }
     for (keys, back) in [("v", true), ("v↓", true), ("v↓↓", false)] {
         let footer = footer(&suppressed(), keys);
-        assert_eq!((footer.contains("u put back"), footer.contains("v view")), (back, true), "{keys}: {footer}");
+        assert_eq!((footer.contains("u return"), footer.contains("v view")), (back, true), "{keys}: {footer}");
     }
     for keys in ["vv", "vvv", "vvvv", "vvvvv"] {
         assert!(footer(&suppressed(), keys).contains("v view"), "{keys}");

@@ -6,17 +6,17 @@ use super::*;
 pub(super) fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
     let mut worries = Vec::new();
     if let Some(before) = &at.status.settings_before {
-        worries.push(t!("these settings are tried, not saved; before: {transport}", transport = before.transport));
+        worries.push(t!("settings under test, not saved; before: {transport}", transport = before.transport));
     }
     let Some(report) = at.report else { return worries };
     if let Some(strain) = &report.strain {
-        worries.push(t!("{strain}. Poll less often, or raise the baud rate", strain));
+        worries.push(t!("{strain}. Poll less often, or increase the baud rate", strain));
     } else if !report.admission.verdict.fits() {
         worries.push(report.admission.verdict.to_string());
     }
     if report.strain.is_none() && missed_lately(report) {
         worries.push(t!(
-            "the line is full: {grouped} reads were skipped. Poll less often, or raise the baud rate",
+            "line overloaded: {grouped} polls skipped. Poll less often, or increase the baud rate",
             grouped = grouped(report.counters.missed)
         ));
     }
@@ -28,9 +28,8 @@ pub(super) fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
     }
     let uart = report.counters.uart.unwrap_or_default();
     if 0 < uart.parity + uart.framing && DeviceStats::of(report).lately {
-        worries.push(
-            t!("the port counts parity or framing errors: compare baud rate and parity with the devices").to_owned(),
-        );
+        worries
+            .push(t!("parity or framing errors at the port: compare baud rate and parity with the devices").to_owned());
     }
     worries
 }
@@ -45,7 +44,7 @@ pub(super) fn of_device(
     let mut worries = Vec::new();
     if let Some(p99) = near(stats, line.timeout) {
         worries.push(t!(
-            "replies take {p99} of {timeout} ms: raise the timeout",
+            "replies take {p99} of {timeout} ms: increase the timeout",
             p99 = p99.as_millis(),
             timeout = line.timeout.as_millis()
         ));
@@ -60,18 +59,18 @@ pub(super) fn of_device(
             let cost = report
                 .admission
                 .dead_cost(device.id)
-                .map(|cost| t!("; every probe costs the line {ms}", ms = ms(cost)));
-            t!("look at its power, wiring and unit number{cost}", cost = cost.unwrap_or_default())
+                .map(|cost| t!("; each probe takes {ms} of the line", ms = ms(cost)));
+            t!("check its power, wiring and unit address{cost}", cost = cost.unwrap_or_default())
         }
         Fault::Crc { .. } | Fault::Lrc { .. } | Fault::Truncated { .. } | Fault::NotHex(_) => {
-            t!("look at baud rate, parity, termination and shield of the line").to_owned()
+            t!("check baud rate, parity, termination and shield of the line").to_owned()
         }
         Fault::Exception(code) => names::advice(code.0).to_owned(),
         Fault::WrongUnit { .. }
         | Fault::WrongFunction { .. }
         | Fault::WrongLength { .. }
         | Fault::WrongEcho
-        | Fault::OutOfSync => t!("is there another master, or a unit number twice?").to_owned(),
+        | Fault::OutOfSync => t!("check for a second master or a duplicate unit address").to_owned(),
         Fault::NotANumber | Fault::NotConnected | Fault::BackedOff => String::new(),
     };
     worries.push(t!("{fault} at {when}: {advice}", fault, when, advice).trim_end_matches(": ").to_owned());

@@ -36,7 +36,7 @@ pub fn address(text: &str, table: Table) -> Result<u16, String> {
     let Some(named) = named else { return number(digits, t!("address"), 0..=65_535).map(to_u16) };
     if named != table {
         return Err(t!(
-            "address: {digits} is of the table {named}, this is {table}",
+            "address: {digits} belongs to the table {named}, this is {table}",
             digits,
             named = translate(named.word()),
             table = translate(table.word())

@@ -50,7 +50,7 @@ impl Send {
     }
 
     fn send(&self, cx: &ViewContext) -> Result<UiAction, String> {
-        let at = Place::of(cx, self.line).ok_or(t!("this line has gone"))?;
+        let at = Place::of(cx, self.line).ok_or(t!("this line no longer exists"))?;
         if self.text.missed() {
             return Err(t!("the text was cut; Ctrl-U clears the line").to_owned());
         }
@@ -88,7 +88,7 @@ impl Send {
         let rows = if self.text.text().trim().is_empty() {
             vec![
                 plain(t!("such as 01 03 03 EA 00 01: unit, function, address, count; or a line of a log"), theme.dim()),
-                plain(t!("the check that the line needs is added"), theme.dim()),
+                plain(t!("the check of the line is added"), theme.dim()),
             ]
         } else {
             match self.ready(framing) {
@@ -122,7 +122,7 @@ impl Ready {
         let theme = cx.theme;
         let added = match (bare, self.added.is_empty()) {
             (true, _) => t!("as typed, nothing added").to_owned(),
-            (false, true) => t!("it has its check").to_owned(),
+            (false, true) => t!("check already present").to_owned(),
             (false, false) => self.added.clone(),
         };
         let mut rows = vec![plain(fit_words(&added, width), theme.normal())];

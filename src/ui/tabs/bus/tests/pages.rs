@@ -14,11 +14,11 @@ fn a_silent_device_shows_its_next_poll_and_r_polls_it_now() {
     for (width, height) in [(80, 24), (120, 40)] {
         let mut model = bus(&fixture, Theme::FULL, "L");
         let shown = screen(&mut model, width, height);
-        assert!(shown.contains("retry in 12 s"), "{shown}");
+        assert!(shown.contains("retry 12 s"), "{shown}");
         assert_eq!(sent_kind(&type_keys(&mut model, "r")), Some(&CommandKind::Refresh(device)));
         type_keys(&mut model, "4⏎");
         let shown = screen(&mut model, width, height);
-        assert!(shown.contains("not answering, retry in 12 s"), "{shown}");
+        assert!(shown.contains("not responding, retry 12 s"), "{shown}");
     }
 }
 
@@ -47,7 +47,7 @@ fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
 #[test]
 fn every_page_in_seven_bits_tells_what_is_wrong() {
     for (page, keys, words) in [
-        ("line", "L", "! PLC-1: no answer in time at 14:01:50"),
+        ("line", "L", "! PLC-1: response timeout at 14:01:50"),
         ("plan", "P", "! TIC-1"),
         ("frames", "F", "x CRC error: got 3C51"),
         ("test", "T", "scan for units"),
@@ -83,12 +83,12 @@ fn a_quiet_line_has_no_warnings_and_a_bad_one_says_what_to_do() {
     assert!(!quiet.contains('!') && !quiet.contains('✗'), "{quiet}");
     let bad = screen(&mut bus(&Fixture::traffic_trouble(), Theme::FULL, ""), 120, 40);
     for words in [
-        "replies take 288 of 300 ms: raise the timeout",
-        "look at its power, wiring and unit number; every probe costs the line 312 ms",
-        "look at baud rate, parity, termination and shield",
+        "replies take 288 of 300 ms: increase the timeout",
+        "check its power, wiring and unit address; each probe takes 312 ms of the line",
+        "check baud rate, parity, termination and shield",
         "!corrupt 6",
         "02 illegal data address 2",
-        "the line is full: 41 reads were skipped",
+        "line overloaded: 41 polls skipped",
     ] {
         assert!(bad.contains(words), "{words} is missing:\n{bad}");
     }

@@ -53,7 +53,7 @@ fn nothing_is_restored_to_a_device_that_does_not_answer() {
     assert_eq!(restored(&mut model, "4↓⏎s⏎⏎⏎"), None);
     type_keys(&mut model, "⎋⎋⎋⎋");
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("2 devices   1 not answering   1 with alarms"), "{shown}");
+    assert!(shown.contains("2 devices   1 not responding   1 with alarms"), "{shown}");
 }
 
 #[test]
@@ -74,12 +74,12 @@ fn a_set_is_saved_by_name_and_replaced_after_a_confirmation() {
     let (commands, shown) = saved("winter⏎");
     assert_eq!(commands, []);
     for words in
-        ["There is a set winter already: of TIC-1, profile fixture, saved", "2026-11-21 14:02 by anna. Replace it?"]
+        ["The set winter exists already: of TIC-1, profile fixture, saved", "2026-11-21 14:02 by anna. Replace it?"]
     {
         assert!(shown.contains(words), "{words} in {shown}");
     }
     let (commands, shown) = saved("summer⏎");
-    assert!(commands.is_empty() && shown.contains("summer.toml already that is no usable set"), "{shown}");
+    assert!(commands.is_empty() && shown.contains("summer.toml exists already and is not a valid set"), "{shown}");
     assert_eq!(saved("winter⏎⏎").0, [("winter".to_owned(), true)]);
     let (commands, shown) = saved("../x⏎");
     assert!(commands.is_empty() && shown.contains("no dot at its beginning"), "{shown}");
