@@ -15,7 +15,7 @@ use crate::{
     plant::{PlantDef, def::TagId},
     report::{
         export,
-        figures::{self, Label},
+        figures::{self, TagDescription},
         step_series::HeldValue,
     },
 };
@@ -64,10 +64,10 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let latest = latest(&source, &def, &tags, period.from, to).await?;
     let mut columns = Vec::new();
     for group in tags.chunks(SERIES_MAX) {
-        let label = |tag: &TagId| Label::at(def.tag(*tag), &latest);
+        let label = |tag: &TagId| TagDescription::at(def.tag(*tag), &latest);
         let begin = columns.len();
         columns.extend(group.iter().map(label).map(|label| {
-            let Label { tag, unit, decimals, counts: _ } = label;
+            let TagDescription { tag, unit, decimals, counts: _ } = label;
             export::Column { tag, unit, decimals, values: Vec::with_capacity(rows) }
         }));
         for (from, count) in pieces(period.from, args.every, rows, group.len()) {
@@ -89,10 +89,10 @@ async fn latest(
     from: Timestamp,
     to: Timestamp,
 ) -> Result<HashMap<TagId, f64>, CliError> {
-    let choosers: BTreeSet<TagId> = tags.iter().flat_map(|tag| figures::choosers(def.tag(*tag))).collect();
-    let choosers: Vec<TagId> = choosers.into_iter().collect();
+    let scaling_tags: BTreeSet<TagId> = tags.iter().flat_map(|tag| figures::scaling_tags(def.tag(*tag))).collect();
+    let scaling_tags: Vec<TagId> = scaling_tags.into_iter().collect();
     let mut latest = HashMap::new();
-    for tags in choosers.chunks(SERIES_MAX) {
+    for tags in scaling_tags.chunks(SERIES_MAX) {
         let query = Query::Series { tags: tags.to_vec(), from, to, buckets: 1 };
         let Answer::Series(series) = source.query(query).await? else { return Err(unexpected()) };
         latest.extend(series.iter().filter_map(|series| Some((series.tag, (*series.buckets.last()?)?.last))));

@@ -7,7 +7,7 @@ use jiff::{SignedDuration, Timestamp};
 use super::{Bucket, Series};
 use crate::{
     plant::{def::TagId, sample::Sample},
-    report::step_series::{Segment, SegmentStats, StepSeries},
+    report::step_series::{HoldInterval, IntervalStats, StepSeries},
 };
 
 /// The span of a curve; `from < to`.
@@ -28,8 +28,8 @@ pub struct Curve {
     from: Timestamp,
     columns: Columns,
     steps: StepSeries,
-    stats: Vec<Option<SegmentStats>>,
-    whole: Option<SegmentStats>,
+    stats: Vec<Option<IntervalStats>>,
+    whole: Option<IntervalStats>,
 }
 
 impl Curve {
@@ -55,7 +55,7 @@ impl Curve {
         }
         let Curve { tag, from, columns, stats, whole, steps: _ } = self;
         let bucket =
-            |stats: SegmentStats| Bucket { min: stats.min, max: stats.max, mean: stats.mean, last: stats.last };
+            |stats: IntervalStats| Bucket { min: stats.min, max: stats.max, mean: stats.mean, last: stats.last };
         Series {
             tag,
             from,
@@ -66,10 +66,10 @@ impl Curve {
         }
     }
 
-    fn add(&mut self, piece: Segment) {
+    fn add(&mut self, piece: HoldInterval) {
         let Curve { columns, stats, whole, .. } = self;
-        SegmentStats::add(whole, piece);
-        columns.cut(piece, |column, part| SegmentStats::add(&mut stats[column], part));
+        IntervalStats::add(whole, piece);
+        columns.cut(piece, |column, part| IntervalStats::add(&mut stats[column], part));
     }
 }
 
@@ -104,13 +104,13 @@ impl Columns {
     }
 
     /// Cuts a piece at the edges of the columns that it lies in.
-    fn cut(&self, piece: Segment, mut each: impl FnMut(usize, Segment)) {
+    fn cut(&self, piece: HoldInterval, mut each: impl FnMut(usize, HoldInterval)) {
         let mut from = piece.from;
         let mut column = self.column_of(from);
         while from < piece.to && column < self.count {
             let to = self.edge(column + 1).min(piece.to);
             if from < to {
-                each(column, Segment { from, to, ..piece });
+                each(column, HoldInterval { from, to, ..piece });
                 from = to;
             }
             column += 1;

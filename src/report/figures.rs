@@ -9,7 +9,7 @@ use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
     DECIMALS_UNKNOWN, RecordRow, SuppressedSummary, TagFigures,
-    step_series::{Segment, SegmentStats, StepSeries, good_value},
+    step_series::{HoldInterval, IntervalStats, StepSeries, good_value},
 };
 use crate::plant::{
     def::TagId,
@@ -20,7 +20,7 @@ use crate::plant::{
 
 /// What a tag is called in a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Label {
+pub struct TagDescription {
     /// `TIC-1.PV`.
     pub tag: String,
     /// `°C`.
@@ -34,10 +34,10 @@ pub struct Label {
 /// Units in which only counters of energy and charge count.
 const COUNTED: [&str; 12] = ["Wh", "kWh", "MWh", "GWh", "varh", "kvarh", "Mvarh", "VAh", "kVAh", "MVAh", "Ah", "kAh"];
 
-impl Label {
+impl TagDescription {
     /// Name, unit and decimals of a tag, where the device may have chosen the last two: `latest` has the latest good values
     /// of the tags that hold them.
-    pub fn at(def: &TagDef, latest: &HashMap<TagId, f64>) -> Label {
+    pub fn at(def: &TagDef, latest: &HashMap<TagId, f64>) -> TagDescription {
         let decimals = match def.decimals {
             Decimals::Fixed(decimals) => decimals,
             Decimals::From(tag) => {
@@ -46,12 +46,12 @@ impl Label {
         };
         let unit = def.unit_by(|tag| latest.get(&tag).copied()).unwrap_or(&def.unit).to_owned();
         let counts = def.counter.unwrap_or_else(|| COUNTED.contains(&unit.as_str()));
-        Label { tag: def.name.clone(), unit, decimals, counts }
+        TagDescription { tag: def.name.clone(), unit, decimals, counts }
     }
 }
 
 /// The tags that hold decimals and unit of a tag.
-pub fn choosers(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
+pub fn scaling_tags(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
     def.decimals.source().into_iter().chain(def.unit_from.as_ref().map(|(tag, _)| *tag))
 }
 
@@ -60,7 +60,7 @@ pub fn choosers(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
 pub struct Figures {
     seconds: f64,
     steps: StepSeries,
-    stats: Option<SegmentStats>,
+    stats: Option<IntervalStats>,
     counted: f64,
 }
 
@@ -77,17 +77,17 @@ impl Figures {
         }
     }
 
-    fn add(&mut self, span: Segment) {
+    fn add(&mut self, span: HoldInterval) {
         let last = self.stats.map_or(span.value, |stats| stats.last);
         // A counter that shows less than half of its last value, but not less than nothing, was reset or has rolled over:
         // it counts from zero. Any other step back is that of a balance, as of energy taken and fed back.
         let reset = (0.0..last / 2.0).contains(&span.value);
         self.counted += if reset { span.value } else { span.value - last };
-        SegmentStats::add(&mut self.stats, span);
+        IntervalStats::add(&mut self.stats, span);
     }
 
     /// The figures, when the last sample has come.
-    pub fn end(mut self, label: Label, in_alarm: Duration) -> TagFigures {
+    pub fn end(mut self, label: TagDescription, in_alarm: Duration) -> TagFigures {
         if let Some(span) = self.steps.clone().end() {
             self.add(span);
         }

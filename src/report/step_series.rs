@@ -19,7 +19,7 @@ pub const HOLD_MAX: Duration = Duration::from_secs(150);
 
 /// A span with one good value; never empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
+pub struct HoldInterval {
     /// From, inclusive.
     pub from: Timestamp,
     /// To, exclusive.
@@ -28,7 +28,7 @@ pub struct Segment {
     pub value: f64,
 }
 
-impl Segment {
+impl HoldInterval {
     /// How long, in seconds.
     pub fn seconds(self) -> f64 {
         self.to.duration_since(self.from).as_secs_f64()
@@ -51,38 +51,38 @@ impl StepSeries {
     }
 
     /// The span that ends with the next sample.
-    pub fn next(&mut self, sample: Sample) -> Option<Segment> {
+    pub fn next(&mut self, sample: Sample) -> Option<HoldInterval> {
         let before = self.current.replace(sample)?;
         self.span(before, sample.at)
     }
 
     /// The span that nothing comes after.
-    pub fn end(mut self) -> Option<Segment> {
+    pub fn end(mut self) -> Option<HoldInterval> {
         let last = self.current.take()?;
         self.span(last, self.until)
     }
 
-    fn span(&self, sample: Sample, successor: Timestamp) -> Option<Segment> {
+    fn span(&self, sample: Sample, successor: Timestamp) -> Option<HoldInterval> {
         let value = good_value(sample)?;
         let to = successor.min(expiry(sample)).min(self.until);
         let from = sample.at.max(self.from);
-        (from < to).then_some(Segment { from, to, value })
+        (from < to).then_some(HoldInterval { from, to, value })
     }
 }
 
 /// Finds the sample in force at rising instants. The samples come in order of time and should begin [`HOLD_MAX`] before
 /// the first.
 #[derive(Debug, Clone)]
-pub struct AsOf {
+pub struct ValuesAt {
     instants: Arc<[Timestamp]>,
     current: Option<Sample>,
     values: Vec<Option<Sample>>,
 }
 
-impl AsOf {
+impl ValuesAt {
     /// At instants in order of time.
-    pub fn new(instants: Arc<[Timestamp]>) -> AsOf {
-        AsOf { values: Vec::with_capacity(instants.len()), instants, current: None }
+    pub fn new(instants: Arc<[Timestamp]>) -> ValuesAt {
+        ValuesAt { values: Vec::with_capacity(instants.len()), instants, current: None }
     }
 
     /// The next sample.
@@ -121,7 +121,7 @@ impl From<Sample> for HeldValue {
 
 /// Extremes, time-weighted mean and last value of spans.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SegmentStats {
+pub struct IntervalStats {
     /// Least.
     pub min: f64,
     /// Greatest.
@@ -134,13 +134,13 @@ pub struct SegmentStats {
     pub seconds: f64,
 }
 
-impl SegmentStats {
+impl IntervalStats {
     /// Adds a span to what there is.
-    pub fn add(stats: &mut Option<SegmentStats>, span: Segment) {
-        let Segment { value, .. } = span;
+    pub fn add(stats: &mut Option<IntervalStats>, span: HoldInterval) {
+        let HoldInterval { value, .. } = span;
         let seconds = span.seconds();
         let Some(old) = stats else {
-            *stats = Some(SegmentStats { min: value, max: value, mean: value, last: value, seconds });
+            *stats = Some(IntervalStats { min: value, max: value, mean: value, last: value, seconds });
             return;
         };
         old.seconds += seconds;
@@ -166,9 +166,9 @@ mod tests {
     use super::*;
     use crate::{plant::sample::Cause, report::testing::sec};
 
-    fn held(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Vec<Segment> {
+    fn held(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Vec<HoldInterval> {
         let mut steps = StepSeries::new(from, until);
-        let mut spans: Vec<Segment> = samples.filter_map(|sample| steps.next(sample)).collect();
+        let mut spans: Vec<HoldInterval> = samples.filter_map(|sample| steps.next(sample)).collect();
         spans.extend(steps.end());
         spans
     }
@@ -206,13 +206,13 @@ mod tests {
     #[test]
     fn an_uncertain_value_is_not_counted_as_good() {
         let samples = [Sample::good(5.0, sec(0)), Sample::good(5.0, sec(4)).uncertain(Cause::Stale)];
-        assert_eq!(held(samples.into_iter(), sec(0), sec(10)), [Segment { from: sec(0), to: sec(4), value: 5.0 }]);
+        assert_eq!(held(samples.into_iter(), sec(0), sec(10)), [HoldInterval { from: sec(0), to: sec(4), value: 5.0 }]);
     }
 
     #[test]
     fn the_value_at_an_instant_is_the_one_that_stood_then() {
         let samples = [Sample::good(1.0, sec(0)), Sample::bad(Cause::Timeout, sec(10)), Sample::good(3.0, sec(20))];
-        let mut as_of = AsOf::new([-1, 0, 9, 10, 19, 20, 169, 170].map(sec).into());
+        let mut as_of = ValuesAt::new([-1, 0, 9, 10, 19, 20, 169, 170].map(sec).into());
         samples.into_iter().for_each(|sample| as_of.next(sample));
         let got: Vec<_> = as_of.end().into_iter().map(|sample| sample.and_then(good_value)).collect();
         assert_eq!(got, [None, Some(1.0), Some(1.0), None, None, Some(3.0), Some(3.0), None]);

@@ -21,7 +21,7 @@ use crate::{
         line_minute::LineMinute,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut},
     },
-    report::step_series::{AsOf, HeldValue},
+    report::step_series::{HeldValue, ValuesAt},
 };
 
 /// Rows of a list or of a record in one answer; an answer that would be longer is refused, never cut.
@@ -101,9 +101,9 @@ impl Store {
         check_span(from, to)?;
         self.bounded(tags.len(), from, to, now, SAMPLES_MAX)?;
         let tags = Distinct::new(tags);
-        let mut as_of: Vec<AsOf> = tags.each.iter().map(|_| AsOf::new(instants.clone())).collect();
+        let mut as_of: Vec<ValuesAt> = tags.each.iter().map(|_| ValuesAt::new(instants.clone())).collect();
         self.each_sample(&tags.each, from, to, |place, sample| as_of[place].next(sample))?;
-        let column = |as_of: AsOf| {
+        let column = |as_of: ValuesAt| {
             let as_of = as_of.end().into_iter().map(|sample| sample.map(HeldValue::from));
             as_of.chain(std::iter::repeat(None)).take(count).collect()
         };

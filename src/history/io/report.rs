@@ -20,15 +20,15 @@ use crate::{
     plant::{PlantDef, def::TagId, record::AlarmRecord, sample::Sample},
     report::{
         Period, ShiftReport,
-        figures::{self, Figures, Label},
-        step_series::AsOf,
+        figures::{self, Figures, TagDescription},
+        step_series::ValuesAt,
     },
 };
 
 /// What is gathered of one tag.
 struct Gathered {
     figures: Option<Figures>,
-    record: Option<AsOf>,
+    record: Option<ValuesAt>,
     latest_good: Option<f64>,
 }
 
@@ -74,7 +74,7 @@ impl Store {
             record: recorded
                 .as_ref()
                 .filter(|recorded| [recorded.sv, recorded.pv].contains(tag))
-                .map(|recorded| AsOf::new(recorded.instants.clone())),
+                .map(|recorded| ValuesAt::new(recorded.instants.clone())),
             latest_good: None,
         };
         let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
@@ -82,20 +82,20 @@ impl Store {
         let latest: HashMap<TagId, f64> =
             tags.iter().zip(&gathered).filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?))).collect();
         let mut gathered: HashMap<TagId, Gathered> = tags.into_iter().zip(gathered).collect();
-        let mut as_of = |tag| gathered.get_mut(&tag).and_then(|tag| tag.record.take()).map(AsOf::end);
+        let mut as_of = |tag| gathered.get_mut(&tag).and_then(|tag| tag.record.take()).map(ValuesAt::end);
         let (record, record_of) = match recorded {
             Some(Recorded { name, sv, pv, instants }) => {
                 let pv_stood = as_of(pv).unwrap_or_default();
                 let sv_stood = if sv == pv { pv_stood.clone() } else { as_of(sv).unwrap_or_default() };
                 let rows = figures::record(&instants, &sv_stood, &pv_stood);
-                (rows, Some((name, Label::at(def.tag(pv), &latest).unit)))
+                (rows, Some((name, TagDescription::at(def.tag(pv), &latest).unit)))
             }
             None => (Vec::new(), None),
         };
         let mut steps: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
         active.iter().chain(&alarms).for_each(|step| steps.entry(&step.subject).or_default().push(step));
         let row = |tag: &TagId| {
-            let label = Label::at(def.tag(*tag), &latest);
+            let label = TagDescription::at(def.tag(*tag), &latest);
             let steps = steps.get(label.tag.as_str()).into_iter().flatten().copied();
             let in_alarm = figures::time_in_alarm(steps, from, until);
             Some(gathered.get_mut(tag)?.figures.take()?.end(label, in_alarm))
@@ -150,8 +150,8 @@ fn reported_tags(def: &PlantDef) -> Vec<TagId> {
 fn tags_to_read(def: &PlantDef, reported: &[TagId], recorded: Option<&Recorded>) -> Vec<TagId> {
     let recorded = recorded.into_iter().flat_map(|recorded| [recorded.sv, recorded.pv]);
     let mut tags: Vec<TagId> = reported.iter().copied().chain(recorded).collect();
-    let choosers: Vec<TagId> = tags.iter().flat_map(|tag| figures::choosers(def.tag(*tag))).collect();
-    tags.extend(choosers);
+    let scaling_tags: Vec<TagId> = tags.iter().flat_map(|tag| figures::scaling_tags(def.tag(*tag))).collect();
+    tags.extend(scaling_tags);
     tags.sort_unstable_by_key(|tag| tag.index());
     tags.dedup();
     tags

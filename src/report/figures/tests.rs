@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::*;
 use crate::{
     plant::{def::Priority, sample::Cause},
-    report::step_series::AsOf,
+    report::step_series::ValuesAt,
     report::testing::{at, sec, tag, zone},
 };
 
@@ -17,8 +17,8 @@ fn figures(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timest
     figures.end(label(), Duration::ZERO)
 }
 
-fn label() -> Label {
-    Label { tag: "TIC-1.PV".into(), unit: "°C".into(), decimals: 1, counts: false }
+fn label() -> TagDescription {
+    TagDescription { tag: "TIC-1.PV".into(), unit: "°C".into(), decimals: 1, counts: false }
 }
 
 /// Figures over 0..100 s of samples (second, value or none) as (min, mean, max, last, good).
@@ -51,7 +51,7 @@ fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
 fn a_report_takes_the_decimals_that_the_screen_takes() {
     let pv = TagDef { decimals: Decimals::From(TagId(9)), ..tag(0, "PV") };
     for (announced, expect) in [(2.0, 2), (6.0, 6), (7.0, DECIMALS_UNKNOWN), (1.5, DECIMALS_UNKNOWN)] {
-        assert_eq!(Label::at(&pv, &HashMap::from([(TagId(9), announced)])).decimals, expect, "{announced}");
+        assert_eq!(TagDescription::at(&pv, &HashMap::from([(TagId(9), announced)])).decimals, expect, "{announced}");
     }
 }
 
@@ -70,11 +70,11 @@ fn a_counter_has_a_difference_and_no_mean() {
     ] {
         let mut figures = Figures::new(sec(0), sec(100));
         readings.iter().for_each(|(at, value)| figures.next(Sample::good(*value, sec(*at))));
-        let got = figures.end(Label { unit: "kWh".into(), counts: true, ..label() }, Duration::ZERO);
+        let got = figures.end(TagDescription { unit: "kWh".into(), counts: true, ..label() }, Duration::ZERO);
         assert_eq!((got.difference, got.mean), (expect, None), "{readings:?}");
     }
     let mut def = crate::report::testing::tag(0, "E");
-    let counts = |def: &TagDef| Label::at(def, &HashMap::new()).counts;
+    let counts = |def: &TagDef| TagDescription::at(def, &HashMap::new()).counts;
     assert!(!counts(&def));
     def.unit = "kWh".into();
     assert!(counts(&def));
@@ -160,7 +160,7 @@ fn the_record_is_on_the_local_grid_with_good_values_only() {
     let pv = [Sample::good(27.0, sec(3)), Sample::bad(Cause::Timeout, sec(15)), Sample::good(28.5, sec(30))];
     let instants: Arc<[_]> = record_grid(Duration::from_secs(10), &TimeZone::UTC, sec(0), sec(40)).into();
     let stood = |samples: &[Sample]| {
-        let mut as_of = AsOf::new(instants.clone());
+        let mut as_of = ValuesAt::new(instants.clone());
         samples.iter().for_each(|sample| as_of.next(*sample));
         as_of.end()
     };

@@ -8,7 +8,7 @@ use super::*;
 use crate::{
     history::series::{Curve, Span},
     plant::sample::Quality,
-    report::{figures::Figures, figures::Label, step_series::HOLD_MAX},
+    report::{figures::Figures, figures::TagDescription, step_series::HOLD_MAX},
 };
 
 /// The samples of a tag in order of time, as one plain query has them.
@@ -60,7 +60,7 @@ proptest! {
             for (place, row) in report.tags.iter().enumerate() {
                 let mut figures = Figures::new(from, until);
                 samples(TagId(place as u16)).filter(|s| s.at < until).for_each(|sample| figures.next(sample));
-                let label = Label { tag: row.tag.clone(), unit: row.unit.clone(), decimals: row.decimals, counts: false };
+                let label = TagDescription { tag: row.tag.clone(), unit: row.unit.clone(), decimals: row.decimals, counts: false };
                 prop_assert_eq!(row, &figures.end(label, Duration::ZERO));
             }
             let stood = |tag: usize, at: Timestamp| by_itself(&store, TagId(tag as u16)).into_iter()
