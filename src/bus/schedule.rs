@@ -29,7 +29,7 @@ use self::{
     budget::PROBE_SHARE,
     device::Health,
     overload::Overload,
-    poll::{ONCE_WITHIN, Pace, Pending},
+    poll::{ONCE_WITHIN, Pace, ScheduledPoll},
     queue::{Queue, Spot},
 };
 use super::plan::Block;
@@ -65,7 +65,7 @@ pub enum Next {
 pub struct Schedule {
     /// A point of every grid.
     origin: Timestamp,
-    polls: Vec<Pending>,
+    polls: Vec<ScheduledPoll>,
     /// Those of devices that answer, as they come.
     queue: Queue,
     /// What the places of many polls depend on has changed: the queue is rebuilt before it is looked at.
@@ -77,8 +77,8 @@ pub struct Schedule {
     /// A critical poll was late since the demand was last looked at, and when that was.
     late: bool,
     judged_at: Timestamp,
-    /// The last read was one that had starved: the next is not.
-    fed: bool,
+    /// The last poll served had starved: two in a row would starve the others.
+    last_was_aged: bool,
 }
 
 impl Schedule {
@@ -86,16 +86,16 @@ impl Schedule {
     pub fn new(blocks: &[Block], now: Timestamp) -> Schedule {
         let (polls, devices, overload) = (Vec::new(), Vec::new(), Overload::default());
         let probes = Budget::new(PROBE_SHARE, now);
-        let (queue, stale, late, judged_at, fed) = (Queue::default(), true, false, now, false);
+        let (queue, stale, late, judged_at, last_was_aged) = (Queue::default(), true, false, now, false);
         let mut schedule =
-            Schedule { origin: now, polls, queue, stale, devices, overload, probes, late, judged_at, fed };
+            Schedule { origin: now, polls, queue, stale, devices, overload, probes, late, judged_at, last_was_aged };
         schedule.replan(blocks, now);
         schedule
     }
 
     /// The plan has changed: blocks that stay keep their grid and counts, devices their health; new blocks are due now.
     pub fn replan(&mut self, blocks: &[Block], now: Timestamp) {
-        let mut old: Vec<Option<Pending>> = std::mem::take(&mut self.polls).into_iter().map(Some).collect();
+        let mut old: Vec<Option<ScheduledPoll>> = std::mem::take(&mut self.polls).into_iter().map(Some).collect();
         self.stale = true;
         for health in &mut self.devices {
             health.probe = None;
@@ -109,7 +109,7 @@ impl Schedule {
             self.devices[place].probe.get_or_insert(index);
             let kept =
                 old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.is_of(block))).and_then(Option::take);
-            self.polls.push(kept.unwrap_or_else(|| Pending::new(block, place, self.origin, now)).at(place));
+            self.polls.push(kept.unwrap_or_else(|| ScheduledPoll::new(block, place, self.origin, now)).at(place));
         }
     }
 
@@ -122,7 +122,8 @@ impl Schedule {
         self.queue.advance(now);
         let mut wake = self.queue.wakes_at();
         let mut best: Option<((u8, Timestamp), usize)> = None;
-        let starved = self.queue.starved().filter(|_| !self.fed).map(|(deadline, index)| ((STARVED, deadline), index));
+        let starved =
+            self.queue.starved().filter(|_| !self.last_was_aged).map(|(deadline, index)| ((STARVED, deadline), index));
         for (rank, index) in starved.chain(self.queue.ready()) {
             let free_at = self.devices[self.polls[index].place].free_at;
             if free_at <= now {
@@ -188,11 +189,11 @@ impl Schedule {
     }
 
     fn rank(&self, spot: Spot, now: Timestamp) -> (u8, Timestamp) {
-        let starves = !self.fed && spot.starves_at.is_some_and(|starves_at| starves_at <= now);
+        let starves = !self.last_was_aged && spot.starves_at.is_some_and(|starves_at| starves_at <= now);
         (if starves { STARVED } else { spot.tier }, spot.deadline)
     }
 
-    fn pace_of(&self, poll: &Pending) -> Pace {
+    fn pace_of(&self, poll: &ScheduledPoll) -> Pace {
         match (self.overload.load(), poll.class, poll.period) {
             (Load::Overload { factor }, PollClass::Normal, Some(period)) => Pace::Stretched(period.mul_f64(factor)),
             (Load::Overload { .. }, PollClass::Background, _) => Pace::Shed,
@@ -203,7 +204,7 @@ impl Schedule {
     /// The request for this block is sent; it is not due again before [`Schedule::done`]. Needed only where others are sent
     /// before its answer comes.
     pub fn begin(&mut self, index: usize, now: Timestamp) {
-        self.fed = self.has_starved(index, now);
+        self.last_was_aged = self.has_starved(index, now);
         self.polls[index].under_way = true;
         self.requeue(index);
     }
@@ -218,7 +219,7 @@ impl Schedule {
     pub fn done(&mut self, index: usize, started: Timestamp, now: Timestamp) -> Served {
         let pace = self.pace_of(&self.polls[index]);
         if !std::mem::take(&mut self.polls[index].under_way) {
-            self.fed = self.has_starved(index, started);
+            self.last_was_aged = self.has_starved(index, started);
         }
         let device = &self.devices[self.polls[index].place];
         let (rests_until, probed) = (device.rests_until, device.probe_at.is_some());

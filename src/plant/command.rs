@@ -244,7 +244,7 @@ pub enum Refusal {
     UnderWay,
     /// It still waited when a stop of the same tag came, and would have undone it.
     #[error("{}", t!("cancelled by a stop, nothing was sent"))]
-    Overtaken,
+    Superseded,
     /// An interlock of the plant file blocks it now.
     #[error("{}", t!("interlock: {what}", what = .0))]
     Interlock(String),

@@ -246,7 +246,7 @@ fn without_read_back(result: &WriteResult) -> Outcome {
     match result {
         WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
         WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(*fault)),
-        WriteResult::Overtaken => Outcome::Refused(Refusal::Overtaken),
+        WriteResult::Superseded => Outcome::Refused(Refusal::Superseded),
         WriteResult::Lost(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
         WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
         WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::Held(_) => {

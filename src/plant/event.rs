@@ -121,7 +121,7 @@ pub enum WriteResult {
     /// Nothing was sent.
     NotSent(Fault),
     /// Nothing was sent: it still waited when a stop of the same tag came.
-    Overtaken,
+    Superseded,
 }
 
 /// Why a request did not end in a valid normal answer.

@@ -329,7 +329,7 @@ impl Plant {
             | WriteResult::Held(_)
             | WriteResult::Refused(_)
             | WriteResult::NotSent(_)
-            | WriteResult::Overtaken => None,
+            | WriteResult::Superseded => None,
         };
         if let Some(tag) = uncertain {
             self.image.failed(&[tag], Fault::Timeout, at);

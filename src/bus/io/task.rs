@@ -285,7 +285,7 @@ impl Task<'_> {
                 // What was requested before a stop and still waits for this tag would undo it.
                 let overtaken = if job.urgent { self.requests.take_writes_of(job.tag) } else { Vec::new() };
                 for id in overtaken {
-                    self.publish_write_result(id, WriteResult::Overtaken).await?;
+                    self.publish_write_result(id, WriteResult::Superseded).await?;
                 }
                 let def = self.def.clone();
                 match self.clear_way(link, schedule, def.tag(job.tag).device, job.urgent).await {

@@ -63,7 +63,7 @@ pub(super) enum Pace {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Pending {
+pub(super) struct ScheduledPoll {
     block: (DeviceId, Table, u16, u16),
     /// Place of its device among those of the schedule.
     pub place: usize,
@@ -87,12 +87,12 @@ pub(super) struct Pending {
     excused: bool,
 }
 
-impl Pending {
+impl ScheduledPoll {
     /// Due at once, and then on the grid that has a point at `origin`.
-    pub fn new(block: &Block, place: usize, origin: Timestamp, now: Timestamp) -> Pending {
+    pub fn new(block: &Block, place: usize, origin: Timestamp, now: Timestamp) -> ScheduledPoll {
         let period = period_of(block);
         let release = period.map_or(now, |period| origin + period * periods_in(origin, now, period));
-        Pending {
+        ScheduledPoll {
             block: key(block),
             place,
             class: block.class,
@@ -114,8 +114,8 @@ impl Pending {
         (self.block, self.period) == (key(block), period_of(block))
     }
 
-    pub fn at(self, place: usize) -> Pending {
-        Pending { place, ..self }
+    pub fn at(self, place: usize) -> ScheduledPoll {
+        ScheduledPoll { place, ..self }
     }
 
     /// When it wants to be read next.

@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use super::{
     Load, PollInfo, Schedule,
     device::Health,
-    poll::{Pace, Pending},
+    poll::{Pace, ScheduledPoll},
 };
 use crate::plant::{def::DeviceId, number::to_f32};
 
@@ -21,7 +21,7 @@ impl Schedule {
     }
 
     /// How a poll stands.
-    fn info(&self, poll: &Pending) -> PollInfo {
+    fn info(&self, poll: &ScheduledPoll) -> PollInfo {
         let pace = self.pace_of(poll);
         let factor = match (self.overload.load(), pace) {
             (Load::Overload { factor }, Pace::Stretched(_)) => to_f32(factor),

@@ -61,7 +61,7 @@ impl Task<'_> {
         };
         let result = match written {
             // It waits again, unless the stop is one of its tag.
-            Written::Ended(WriteResult::Overtaken) => {
+            Written::Ended(WriteResult::Superseded) => {
                 self.requests.put_off(BusRequest::Write(*job));
                 return Ok(());
             }
@@ -87,7 +87,7 @@ impl Task<'_> {
             }
             // The key may have changed since it was read.
             WriteResult::Refused(_) if tag.write_unlock.is_some() => schedule.refresh(tag.device, self.clock.now()),
-            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Overtaken | WriteResult::Held(_) => {}
+            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Superseded | WriteResult::Held(_) => {}
         }
         match result {
             // A stop may be requested again at once.
@@ -116,7 +116,7 @@ impl Task<'_> {
             return Ok(Unlocked::No(Written::Ended(WriteResult::NotSent(Fault::NotANumber))));
         }
         let sent = self.send_number(link, schedule, key, raw, job.urgent).await;
-        if let Ok(ended @ (WriteResult::NotSent(_) | WriteResult::Overtaken)) = sent {
+        if let Ok(ended @ (WriteResult::NotSent(_) | WriteResult::Superseded)) = sent {
             return Ok(Unlocked::No(Written::Ended(ended)));
         }
         let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
@@ -155,7 +155,7 @@ impl Task<'_> {
         let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
         // Nothing else goes out before a stop that waits.
         if !urgent && self.requests.stop_waits() {
-            return Ok(WriteResult::Overtaken);
+            return Ok(WriteResult::Superseded);
         }
         let sent = self.send_write(link, device, request, urgent && !backed_off).await;
         self.keep_write_gap(link, schedule, device);

@@ -166,7 +166,7 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
         };
         results.push(line.until(&def, ended).await);
     }
-    assert_eq!(results, [(4, WriteResult::Overtaken), (5, WriteResult::ReadBack(20.0))]);
+    assert_eq!(results, [(4, WriteResult::Superseded), (5, WriteResult::ReadBack(20.0))]);
     let heard = heard.lock().expect("no panic").clone();
     let stop = heard.iter().position(|message| *message == [1, 6, 0, 20, 0, 0]).expect("sent");
     assert!(stop <= before + 1, "{} requests went before the stop: {:?}", stop - before, &heard[before..]);
