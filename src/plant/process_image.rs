@@ -224,7 +224,7 @@ impl ProcessImage {
         self.set(tag, Sample::bad(cause, at));
     }
 
-    /// A value that stays bad for the same reason has been so since it became it.
+    /// A value that stays bad for the same cause keeps the time at which it became bad.
     fn set(&mut self, tag: TagId, sample: Sample) {
         let before = self.samples[tag.index()];
         let lasts = sample.quality.is_bad() && sample.quality == before.quality;

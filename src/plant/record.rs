@@ -172,7 +172,7 @@ pub const SEAL_LOG: &str = "seal audit log";
 
 /// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
-pub const ELSEWHERE: [&str; 27] = [
+pub const NOT_PROCESS_ACTIONS: [&str; 27] = [
     WRITE_REQUESTED,
     // The same in a history of an earlier version.
     "order",

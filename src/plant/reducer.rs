@@ -3,7 +3,7 @@
 mod alarms;
 mod connection;
 mod health;
-mod measure;
+mod alarm_metrics;
 mod restore;
 mod service;
 mod station;
@@ -175,7 +175,7 @@ impl Plant {
         let mut effects = self.evaluate(at);
         effects.records.extend(action.map(Record::Action));
         self.advance_restores(at, &mut effects);
-        self.measure(&effects.records);
+        self.count_alarms(&effects.records);
         effects
     }
 
@@ -234,7 +234,7 @@ impl Plant {
     fn after_command(&mut self, mut effects: Effects, at: Timestamp) -> Effects {
         self.advance_restores(at, &mut effects);
         self.at = self.at.max(at);
-        self.measure(&effects.records);
+        self.count_alarms(&effects.records);
         effects
     }
 
@@ -274,7 +274,7 @@ impl Plant {
         effects.records.extend(minutes);
         effects.records.extend(expired.into_iter().map(Record::Action));
         self.advance_restores(at, &mut effects);
-        self.measure(&effects.records);
+        self.count_alarms(&effects.records);
         effects
     }
 

@@ -235,7 +235,7 @@ impl PlantTask {
             self.plant.restore(&steps);
             self.record(Vec::new(), steps);
         }
-        self.plant.remeasure(&recent.active, &recent.steps, &recent.watched, self.clock.now());
+        self.plant.restore_alarm_counts(&recent.active, &recent.steps, &recent.watched, self.clock.now());
     }
 
     fn handle_audit_message(&mut self, message: AuditMessage) {

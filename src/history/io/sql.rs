@@ -1,6 +1,6 @@
 //! The schema as numbered migrations, and the queries in SQL. Times are UTC; local time is Rust's business.
 
-use crate::plant::record::ELSEWHERE;
+use crate::plant::record::NOT_PROCESS_ACTIONS;
 
 /// The migrations; the schema's version is their number. Each runs in one transaction, followed by a checkpoint before
 /// any data, because data definitions among data in the log are what DuckDB's known recovery bugs need.
@@ -187,7 +187,7 @@ const ACTION: &str = "utc, by_whom, action, target, old_value, new_value, outcom
 
 /// Actions on the plant in a span, without those on users and terminals.
 pub fn actions(order: &str) -> String {
-    let others = ELSEWHERE.map(|word| format!("'{word}'")).join(", ");
+    let others = NOT_PROCESS_ACTIONS.map(|word| format!("'{word}'")).join(", ");
     format!("SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND action NOT IN ({others}) {order}")
 }
 

@@ -164,7 +164,10 @@ fn a_write_is_recorded_before_it_is_sent() {
     let effects = plant.on_command(shown(&plant, 1, SV, 61.0), at(1));
     let intent = plant.intent(&effects.bus[0].1).expect("a write is about to be sent");
     assert_eq!((&*intent.action, &*intent.target, &*intent.outcome), ("write requested", "TIC-1.SV", "pending"));
-    assert!(crate::plant::record::ELSEWHERE.contains(&&*intent.action), "a shift report has the outcome alone");
+    assert!(
+        crate::plant::record::NOT_PROCESS_ACTIONS.contains(&&*intent.action),
+        "a shift report has the outcome alone"
+    );
     assert_eq!(plant.intent(&BusRequest::StopTest), None);
     let ended = plant.on_stop().records;
     let [Record::Action(action)] = &ended[..] else { panic!("{ended:?}") };

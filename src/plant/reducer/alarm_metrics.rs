@@ -12,7 +12,13 @@ impl Plant {
     /// Counts the journal of the last day in the alarm monitor. `active` are the raising steps of alarms
     /// that were active before it, `steps` what came since; both oldest first, none after `now`. `watched` are the windows
     /// of that day in which a station ran.
-    pub fn remeasure(&mut self, active: &[AlarmRecord], steps: &[AlarmRecord], watched: &[i64], now: Timestamp) {
+    pub fn restore_alarm_counts(
+        &mut self,
+        active: &[AlarmRecord],
+        steps: &[AlarmRecord],
+        watched: &[i64],
+        now: Timestamp,
+    ) {
         let began = steps.first().map_or(now, |step| step.at.min(now));
         self.alarm_monitor = AlarmMonitor::running(began);
         watched.iter().for_each(|window| self.alarm_monitor.watched(*window));
@@ -23,7 +29,7 @@ impl Plant {
     }
 
     /// Counts the steps of alarms among what is to be stored.
-    pub(super) fn measure(&mut self, records: &[Record]) {
+    pub(super) fn count_alarms(&mut self, records: &[Record]) {
         self.alarm_monitor.advance(self.at);
         for record in records {
             match record {
@@ -73,7 +79,7 @@ mod tests {
         assert_eq!((metrics.last_10_min, metrics.last_hour, metrics.flood_since), (11, 11, Some(at(42))));
         let mut again = Plant::new(fixture::shared(), at(50), 1.0);
         again.restore(&journal);
-        again.remeasure(&[], &journal, &[], at(50));
+        again.restore_alarm_counts(&[], &journal, &[], at(50));
         plant.on_tick(at(53));
         again.on_tick(at(53));
         assert_eq!(again.snapshot().alarm_metrics.last_10_min, 11);
