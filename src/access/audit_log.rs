@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 
 use crate::plant::{
     record::{ActionRecord, ChainHash, hex},
-    visible::acts,
+    visible::is_control_or_bidi,
 };
 
 /// The start of the chain in version 1, whose entries have the same format.
@@ -121,8 +121,9 @@ fn fit_text(text: &mut Arc<str>) {
     if TEXT_MAX < text.len() {
         *text = format!("{}{CUT}", &text[..text.floor_char_boundary(TEXT_MAX - CUT.len())]).into();
     }
-    if text.contains(acts) {
-        *text = text.chars().map(|letter| if acts(letter) { ' ' } else { letter }).collect::<String>().into();
+    if text.contains(is_control_or_bidi) {
+        *text =
+            text.chars().map(|letter| if is_control_or_bidi(letter) { ' ' } else { letter }).collect::<String>().into();
     }
 }
 

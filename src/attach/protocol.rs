@@ -16,7 +16,7 @@ use crate::{
         def::LineId,
         line_report::LineReport,
         number::to_u32,
-        visible::acts,
+        visible::is_control_or_bidi,
     },
 };
 
@@ -263,7 +263,7 @@ impl Place {
 
 /// Text from the other end on one line: only visible characters, and not too many.
 fn one_line(text: &str, chars_max: usize) -> String {
-    text.chars().filter(|letter| !acts(*letter)).take(chars_max).collect()
+    text.chars().filter(|letter| !is_control_or_bidi(*letter)).take(chars_max).collect()
 }
 
 /// One word of it, without a comma: what says where it is must not be able to say who it is.

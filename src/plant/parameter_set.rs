@@ -13,7 +13,7 @@ use super::{
     def::{DeviceId, PlantDef, TagId},
     scale,
     tag::TagDef,
-    visible::acts,
+    visible::is_control_or_bidi,
 };
 
 pub(crate) use plan::{Change, Problem, plan};
@@ -69,7 +69,7 @@ pub const NAME_MAX: usize = 32;
 /// A name that can be a file's everywhere, in any language: no path, nothing hidden, not blank at its ends. `Err` says
 /// what is expected.
 pub fn check_name(name: &str) -> Result<(), String> {
-    let barred = |c: char| acts(c) || "/\\:*?\"<>|".contains(c);
+    let barred = |c: char| is_control_or_bidi(c) || "/\\:*?\"<>|".contains(c);
     if name.is_empty() {
         return Err("type a name".to_owned());
     }

@@ -4,7 +4,7 @@ use std::{borrow::Cow, fmt::Write};
 
 /// Does it act on a terminal rather than being shown: a control (C0, DEL, C1), a mark that turns or hides the direction of
 /// writing, or a separator of lines that is none on a screen?
-pub fn acts(letter: char) -> bool {
+pub fn is_control_or_bidi(letter: char) -> bool {
     letter.is_control()
         || matches!(letter, '\u{61C}' | '\u{200B}' | '\u{200E}' | '\u{200F}' | '\u{2028}'..='\u{202E}')
         || matches!(letter, '\u{2060}'..='\u{206F}' | '\u{FEFF}')
@@ -12,14 +12,14 @@ pub fn acts(letter: char) -> bool {
 
 /// Is it shown as one character by itself: it does not act, join or hide, and every font has the same for it?
 pub fn is_printable(letter: char) -> bool {
-    !acts(letter)
+    !is_control_or_bidi(letter)
         && !matches!(letter, '\u{AD}' | '\u{180E}' | '\u{200C}' | '\u{200D}' | '\u{E000}'..='\u{F8FF}')
         && !matches!(letter, '\u{FFF0}'..='\u{FFFF}' | '\u{E0000}'..)
 }
 
 /// The text with such characters as `\u{202e}`; ends of lines and tabs stay.
 pub fn visible(text: &str) -> Cow<'_, str> {
-    let is_hidden = |letter: char| acts(letter) && !matches!(letter, '\n' | '\t');
+    let is_hidden = |letter: char| is_control_or_bidi(letter) && !matches!(letter, '\n' | '\t');
     if !text.contains(is_hidden) {
         return Cow::Borrowed(text);
     }
@@ -39,13 +39,13 @@ pub fn first_hidden(text: &str) -> Option<(usize, char)> {
     text.char_indices().find(|(at, letter)| match letter {
         '\n' | '\t' => false,
         '\r' => !text[at + 1..].starts_with('\n'),
-        _ => acts(*letter),
+        _ => is_control_or_bidi(*letter),
     })
 }
 
 /// The same text with as many bytes, for places that are counted in bytes: `?`, `¿` or `�` for each such character.
 pub fn same_length(text: &str) -> String {
-    let shown = |letter: char| match (acts(letter) && !matches!(letter, '\n' | '\t'), letter.len_utf8()) {
+    let shown = |letter: char| match (is_control_or_bidi(letter) && !matches!(letter, '\n' | '\t'), letter.len_utf8()) {
         (false, _) => letter,
         (true, 1) if letter == '\r' => ' ',
         (true, 1) => '?',

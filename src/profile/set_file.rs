@@ -16,7 +16,7 @@ use crate::plant::{
     def::PlantDef,
     parameter_set::{ParameterSet, SetValue},
     tag::TagDef,
-    visible::acts,
+    visible::is_control_or_bidi,
 };
 
 toml_tables! {
@@ -203,7 +203,7 @@ fn row(value: &SetValue, tag: Option<&TagDef>, unit: &str) -> String {
     let key = if value.tag.chars().all(bare) && !value.tag.is_empty() { value.tag.clone() } else { quoted(&value.tag) };
     let words = tag.map_or("", |tag| tag.label.as_str());
     let note = [unit, words].into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(", ");
-    let note: String = note.chars().filter(|c| !acts(*c)).collect();
+    let note: String = note.chars().filter(|c| !is_control_or_bidi(*c)).collect();
     format!("{:<24}# {note}", format!("{key} = {written}")).trim_end_matches("# ").trim_end().to_owned() + "\n"
 }
 
@@ -218,7 +218,7 @@ fn quoted(text: &str) -> String {
     for c in text.chars() {
         match c {
             '"' | '\\' => out.extend(['\\', c]),
-            c if acts(c) => out.push_str(&format!("\\u{:04X}", u32::from(c))),
+            c if is_control_or_bidi(c) => out.push_str(&format!("\\u{:04X}", u32::from(c))),
             c => out.push(c),
         }
     }

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use ratatui::buffer::Buffer;
 
 use super::theme::{Glyphs, Theme};
-use crate::plant::visible::acts;
+use crate::plant::visible::is_control_or_bidi;
 
 /// Rewrites SARA AM (U+0E33) as NIKHAHIT + SARA AA: it looks the same, and every cluster becomes one cell wide.
 /// Terminals put SARA AM in a cell of its own, and the diff of two frames then leaves it behind on the screen.
@@ -34,7 +34,7 @@ pub fn thai_cells(text: &str) -> Cow<'_, str> {
 /// and only characters of the glyph set.
 pub fn apply(buffer: &mut Buffer, theme: &Theme) {
     for cell in &mut buffer.content {
-        if cell.symbol().chars().any(acts) {
+        if cell.symbol().chars().any(is_control_or_bidi) {
             cell.set_symbol("?");
         }
         if cell.symbol().is_ascii() {

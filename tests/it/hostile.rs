@@ -7,7 +7,7 @@ use std::{
     process::Stdio,
 };
 
-use sightglass::plant::visible::acts;
+use sightglass::plant::visible::is_control_or_bidi;
 
 use crate::support::{folder, sightglass};
 
@@ -23,7 +23,7 @@ fn check(args: &[&str], input: &str) {
     let output = child.wait_with_output().unwrap();
     for said in [output.stdout, output.stderr] {
         let said = String::from_utf8(said).unwrap();
-        let raw = said.chars().find(|letter| acts(*letter) && !matches!(letter, '\n' | '\t'));
+        let raw = said.chars().find(|letter| is_control_or_bidi(*letter) && !matches!(letter, '\n' | '\t'));
         assert_eq!(raw, None, "{args:?} says {said:?}");
     }
 }

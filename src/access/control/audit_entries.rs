@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     access::{SessionRequest, user},
-    plant::{record::ActionRecord, visible::acts},
+    plant::{record::ActionRecord, visible::is_control_or_bidi},
 };
 
 /// Most characters of a text that a user can put into the audit log.
@@ -135,5 +135,5 @@ pub(super) fn audit(session: &SessionState, action: &str, target: &str, outcome:
 
 /// A text of a terminal for the audit log: limited in length, without control and invisible characters.
 pub(super) fn clean(words: &str) -> String {
-    words.chars().take(WORDS_MAX).map(|letter| if acts(letter) { ' ' } else { letter }).collect()
+    words.chars().take(WORDS_MAX).map(|letter| if is_control_or_bidi(letter) { ' ' } else { letter }).collect()
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::Field;
 use crate::{
     bus::{frame, names},
-    plant::{number::to_u16, visible::acts},
+    plant::{number::to_u16, visible::is_control_or_bidi},
 };
 
 /// The reading of one message as a request or as an answer.
@@ -157,7 +157,7 @@ pub(super) fn bit_words(bits: &[bool]) -> String {
 /// Text as it stands, anything else escaped.
 pub(super) fn text(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
-        Ok(text) if !text.contains(acts) => format!("\"{text}\""),
+        Ok(text) if !text.contains(is_control_or_bidi) => format!("\"{text}\""),
         Ok(_) | Err(_) => format!("\"{}\"", bytes.escape_ascii()),
     }
 }
