@@ -9,7 +9,7 @@ use tokio::{
 };
 
 use super::{
-    durability::{CommitBarrier, Disk, Wait},
+    durability::{CommitBarrier, RecorderProgress, Wait},
     entries::RecordedFiles,
 };
 use crate::{
@@ -53,7 +53,7 @@ struct Reply {
 }
 
 impl Reply {
-    fn send(self, disk: Disk) {
+    fn send(self, disk: RecorderProgress) {
         let durability = if self.wait.is_recorded(disk) { Durability::Recorded } else { Durability::NotRecorded };
         // A terminal that has gone needs no reply.
         let _ = self.sender.send(self.result.map(|()| durability));
@@ -103,8 +103,8 @@ impl AuditQueue {
         }
     }
 
-    fn disk(&self) -> Disk {
-        Disk { batches: self.recorded.borrow().batches, alive: self.recorded.has_changed().is_ok() }
+    fn disk(&self) -> RecorderProgress {
+        RecorderProgress { batches: self.recorded.borrow().batches, alive: self.recorded.has_changed().is_ok() }
     }
 
     /// Records the start of a station; see [`RecordedFiles::started`].

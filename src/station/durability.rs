@@ -23,7 +23,7 @@ const COMMANDS_MAX: usize = 64;
 
 /// What the recorder has reported.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Disk {
+pub(super) struct RecorderProgress {
     /// Batches on disk.
     pub batches: u64,
     /// The recorder still runs.
@@ -38,16 +38,16 @@ pub(super) struct Wait {
 }
 
 impl Wait {
-    pub fn is_recorded(self, disk: Disk) -> bool {
+    pub fn is_recorded(self, disk: RecorderProgress) -> bool {
         self.batch <= disk.batches
     }
 
     /// When it ends by itself; `None` if it is over already.
-    pub fn ends_at(self, disk: Disk) -> Option<Duration> {
+    pub fn ends_at(self, disk: RecorderProgress) -> Option<Duration> {
         (disk.alive && !self.is_recorded(disk)).then(|| self.since + WAIT_MAX)
     }
 
-    pub fn is_over(self, disk: Disk, now: Duration) -> bool {
+    pub fn is_over(self, disk: RecorderProgress, now: Duration) -> bool {
         self.ends_at(disk).is_none_or(|end| end <= now)
     }
 }
@@ -71,7 +71,7 @@ impl CommitBarrier {
     }
 
     /// Actions and steps join the next batch.
-    pub fn put(&mut self, actions: &[ActionRecord], steps: &[AlarmRecord], disk: Disk, now: Duration) {
+    pub fn put(&mut self, actions: &[ActionRecord], steps: &[AlarmRecord], disk: RecorderProgress, now: Duration) {
         let by_operators = || steps.iter().filter(|step| step.by.is_some());
         if !actions.is_empty() || by_operators().next().is_some() {
             // The wait of an earlier batch goes on.
@@ -93,17 +93,17 @@ impl CommitBarrier {
     }
 
     /// Until when a snapshot must wait; `None` if it can be published now.
-    pub fn hold_until(&self, disk: Disk) -> Option<Duration> {
+    pub fn hold_until(&self, disk: RecorderProgress) -> Option<Duration> {
         self.needed.ends_at(disk)
     }
 
     /// Whether the disk has taken longer than [`WAIT_MAX`].
-    pub fn is_late(&self, disk: Disk, now: Duration) -> bool {
+    pub fn is_late(&self, disk: RecorderProgress, now: Duration) -> bool {
         !self.needed.is_recorded(disk) && self.needed.since + WAIT_MAX <= now
     }
 
     /// Marks in a snapshot what is not on disk: ended commands, and operator notes of alarms.
-    pub fn mark(&mut self, snapshot: &mut Snapshot, disk: Disk) {
+    pub fn mark(&mut self, snapshot: &mut Snapshot, disk: RecorderProgress) {
         let needed = self.needed.batch;
         let has_ended = |status: &&mut CommandStatus| !status.is_pending();
         for status in snapshot.commands.iter_mut().rev().filter(has_ended) {
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn a_wait_ends_with_the_disk_or_after_its_time() {
         let (second, half) = (Duration::from_secs(1), Duration::from_millis(500));
-        let disk = |batches| Disk { batches, alive: true };
+        let disk = |batches| RecorderProgress { batches, alive: true };
         let action = [stopped("tank", jiff::Timestamp::UNIX_EPOCH)];
         let mut barrier = CommitBarrier::new(Duration::ZERO);
         assert_eq!(barrier.hold_until(disk(0)), None, "nothing to record");
@@ -150,7 +150,10 @@ mod tests {
         barrier.sent();
         let reply = barrier.wait(second + half);
         assert_eq!(barrier.hold_until(disk(0)), Some(2 * second));
-        assert_eq!((barrier.hold_until(disk(1)), barrier.hold_until(Disk { batches: 0, alive: false })), (None, None));
+        assert_eq!(
+            (barrier.hold_until(disk(1)), barrier.hold_until(RecorderProgress { batches: 0, alive: false })),
+            (None, None)
+        );
         barrier.put(&action, &[], disk(0), 2 * second);
         assert_eq!(barrier.hold_until(disk(1)), Some(2 * second), "the wait of the first batch goes on");
         assert!(!barrier.is_late(disk(1), second + half) && barrier.is_late(disk(1), 2 * second));

@@ -59,7 +59,7 @@ pub(super) struct Persistence {
     pub store: watch::Receiver<HistoryStatus>,
     /// What is still to come from the history; `None` once it is known.
     pub past: Option<Past>,
-    /// AuditQueue and the state of the alarms go there first.
+    /// Actions and the state of the alarms go there first.
     pub audit: Option<AuditQueue>,
     /// The folder of parameter sets.
     pub sets: Option<PathBuf>,
@@ -272,7 +272,7 @@ impl PlantTask {
     }
 
     fn apply_effects(&mut self, effects: Effects) {
-        // Written down before it is sent: a station that is killed in between leaves a trace.
+        // On the way to the log before it is sent; its outcome is shown once both are on disk.
         let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request));
         self.keep(intents.map(Record::Action).collect());
         for (line, request) in effects.bus {

@@ -56,7 +56,7 @@ impl AccessControl {
     }
 
     /// The role is enough, and so is the reauthentication.
-    pub(super) fn let_through(
+    pub(super) fn forward_to_plant(
         &self,
         terminal: u32,
         mut command: Command,
@@ -96,6 +96,6 @@ impl AccessControl {
         if !own && !self.may_record(&origin, at) {
             return self.undelivered(command.id, &why.to_string());
         }
-        self.let_through(terminal, command, None, command::Outcome::Refused(why), at)
+        self.forward_to_plant(terminal, command, None, command::Outcome::Refused(why), at)
     }
 }

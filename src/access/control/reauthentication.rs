@@ -31,7 +31,7 @@ impl AccessControl {
     ) -> Vec<Effect> {
         let needed = required(&self.def, &command.kind).filter(|_| self.users.is_some());
         let (Some(needed), Some(session)) = (needed, self.sessions.get(&terminal)) else {
-            return self.let_through(terminal, command, None, Outcome::Pending, at);
+            return self.forward_to_plant(terminal, command, None, Outcome::Pending, at);
         };
         let Some(by) = session.who.as_ref().map(|who| who.user.clone()) else { return Vec::new() };
         let own = |name: &str| user::key(name) == user::key(&by);
@@ -98,7 +98,7 @@ impl AccessControl {
                 let why = format!("{} cannot approve this: it is for a {}", other.name, needed.word());
                 self.refuse_reauthentication(terminal, command, why, at)
             }
-            Some(_) | None => self.let_through(terminal, command, approver.as_deref(), Outcome::Pending, at),
+            Some(_) | None => self.forward_to_plant(terminal, command, approver.as_deref(), Outcome::Pending, at),
         }
     }
 

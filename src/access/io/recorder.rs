@@ -66,9 +66,9 @@ pub enum Message {
 /// How it stands.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recorded {
-    /// Batches since the start of which everything is on disk, and of all batches before them.
+    /// Number of batches, from the first, that are completely on disk.
     pub batches: u64,
-    /// Batches that were taken and are not.
+    /// Batches taken, not yet on disk.
     pub waiting: u64,
     /// Actions that the history had no room for.
     pub lost: u64,
