@@ -205,11 +205,11 @@ impl PlantTask {
             }
         }
         let ended = self.plant.on_stop();
-        self.keep(ended.records);
+        self.dispatch(ended.records);
         let stopped = entries::stopped(&self.plant.def().name, self.clock.utc());
         if let Some(audit) = &mut self.persistence.audit {
             audit.send_all();
-            self.record(vec![stopped], Vec::new());
+            self.send_to_audit_log(vec![stopped], Vec::new());
         }
         self.publish();
     }
@@ -233,14 +233,14 @@ impl PlantTask {
         if !steps.is_empty() {
             tracing::info!(steps = steps.len(), "the alarm state is restored from the journal");
             self.plant.restore(&steps);
-            self.record(Vec::new(), steps);
+            self.send_to_audit_log(Vec::new(), steps);
         }
         self.plant.restore_alarm_counts(&recent.active, &recent.steps, &recent.watched, self.clock.now());
     }
 
     fn handle_audit_message(&mut self, message: AuditMessage) {
         match (message, &mut self.persistence.audit) {
-            (AuditMessage::Entry(action), _) => self.keep(vec![Record::Action(action)]),
+            (AuditMessage::Entry(action), _) => self.dispatch(vec![Record::Action(action)]),
             (AuditMessage::Reply(sender, result), Some(audit)) => audit.reply(sender, result),
             // A terminal that has left needs no answer.
             (AuditMessage::Reply(reply, answer), None) => drop(reply.send(answer.map(|()| Durability::NotRecorded))),
@@ -251,7 +251,7 @@ impl PlantTask {
 
     fn send_due_replies(&mut self) {
         let left = self.persistence.audit.as_mut().map(AuditQueue::send_due).unwrap_or_default();
-        self.store(left.into_iter().map(Record::Action).collect());
+        self.send_to_history(left.into_iter().map(Record::Action).collect());
     }
 
     /// A step of the system clock is followed at once, recorded and alarmed.
@@ -262,8 +262,8 @@ impl PlantTask {
     }
 
     fn clock_stepped(&mut self, old: Timestamp, new: Timestamp) {
-        self.store(vec![Record::ClockSet]);
-        self.record(vec![entries::clock_step(old, new)], Vec::new());
+        self.send_to_history(vec![Record::ClockSet]);
+        self.send_to_audit_log(vec![entries::clock_step(old, new)], Vec::new());
         let words = format!("the clock was set from {old:.0} to {new:.0}; times follow it from here on");
         tracing::warn!("{words}");
         let state = FaultState::Occurred(words.into());
@@ -274,11 +274,11 @@ impl PlantTask {
     fn apply_effects(&mut self, effects: Effects) {
         // On the way to the log before it is sent; its outcome is shown once both are on disk.
         let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request));
-        self.keep(intents.map(Record::Action).collect());
+        self.dispatch(intents.map(Record::Action).collect());
         for (line, request) in effects.bus {
             self.send(line, request);
         }
-        self.keep(effects.records);
+        self.dispatch(effects.records);
         if let Some((command, settings)) = effects.save {
             self.save(command, settings);
         }
@@ -299,11 +299,11 @@ impl PlantTask {
             }
             None => self.plant.on_undeliverable(line, &request),
         };
-        self.keep(effects.records);
+        self.dispatch(effects.records);
     }
 
     /// Records of the plant, in its own time.
-    fn keep(&mut self, mut records: Vec<Record>) {
+    fn dispatch(&mut self, mut records: Vec<Record>) {
         if records.is_empty() {
             return;
         }
@@ -324,12 +324,12 @@ impl PlantTask {
                 Record::Sample(..) | Record::Line(_) | Record::ClockSet => others.push(record),
             }
         }
-        self.record(actions, steps);
-        self.store(others);
+        self.send_to_audit_log(actions, steps);
+        self.send_to_history(others);
     }
 
     /// To the disk, and actions from there to the history; straight there where there is no room.
-    fn record(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
+    fn send_to_audit_log(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
         if actions.is_empty() && steps.is_empty() {
             return;
         }
@@ -337,10 +337,10 @@ impl PlantTask {
             Some(audit) => audit.put(actions, steps),
             None => actions,
         };
-        self.store(left.into_iter().map(Record::Action).collect());
+        self.send_to_history(left.into_iter().map(Record::Action).collect());
     }
 
-    fn store(&mut self, records: Vec<Record>) {
+    fn send_to_history(&mut self, records: Vec<Record>) {
         let Some(store) = &self.persistence.records else { return };
         let lost = offer(store, records);
         if lost > 0 {

@@ -54,7 +54,7 @@ impl PlantTask {
         // What is being done ends with the folder read, so a request to read is granted already.
         if let SetWork::Write { command, .. } = work {
             let effects = self.plant.on_set_written(command, Err(refused.to_owned()));
-            self.keep(effects.records);
+            self.dispatch(effects.records);
         }
     }
 
@@ -67,7 +67,7 @@ impl PlantTask {
         self.plant.on_sets(sets);
         if let Some((command, result)) = written {
             let effects = self.plant.on_set_written(command, result);
-            self.keep(effects.records);
+            self.dispatch(effects.records);
         }
     }
 
@@ -92,7 +92,7 @@ impl PlantTask {
             Ok((file, result)) => {
                 let now = self.clock.utc();
                 let changed = self.persistence.audit.as_mut().and_then(|audit| audit.plant_file(&file, now));
-                self.record(changed.into_iter().collect(), Vec::new());
+                self.send_to_audit_log(changed.into_iter().collect(), Vec::new());
                 self.file = Some(file);
                 result
             }
@@ -106,6 +106,6 @@ impl PlantTask {
 
     fn report_saved(&mut self, command: CommandId, settings: &LineDef, result: Result<(), String>) {
         let effects = self.plant.on_saved(command, settings, result);
-        self.keep(effects.records);
+        self.dispatch(effects.records);
     }
 }
