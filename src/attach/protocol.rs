@@ -29,7 +29,7 @@ pub const HANDSHAKE_BYTES_MAX: usize = 4 * 1024;
 /// Longest message of a terminal, bytes.
 pub const REQUEST_BYTES_MAX: usize = 64 * 1024;
 /// Longest message to a terminal, bytes.
-pub const NEWS_BYTES_MAX: usize = 32 * 1024 * 1024;
+pub const SERVER_MESSAGE_BYTES_MAX: usize = 32 * 1024 * 1024;
 /// Bytes of the length before each message.
 pub const LENGTH_BYTES: usize = 4;
 /// Longest word that a terminal says of itself, characters.

@@ -18,8 +18,8 @@ use sightglass::{
             serve::{ListenError, listen},
         },
         protocol::{
-            self, ClientMessage, HANDSHAKE_BYTES_MAX, Handshake, LENGTH_BYTES, NEWS_BYTES_MAX, Place,
-            REQUEST_BYTES_MAX, ServerMessage,
+            self, ClientMessage, HANDSHAKE_BYTES_MAX, Handshake, LENGTH_BYTES, Place, REQUEST_BYTES_MAX,
+            SERVER_MESSAGE_BYTES_MAX, ServerMessage,
         },
     },
     history::{HistoryError, Query, io::QueryRequest},
@@ -199,7 +199,7 @@ async fn until_closed(stream: &mut UnixStream) -> Vec<u8> {
 async fn next(stream: &mut UnixStream) -> Vec<u8> {
     let mut length = [0; LENGTH_BYTES];
     stream.read_exact(&mut length).await.unwrap();
-    let mut bytes = vec![0; protocol::length(length, NEWS_BYTES_MAX).unwrap()];
+    let mut bytes = vec![0; protocol::length(length, SERVER_MESSAGE_BYTES_MAX).unwrap()];
     stream.read_exact(&mut bytes).await.unwrap();
     bytes
 }

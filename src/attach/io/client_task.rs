@@ -17,7 +17,9 @@ use crate::{
     attach::{
         assembly::Assembly,
         command_id_map::{CommandIdMap, GONE},
-        protocol::{self, ClientMessage, HandshakeReply, NEWS_BYTES_MAX, Place, REQUEST_BYTES_MAX, ServerMessage},
+        protocol::{
+            self, ClientMessage, HandshakeReply, Place, REQUEST_BYTES_MAX, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+        },
     },
     history::{Answer, HistoryError, io::QueryRequest},
     plant::{PlantDef, Snapshot},
@@ -112,8 +114,8 @@ impl ClientTask {
         write: OwnedWriteHalf,
         requests: &mut mpsc::Receiver<(u32, Request)>,
     ) -> Disconnected {
-        let (come, mut incoming) = mpsc::channel(IN);
-        let (out, go) = mpsc::channel(OUT);
+        let (inbound, mut incoming) = mpsc::channel(IN);
+        let (out, outbound) = mpsc::channel(OUT);
         let conversation = async {
             loop {
                 self.cancel(&out);
@@ -128,8 +130,8 @@ impl ClientTask {
         };
         tokio::select! {
             end = conversation => end,
-            error = receive_messages(read, come) => Disconnected::Gone(error.to_string()),
-            error = send_messages(write, go) => Disconnected::Gone(error.to_string()),
+            error = receive_messages(read, inbound) => Disconnected::Gone(error.to_string()),
+            error = send_messages(write, outbound) => Disconnected::Gone(error.to_string()),
         }
     }
 
@@ -288,7 +290,7 @@ impl ClientTask {
 }
 
 fn is_equal(one: &PlantDef, other: &PlantDef) -> bool {
-    protocol::encode(one, NEWS_BYTES_MAX) == protocol::encode(other, NEWS_BYTES_MAX)
+    protocol::encode(one, SERVER_MESSAGE_BYTES_MAX) == protocol::encode(other, SERVER_MESSAGE_BYTES_MAX)
 }
 
 fn enqueue(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
@@ -300,20 +302,20 @@ fn enqueue(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), Str
 }
 
 /// Reads to the end of the connection, which may be at any moment.
-async fn receive_messages(mut read: OwnedReadHalf, come: mpsc::Sender<ServerMessage>) -> WireError {
+async fn receive_messages(mut read: OwnedReadHalf, inbound: mpsc::Sender<ServerMessage>) -> WireError {
     loop {
         let message = match connect::next(&mut read).await {
             Ok(message) => message,
             Err(error) => return error,
         };
-        if come.send(message).await.is_err() {
+        if inbound.send(message).await.is_err() {
             return WireError::Closed;
         }
     }
 }
 
-async fn send_messages(mut write: OwnedWriteHalf, mut go: mpsc::Receiver<Vec<u8>>) -> WireError {
-    while let Some(bytes) = go.recv().await {
+async fn send_messages(mut write: OwnedWriteHalf, mut outbound: mpsc::Receiver<Vec<u8>>) -> WireError {
+    while let Some(bytes) = outbound.recv().await {
         if let Err(error) = wire::write(&mut write, &bytes).await {
             return error;
         }

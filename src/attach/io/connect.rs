@@ -25,7 +25,9 @@ use crate::{
     attach::{
         assembly::{Assembly, OtherPlant},
         command_id_map::CommandIdMap,
-        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, NEWS_BYTES_MAX, Place, ServerMessage},
+        protocol::{
+            self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, Place, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+        },
     },
     station::Session,
 };
@@ -91,7 +93,7 @@ pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError
         let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
         let hello = protocol::encode(&(Handshake::current(), place), HANDSHAKE_BYTES_MAX);
         wire::write(&mut write, &hello.map_err(WireError::from)?).await?;
-        let bytes = wire::read(&mut read, NEWS_BYTES_MAX).await?;
+        let bytes = wire::read(&mut read, SERVER_MESSAGE_BYTES_MAX).await?;
         let welcome = protocol::handshake_reply(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;
         Ok(Line { read, write, welcome })
     };
@@ -117,7 +119,7 @@ async fn first(line: &mut Line) -> Result<(SessionStatus, Assembly), AttachError
 
 /// The next message of the station.
 pub(super) async fn next(read: &mut OwnedReadHalf) -> Result<ServerMessage, WireError> {
-    let bytes = wire::read(read, NEWS_BYTES_MAX).await?;
+    let bytes = wire::read(read, SERVER_MESSAGE_BYTES_MAX).await?;
     Ok(protocol::decode(&bytes, "message of a station")?)
 }
 

@@ -18,7 +18,7 @@ use crate::{
     attach::{
         check,
         protocol::{
-            self, ClientMessage, Handshake, HandshakeReply, NEWS_BYTES_MAX, ProtocolError, REQUEST_BYTES_MAX,
+            self, ClientMessage, Handshake, HandshakeReply, ProtocolError, REQUEST_BYTES_MAX, SERVER_MESSAGE_BYTES_MAX,
             ServerMessage,
         },
     },
@@ -207,7 +207,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
             Err(_) => tracing::warn!(terminal = self.session.terminal, "no session status for a terminal"),
         }
         let welcome = HandshakeReply { run, terminal: self.session.terminal, def: self.def.clone() };
-        let welcome = protocol::encode(&(Handshake::current(), welcome), NEWS_BYTES_MAX);
+        let welcome = protocol::encode(&(Handshake::current(), welcome), SERVER_MESSAGE_BYTES_MAX);
         self.write(&welcome.map_err(WireError::from)?, STUCK_MAX).await?;
         self.send_session_status().await?;
         let mut sent = Arc::new(Snapshot::blank(self.def.clone()));
@@ -267,10 +267,10 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
     }
 
     async fn send(&mut self, message: &ServerMessage) -> Result<(), ConnectionEnd> {
-        let bytes = match (protocol::encode(message, NEWS_BYTES_MAX), message) {
+        let bytes = match (protocol::encode(message, SERVER_MESSAGE_BYTES_MAX), message) {
             (Err(error @ ProtocolError::TooLong { .. }), ServerMessage::Answer { ticket, .. }) => {
                 let answer = Err(HistoryError::Engine(format!("{error}; choose a shorter period")));
-                protocol::encode(&ServerMessage::Answer { ticket: *ticket, answer }, NEWS_BYTES_MAX)
+                protocol::encode(&ServerMessage::Answer { ticket: *ticket, answer }, SERVER_MESSAGE_BYTES_MAX)
             }
             (bytes, _) => bytes,
         };

@@ -232,7 +232,7 @@ impl Listener {
                     Ok(()) => sender.publish(snapshots.borrow_and_update().clone()),
                     Err(_) => break,
                 },
-                Some(parse_handshake) = connections.strangers.join_next() => if let Ok(parse_handshake) = parse_handshake { connections.on_greeted(parse_handshake) },
+                Some(greeted) = connections.strangers.join_next() => if let Ok(greeted) = greeted { connections.on_greeted(greeted) },
                 Some(left) = connections.serving.join_next() => if let Ok(left) = left { connections.on_left(left) },
                 _ = check.tick() => {
                     self.keep();

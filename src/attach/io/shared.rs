@@ -9,7 +9,7 @@ use tokio::{
 
 use crate::{
     attach::{
-        protocol::{self, NEWS_BYTES_MAX, ProtocolError, ServerMessage},
+        protocol::{self, ProtocolError, SERVER_MESSAGE_BYTES_MAX, ServerMessage},
         redaction::redact,
     },
     plant::{Snapshot, def::LineId, line_report::LineReport},
@@ -113,5 +113,5 @@ pub fn is_same(one: Option<&Arc<LineReport>>, other: Option<&Arc<LineReport>>) -
 }
 
 fn encode(message: &ServerMessage) -> Encoded {
-    protocol::encode(message, NEWS_BYTES_MAX).map(Arc::from)
+    protocol::encode(message, SERVER_MESSAGE_BYTES_MAX).map(Arc::from)
 }

@@ -32,7 +32,7 @@ fn a_handshake_has_place_and_plant() {
     assert_eq!(client_handshake(&hello_bytes), Ok(place()));
     let def = Fixture::normal().snapshot().def.clone();
     let sent = HandshakeReply { run: 7, terminal: 3, def: def.clone() };
-    let bytes = body(encode(&(Handshake::current(), sent), NEWS_BYTES_MAX).unwrap());
+    let bytes = body(encode(&(Handshake::current(), sent), SERVER_MESSAGE_BYTES_MAX).unwrap());
     let received = handshake_reply(&bytes).unwrap().unwrap();
     assert_eq!((received.run, received.terminal), (7, 3));
     assert_eq!(encode(&received.def, usize::MAX), encode(&def, usize::MAX));
@@ -105,7 +105,8 @@ fn requests_and_news_survive_the_way() {
         ServerMessage::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: "busy".into() },
     ];
     for sent in sent {
-        let received: ServerMessage = decode(&body(encode(&sent, NEWS_BYTES_MAX).unwrap()), "message").unwrap();
+        let received: ServerMessage =
+            decode(&body(encode(&sent, SERVER_MESSAGE_BYTES_MAX).unwrap()), "message").unwrap();
         assert_eq!(format!("{received:?}"), format!("{sent:?}"));
     }
 }
@@ -114,7 +115,7 @@ fn requests_and_news_survive_the_way() {
 fn a_message_is_neither_longer_nor_shorter_than_it_says() {
     assert_eq!(length([0, 0, 1, 0], REQUEST_BYTES_MAX), Ok(65_536));
     assert_eq!(length([1, 0, 1, 0], REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { bytes: 65_537, max: 65_536 }));
-    assert!(length([0xFF; 4], NEWS_BYTES_MAX).is_err());
+    assert!(length([0xFF; 4], SERVER_MESSAGE_BYTES_MAX).is_err());
     let mut bytes =
         body(encode(&ServerMessage::RequestDone { ticket: 2, answer: Ok(Durability::Recorded) }, 100).unwrap());
     bytes.push(0);
