@@ -202,7 +202,7 @@ pub struct Faceplate {
 
 impl Faceplate {
     /// What the controller works towards now: to show, never to write.
-    pub fn aim(&self) -> TagId {
+    pub fn sv_to_show(&self) -> TagId {
         self.sv_used.unwrap_or(self.sv)
     }
 }

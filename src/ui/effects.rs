@@ -34,7 +34,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 effects.extend(show(model, Tab::Trends));
             }
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
-            UiAction::Confirmed(command, credentials) => effects.extend(model.send_command(command, credentials)),
+            UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
             UiAction::SessionRequest(tab, request) => {
                 // 0 means no request: numbers start at 1.
                 model.session_lock.last_request = model.session_lock.last_request.checked_add(1).unwrap_or(1);
@@ -65,7 +65,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
         | UiAction::Command(_)
-        | UiAction::Confirmed(..)
+        | UiAction::SendCommand(..)
         | UiAction::SessionRequest(..) => None,
     });
     effects.collect()

@@ -1,4 +1,4 @@
-//! What the last frame showed: a key actions on the row that its operator saw, or on none.
+//! What the last frame showed: a key acts on the row that its operator saw, or on none.
 //!
 //! Keys alone change nothing unseen: what they lead to follows from what is on the screen. News do, between two frames; then a
 //! key that would act on another row than the drawn one, or on the same in another state, does nothing and says so.
@@ -55,7 +55,7 @@ pub struct LastFrame {
 }
 
 impl Model {
-    /// A frame was last_frame.
+    /// A frame was drawn.
     pub(super) fn note_drawn(&mut self) {
         self.last_frame = Some(self.as_drawn());
     }

@@ -15,7 +15,7 @@ pub(crate) mod session_lock;
 pub(crate) mod rights;
 pub(crate) mod tabs;
 pub(crate) mod theme;
-pub(crate) mod pending_command;
+pub(crate) mod last_command;
 pub(crate) mod widgets;
 
 #[cfg(test)]
@@ -37,10 +37,10 @@ use crate::{
 };
 use extension::Extension;
 use keys::Global;
+pub use last_command::LastCommand;
 use last_frame::LastFrame;
 use modal::{Confirm, Modal};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
-pub use pending_command::PendingCommand;
 use session_lock::SessionLock;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
@@ -66,7 +66,7 @@ pub struct Model {
     /// What time it is and how the animation stands.
     pub clock: Clock,
     /// The last command of this terminal and its outcome.
-    pub pending_command: Option<PendingCommand>,
+    pub last_command: Option<LastCommand>,
     /// Number of this terminal.
     pub terminal: u32,
     /// The session: user, role and lock.
@@ -148,7 +148,7 @@ impl Model {
             language: Language::default(),
             screen: Rect::default(),
             clock: Clock::default(),
-            pending_command: None,
+            last_command: None,
             terminal,
             session: Arc::default(),
             session_lock: SessionLock::default(),
@@ -347,7 +347,7 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.
-            let failed = model.pending_command.take().is_some_and(|pending| pending.is_trouble());
+            let failed = model.last_command.take().is_some_and(|pending| pending.is_trouble());
             if !failed {
                 with_tabs(model, |tabs, cx| {
                     tabs.shown_mut().back(cx);
@@ -380,7 +380,7 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     model.clock.phase = model.clock.phase.wrapping_add(1);
     model.clock.silent = silent;
     let phase = model.clock.phase;
-    model.pending_command.take_if(|pending| pending.is_over(phase));
+    model.last_command.take_if(|pending| pending.is_over(phase));
     if silent >= SILENCE {
         model.doubt();
     }

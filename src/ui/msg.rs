@@ -107,7 +107,7 @@ pub enum UiAction {
     /// Give a command and watch its outcome.
     Command(CommandKind),
     /// The same with the confirmed value and the credentials.
-    Confirmed(Command, Option<Credentials>),
+    SendCommand(Command, Option<Credentials>),
     /// Send the station a request; the answer goes to the window that waits for one, else to this tab.
     SessionRequest(Tab, SessionRequest),
     /// Ask whether to leave.

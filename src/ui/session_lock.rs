@@ -75,7 +75,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     let user = |session: &SessionStatus| session.who.as_ref().map(|who| who.user.clone());
     if user(&before) != user(&now) || is_closed(&now) {
         model.modal.take_if(|modal| !modal.is_quit());
-        model.pending_command = model.pending_command.take_if(|_| user(&before) == user(&now));
+        model.last_command = model.last_command.take_if(|_| user(&before) == user(&now));
         model.kept = None;
     }
     let back = keep_work(model, &before, &now);
@@ -167,7 +167,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
         match action {
             UiAction::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
             UiAction::Command(_)
-            | UiAction::Confirmed(..)
+            | UiAction::SendCommand(..)
             | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
             | UiAction::Do(Effect::SaveReport { .. } | Effect::Extension(_)) => held = held.or(Some(None)),
             UiAction::Open(_)
@@ -243,7 +243,7 @@ fn answered(model: &Model, mut form: Box<UserForm>, answer: Result<(), String>) 
 pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
     let shown = model.tabs.shown;
     model.tabs = Tabs::new(&snapshot);
-    (model.snapshot, model.pending_command, model.kept) = (snapshot, None, None);
+    (model.snapshot, model.last_command, model.kept) = (snapshot, None, None);
     model.plants = model.plants.wrapping_add(1);
     let words = vec![
         t!("The plant file changed").to_owned(),

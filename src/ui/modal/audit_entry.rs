@@ -26,7 +26,7 @@ impl AuditEntryDialog {
     /// Name and words of every field that has a value.
     fn rows(&self, cx: &ViewContext) -> Vec<Row> {
         let entry = &self.0;
-        let told = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
+        let notes = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
         let at = entry.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
         let chain_hash =
             entry.chain_hash.map_or((String::new(), t!("not in the audit log").to_owned()), |chain_hash| {
@@ -39,10 +39,10 @@ impl AuditEntryDialog {
             (t!("from"), entry.from.to_string()),
             (t!("action"), entry.action.to_string()),
             (t!("target"), entry.target.to_string()),
-            (t!("old"), told(&entry.old)),
-            (t!("new"), told(&entry.new)),
+            (t!("old"), notes(&entry.old)),
+            (t!("new"), notes(&entry.new)),
             (t!("outcome"), entry.outcome.to_string()),
-            (t!("note"), told(&entry.note)),
+            (t!("note"), notes(&entry.note)),
             (t!("hash"), chain_hash.1),
         ];
         let lines = lines.into_iter().filter(|(_, words)| !words.is_empty());

@@ -231,7 +231,7 @@ impl Confirm {
             Intent::Command(kind) => {
                 let expected = self.expected.as_ref().and_then(|expected| expected.shown(cx));
                 let credentials = self.reauthentication.as_ref().map(credentials);
-                UiAction::Confirmed(Command { expected_value: expected, ..kind.clone().into() }, credentials)
+                UiAction::SendCommand(Command { expected_value: expected, ..kind.clone().into() }, credentials)
             }
         };
         if self.reauthentication.is_some() {
@@ -274,7 +274,7 @@ impl Confirm {
     }
 
     /// What of the window is below the words: rows of the form and of what is wrong with it.
-    fn view_sign(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
+    fn view_reauthentication(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
         if let Some(form) = &self.reauthentication {
             form.view(cx, canvas, y);
             let y = y + form.rows();
@@ -300,16 +300,16 @@ impl Confirm {
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
         if let Intent::Command(CommandKind::Write { tag, value }) = &self.intent {
             // As it stands now: what was true when the window opened may have changed under it.
-            let told = interlock::before_write(cx, *tag, *value).into_iter();
-            rows.extend(told.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
+            let notes = interlock::before_write(cx, *tag, *value).into_iter();
+            rows.extend(notes.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
         }
         let missing = match &self.intent {
             Intent::Command(kind) => rights::missing(cx, kind),
             Intent::Quit => None,
         };
         let news = self.expected.as_ref().and_then(|expected| expected.news(cx)).map(|words| cx.theme.enter(&words));
-        let told = news.into_iter().chain(missing);
-        rows.extend(told.flat_map(|words| wrap(&words, room)).map(|line| (line, cx.theme.trouble())));
+        let notes = news.into_iter().chain(missing);
+        rows.extend(notes.flat_map(|words| wrap(&words, room)).map(|line| (line, cx.theme.trouble())));
         let yes = if self.wants_y() { "y".to_owned() } else { cx.theme.enter("⏎") };
         let keys = match self.is_refused(cx) {
             true => t!("Esc {escape}", escape = self.escape()),
@@ -321,7 +321,7 @@ impl Confirm {
         let form = self.reauthentication.as_ref().map_or(0, |form| form.rows() + problem);
         let mut canvas = window(cx, frame, body, &self.title, (inner, to_u16(rows.len()) + form + 2));
         let y = canvas.rows(0, 0, &rows);
-        self.view_sign(cx, &mut canvas, y);
+        self.view_reauthentication(cx, &mut canvas, y);
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, &keys, cx.theme.strong());
     }

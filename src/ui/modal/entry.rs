@@ -54,14 +54,14 @@ impl Entry {
             };
             match checked {
                 Ok(_) if self.expected.changed(cx) => self.problem = None,
-                Ok(value) if number::asks(cx, self.tag, value) => {
-                    let why = number::worries(cx, self.tag, value);
+                Ok(value) if number::needs_confirmation(cx, self.tag, value) => {
+                    let why = number::warnings(cx, self.tag, value);
                     return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value).with_notes(why)));
                 }
                 Ok(value) => {
                     let expected = self.expected.shown(cx);
                     let kind = CommandKind::Write { tag: self.tag, value };
-                    return Next::Do(vec![UiAction::Confirmed(
+                    return Next::Do(vec![UiAction::SendCommand(
                         Command { expected_value: expected, ..kind.into() },
                         None,
                     )]);
@@ -71,7 +71,7 @@ impl Entry {
         } else if let Some(c) = strange(event) {
             self.reject(c);
         } else if self.line.on_key(event) {
-            // What was left out is told until the line is empty again.
+            // What was left out is notes until the line is empty again.
             self.problem.take_if(|_| !self.line.missed());
         }
         Next::Stay(Modal::Entry(self))
@@ -103,8 +103,8 @@ impl Entry {
         let notes = notes.chain(interlock::key_text(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let missing = rights::missing(cx, &CommandKind::Write { tag: self.tag, value: 0.0 });
-        let told = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);
-        let problem = wrap(&told.map_or(String::new(), |words| theme.enter(&words)), room);
+        let notes = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);
+        let problem = wrap(&notes.map_or(String::new(), |words| theme.enter(&words)), room);
         let inner = rows
             .iter()
             .map(|(text, _)| width(text))
@@ -113,8 +113,8 @@ impl Entry {
             .unwrap_or(0)
             .max(46);
         let title = t!("write {name} {label}", name = def.name, label = def.label);
-        let told = to_u16(problem.len().max(1));
-        let mut canvas = window(cx, frame, body, &title, (inner, to_u16(rows.len()) + 3 + told));
+        let notes = to_u16(problem.len().max(1));
+        let mut canvas = window(cx, frame, body, &title, (inner, to_u16(rows.len()) + 3 + notes));
         let old = value::show(cx, self.tag);
         let x = canvas.text(0, 0, t!("old "), theme.dim());
         let x = canvas.text(x, 0, &old.whole(), old.style);
@@ -127,7 +127,7 @@ impl Entry {
         canvas.rows(0, 1, &rows);
         let last = canvas.height().saturating_sub(1);
         for (y, line) in problem.iter().enumerate() {
-            canvas.text(0, last.saturating_sub(told) + to_u16(y), line, theme.trouble());
+            canvas.text(0, last.saturating_sub(notes) + to_u16(y), line, theme.trouble());
         }
         canvas.text(0, last, &theme.enter(t!("⏎ write and verify   Esc cancel")), theme.strong());
     }

@@ -26,7 +26,7 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
         return Err(t!("enter a number").to_owned());
     }
     let (number, typed) = parse(text).ok_or_else(|| t!("\"{text}\" is not a number", text))?;
-    // Zeros count: where no decimals are taken, `1,000` and `1.000` mean a thousand to their author, and are refused.
+    // Trailing zeros count as decimals: a tag without decimals refuses `1,000` and `1.000`, which mean a thousand to their author.
     let decimals = usize::from(cx.snapshot.decimals[tag.index()]);
     if typed > decimals {
         return Err(match decimals {
@@ -36,7 +36,7 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
         });
     }
     let value = match number {
-        Number::Whole(value) => value,
+        Number::Absolute(value) => value,
         Number::Step(by) => {
             stepped(cx, tag, by).ok_or(t!("the current value is unknown: enter the new value without a sign"))?
         }
@@ -71,11 +71,11 @@ pub fn help(cx: &ViewContext, tag: TagId) -> String {
 }
 
 /// Is a number for this tag asked again in a window of its own? A tag with reauthentication is.
-pub fn asks(cx: &ViewContext, tag: TagId, value: f64) -> bool {
+pub fn needs_confirmation(cx: &ViewContext, tag: TagId, value: f64) -> bool {
     cx.def().tag(tag).confirm.is_some()
         || reauthentication::required(cx.def(), &CommandKind::Write { tag, value }).is_some()
         || rounded_text(cx, tag, value).is_some()
-        || !worries(cx, tag, value).is_empty()
+        || !warnings(cx, tag, value).is_empty()
 }
 
 /// `72.3 → the device holds steps of 0.5: 72.5`; `None` where it holds what was typed.
@@ -95,7 +95,7 @@ pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> 
 }
 
 /// Why a number that is allowed may still not be what its author meant.
-pub fn worries(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
+pub fn warnings(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let text =
         |value: f64| format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)).trim_end().to_owned();
     let step = cx.snapshot.sample(tag).value.map(|now| (value - now).abs());
@@ -165,7 +165,7 @@ fn plain(value: f64) -> String {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Number {
     /// A new value.
-    Whole(f64),
+    Absolute(f64),
     /// A change of the present one.
     Step(f64),
 }
@@ -183,7 +183,7 @@ fn parse(text: &str) -> Option<(Number, usize)> {
         return None;
     }
     let value = point.parse().ok()?;
-    let number = if unsigned.is_some() && !whole { Number::Step(value) } else { Number::Whole(value) };
+    let number = if unsigned.is_some() && !whole { Number::Step(value) } else { Number::Absolute(value) };
     Some((number, after.len()))
 }
 
@@ -259,7 +259,9 @@ mod tests {
     fn a_large_step_or_a_set_value_at_an_alarm_limit_is_asked_again() {
         let fixture = Fixture::normal();
         let sv = fixture.tag("TIC-1.SV");
-        let asked = |value: f64| with_cx(&fixture.snapshot(), |cx| (asks(cx, sv, value), worries(cx, sv, value)));
+        let asked = |value: f64| {
+            with_cx(&fixture.snapshot(), |cx| (needs_confirmation(cx, sv, value), warnings(cx, sv, value)))
+        };
         assert_eq!(asked(65.0), (false, Vec::new()));
         let (again, why) = asked(5.0);
         assert!(again && why[0].starts_with("! a change of 65.0 °C, 54 % of the range"), "{why:?}");

@@ -151,7 +151,7 @@ impl Reason {
             return Next::Stay(Modal::Reason(Box::new(self)));
         }
         let note = (!words.is_empty()).then(|| Arc::from(words));
-        Next::Do(vec![UiAction::Confirmed(Command { note, ..kind.into() }, None)])
+        Next::Do(vec![UiAction::SendCommand(Command { note, ..kind.into() }, None)])
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {

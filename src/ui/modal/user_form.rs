@@ -60,7 +60,7 @@ pub struct UserForm {
     waiting: bool,
     /// The number of that request; 0 before it has one.
     number: u32,
-    /// Why the last Enter led to nothing, and at which tick that was told.
+    /// Why the last Enter led to nothing, and at which tick that was notes.
     problem: Option<(String, u32)>,
     /// The window that waits below, with all that was typed in it.
     below: Option<Box<Modal>>,
@@ -244,8 +244,8 @@ impl UserForm {
 
     /// Rows of a form in so many columns.
     fn rows(&self, cx: &ViewContext, room: u16) -> Vec<(String, Style)> {
-        let told = self.words(cx).into_iter().flat_map(|words| wrap(&words, room));
-        told.map(|words| (words, cx.theme.normal())).collect()
+        let notes = self.words(cx).into_iter().flat_map(|words| wrap(&words, room));
+        notes.map(|words| (words, cx.theme.normal())).collect()
     }
 
     /// Rows that all of it takes in so many columns.

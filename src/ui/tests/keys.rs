@@ -268,7 +268,7 @@ fn only_what_was_read_back_is_called_verified() {
         snapshot.commands = vec![CommandStatus {
             outcome: Outcome::Verified,
             ..CommandStatus::new(
-                Command::new(0, model.pending_command.as_ref().expect("the command is pending").command.id, kind),
+                Command::new(0, model.last_command.as_ref().expect("the command is pending").command.id, kind),
                 "tech1",
                 snapshot.at,
             )

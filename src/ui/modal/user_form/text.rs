@@ -20,7 +20,7 @@ impl UserForm {
         }
     }
 
-    /// The keys of the moment; Esc is told by whoever shows the form.
+    /// The keys of the moment; Esc is notes by whoever shows the form.
     pub fn hints(&self) -> Vec<Hint> {
         let mut hints = vec![Hint::of("⏎", self.verb())];
         if self.form.rows() > 1 {
@@ -93,8 +93,8 @@ impl UserForm {
 
     /// Seconds that one must still wait, as the station has said.
     pub(super) fn wait(&self, cx: &ViewContext) -> u32 {
-        let told = self.problem.as_ref().and_then(|(words, at)| Some((seconds(words)?.1, *at)));
-        told.map_or(0, |(wait, at)| wait.saturating_sub(cx.phase.wrapping_sub(at) / 2))
+        let notes = self.problem.as_ref().and_then(|(words, at)| Some((seconds(words)?.1, *at)));
+        notes.map_or(0, |(wait, at)| wait.saturating_sub(cx.phase.wrapping_sub(at) / 2))
     }
 
     pub(super) fn problem_text(&self, cx: &ViewContext) -> Option<String> {

@@ -41,9 +41,9 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
         Row::new("", format!("{} {}: {reason}", signal.word(), signal.label()), theme.trouble())
     }));
     // What stands above already is not said again.
-    let told = cx.snapshot.sample(def.id).quality.cause() == Some(Cause::NotConnected);
+    let notes = cx.snapshot.sample(def.id).quality.cause() == Some(Cause::NotConnected);
     rows.extend(
-        line_words(cx, &line.state).filter(|_| !told).map(|words| Row::new(t!("line"), words, theme.trouble())),
+        line_words(cx, &line.state).filter(|_| !notes).map(|words| Row::new(t!("line"), words, theme.trouble())),
     );
     let verdict = exchange.and_then(|exchange| exchange.outcome.err());
     if let Some((at, fault)) = status.last_fault.filter(|(_, fault)| Some(*fault) != verdict) {

@@ -10,7 +10,7 @@ use crate::{
         def::{Faceplate, Subject},
         tuning::Tuning,
     },
-    ui::widgets::mimic::{Bounds, panel::set_apart, trend},
+    ui::widgets::mimic::{Bounds, panel::sv_difference, trend},
 };
 
 /// How far back the small trend goes.
@@ -78,7 +78,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
 
 /// A row a bar (`tall`: three, with value, bar and ends of the scale).
 fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool) {
-    let rows = [("PV", Some(faceplate.pv)), ("SV", Some(faceplate.aim())), ("MV", faceplate.mv)];
+    let rows = [("PV", Some(faceplate.pv)), ("SV", Some(faceplate.sv_to_show())), ("MV", faceplate.mv)];
     let rows: Vec<(&str, TagId)> = rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).collect();
     // All bars start in one column, so that they can be compared.
     let values = rows.iter().map(|(_, tag)| width(&value::show(cx, *tag).with_unit())).max().unwrap_or(0).clamp(9, 14);
@@ -88,12 +88,12 @@ fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool
         canvas.text(if tall { 0 } else { 1 }, y, name, cx.theme.dim());
         let room = if tall { canvas.width().saturating_sub(4) } else { values };
         let end = canvas.text(4, y, &shown.within(room), shown.style);
-        let apart = set_apart(cx, faceplate).filter(|_| tag == faceplate.aim());
+        let apart = sv_difference(cx, faceplate).filter(|_| tag == faceplate.sv_to_show());
         if let Some(words) = apart.as_ref().filter(|_| tall) {
             canvas.text(end + 2, y, words, cx.theme.strong());
         }
         // PV and SV share the scale of PV, so that their distance is seen.
-        let scale = if tag == faceplate.aim() { faceplate.pv } else { tag };
+        let scale = if tag == faceplate.sv_to_show() { faceplate.pv } else { tag };
         let ends = ends(cx, scale);
         let (x, y, wide) = if tall {
             if let Some((low, high)) = &ends {
@@ -133,7 +133,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId,
         share.is_finite().then(|| 1 + to_u16((share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round()))
     };
     let now = cx.snapshot.sample(tag).good_value();
-    if tag == faceplate.aim() {
+    if tag == faceplate.sv_to_show() {
         if let Some((low, high)) =
             cx.snapshot.range(faceplate.sv).and_then(|(low, high)| Some((column(low)?, column(high)?)))
         {
@@ -155,7 +155,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId,
         }
     }
     if scale == faceplate.pv
-        && let Some(x) = cx.snapshot.sample(faceplate.aim()).good_value().and_then(column)
+        && let Some(x) = cx.snapshot.sample(faceplate.sv_to_show()).good_value().and_then(column)
     {
         canvas.glyph(x, 0, '▼', theme.set_value());
     }

@@ -145,7 +145,7 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
     cells.push((text, Columns::ALARM, style));
     match &device.faceplate {
         Some(faceplate) => {
-            for tag in [Some(faceplate.pv), Some(faceplate.aim()), faceplate.mv] {
+            for tag in [Some(faceplate.pv), Some(faceplate.sv_to_show()), faceplate.mv] {
                 let shown = tag.map(|tag| value::show(cx, tag));
                 let text = shown.as_ref().map_or(String::new(), |shown| {
                     let whole = shown.with_unit();

@@ -114,7 +114,7 @@ fn table(cx: &ViewContext, canvas: &mut Canvas, program: &ProgramDef, cell: Cell
 
 /// What the program does besides its steps.
 fn facts(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef) {
-    let sv = device.faceplate.as_ref().map(|faceplate| faceplate.aim());
+    let sv = device.faceplate.as_ref().map(|faceplate| faceplate.sv_to_show());
     let pv = device.faceplate.as_ref().map(|faceplate| faceplate.pv);
     let rows = [
         (t!("command"), Some(program.command)),

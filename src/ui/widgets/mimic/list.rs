@@ -79,7 +79,7 @@ fn item(cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, names: u16, sel
             let device = cx.def().device(*device);
             let faceplate = device.faceplate.as_ref();
             let tags = faceplate.map(|faceplate| {
-                [Some(faceplate.pv), Some(faceplate.aim()), faceplate.mv].into_iter().flatten().collect()
+                [Some(faceplate.pv), Some(faceplate.sv_to_show()), faceplate.mv].into_iter().flatten().collect()
             });
             (device.name.clone(), tags.unwrap_or_default())
         }

@@ -27,11 +27,11 @@ pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &De
     canvas.text(x + 2, 0, &fit(&device.model, room), theme.dim());
     let Some(faceplate) = &device.faceplate else { return };
     let mut y = 1;
-    for (name, tag) in [("PV", Some(faceplate.pv)), ("SV", Some(faceplate.aim())), ("MV", faceplate.mv)] {
+    for (name, tag) in [("PV", Some(faceplate.pv)), ("SV", Some(faceplate.sv_to_show())), ("MV", faceplate.mv)] {
         let Some(tag) = tag else { continue };
         canvas.text(0, y, name, theme.dim());
         put_value(cx, &mut canvas, 4, y, tag, at.width.saturating_sub(4));
-        if let Some(words) = set_apart(cx, faceplate).filter(|_| tag == faceplate.aim()) {
+        if let Some(words) = sv_difference(cx, faceplate).filter(|_| tag == faceplate.sv_to_show()) {
             canvas.text_right(at.width, y, &words, theme.strong());
         }
         y += 1;
@@ -55,9 +55,9 @@ pub fn controller(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, device: &De
 }
 
 /// `set 70.0`, where the controller works towards something else: a program or a ramp moves it.
-pub fn set_apart(cx: &ViewContext, faceplate: &Faceplate) -> Option<String> {
+pub fn sv_difference(cx: &ViewContext, faceplate: &Faceplate) -> Option<String> {
     let value = |tag| cx.snapshot.sample(tag).good_value();
-    let set = value(faceplate.sv).filter(|set| value(faceplate.aim()) != Some(*set))?;
+    let set = value(faceplate.sv).filter(|set| value(faceplate.sv_to_show()) != Some(*set))?;
     Some(t!("set {format}", format = cx.snapshot.format(faceplate.sv, set)))
 }
 
@@ -90,7 +90,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, faceplate: &Faceplate) {
             canvas.glyph(x, y, '┃', theme.normal());
         }
     }
-    if let Some(x) = cx.snapshot.sample(faceplate.aim()).good_value().and_then(column) {
+    if let Some(x) = cx.snapshot.sample(faceplate.sv_to_show()).good_value().and_then(column) {
         canvas.glyph(x, y, '▼', theme.set_value());
     }
     if let Some(x) = cx.snapshot.sample(faceplate.pv).good_value().and_then(column) {

@@ -14,7 +14,7 @@ const OUTCOME_TICKS: u32 = 120;
 
 /// A command of this terminal on its way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PendingCommand {
+pub struct LastCommand {
     /// The command as it was sent.
     pub command: Command,
     /// As last seen in a snapshot.
@@ -25,7 +25,7 @@ pub struct PendingCommand {
     pub undelivered: Option<Arc<str>>,
 }
 
-impl PendingCommand {
+impl LastCommand {
     /// Has it ended in a way that its operator must read?
     pub fn is_trouble(&self) -> bool {
         let outcome = self.status.as_ref().map(|status| &status.outcome);
@@ -55,20 +55,20 @@ impl Model {
         let expected_value = command.expected_value.or_else(|| self.snapshot.expected_value(&command.kind));
         let command = Command { id, run: self.snapshot.run, expected_value, ..command };
         let is_sent = undelivered.is_none();
-        self.pending_command = Some(PendingCommand { command: command.clone(), status: None, changed_at, undelivered });
+        self.last_command = Some(LastCommand { command: command.clone(), status: None, changed_at, undelivered });
         is_sent.then_some(Effect::Command(command, credentials))
     }
 
     /// Notes that the pending command did not reach the plant.
     pub(super) fn note_undelivered(&mut self, id: CommandId, why: Arc<str>) {
-        if let Some(pending) = self.pending_command.as_mut().filter(|pending| pending.command.id == id) {
+        if let Some(pending) = self.last_command.as_mut().filter(|pending| pending.command.id == id) {
             pending.undelivered = Some(why);
         }
     }
 
     /// Reads the outcome of the pending command from the new snapshot.
     pub(super) fn follow(&mut self) {
-        if let Some(pending) = &mut self.pending_command
+        if let Some(pending) = &mut self.last_command
             && let Some(status) = self.snapshot.commands.iter().find(|status| status.command.id == pending.command.id)
         {
             if pending.status.as_ref() != Some(status) {
@@ -80,7 +80,7 @@ impl Model {
 
     /// Ends the wait of a window for the check of its credentials; refused ones are asked for again.
     pub(super) fn close_confirmation(&mut self) {
-        let Some(pending) = &self.pending_command else { return };
+        let Some(pending) = &self.last_command else { return };
         let refused = match (&pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
             (Some(why), _) => Some(t!("not sent: {why}", why)),
             (None, Some(Outcome::Refused(Refusal::NotReauthenticated(why)))) => Some(why.clone()),
