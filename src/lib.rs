@@ -31,7 +31,7 @@
 //!    Record        │   │   └────────────────────┐
 //!    mpsc,         │   │ watch<Arc<Snapshot>>   │
 //!    loss counted  ▼   ▼   latest only          │
-//!  book ──> history     session server ──── Session      one per terminal: channels, or the
+//! audit ──> history     session server ──── Session      one per terminal: channels, or the
 //!  thread   thread  <─── Query / Answer        │          socket of `attach`
 //!  (chain)  DuckDB       AccessControl      terminal (ui)
 //! ```
@@ -82,12 +82,13 @@
 //! | SV, PV, MV | setpoint, measured value and output, as the controllers print them |
 //! | poll class | critical, normal or background: which polls an overloaded line skips last |
 //! | backoff | a device that does not answer is asked at growing intervals |
-//! | outstanding reply | a response that may still come after its timeout; it is never taken for another |
+//! | outstanding reply, in sync | a response that may still come after its timeout; it is never taken for another |
 //! | gap registers | registers read only because they stand between two blocks |
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be told apart |
 //! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
-//! | scenario, fault, drill | a scripted plant for tests; what a trainer injects; a scenario that evaluates an operator |
+//! | fault, injected fault | why a request or the station failed; what a trainer puts into the simulated plant
+//! | scenario, drill | a scripted plant for tests; one that evaluates an operator |
 //!
 //! # Recipes
 //!

@@ -152,7 +152,7 @@ fn morning(def: &PlantDef) -> Timestamp {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::faults::{Fault, FaultTarget, available_faults};
+    use crate::sim::faults::{FaultTarget, InjectedFault, available_faults};
 
     fn drill(name: &str, with_operator: bool) -> (Verdict, Vec<String>) {
         let printed = std::cell::RefCell::new(Vec::new());
@@ -203,7 +203,7 @@ mod tests {
         [[expect]]\ngood = 'TIC-1.PV'\nafter = '3m 45s'\n[[expect]]\ngood = 'PLC-1.LT-1'\nafter = '3m 45s'\n";
 
     /// What the operator sees of a fault in a device: a value that is bad, and an alarm that comes and goes.
-    fn seen(device: &str, fault: Fault) -> String {
+    fn seen(device: &str, fault: InjectedFault) -> String {
         let value = if device == "TIC-1" { "TIC-1.PV" } else { "PLC-1.LT-1" };
         let bad = format!("[[expect]]\nnot_good = '{value}'\nafter = '40s'\nwithin = '10s'\n");
         let alarm = |of: &str| {
@@ -214,8 +214,12 @@ mod tests {
         };
         match fault {
             // A device that refuses everything is as good as silent.
-            Fault::Silent | Fault::Late(_) | Fault::BadCrc | Fault::Cut | Fault::Exception(_) => bad + &alarm(device),
-            Fault::SensorBurnout => bad + &alarm("TIC-1.FAULT"),
+            InjectedFault::Silent
+            | InjectedFault::Late(_)
+            | InjectedFault::BadCrc
+            | InjectedFault::Cut
+            | InjectedFault::Exception(_) => bad + &alarm(device),
+            InjectedFault::SensorBurnout => bad + &alarm("TIC-1.FAULT"),
             _ => String::new(),
         }
     }
@@ -232,7 +236,7 @@ mod tests {
                 FaultTarget::Tag(_) | FaultTarget::Process => (String::new(), ""),
             };
             // What is stuck no master can know; the next test says so.
-            for fault in available.faults.into_iter().filter(|fault| *fault != Fault::Stuck) {
+            for fault in available.faults.into_iter().filter(|fault| *fault != InjectedFault::Stuck) {
                 let (verdict, printed) = drill_of(&target, &fault.to_string(), &(seen(device, fault) + HONEST));
                 let all = format!("{name} {fault}\n{}\n{}", printed.join("\n"), verdict.lines().join("\n"));
                 assert!(verdict.over && verdict.passed(), "{all}");

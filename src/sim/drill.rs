@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{
-    faults::{ActiveFault, AvailableFaults, Fault, FaultTarget},
+    faults::{ActiveFault, AvailableFaults, FaultTarget, InjectedFault},
     scenario::judge::{ActualValues, Verdict},
 };
 
@@ -11,9 +11,9 @@ use super::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimCommand {
     /// Inject a fault, or change its parameter.
-    Inject(FaultTarget, Fault),
+    Inject(FaultTarget, InjectedFault),
     /// Clear a fault, whatever its parameter.
-    Clear(FaultTarget, Fault),
+    Clear(FaultTarget, InjectedFault),
     /// Clear all faults.
     ClearAll,
 }
@@ -52,7 +52,7 @@ impl Status {
     }
 
     /// The active fault of this name in a target.
-    pub fn find(&self, target: FaultTarget, fault: Fault) -> Option<&ActiveFault> {
+    pub fn find(&self, target: FaultTarget, fault: InjectedFault) -> Option<&ActiveFault> {
         self.active.iter().find(|active| active.target == target && active.fault.word() == fault.word())
     }
 }

@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, time::Duration};
 use jiff::Timestamp;
 
 pub use self::{
-    syntax::{Fault, Position, TargetKind, Valve},
+    syntax::{InjectedFault, Position, TargetKind, Valve},
     target::{AvailableFaults, FaultTarget, available_faults, why_not_applicable},
 };
 use super::{
@@ -46,7 +46,7 @@ pub struct ActiveFault {
     /// Where.
     pub target: FaultTarget,
     /// What.
-    pub fault: Fault,
+    pub fault: InjectedFault,
     /// Since when.
     pub since: Timestamp,
 }
@@ -83,7 +83,7 @@ impl Faults {
     }
 
     /// Injects a fault; a fault that it excludes is cleared.
-    pub fn inject(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault, since: Timestamp) {
+    pub fn inject(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: InjectedFault, since: Timestamp) {
         // The same fault with another number goes on: what is stuck stays.
         let since = self.find(target, fault).map_or(since, |old| old.since);
         self.list.retain(|old| old.target != target || !old.fault.excludes(fault));
@@ -93,7 +93,7 @@ impl Faults {
     }
 
     /// Clears a fault, whatever its parameter.
-    pub fn clear(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault) {
+    pub fn clear(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: InjectedFault) {
         self.list.retain(|old| old.target != target || old.fault.word() != fault.word());
         self.arrange(simulator, target, fault, false);
     }
@@ -110,21 +110,21 @@ impl Faults {
         &self.list
     }
 
-    fn find(&self, target: FaultTarget, fault: Fault) -> Option<&ActiveFault> {
+    fn find(&self, target: FaultTarget, fault: InjectedFault) -> Option<&ActiveFault> {
         self.list.iter().find(|active| active.target == target && active.fault.word() == fault.word())
     }
 
-    fn at(&self, target: FaultTarget, kind: TargetKind) -> impl Iterator<Item = Fault> {
+    fn at(&self, target: FaultTarget, kind: TargetKind) -> impl Iterator<Item = InjectedFault> {
         self.list.iter().filter(move |f| f.target == target && f.fault.target_kind() == kind).map(|f| f.fault)
     }
 
     /// Carries a change into the process, and forgets what is no longer stuck.
-    fn arrange(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: Fault, begins: bool) {
+    fn arrange(&mut self, simulator: &mut Simulator, target: FaultTarget, fault: InjectedFault, begins: bool) {
         match (target, fault) {
-            (_, Fault::Stuck) if !begins => {
+            (_, InjectedFault::Stuck) if !begins => {
                 self.memories.entry(target).or_default().let_go();
             }
-            (FaultTarget::Unit(line, unit), Fault::SensorBurnout) if simulator.is_controller(line, unit) => {
+            (FaultTarget::Unit(line, unit), InjectedFault::SensorBurnout) if simulator.is_controller(line, unit) => {
                 if let Some(rig) = simulator.rig_mut() {
                     rig.set_sensor_open(begins);
                 }
@@ -146,23 +146,25 @@ impl Faults {
             return None;
         }
         if simulator.is_broadcast(line, unit) {
-            let deaf = |unit| matches!(self.on_the_line(line, unit), Some(Fault::Silent | Fault::Exception(_)));
+            let deaf = |unit| {
+                matches!(self.on_the_line(line, unit), Some(InjectedFault::Silent | InjectedFault::Exception(_)))
+            };
             simulator.broadcast(line, request, |unit| !deaf(unit));
             return None;
         }
         let late = simulator.reply_delay(line, unit);
         let answer = |pdu, damage, delay| Answer { unit, pdu, damage, delay };
         let mut answer = match self.on_the_line(line, unit) {
-            Some(Fault::Silent) => {
+            Some(InjectedFault::Silent) => {
                 simulator.count_for_others(line, unit);
                 return None;
             }
-            Some(Fault::Exception(code)) => {
+            Some(InjectedFault::Exception(code)) => {
                 return simulator.refuse(line, unit, request, code).map(|pdu| answer(pdu, Damage::None, late));
             }
-            Some(Fault::Late(by)) => answer(simulator.respond(line, unit, request)?, Damage::None, late + by),
-            Some(Fault::BadCrc) => answer(simulator.respond(line, unit, request)?, Damage::Check, late),
-            Some(Fault::Cut) => answer(simulator.respond(line, unit, request)?, Damage::Cut, late),
+            Some(InjectedFault::Late(by)) => answer(simulator.respond(line, unit, request)?, Damage::None, late + by),
+            Some(InjectedFault::BadCrc) => answer(simulator.respond(line, unit, request)?, Damage::Check, late),
+            Some(InjectedFault::Cut) => answer(simulator.respond(line, unit, request)?, Damage::Cut, late),
             Some(_) | None => answer(simulator.respond(line, unit, request)?, Damage::None, late),
         };
         answer.pdu = self.corrupt_values(line, unit, request, answer.pdu);
@@ -172,7 +174,7 @@ impl Faults {
         Some(answer)
     }
 
-    fn on_the_line(&self, line: LineId, unit: u8) -> Option<Fault> {
+    fn on_the_line(&self, line: LineId, unit: u8) -> Option<InjectedFault> {
         self.at(FaultTarget::Unit(line, unit), TargetKind::Unit).next()
     }
 
@@ -188,7 +190,7 @@ impl Faults {
                 }
                 FaultTarget::Unit(..) | FaultTarget::Line(_) | FaultTarget::Process => None,
             };
-            let faults: Vec<Fault> = self.at(target, TargetKind::Value).collect();
+            let faults: Vec<InjectedFault> = self.at(target, TargetKind::Value).collect();
             if let (Some(values), false) = (values, faults.is_empty()) {
                 pdu = values.corrupt(&faults, self.memories.entry(target).or_default(), request, pdu);
             }
@@ -198,7 +200,7 @@ impl Faults {
 
     /// Whether noise hits the next message on a line; the number says which bit.
     fn hit(&mut self, line: LineId) -> Option<u64> {
-        let Some(Fault::Noise(percent)) = self.at(FaultTarget::Line(line), TargetKind::Line).next() else {
+        let Some(InjectedFault::Noise(percent)) = self.at(FaultTarget::Line(line), TargetKind::Line).next() else {
             return None;
         };
         self.messages += 1;

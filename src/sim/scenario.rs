@@ -11,7 +11,7 @@ pub mod read;
 
 use std::time::Duration;
 
-use super::faults::{Fault, FaultTarget};
+use super::faults::{FaultTarget, InjectedFault};
 use crate::plant::{
     Snapshot,
     command::CommandKind,
@@ -66,7 +66,7 @@ pub struct FaultEvent {
     pub at: Duration,
     /// Where.
     pub target: FaultTarget,
-    pub fault: Fault,
+    pub fault: InjectedFault,
     /// `false`: the fault is cleared.
     pub begins: bool,
 }

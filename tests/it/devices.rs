@@ -21,7 +21,7 @@ use sightglass::{
     },
     profile::{self, Kind, Search},
     sim::{
-        faults::{Fault, TargetKind},
+        faults::{InjectedFault, TargetKind},
         io::{Service, SimulatorHandle, serve_stream},
         simulator::Simulator,
     },
@@ -36,9 +36,11 @@ use crate::support::folder;
 
 /// What a unit can do wrong on the wire. Each makes every value of the unit doubtful, and none of them wrong. An answer that
 /// is only late must be later than any shipped line waits.
-fn faults() -> impl Iterator<Item = Fault> {
-    let of_unit = Fault::all().filter(|fault| fault.target_kind() == TargetKind::Unit);
-    of_unit.map(|fault| if matches!(fault, Fault::Late(_)) { Fault::Late(Duration::from_secs(3)) } else { fault })
+fn faults() -> impl Iterator<Item = InjectedFault> {
+    let of_unit = InjectedFault::all().filter(|fault| fault.target_kind() == TargetKind::Unit);
+    of_unit.map(|fault| {
+        if matches!(fault, InjectedFault::Late(_)) { InjectedFault::Late(Duration::from_secs(3)) } else { fault }
+    })
 }
 
 /// A fault is in force this long, which is longer than the slowest poll of any shipped file and its doubt.
@@ -138,7 +140,7 @@ impl Plant {
         self.named(|snapshot, tag| snapshot.sample(tag).quality.is_good())
     }
 
-    async fn set_all(&self, fault: Fault) {
+    async fn set_all(&self, fault: InjectedFault) {
         for (line, unit) in self.simulator.units().collect::<Vec<_>>() {
             self.simulator.inject_into_unit(line, unit, fault).await;
         }

@@ -1,6 +1,6 @@
 //! What faults of the process do between the outputs of PLC and controller and the water.
 
-use super::syntax::{Fault, Position, Valve};
+use super::syntax::{InjectedFault, Position, Valve};
 use crate::sim::tank::Actuators;
 
 /// The active faults of the process.
@@ -16,16 +16,16 @@ pub struct ProcessFaults {
 
 impl ProcessFaults {
     /// The faults of the process among these.
-    pub fn of(faults: impl Iterator<Item = Fault>) -> ProcessFaults {
+    pub fn of(faults: impl Iterator<Item = InjectedFault>) -> ProcessFaults {
         let mut process_faults = ProcessFaults::default();
         for fault in faults {
             match fault {
-                Fault::HeaterBurnout => process_faults.heater = true,
-                Fault::PumpFailed => process_faults.pump = true,
-                Fault::AgitatorFailed => process_faults.agitator = true,
-                Fault::ValveStuck(Valve::Drain, position) => process_faults.drain = Some(position),
-                Fault::ValveStuck(Valve::Fill, position) => process_faults.fill = Some(position),
-                Fault::Leak(ml_per_min) => process_faults.leak_l_per_min = f64::from(ml_per_min) / 1e3,
+                InjectedFault::HeaterBurnout => process_faults.heater = true,
+                InjectedFault::PumpFailed => process_faults.pump = true,
+                InjectedFault::AgitatorFailed => process_faults.agitator = true,
+                InjectedFault::ValveStuck(Valve::Drain, position) => process_faults.drain = Some(position),
+                InjectedFault::ValveStuck(Valve::Fill, position) => process_faults.fill = Some(position),
+                InjectedFault::Leak(ml_per_min) => process_faults.leak_l_per_min = f64::from(ml_per_min) / 1e3,
                 _ => {}
             }
         }

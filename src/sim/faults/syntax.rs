@@ -6,7 +6,7 @@ use std::{fmt, str::FromStr, time::Duration};
 
 /// What is wrong with a line, a unit on it, its values, or the process behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Fault {
+pub enum InjectedFault {
     /// So many of 100 messages on the line have a wrong bit.
     Noise(u8),
     /// The unit receives nothing and does nothing.
@@ -99,9 +99,9 @@ pub enum FaultSyntaxError {
     },
 }
 
-impl Fault {
+impl InjectedFault {
     /// Every fault, with its usual number, in the order of the page.
-    pub fn all() -> impl Iterator<Item = Fault> {
+    pub fn all() -> impl Iterator<Item = InjectedFault> {
         ROWS.iter().map(|row| row.fault)
     }
 
@@ -116,9 +116,9 @@ impl Fault {
     }
 
     /// Whether two faults of the same thing cannot both be: the later one takes the place of the earlier.
-    pub fn excludes(self, other: Fault) -> bool {
+    pub fn excludes(self, other: InjectedFault) -> bool {
         match (self, other) {
-            (Fault::ValveStuck(one, _), Fault::ValveStuck(two, _)) => one == two,
+            (InjectedFault::ValveStuck(one, _), InjectedFault::ValveStuck(two, _)) => one == two,
             _ => {
                 self.word() == other.word()
                     || (self.target_kind() == TargetKind::Unit && other.target_kind() == TargetKind::Unit)
@@ -131,32 +131,32 @@ impl Fault {
         self.row().parameter
     }
 
-    /// Its number, in the unit of [`Fault::parameter`].
+    /// Its number, in the unit of [`InjectedFault::parameter`].
     pub fn number(self) -> Option<f64> {
         match self {
-            Fault::Noise(percent) => Some(f64::from(percent)),
-            Fault::Late(by) => Some(by.as_secs_f64()),
-            Fault::Exception(code) => Some(f64::from(code)),
-            Fault::Leak(ml_per_min) => Some(f64::from(ml_per_min) / 1e3),
+            InjectedFault::Noise(percent) => Some(f64::from(percent)),
+            InjectedFault::Late(by) => Some(by.as_secs_f64()),
+            InjectedFault::Exception(code) => Some(f64::from(code)),
+            InjectedFault::Leak(ml_per_min) => Some(f64::from(ml_per_min) / 1e3),
             _ => None,
         }
     }
 
     /// The same fault with another number; `None` if it has none or this one cannot be.
-    pub fn with(self, number: f64) -> Option<Fault> {
+    pub fn with(self, number: f64) -> Option<InjectedFault> {
         let parameter = self.parameter().filter(|parameter| (parameter.min..=parameter.max).contains(&number))?;
         let whole = number.fract() == 0.0 || matches!(parameter.unit, "s" | "l/min");
         whole.then_some(match self {
-            Fault::Noise(_) => Fault::Noise(to_u8(number)),
-            Fault::Late(_) => Fault::Late(Duration::from_millis(to_u64((number * 1e3).round()))),
-            Fault::Exception(_) => Fault::Exception(to_u8(number)),
-            Fault::Leak(_) => Fault::Leak(to_u32((number * 1e3).round())),
+            InjectedFault::Noise(_) => InjectedFault::Noise(to_u8(number)),
+            InjectedFault::Late(_) => InjectedFault::Late(Duration::from_millis(to_u64((number * 1e3).round()))),
+            InjectedFault::Exception(_) => InjectedFault::Exception(to_u8(number)),
+            InjectedFault::Leak(_) => InjectedFault::Leak(to_u32((number * 1e3).round())),
             other => other,
         })
     }
 
     /// The same fault with the next greater or smaller of its usual numbers; itself at the end or without a number.
-    pub fn step(self, greater: bool) -> Fault {
+    pub fn step(self, greater: bool) -> InjectedFault {
         let (Some(parameter), Some(number)) = (self.parameter(), self.number()) else { return self };
         let next = if greater {
             parameter.steps.iter().find(|step| **step > number)
@@ -168,25 +168,25 @@ impl Fault {
 }
 
 /// `silent`, `late 2s`, `leak 0.5 l/min`: what a scenario file has and a screen shows.
-impl fmt::Display for Fault {
+impl fmt::Display for InjectedFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.word())?;
         match self {
-            Fault::Late(by) if by.subsec_millis() == 0 => write!(f, " {}s", by.as_secs()),
-            Fault::Late(by) => write!(f, " {}ms", by.as_millis()),
-            Fault::Exception(code) => write!(f, " {code}"),
-            Fault::Noise(percent) => write!(f, " {percent} %"),
-            Fault::Leak(ml_per_min) => write!(f, " {} l/min", f64::from(*ml_per_min) / 1e3),
+            InjectedFault::Late(by) if by.subsec_millis() == 0 => write!(f, " {}s", by.as_secs()),
+            InjectedFault::Late(by) => write!(f, " {}ms", by.as_millis()),
+            InjectedFault::Exception(code) => write!(f, " {code}"),
+            InjectedFault::Noise(percent) => write!(f, " {percent} %"),
+            InjectedFault::Leak(ml_per_min) => write!(f, " {} l/min", f64::from(*ml_per_min) / 1e3),
             _ => Ok(()),
         }
     }
 }
 
-impl FromStr for Fault {
+impl FromStr for InjectedFault {
     type Err = FaultSyntaxError;
 
-    /// A fault as [`Fault`] is displayed; a number that is left out is the usual one. Units may be left out but for a time.
-    fn from_str(text: &str) -> Result<Fault, FaultSyntaxError> {
+    /// A fault as [`InjectedFault`] is displayed; a number that is left out is the usual one. Units may be left out but for a time.
+    fn from_str(text: &str) -> Result<InjectedFault, FaultSyntaxError> {
         let text = text.trim();
         // The longest name first: `SV-1 stuck open` before any that it might begin with.
         let named =
@@ -200,7 +200,7 @@ impl FromStr for Fault {
             return Ok(fault);
         }
         let number = match fault {
-            Fault::Late(_) => rest.parse::<jiff::SignedDuration>().ok().map(|span| span.as_secs_f64()),
+            InjectedFault::Late(_) => rest.parse::<jiff::SignedDuration>().ok().map(|span| span.as_secs_f64()),
             _ => {
                 let unit = fault.parameter().map_or("", |parameter| parameter.unit);
                 rest.strip_suffix(unit).unwrap_or(rest).trim().parse().ok()
@@ -212,12 +212,12 @@ impl FromStr for Fault {
     }
 }
 
-impl Fault {
+impl InjectedFault {
     fn expected(self) -> String {
         let word = self.word();
         match (self, self.parameter()) {
             (_, None) => format!("only `{word}`: it has no number"),
-            (Fault::Late(_), Some(_)) => "a time from 50ms to 60s, such as `late 2s`".to_owned(),
+            (InjectedFault::Late(_), Some(_)) => "a time from 50ms to 60s, such as `late 2s`".to_owned(),
             (_, Some(Parameter { unit, min, max, .. })) => {
                 let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
                 let usual = self.number().unwrap_or(min);
@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn every_fault_is_written_as_it_is_shown() {
-        for fault in Fault::all() {
+        for fault in InjectedFault::all() {
             assert_eq!(fault.to_string().parse(), Ok(fault));
             assert_eq!(fault.word().parse(), Ok(fault), "its usual number may be left out");
             assert!(fault.excludes(fault), "{fault} twice is once");
@@ -247,17 +247,17 @@ mod tests {
 
     #[test]
     fn a_number_may_be_written_in_several_ways_and_is_checked() {
-        let check = |text: &str, expect: Result<Fault, &str>| {
-            let found = text.parse::<Fault>().map_err(|error| error.to_string());
+        let check = |text: &str, expect: Result<InjectedFault, &str>| {
+            let found = text.parse::<InjectedFault>().map_err(|error| error.to_string());
             assert_eq!(found, expect.map_err(str::to_owned), "{text}");
         };
-        check("late 1.5s", Ok(Fault::Late(Duration::from_millis(1500))));
-        check("late 700 ms", Ok(Fault::Late(Duration::from_millis(700))));
-        check("exception 11", Ok(Fault::Exception(11)));
-        check("leak 0.5 l/min", Ok(Fault::Leak(500)));
-        check("leak 0.5", Ok(Fault::Leak(500)));
-        check("noise 20%", Ok(Fault::Noise(20)));
-        check("SV-1 stuck closed", Ok(Fault::ValveStuck(Valve::Drain, Position::Closed)));
+        check("late 1.5s", Ok(InjectedFault::Late(Duration::from_millis(1500))));
+        check("late 700 ms", Ok(InjectedFault::Late(Duration::from_millis(700))));
+        check("exception 11", Ok(InjectedFault::Exception(11)));
+        check("leak 0.5 l/min", Ok(InjectedFault::Leak(500)));
+        check("leak 0.5", Ok(InjectedFault::Leak(500)));
+        check("noise 20%", Ok(InjectedFault::Noise(20)));
+        check("SV-1 stuck closed", Ok(InjectedFault::ValveStuck(Valve::Drain, Position::Closed)));
         check("late 5", Err("found `late 5`, expected a time from 50ms to 60s, such as `late 2s`"));
         check("noise 101 %", Err("found `noise 101 %`, expected a number from 1 to 100, such as `noise 10 %`"));
         check("exception 2.5", Err("found `exception 2.5`, expected a number from 1 to 255, such as `exception 4`"));
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn one_unit_has_one_fault_on_the_line_and_one_valve_one_place() {
         let check = |one: &str, other: &str, expect: bool| {
-            let fault = |text: &str| text.parse::<Fault>().expect("a fault");
+            let fault = |text: &str| text.parse::<InjectedFault>().expect("a fault");
             assert_eq!(fault(one).excludes(fault(other)), expect, "{one} and {other}");
         };
         check("silent", "late 2s", true);

@@ -2,13 +2,13 @@
 
 use std::{mem::discriminant, time::Duration};
 
-use super::syntax::{Fault, Parameter, Position, TargetKind, Valve};
+use super::syntax::{InjectedFault, Parameter, Position, TargetKind, Valve};
 
 /// What is known of a fault.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
     /// With its usual number.
-    pub fault: Fault,
+    pub fault: InjectedFault,
     /// Its name, without its number.
     pub word: &'static str,
     pub target_kind: TargetKind,
@@ -29,7 +29,7 @@ impl Row {
 }
 
 const fn row(
-    fault: Fault,
+    fault: InjectedFault,
     word: &'static str,
     target_kind: TargetKind,
     cause: &'static str,
@@ -39,11 +39,11 @@ const fn row(
     Row { fault, word, target_kind, cause, symptoms, response, parameter: None }
 }
 
-impl Fault {
+impl InjectedFault {
     /// Its row. Only the number may differ from it; a valve and its position are part of the fault.
     pub(crate) fn row(self) -> &'static Row {
         let is_same = |row: &&Row| match self {
-            Fault::ValveStuck(..) => row.fault == self,
+            InjectedFault::ValveStuck(..) => row.fault == self,
             _ => discriminant(&row.fault) == discriminant(&self),
         };
         ROWS.iter().find(is_same).expect("every fault has a row")
@@ -53,7 +53,7 @@ impl Fault {
 /// In the order of the page.
 pub(super) const ROWS: [Row; 18] = [
     row(
-        Fault::Noise(10),
+        InjectedFault::Noise(10),
         "noise",
         TargetKind::Line,
         "Interference, a missing termination or a bad screen: bits change on the way, in requests and in answers.",
@@ -63,7 +63,7 @@ pub(super) const ROWS: [Row; 18] = [
     )
     .with_number("%", 1.0, 100.0, &[1.0, 5.0, 10.0, 20.0, 50.0]),
     row(
-        Fault::Silent,
+        InjectedFault::Silent,
         "silent",
         TargetKind::Unit,
         "The unit has no power, the wrong address or baud rate, or its wire is off.",
@@ -72,7 +72,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Inspect the unit; treat all it controls as unknown.",
     ),
     row(
-        Fault::Late(Duration::from_secs(2)),
+        InjectedFault::Late(Duration::from_secs(2)),
         "late",
         TargetKind::Unit,
         "The unit is overloaded or sits behind a slow radio or converter.",
@@ -82,7 +82,7 @@ pub(super) const ROWS: [Row; 18] = [
     )
     .with_number("s", 0.05, 60.0, &[0.2, 0.5, 1.0, 2.0, 5.0]),
     row(
-        Fault::BadCrc,
+        InjectedFault::BadCrc,
         "bad crc",
         TargetKind::Unit,
         "The check of each answer is wrong: a defective driver, or two units with one address.",
@@ -91,7 +91,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Read the value back before writing again.",
     ),
     row(
-        Fault::Cut,
+        InjectedFault::Cut,
         "cut",
         TargetKind::Unit,
         "Each answer ends in the middle: the driver switches off too early, or the unit restarts.",
@@ -99,7 +99,7 @@ pub(super) const ROWS: [Row; 18] = [
         "See the frames on Bus: where they end shows which side switches off.",
     ),
     row(
-        Fault::Exception(4),
+        InjectedFault::Exception(4),
         "exception",
         TargetKind::Unit,
         "The unit understands and refuses: no such register, busy, or its own failure.",
@@ -109,7 +109,7 @@ pub(super) const ROWS: [Row; 18] = [
     )
     .with_number("", 1.0, 255.0, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 11.0]),
     row(
-        Fault::Stuck,
+        InjectedFault::Stuck,
         "stuck value",
         TargetKind::Value,
         "The measuring part of the unit hangs while its communication goes on: every answer is good and old.",
@@ -118,7 +118,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Compare with what the process must do: heating without a change of temperature is not possible.",
     ),
     row(
-        Fault::Torn,
+        InjectedFault::Torn,
         "torn value",
         TargetKind::Value,
         "The unit updates a 32-bit value between its two words: one word is new, one is of the reading before.",
@@ -127,7 +127,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Distrust single spikes; ask the maker for a register that latches.",
     ),
     row(
-        Fault::WordOrder,
+        InjectedFault::WordOrder,
         "word order",
         TargetKind::Value,
         "The unit was replaced or set to another word order.",
@@ -136,7 +136,7 @@ pub(super) const ROWS: [Row; 18] = [
         "After a replacement compare one value with the face of the unit; set `order` in the profile.",
     ),
     row(
-        Fault::SensorBurnout,
+        InjectedFault::SensorBurnout,
         "sensor burnout",
         TargetKind::Value,
         "The wire of the sensor breaks; the unit knows it and says so.",
@@ -145,7 +145,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Stop the sequence, check the terminals; do not heat by hand without a temperature.",
     ),
     row(
-        Fault::HeaterBurnout,
+        InjectedFault::HeaterBurnout,
         "heater burnout",
         TargetKind::Process,
         "The heating element is open: the controller asks for power and none is taken.",
@@ -153,7 +153,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Compare MV with the power that is measured.",
     ),
     row(
-        Fault::ValveStuck(Valve::Drain, Position::Open),
+        InjectedFault::ValveStuck(Valve::Drain, Position::Open),
         "SV-1 stuck open",
         TargetKind::Process,
         "SV-1 does not close: TK-1 runs empty into TK-3.",
@@ -162,7 +162,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Stop; close the hand valve under TK-1.",
     ),
     row(
-        Fault::ValveStuck(Valve::Drain, Position::Closed),
+        InjectedFault::ValveStuck(Valve::Drain, Position::Closed),
         "SV-1 stuck closed",
         TargetKind::Process,
         "SV-1 does not open: TK-1 keeps its hot water.",
@@ -171,7 +171,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Stop and check the coil of the valve; the water is hot.",
     ),
     row(
-        Fault::ValveStuck(Valve::Fill, Position::Open),
+        InjectedFault::ValveStuck(Valve::Fill, Position::Open),
         "SV-2 stuck open",
         TargetKind::Process,
         "SV-2 does not close: TK-2 runs into TK-1.",
@@ -179,7 +179,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Close the hand valve under TK-2 before TK-1 overflows.",
     ),
     row(
-        Fault::ValveStuck(Valve::Fill, Position::Closed),
+        InjectedFault::ValveStuck(Valve::Fill, Position::Closed),
         "SV-2 stuck closed",
         TargetKind::Process,
         "SV-2 does not open: TK-1 is not filled.",
@@ -188,7 +188,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Check the water in TK-2, then the coil of the valve.",
     ),
     row(
-        Fault::Leak(2_000),
+        InjectedFault::Leak(2_000),
         "leak",
         TargetKind::Process,
         "TK-1 loses water to the floor.",
@@ -198,7 +198,7 @@ pub(super) const ROWS: [Row; 18] = [
     )
     .with_number("l/min", 0.01, 20.0, &[0.2, 0.5, 1.0, 2.0, 5.0]),
     row(
-        Fault::PumpFailed,
+        InjectedFault::PumpFailed,
         "pump failed",
         TargetKind::Process,
         "P-1 does not turn: its motor protection is off or its shaft is broken.",
@@ -206,7 +206,7 @@ pub(super) const ROWS: [Row; 18] = [
         "Check the motor protection switch.",
     ),
     row(
-        Fault::AgitatorFailed,
+        InjectedFault::AgitatorFailed,
         "agitator failed",
         TargetKind::Process,
         "M-1 does not turn: the water forms layers.",

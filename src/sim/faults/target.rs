@@ -1,7 +1,7 @@
 //! The target of a fault, by its name in the plant, and the faults that apply to it.
 
 use super::{
-    syntax::{Fault, TargetKind},
+    syntax::{InjectedFault, TargetKind},
     values::Values,
 };
 use crate::plant::{
@@ -29,7 +29,7 @@ pub struct AvailableFaults {
     /// The target.
     pub target: FaultTarget,
     /// Each with its default parameter.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<InjectedFault>,
 }
 
 impl FaultTarget {
@@ -52,7 +52,7 @@ impl FaultTarget {
     }
 
     /// Whether this kind of fault applies to this kind of target.
-    pub fn accepts(self, fault: Fault) -> bool {
+    pub fn accepts(self, fault: InjectedFault) -> bool {
         match (self, fault.target_kind()) {
             (FaultTarget::Line(_), TargetKind::Line)
             | (FaultTarget::Unit(..), TargetKind::Unit | TargetKind::Value)
@@ -75,14 +75,14 @@ pub fn available_faults(def: &PlantDef) -> Vec<AvailableFaults> {
     let units = def.devices.iter().map(FaultTarget::of);
     let targets = lines.chain(units).chain([FaultTarget::Process]);
     let available = targets.map(|target| {
-        let faults = Fault::all().filter(|fault| why_not_applicable(def, target, *fault).is_none()).collect();
+        let faults = InjectedFault::all().filter(|fault| why_not_applicable(def, target, *fault).is_none()).collect();
         AvailableFaults { target, faults }
     });
     available.filter(|available| !available.faults.is_empty()).collect()
 }
 
 /// Why a fault does not apply to a target; `None` if it does.
-pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: Fault) -> Option<String> {
+pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: InjectedFault) -> Option<String> {
     let name = target.name(def);
     if !target.accepts(fault) {
         let belongs = match fault.target_kind() {
@@ -101,8 +101,11 @@ pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: Fault) -> 
         }
         (FaultTarget::Process, _) if def.simulation.as_deref() != Some(SIMULATION) => "is not simulated",
         // The thesis's controller reports a broken sensor in its fault word.
-        (FaultTarget::Unit(line, unit), Fault::SensorBurnout) if is_controller(line, unit) => return None,
-        (FaultTarget::Unit(line, unit), Fault::Stuck | Fault::Torn | Fault::WordOrder | Fault::SensorBurnout) => {
+        (FaultTarget::Unit(line, unit), InjectedFault::SensorBurnout) if is_controller(line, unit) => return None,
+        (
+            FaultTarget::Unit(line, unit),
+            InjectedFault::Stuck | InjectedFault::Torn | InjectedFault::WordOrder | InjectedFault::SensorBurnout,
+        ) => {
             let values = device_at(def, line, unit).map(|device| Values::of(def, device)).unwrap_or_default();
             if values.can_have(fault) {
                 return None;
@@ -119,10 +122,10 @@ fn over_mbap(def: &PlantDef, line: LineId) -> bool {
     matches!(def.line(line).transport, Transport::Tcp { framing: Framing::Mbap, .. })
 }
 
-fn lack(fault: Fault) -> &'static str {
+fn lack(fault: InjectedFault) -> &'static str {
     match fault {
-        Fault::Torn | Fault::WordOrder => "has no value of 32 bits",
-        Fault::SensorBurnout => "has no mark for a broken sensor in its profile (bad_if)",
+        InjectedFault::Torn | InjectedFault::WordOrder => "has no value of 32 bits",
+        InjectedFault::SensorBurnout => "has no mark for a broken sensor in its profile (bad_if)",
         _ => "has no value that is only read",
     }
 }

@@ -13,7 +13,7 @@ fn simulator() -> (Simulator, Faults) {
     (Simulator::tank(Rig::new()), Faults::default())
 }
 
-fn check(fault: Option<Fault>, expect: Option<(usize, bool)>, written: bool) {
+fn check(fault: Option<InjectedFault>, expect: Option<(usize, bool)>, written: bool) {
     let (mut simulator, mut faults) = simulator();
     if let Some(fault) = fault {
         faults.inject(&mut simulator, TIC, fault, SINCE);
@@ -33,31 +33,31 @@ fn check(fault: Option<Fault>, expect: Option<(usize, bool)>, written: bool) {
 #[test]
 fn each_fault_looks_as_it_does_on_the_line() {
     check(None, Some((7, true)), true);
-    check(Some(Fault::Silent), None, false);
-    check(Some(Fault::Late(Duration::from_secs(1))), Some((7, true)), true);
-    check(Some(Fault::BadCrc), Some((7, false)), true);
-    check(Some(Fault::Cut), Some((3, false)), true);
-    check(Some(Fault::Exception(4)), Some((5, true)), false);
-    check(Some(Fault::SensorBurnout), Some((7, true)), true);
+    check(Some(InjectedFault::Silent), None, false);
+    check(Some(InjectedFault::Late(Duration::from_secs(1))), Some((7, true)), true);
+    check(Some(InjectedFault::BadCrc), Some((7, false)), true);
+    check(Some(InjectedFault::Cut), Some((3, false)), true);
+    check(Some(InjectedFault::Exception(4)), Some((5, true)), false);
+    check(Some(InjectedFault::SensorBurnout), Some((7, true)), true);
 }
 
 #[test]
 fn the_same_answer_in_ascii() {
     let (mut simulator, mut faults) = simulator();
-    let mut frame = |fault: Option<Fault>| {
+    let mut frame = |fault: Option<InjectedFault>| {
         faults.clear_all(&mut simulator);
         fault.into_iter().for_each(|fault| faults.inject(&mut simulator, TIC, fault, SINCE));
         faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| answer.ascii())
     };
     assert_eq!(frame(None).as_deref(), Some(&b":01030202BC3C\r\n"[..]));
-    assert_eq!(frame(Some(Fault::BadCrc)).as_deref(), Some(&b":01030202BC30\r\n"[..]));
-    assert_eq!(frame(Some(Fault::Cut)).as_deref(), Some(&b":010302"[..]));
+    assert_eq!(frame(Some(InjectedFault::BadCrc)).as_deref(), Some(&b":01030202BC30\r\n"[..]));
+    assert_eq!(frame(Some(InjectedFault::Cut)).as_deref(), Some(&b":010302"[..]));
 }
 
 #[test]
 fn a_broadcast_passes_by_a_silent_unit() {
     let (mut simulator, mut faults) = simulator();
-    faults.inject(&mut simulator, TIC, Fault::Silent, SINCE);
+    faults.inject(&mut simulator, TIC, InjectedFault::Silent, SINCE);
     assert_eq!(faults.answer(&mut simulator, L1, 0, &WRITE_SV), None);
     assert_eq!(simulator.respond(L1, 1, &READ_SV), Some(vec![3, 2, 0x02, 0xBC]));
     assert_eq!(simulator.respond(L1, 2, &READ_SV), Some(vec![3, 2, 0x01, 0xF4]));
@@ -66,7 +66,7 @@ fn a_broadcast_passes_by_a_silent_unit() {
 #[test]
 fn a_late_answer_says_how_late() {
     let (mut simulator, mut faults) = simulator();
-    faults.inject(&mut simulator, TIC, Fault::Late(Duration::from_millis(700)), SINCE);
+    faults.inject(&mut simulator, TIC, InjectedFault::Late(Duration::from_millis(700)), SINCE);
     let delay = faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| answer.delay);
     assert_eq!(delay, Some(Duration::from_millis(705)));
 }
@@ -77,7 +77,7 @@ fn the_same_answer_on_tcp() {
     let frame = |answer: Option<Answer>| answer.map(|answer| answer.tcp(0x1234));
     let well = frame(faults.answer(&mut simulator, L1, 1, &READ_SV));
     assert_eq!(well, Some(vec![0x12, 0x34, 0, 0, 0, 5, 1, 3, 2, 0x02, 0xBC]));
-    faults.inject(&mut simulator, TIC, Fault::BadCrc, SINCE);
+    faults.inject(&mut simulator, TIC, InjectedFault::BadCrc, SINCE);
     let wrong = frame(faults.answer(&mut simulator, L1, 1, &READ_SV));
     assert_eq!(wrong.map(|frame| frame[..2].to_vec()), Some(vec![0xED, 0x34]));
 }
@@ -86,7 +86,7 @@ fn the_same_answer_on_tcp() {
 fn noise_corrupts_its_share_of_messages_reproducibly() {
     let corrupt = |percent| {
         let (mut simulator, mut faults) = simulator();
-        faults.inject(&mut simulator, FaultTarget::Line(L1), Fault::Noise(percent), SINCE);
+        faults.inject(&mut simulator, FaultTarget::Line(L1), InjectedFault::Noise(percent), SINCE);
         let ask = |_| faults.answer(&mut simulator, L1, 1, &READ_SV).map(|answer| (answer.rtu(), answer.ascii()));
         (0..1_000).map(ask).collect::<Vec<_>>()
     };
@@ -106,14 +106,19 @@ fn noise_corrupts_its_share_of_messages_reproducibly() {
 fn a_later_fault_takes_the_place_of_one_that_it_excludes() {
     let (mut simulator, mut faults) = simulator();
     let list = |faults: &Faults| faults.list().iter().map(|f| f.fault.to_string()).collect::<Vec<_>>();
-    for fault in [Fault::Silent, Fault::BadCrc, Fault::Stuck] {
+    for fault in [InjectedFault::Silent, InjectedFault::BadCrc, InjectedFault::Stuck] {
         faults.inject(&mut simulator, TIC, fault, SINCE);
     }
     assert_eq!(list(&faults), ["bad crc", "stuck value"]);
-    faults.inject(&mut simulator, FaultTarget::Process, Fault::Leak(500), SINCE);
-    faults.inject(&mut simulator, FaultTarget::Process, Fault::Leak(2_000), SINCE + jiff::SignedDuration::from_secs(9));
+    faults.inject(&mut simulator, FaultTarget::Process, InjectedFault::Leak(500), SINCE);
+    faults.inject(
+        &mut simulator,
+        FaultTarget::Process,
+        InjectedFault::Leak(2_000),
+        SINCE + jiff::SignedDuration::from_secs(9),
+    );
     assert_eq!(list(&faults), ["bad crc", "stuck value", "leak 2 l/min"]);
     assert_eq!(faults.list()[2].since, SINCE, "it is the same leak");
-    faults.clear(&mut simulator, FaultTarget::Process, Fault::Leak(1));
+    faults.clear(&mut simulator, FaultTarget::Process, InjectedFault::Leak(1));
     assert_eq!(list(&faults), ["bad crc", "stuck value"]);
 }

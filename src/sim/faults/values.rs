@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::syntax::Fault;
+use super::syntax::InjectedFault;
 use crate::{
     bus::codec,
     plant::{
@@ -56,26 +56,26 @@ impl Values {
     }
 
     /// Whether a fault can be there: torn values need 32 bits, a burnt-out sensor its mark.
-    pub fn can_have(&self, fault: Fault) -> bool {
+    pub fn can_have(&self, fault: InjectedFault) -> bool {
         match fault {
-            Fault::Stuck => !self.measured.is_empty(),
-            Fault::Torn | Fault::WordOrder => !self.pairs.is_empty(),
-            Fault::SensorBurnout => !self.marks.is_empty(),
+            InjectedFault::Stuck => !self.measured.is_empty(),
+            InjectedFault::Torn | InjectedFault::WordOrder => !self.pairs.is_empty(),
+            InjectedFault::SensorBurnout => !self.marks.is_empty(),
             _ => false,
         }
     }
 
     /// The answer with what these faults make of it. `request` and `answer` are PDUs; what is no read of the four tables
     /// passes as it is.
-    pub fn corrupt(&self, faults: &[Fault], memory: &mut Memory, request: &[u8], answer: Vec<u8>) -> Vec<u8> {
+    pub fn corrupt(&self, faults: &[InjectedFault], memory: &mut Memory, request: &[u8], answer: Vec<u8>) -> Vec<u8> {
         let Some(mut cells) = Cells::of(request, &answer) else { return answer };
         let now = cells.clone();
         for fault in faults {
             match fault {
-                Fault::Stuck => self.hold(&mut cells, memory),
-                Fault::Torn => self.tear(&mut cells, &now, memory),
-                Fault::WordOrder => self.swap(&mut cells),
-                Fault::SensorBurnout => self.mark(&mut cells),
+                InjectedFault::Stuck => self.hold(&mut cells, memory),
+                InjectedFault::Torn => self.tear(&mut cells, &now, memory),
+                InjectedFault::WordOrder => self.swap(&mut cells),
+                InjectedFault::SensorBurnout => self.mark(&mut cells),
                 _ => {}
             }
         }
@@ -230,7 +230,7 @@ mod tests {
         [3, 8].into_iter().chain(words.iter().flat_map(|word| word.to_be_bytes())).collect()
     }
 
-    fn check(fault: Fault, expect: [u16; 4]) {
+    fn check(fault: InjectedFault, expect: [u16; 4]) {
         let mut memory = Memory::default();
         let before = values().corrupt(&[fault], &mut memory, &READ, answer([0x428B, 0xFAE1, 500, 270]));
         assert_eq!(before.len(), 10);
@@ -241,18 +241,19 @@ mod tests {
     #[test]
     fn what_the_second_answer_holds_under_each_fault() {
         // What is set stays true while what is measured is stuck.
-        check(Fault::Stuck, [0x428B, 0xFAE1, 700, 270]);
-        check(Fault::Torn, [0x428C, 0xFAE1, 700, 280]);
-        check(Fault::WordOrder, [0x0A3D, 0x428C, 700, 280]);
-        check(Fault::SensorBurnout, [0x428C, 0x0A3D, 700, 0x7FFF]);
-        check(Fault::Silent, [0x428C, 0x0A3D, 700, 280]);
+        check(InjectedFault::Stuck, [0x428B, 0xFAE1, 700, 270]);
+        check(InjectedFault::Torn, [0x428C, 0xFAE1, 700, 280]);
+        check(InjectedFault::WordOrder, [0x0A3D, 0x428C, 700, 280]);
+        check(InjectedFault::SensorBurnout, [0x428C, 0x0A3D, 700, 0x7FFF]);
+        check(InjectedFault::Silent, [0x428C, 0x0A3D, 700, 280]);
     }
 
     #[test]
     fn bits_are_stuck_as_well_and_let_go() {
         let (values, mut memory) = (values(), Memory::default());
-        let read =
-            |memory: &mut Memory, bit| values.corrupt(&[Fault::Stuck], memory, &[2, 0, 0, 0, 2], vec![2, 1, bit]);
+        let read = |memory: &mut Memory, bit| {
+            values.corrupt(&[InjectedFault::Stuck], memory, &[2, 0, 0, 0, 2], vec![2, 1, bit])
+        };
         assert_eq!(read(&mut memory, 0b01), [2, 1, 0b01]);
         assert_eq!(read(&mut memory, 0b10), [2, 1, 0b11], "the second bit is no tag and moves");
         memory.let_go();
@@ -261,7 +262,7 @@ mod tests {
 
     #[test]
     fn a_fault_is_offered_where_it_can_be() {
-        let can = |values: &Values| Fault::all().filter(|fault| values.can_have(*fault)).count();
+        let can = |values: &Values| InjectedFault::all().filter(|fault| values.can_have(*fault)).count();
         assert_eq!((can(&values()), can(&Values::default())), (4, 0));
     }
 
@@ -272,7 +273,7 @@ mod tests {
             answer in prop::collection::vec(any::<u8>(), 0..12),
         ) {
             let mut memory = Memory::default();
-            let corrupt = values().corrupt(&Fault::all().collect::<Vec<_>>(), &mut memory, &request, answer.clone());
+            let corrupt = values().corrupt(&InjectedFault::all().collect::<Vec<_>>(), &mut memory, &request, answer.clone());
             prop_assert_eq!(corrupt.len(), answer.len());
             if answer.first().is_some_and(|function| *function >= 0x80) {
                 prop_assert_eq!(corrupt, answer);

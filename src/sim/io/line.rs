@@ -220,7 +220,7 @@ mod tests {
     use crate::bus::frame::with_crc;
     use crate::plant::def::LineId;
     use crate::plant::def::Parity;
-    use crate::sim::faults::Fault;
+    use crate::sim::faults::InjectedFault;
     use crate::sim::io::{SimulatorHandle, serving::FOR_EVER};
     use crate::sim::rig::Rig;
     use crate::sim::simulator::Simulator;
@@ -308,12 +308,12 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn faults_look_as_they_do_on_a_line() {
         let (mut master, simulator) = line(9600, Parity::None, 1.0);
-        simulator.inject_into_unit(L1, 1, Fault::Silent).await;
+        simulator.inject_into_unit(L1, 1, InjectedFault::Silent).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0, Vec::<u8>::new());
         assert_eq!(ask(&mut master, READ_STEP).await.0.len(), 7);
-        simulator.inject_into_unit(L1, 1, Fault::Cut).await;
+        simulator.inject_into_unit(L1, 1, InjectedFault::Cut).await;
         assert_eq!(ask(&mut master, READ_TEN).await.0.len(), 12);
-        simulator.inject_into_unit(L1, 1, Fault::Late(Duration::from_millis(700))).await;
+        simulator.inject_into_unit(L1, 1, InjectedFault::Late(Duration::from_millis(700))).await;
         let (frame, took) = ask(&mut master, READ_TEN).await;
         assert!(frame.len() == 25 && took > Duration::from_millis(743), "{took:?}");
     }
@@ -321,7 +321,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn another_unit_answers_while_one_is_late() {
         let (mut master, simulator) = line(9600, Parity::None, 1.0);
-        simulator.inject_into_unit(L1, 1, Fault::Late(Duration::from_millis(500))).await;
+        simulator.inject_into_unit(L1, 1, InjectedFault::Late(Duration::from_millis(500))).await;
         master.write_all(&with_crc(READ_TEN)).await.expect("the line takes requests");
         tokio::time::advance(Duration::from_millis(100)).await;
         let (frames, _) = ask(&mut master, READ_STEP).await;
@@ -380,7 +380,7 @@ mod tests {
         assert_eq!(ask_ascii(&mut master, ":0103:010303EA00010E\r\n").await.0, ":01030202BC3C\r\n");
         assert_eq!(ask_ascii(&mut master, ":010303EA00010F\r\n").await.0, "");
         assert_eq!(ask_ascii(&mut master, ":0208000C0000EA\r\n").await.0, ":0208000C0003E7\r\n");
-        simulator.inject_into_unit(L1, 1, Fault::BadCrc).await;
+        simulator.inject_into_unit(L1, 1, InjectedFault::BadCrc).await;
         assert_eq!(ask_ascii(&mut master, ":010303EA00010E\r\n").await.0, ":01030202BC30\r\n");
     }
 }

@@ -12,7 +12,7 @@ use crate::{
         def::{LineId, TagId},
     },
     sim::{
-        faults::{ActiveFault, Answer, Fault, FaultTarget, Faults},
+        faults::{ActiveFault, Answer, FaultTarget, Faults, InjectedFault},
         ground_truth::GroundTruth,
         rig::{Rig, RigState},
         scenario::judge::ActualValues,
@@ -104,17 +104,17 @@ impl SimulatorHandle {
     }
 
     /// Injects a fault into a unit of a line.
-    pub async fn inject_into_unit(&self, line: LineId, unit: u8, fault: Fault) {
+    pub async fn inject_into_unit(&self, line: LineId, unit: u8, fault: InjectedFault) {
         self.inject(FaultTarget::Unit(line, unit), fault).await;
     }
 
     /// Injects a fault; a fault that it excludes is cleared.
-    pub async fn inject(&self, target: FaultTarget, fault: Fault) {
+    pub async fn inject(&self, target: FaultTarget, fault: InjectedFault) {
         self.put(move |owned| owned.faults.inject(&mut owned.simulator, target, fault, owned.now)).await;
     }
 
     /// Clears a fault, whatever its parameter.
-    pub async fn clear(&self, target: FaultTarget, fault: Fault) {
+    pub async fn clear(&self, target: FaultTarget, fault: InjectedFault) {
         self.put(move |owned| owned.faults.clear(&mut owned.simulator, target, fault)).await;
     }
 
@@ -239,7 +239,7 @@ mod tests {
     async fn faults_reach_the_units() {
         let simulator =
             SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0));
-        simulator.inject_into_unit(LineId(0), 1, Fault::Silent).await;
+        simulator.inject_into_unit(LineId(0), 1, InjectedFault::Silent).await;
         assert_eq!(simulator.ask(LineId(0), 1, &[3, 3, 0xEA, 0, 1]).await, None);
         assert!(simulator.ask(LineId(0), 2, &[3, 4, 0, 0, 1]).await.is_some());
         simulator.set_sensor_open(true).await;

@@ -17,7 +17,7 @@ use crate::{
         reader::{self, At, Choice, Node, Value, text, toml_tables},
         renamed,
     },
-    sim::faults::{Fault, FaultTarget, why_not_applicable},
+    sim::faults::{FaultTarget, InjectedFault, why_not_applicable},
 };
 
 toml_tables! {
@@ -38,7 +38,7 @@ toml_tables! {
     /// An `[[event]]`.
     EventTable, "an event" {
         need "at" at_time: Duration,
-        need "fault" fault: Fault,
+        need "fault" fault: InjectedFault,
         opt "line" line: String,
         opt "device" device: String,
         opt "tag" tag: String,
@@ -81,13 +81,13 @@ toml_tables! {
     }
 }
 
-impl Value for Fault {
-    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Fault> {
+impl Value for InjectedFault {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<InjectedFault> {
         let word = String::read(value, at, problems)?;
         match word.parse() {
             Ok(fault) => Some(fault),
             Err(error) => {
-                let mut known: Vec<&str> = Fault::all().map(|fault| fault.word()).collect();
+                let mut known: Vec<&str> = InjectedFault::all().map(|fault| fault.word()).collect();
                 known.dedup();
                 let problem = problems.add(at, format!("{error}")).label("not a fault");
                 renamed::offer(problem, "a fault", &word, &known);

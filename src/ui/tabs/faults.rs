@@ -11,7 +11,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     sim::{
         drill::{Progress, SimCommand, Status},
-        faults::{Fault, FaultTarget},
+        faults::{FaultTarget, InjectedFault},
     },
     ui::{
         Effect,
@@ -27,7 +27,7 @@ pub struct Faults {
     /// Which row is selected; headings are not counted.
     selected: usize,
     /// Parameters chosen for faults that are not active.
-    numbers: BTreeMap<(FaultTarget, &'static str), Fault>,
+    numbers: BTreeMap<(FaultTarget, &'static str), InjectedFault>,
     /// The score of the drill is shown instead of the fault.
     verdict: bool,
 }
@@ -71,7 +71,7 @@ impl TabView for Faults {
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
         let Some(status) = open(cx) else { return Rows::default() };
         let rows = rows(status);
-        let seen = |(target, fault): &(FaultTarget, Fault)| {
+        let seen = |(target, fault): &(FaultTarget, InjectedFault)| {
             (format!("{target:?}"), translate(fault.word()), status.find(*target, *fault).is_some())
         };
         Rows::of(rows.iter().map(seen), self.selected.min(rows.len().saturating_sub(1)))
@@ -131,7 +131,7 @@ impl Faults {
     }
 
     /// The fault with its present or chosen parameter.
-    fn number(&self, status: &Status, target: FaultTarget, offered: Fault) -> Fault {
+    fn number(&self, status: &Status, target: FaultTarget, offered: InjectedFault) -> InjectedFault {
         match status.find(target, offered) {
             Some(active) => active.fault,
             None => self.numbers.get(&(target, offered.word())).copied().unwrap_or(offered),
@@ -175,7 +175,7 @@ fn open<'a>(cx: &ViewContext<'a>) -> Option<&'a Status> {
     extension::state::<Status>(cx).filter(|status| status.is_open())
 }
 
-fn rows(status: &Status) -> Vec<(FaultTarget, Fault)> {
+fn rows(status: &Status) -> Vec<(FaultTarget, InjectedFault)> {
     status
         .available
         .iter()

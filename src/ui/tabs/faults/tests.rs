@@ -8,7 +8,7 @@ use crate::{
     plant::def::LineId,
     sim::{
         drill::{Progress, SimCommand, Status},
-        faults::{ActiveFault, AvailableFaults, Fault, FaultTarget, TargetKind},
+        faults::{ActiveFault, AvailableFaults, FaultTarget, InjectedFault, TargetKind},
         scenario::judge::{ExpectationStatus, Row, Verdict},
     },
     ui::{
@@ -27,7 +27,7 @@ const TIC: FaultTarget = FaultTarget::Unit(L1, 1);
 /// TIC-1 is silent and TK-1 leaks; the screen does not know yet that the valve is open.
 fn status(fixture: &Fixture) -> Status {
     let of = |target: FaultTarget| {
-        let faults = Fault::all().filter(|fault| target.accepts(*fault)).collect();
+        let faults = InjectedFault::all().filter(|fault| target.accepts(*fault)).collect();
         AvailableFaults { target, faults }
     };
     let since = fixture::now() - SignedDuration::from_secs(42);
@@ -35,8 +35,8 @@ fn status(fixture: &Fixture) -> Status {
     Status {
         available: [FaultTarget::Line(L1), TIC, FaultTarget::Unit(L1, 2), FaultTarget::Process].map(of).into(),
         active: vec![
-            ActiveFault { target: TIC, fault: Fault::Silent, since },
-            ActiveFault { target: FaultTarget::Process, fault: Fault::Leak(500), since },
+            ActiveFault { target: TIC, fault: InjectedFault::Silent, since },
+            ActiveFault { target: FaultTarget::Process, fault: InjectedFault::Leak(500), since },
         ],
         actual: actual.into_iter().map(|(name, value)| (fixture.tag(name), value)).collect(),
         exam: false,
@@ -96,14 +96,14 @@ fn press(model: &mut Model, keys: &str) -> Vec<SimCommand> {
 fn faults_go_on_and_off_by_enter_with_their_numbers() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
-    assert_eq!(press(&mut model, "⏎"), [SimCommand::Inject(FaultTarget::Line(L1), Fault::Noise(10))]);
-    assert_eq!(press(&mut model, "→→⏎"), [SimCommand::Inject(FaultTarget::Line(L1), Fault::Noise(50))]);
-    assert_eq!(press(&mut model, "↓⏎"), [SimCommand::Clear(TIC, Fault::Silent)], "what is on goes off");
-    let late = Fault::Late(Duration::from_secs(1));
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Inject(FaultTarget::Line(L1), InjectedFault::Noise(10))]);
+    assert_eq!(press(&mut model, "→→⏎"), [SimCommand::Inject(FaultTarget::Line(L1), InjectedFault::Noise(50))]);
+    assert_eq!(press(&mut model, "↓⏎"), [SimCommand::Clear(TIC, InjectedFault::Silent)], "what is on goes off");
+    let late = InjectedFault::Late(Duration::from_secs(1));
     assert_eq!(press(&mut model, "↓←⏎"), [SimCommand::Inject(TIC, late)], "a number is set before it is on");
     assert_eq!(press(&mut model, "c"), [SimCommand::ClearAll]);
     assert_eq!(press(&mut model, "↑↑↑↑↑"), []);
-    assert_eq!(press(&mut model, "⏎"), [SimCommand::Inject(FaultTarget::Line(L1), Fault::Noise(50))]);
+    assert_eq!(press(&mut model, "⏎"), [SimCommand::Inject(FaultTarget::Line(L1), InjectedFault::Noise(50))]);
 }
 
 #[test]
@@ -131,7 +131,11 @@ fn a_fault_is_switched_only_as_it_was_drawn() {
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
     // Another operator of the demonstration sets it first: Enter, meant to set it, would clear it.
     let mut set = status(&fixture);
-    set.active.push(ActiveFault { target: FaultTarget::Line(L1), fault: Fault::Noise(10), since: fixture::now() });
+    set.active.push(ActiveFault {
+        target: FaultTarget::Line(L1),
+        fault: InjectedFault::Noise(10),
+        since: fixture::now(),
+    });
     let set = |model: &mut Model| drop(update(model, Msg::Extension(Arc::new(set))));
     assert_acts_only_on_what_was_drawn(&mut model, set, "⏎");
 }
@@ -140,13 +144,14 @@ fn a_fault_is_switched_only_as_it_was_drawn() {
 fn the_number_of_a_fault_in_force_changes_at_once() {
     let fixture = Fixture::normal();
     let mut model = with(&fixture, status(&fixture), Theme::FULL);
-    let leak = Fault::all().position(|fault| matches!(fault, Fault::Leak(_))).expect("a leak");
-    let process =
-        Fault::all().position(|fault| fault.target_kind() == TargetKind::Process).expect("faults of the process");
+    let leak = InjectedFault::all().position(|fault| matches!(fault, InjectedFault::Leak(_))).expect("a leak");
+    let process = InjectedFault::all()
+        .position(|fault| fault.target_kind() == TargetKind::Process)
+        .expect("faults of the process");
     let units = 2 * (process - 1);
     press(&mut model, &"↓".repeat(1 + units + leak - process));
-    assert_eq!(press(&mut model, "→"), [SimCommand::Inject(FaultTarget::Process, Fault::Leak(1_000))]);
-    assert_eq!(press(&mut model, "←"), [SimCommand::Inject(FaultTarget::Process, Fault::Leak(200))]);
+    assert_eq!(press(&mut model, "→"), [SimCommand::Inject(FaultTarget::Process, InjectedFault::Leak(1_000))]);
+    assert_eq!(press(&mut model, "←"), [SimCommand::Inject(FaultTarget::Process, InjectedFault::Leak(200))]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::{
     plant::tag::Poll,
     sim::{
         drill::{Progress, Status},
-        faults::{Fault, FaultTarget, target::device_at},
+        faults::{FaultTarget, InjectedFault, target::device_at},
         scenario::judge::ExpectationStatus,
     },
     ui::widgets::value::show,
@@ -110,7 +110,7 @@ fn target_label(cx: &ViewContext, target: FaultTarget) -> String {
 }
 
 /// Describes the selected fault above the comparison.
-fn describe(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Fault, canvas: &mut Canvas) {
+fn describe(cx: &ViewContext, status: &Status, target: FaultTarget, fault: InjectedFault, canvas: &mut Canvas) {
     let (theme, room) = (cx.theme, canvas.width());
     let description = fault.row();
     let mut lines = vec![(format!("{}: {fault}", target.name(cx.def())), theme.strong())];
