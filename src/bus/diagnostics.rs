@@ -155,8 +155,9 @@ impl Job {
                 self.found(Finding::Object { name: "ServerId".into(), text });
             }
             (Some(0x01..=0x04), _) => {
-                if let Some(finding) = values(request, &answer) {
-                    self.found(finding);
+                let values = answer.get(1..).and_then(|pdu| pdu::values_read(&request[1..], pdu));
+                if let Some((table, address, words)) = values {
+                    self.found(Finding::Values { table, address, words });
                 }
             }
             _ => {}
@@ -321,25 +322,6 @@ fn words(request: &[u8]) -> String {
         [unit, function, ..] => format!("unit {unit}, function {function} / 0x{function:02X}"),
         _ => String::new(),
     }
-}
-
-fn values(request: &[u8], answer: &[u8]) -> Option<Finding> {
-    let word = |at: usize| Some(u16::from_be_bytes([*request.get(at)?, *request.get(at + 1)?]));
-    let (address, count) = (word(2)?, word(4)?);
-    let data = answer.get(3..)?;
-    let (table, bits) = match request[1] {
-        0x01 => (Table::Coil, true),
-        0x02 => (Table::Discrete, true),
-        0x03 => (Table::Holding, false),
-        _ => (Table::Input, false),
-    };
-    let words = if bits {
-        let bit = |n: u16| u16::from(data.get(usize::from(n / 8)).is_some_and(|byte| byte >> (n % 8) & 1 == 1));
-        (0..count).map(bit).collect()
-    } else {
-        data.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
-    };
-    Some(Finding::Values { table, address, words })
 }
 
 fn loopback_words(findings: &[Finding], sent: u32) -> String {

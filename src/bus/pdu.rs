@@ -246,6 +246,23 @@ pub fn request_fields(pdu: &[u8]) -> Option<(Vec<u16>, &[u8])> {
     rest.is_empty().then_some((fields, rest))
 }
 
+/// What a response to a read of one table holds, both as PDUs: the table, the first address and a word each; bits are 0 or 1.
+/// `None` for any other exchange, and for a response of a wrong length.
+pub fn values_read(request: &[u8], response: &[u8]) -> Option<(Table, u16, Vec<u16>)> {
+    let ([code, a, b, c, d], [answered, length, data @ ..]) = (request, response) else { return None };
+    let function = function(*code).filter(|_| answered == code && usize::from(*length) == data.len())?;
+    let (address, count) = (u16::from_be_bytes([*a, *b]), usize::from(u16::from_be_bytes([*c, *d])));
+    let bit = |n: usize| u16::from(data[n / 8] >> (n % 8) & 1);
+    let values = match function.response {
+        [ByteCount, Bits] if data.len() == count.div_ceil(8) => (0..count).map(bit).collect(),
+        [ByteCount, Registers] if data.len() == 2 * count => {
+            data.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+        }
+        _ => return None,
+    };
+    Some((function.table, address, values))
+}
+
 /// The objects of a device identification response PDU, id and text, as far as they are whole.
 pub fn identification_objects(pdu: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
     let (count, mut rest) = match pdu {

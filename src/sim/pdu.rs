@@ -5,8 +5,11 @@ mod identity;
 pub use identity::Identity;
 
 use crate::{
-    bus::pdu::{self, Item, MEI_IDENTIFICATION},
-    plant::{def::Limits, number::to_u8},
+    bus::{
+        names,
+        pdu::{self, Item, MEI_IDENTIFICATION},
+    },
+    plant::{def::Limits, number::to_u8, tag::Table},
 };
 
 /// Why a device refuses (Modbus application protocol V1.1b3, 7).
@@ -31,24 +34,6 @@ impl Refusal {
     }
 }
 
-/// Which kind of bits a request means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Bits {
-    /// Functions 01, 05, 0F.
-    Coils,
-    /// Function 02.
-    Discretes,
-}
-
-/// Which kind of words a request means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Words {
-    /// Functions 03, 06, 10, 16, 17, 18.
-    Holding,
-    /// Function 04.
-    Input,
-}
-
 /// What a device has behind its addresses. A write of several is tried on a copy, so one bad value refuses the whole block.
 pub trait Registers: Clone {
     /// The functions it knows.
@@ -60,12 +45,12 @@ pub trait Registers: Clone {
         Identity { server_id: 0, objects: &[] }
     }
 
-    /// One bit.
-    fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal>;
+    /// One coil or discrete input.
+    fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal>;
     /// Writes one coil.
     fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal>;
-    /// One word.
-    fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal>;
+    /// One holding or input register.
+    fn word(&self, table: Table, address: u16) -> Result<u16, Refusal>;
     /// Writes one holding register.
     fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal>;
     /// Whether it is too busy for this function now: then the request has no answer and no effect.
@@ -119,11 +104,9 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Refusal> 
     let limits = device.limits();
     match (function, &fields[..]) {
         (0x01 | 0x02, &[address, count]) => {
-            let kind = if function == 0x01 { Bits::Coils } else { Bits::Discretes };
-            read_bits(device, function, kind, span(function, 0, address, count, limits.read_bits_max)?)
+            read_bits(device, function, span(function, 0, address, count, limits.read_bits_max)?)
         }
-        (0x03, &[address, count]) => read_words(device, function, Words::Holding, address, count),
-        (0x04, &[address, count]) => read_words(device, function, Words::Input, address, count),
+        (0x03 | 0x04, &[address, count]) => read_words(device, function, address, count),
         (0x05, &[address, state @ (0x0000 | 0xFF00)]) => {
             device.write_bit(address, state != 0)?;
             Ok(pdu.to_vec())
@@ -141,7 +124,7 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Refusal> 
         }
         (0x11, []) => Ok(identity::report(&device.identity(), device.running())),
         (0x16, &[address, and, or]) => {
-            let value = device.word(Words::Holding, address)? & and | or & !and;
+            let value = device.word(Table::Holding, address)? & and | or & !and;
             device.write_word(address, value)?;
             Ok(pdu.to_vec())
         }
@@ -149,7 +132,7 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Refusal> 
             let values = registers(span(function, 1, to, written, limits.write_registers_max)?, data)?;
             let mut trial = device.clone();
             write_words(&mut trial, to, &values)?;
-            let reply = read_words(&trial, function, Words::Holding, from, count)?;
+            let reply = read_words(&trial, function, from, count)?;
             *device = trial;
             Ok(reply)
         }
@@ -161,23 +144,19 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Refusal> 
 
 type Span = std::ops::RangeInclusive<u16>;
 
-fn read_bits<D: Registers>(device: &D, function: u8, kind: Bits, addresses: Span) -> Result<Vec<u8>, Refusal> {
+fn read_bits<D: Registers>(device: &D, function: u8, addresses: Span) -> Result<Vec<u8>, Refusal> {
+    let table = names::table(function);
     let bytes = addresses.len().div_ceil(8);
     let mut reply = vec![function, to_u8(bytes)];
     reply.resize(2 + bytes, 0);
     for (place, at) in addresses.enumerate() {
-        reply[2 + place / 8] |= u8::from(device.bit(kind, at)?) << (place % 8);
+        reply[2 + place / 8] |= u8::from(device.bit(table, at)?) << (place % 8);
     }
     Ok(reply)
 }
 
-fn read_words<D: Registers>(
-    device: &D,
-    function: u8,
-    kind: Words,
-    address: u16,
-    count: u16,
-) -> Result<Vec<u8>, Refusal> {
+fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) -> Result<Vec<u8>, Refusal> {
+    let table = names::table(function);
     let Limits { read_registers_max, alignment, .. } = device.limits();
     let mut reply = vec![function, to_u8(count.min(read_registers_max) * 2)];
     let addresses = span(function, 0, address, count, read_registers_max)?;
@@ -188,7 +167,7 @@ fn read_words<D: Registers>(
         return Err(Refusal::Value);
     }
     for at in addresses {
-        reply.extend_from_slice(&device.word(kind, at)?.to_be_bytes());
+        reply.extend_from_slice(&device.word(table, at)?.to_be_bytes());
     }
     Ok(reply)
 }
@@ -229,14 +208,14 @@ fn span(function: u8, nth: usize, address: u16, count: u16, limit: u16) -> Resul
 
 /// A queue as the standard keeps it: its count at the address, its words behind; reading takes nothing out (V1.1b3, 6.18).
 fn read_queue<D: Registers>(device: &D, function: u8, address: u16) -> Result<Vec<u8>, Refusal> {
-    let count = device.word(Words::Holding, address)?;
+    let count = device.word(Table::Holding, address)?;
     if count > QUEUE_MAX {
         return Err(Refusal::Value);
     }
     let mut reply = vec![function, 0, to_u8(2 + 2 * count), 0, to_u8(count)];
     for place in 1..=count {
         let at = address.checked_add(place).ok_or(Refusal::Address)?;
-        reply.extend_from_slice(&device.word(Words::Holding, at)?.to_be_bytes());
+        reply.extend_from_slice(&device.word(Table::Holding, at)?.to_be_bytes());
     }
     Ok(reply)
 }
@@ -266,14 +245,14 @@ mod tests {
             Limits { read_registers_max: 6, write_registers_max: 6, ..Limits::STANDARD }
         }
 
-        fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {
+        fn bit(&self, _: Table, address: u16) -> Result<bool, Refusal> {
             Ok(self.bits[place(address)?])
         }
         fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
             self.bits[place(address)?] = on;
             Ok(())
         }
-        fn word(&self, _: Words, address: u16) -> Result<u16, Refusal> {
+        fn word(&self, _: Table, address: u16) -> Result<u16, Refusal> {
             Ok(self.words[place(address)?])
         }
         fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {

@@ -2,17 +2,13 @@
 
 use std::ops::Range;
 
-use crate::sim::pdu::{Bits, Refusal};
+use crate::{plant::tag::Table, sim::pdu::Refusal};
 
 /// Bits of one kind, sixteen to a word, lowest number in the lowest bit.
 #[derive(Debug, Clone)]
 pub struct Bank(Vec<u16>);
 
 impl Bank {
-    fn new(words: usize) -> Bank {
-        Bank(vec![0; words])
-    }
-
     /// One bit; `false` beyond the end.
     pub fn get(&self, number: u16) -> bool {
         self.0.get(usize::from(number / 16)).is_some_and(|word| word >> (number % 16) & 1 == 1)
@@ -29,36 +25,26 @@ impl Bank {
 /// Everything a master can reach.
 #[derive(Debug, Clone)]
 pub struct Memory {
-    /// X0–X777.
-    pub x: Bank,
-    /// Y0–Y777.
-    pub y: Bank,
-    /// C0–C1777.
-    pub c: Bank,
-    gx: Bank,
-    gy: Bank,
-    sp: Bank,
-    s: Bank,
-    t: Bank,
-    ct: Bank,
+    /// In the order of [`PLACES`].
+    banks: [Bank; 9],
     v: Vec<u16>,
 }
 
-/// The banks by name, so that one table serves bits and words.
+/// The banks by name, in the order of [`PLACES`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
+    /// Remote inputs.
+    Gx,
     /// Inputs.
     X,
+    /// Special relays.
+    Sp,
+    /// Remote outputs.
+    Gy,
     /// Outputs.
     Y,
     /// Control relays.
     C,
-    /// Remote inputs.
-    Gx,
-    /// Remote outputs.
-    Gy,
-    /// Special relays.
-    Sp,
     /// Stages.
     S,
     /// Timer bits.
@@ -70,28 +56,28 @@ pub enum Kind {
 /// Where a bank stands: first bit address with its table, first word in V memory, length in words, writable.
 struct Place {
     kind: Kind,
-    table: Bits,
+    table: Table,
     first_bit: u16,
     first_word: u16,
     words: u16,
     writable: bool,
 }
 
-const fn place(kind: Kind, table: Bits, first_bit: u16, first_word: u16, words: u16, writable: bool) -> Place {
+const fn place(kind: Kind, table: Table, first_bit: u16, first_word: u16, words: u16, writable: bool) -> Place {
     Place { kind, table, first_bit, first_word, words, writable }
 }
 
 /// DL06 user manual, 3rd edition, pages 4-12 to 4-15; V memory in octal as the manual has it.
-const PLACES: &[Place] = &[
-    place(Kind::Gx, Bits::Discretes, 0, 0o40000, 128, false),
-    place(Kind::X, Bits::Discretes, 2048, 0o40400, 32, false),
-    place(Kind::Sp, Bits::Discretes, 3072, 0o41200, 32, false),
-    place(Kind::Gy, Bits::Coils, 0, 0o40200, 128, true),
-    place(Kind::Y, Bits::Coils, 2048, 0o40500, 32, true),
-    place(Kind::C, Bits::Coils, 3072, 0o40600, 64, true),
-    place(Kind::S, Bits::Coils, 5120, 0o41000, 64, false),
-    place(Kind::T, Bits::Coils, 6144, 0o41100, 16, false),
-    place(Kind::Ct, Bits::Coils, 6400, 0o41140, 8, false),
+static PLACES: [Place; 9] = [
+    place(Kind::Gx, Table::Discrete, 0, 0o40000, 128, false),
+    place(Kind::X, Table::Discrete, 2048, 0o40400, 32, false),
+    place(Kind::Sp, Table::Discrete, 3072, 0o41200, 32, false),
+    place(Kind::Gy, Table::Coil, 0, 0o40200, 128, true),
+    place(Kind::Y, Table::Coil, 2048, 0o40500, 32, true),
+    place(Kind::C, Table::Coil, 3072, 0o40600, 64, true),
+    place(Kind::S, Table::Coil, 5120, 0o41000, 64, false),
+    place(Kind::T, Table::Coil, 6144, 0o41100, 16, false),
+    place(Kind::Ct, Table::Coil, 6400, 0o41140, 8, false),
 ];
 
 /// V memory that holds words of its own, and whether it may be written. System parameters are left out on purpose.
@@ -106,31 +92,21 @@ const AREAS: &[(Range<u16>, bool)] = &[
 impl Memory {
     /// All off, all zero, but SP1, which is always on.
     pub fn new() -> Memory {
-        let mut memory = Memory {
-            x: Bank::new(32),
-            y: Bank::new(32),
-            c: Bank::new(64),
-            gx: Bank::new(128),
-            gy: Bank::new(128),
-            sp: Bank::new(32),
-            s: Bank::new(64),
-            t: Bank::new(16),
-            ct: Bank::new(8),
-            v: vec![0; 0o20000],
-        };
-        memory.sp.set(1, true);
+        let banks = PLACES.each_ref().map(|place| Bank(vec![0; usize::from(place.words)]));
+        let mut memory = Memory { banks, v: vec![0; 0o20000] };
+        memory.bank_mut(Kind::Sp).set(1, true);
         memory
     }
 
     /// One bit by its wire address.
-    pub fn bit(&self, table: Bits, address: u16) -> Result<bool, Refusal> {
+    pub fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal> {
         let (place, number) = find_bit(table, address)?;
         Ok(self.bank(place.kind).get(number))
     }
 
     /// Writes a coil by its wire address.
     pub fn write_coil(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
-        let (place, number) = find_bit(Bits::Coils, address)?;
+        let (place, number) = find_bit(Table::Coil, address)?;
         if !place.writable {
             return Err(Refusal::Address);
         }
@@ -163,32 +139,14 @@ impl Memory {
         }
     }
 
-    fn bank(&self, kind: Kind) -> &Bank {
-        match kind {
-            Kind::X => &self.x,
-            Kind::Y => &self.y,
-            Kind::C => &self.c,
-            Kind::Gx => &self.gx,
-            Kind::Gy => &self.gy,
-            Kind::Sp => &self.sp,
-            Kind::S => &self.s,
-            Kind::T => &self.t,
-            Kind::Ct => &self.ct,
-        }
+    /// The bits of one kind.
+    pub fn bank(&self, kind: Kind) -> &Bank {
+        &self.banks[kind as usize]
     }
 
-    fn bank_mut(&mut self, kind: Kind) -> &mut Bank {
-        match kind {
-            Kind::X => &mut self.x,
-            Kind::Y => &mut self.y,
-            Kind::C => &mut self.c,
-            Kind::Gx => &mut self.gx,
-            Kind::Gy => &mut self.gy,
-            Kind::Sp => &mut self.sp,
-            Kind::S => &mut self.s,
-            Kind::T => &mut self.t,
-            Kind::Ct => &mut self.ct,
-        }
+    /// The bits of one kind, to set them.
+    pub fn bank_mut(&mut self, kind: Kind) -> &mut Bank {
+        &mut self.banks[kind as usize]
     }
 }
 
@@ -198,7 +156,7 @@ enum Word {
     Bits { place: &'static Place, index: usize },
 }
 
-fn find_bit(table: Bits, address: u16) -> Result<(&'static Place, u16), Refusal> {
+fn find_bit(table: Table, address: u16) -> Result<(&'static Place, u16), Refusal> {
     let number = |place: &Place| address.checked_sub(place.first_bit).filter(|number| *number < place.words * 16);
     let mut places = PLACES.iter().filter(|place| place.table == table);
     places.find_map(|place| number(place).map(|number| (place, number))).ok_or(Refusal::Address)
@@ -218,21 +176,26 @@ mod tests {
     use super::*;
 
     #[test]
+    fn each_bank_has_the_place_of_its_kind() {
+        assert!(PLACES.iter().enumerate().all(|(index, place)| place.kind as usize == index));
+    }
+
+    #[test]
     fn bits_stand_where_the_manual_says() {
         let check = |table, address, expect| {
             assert_eq!(find_bit(table, address).ok().map(|(place, number)| (place.kind, number)), expect, "{address}");
         };
-        check(Bits::Coils, 2048, Some((Kind::Y, 0)));
-        check(Bits::Coils, 2064, Some((Kind::Y, 0o20)));
-        check(Bits::Coils, 3116, Some((Kind::C, 0o54)));
-        check(Bits::Coils, 4095, Some((Kind::C, 0o1777)));
-        check(Bits::Coils, 4096, None);
-        check(Bits::Coils, 6527, Some((Kind::Ct, 0o177)));
-        check(Bits::Coils, 6528, None);
-        check(Bits::Discretes, 2063, Some((Kind::X, 0o17)));
-        check(Bits::Discretes, 2067, Some((Kind::X, 0o23)));
-        check(Bits::Discretes, 3150, Some((Kind::Sp, 0o116)));
-        check(Bits::Discretes, 3584, None);
+        check(Table::Coil, 2048, Some((Kind::Y, 0)));
+        check(Table::Coil, 2064, Some((Kind::Y, 0o20)));
+        check(Table::Coil, 3116, Some((Kind::C, 0o54)));
+        check(Table::Coil, 4095, Some((Kind::C, 0o1777)));
+        check(Table::Coil, 4096, None);
+        check(Table::Coil, 6527, Some((Kind::Ct, 0o177)));
+        check(Table::Coil, 6528, None);
+        check(Table::Discrete, 2063, Some((Kind::X, 0o17)));
+        check(Table::Discrete, 2067, Some((Kind::X, 0o23)));
+        check(Table::Discrete, 3150, Some((Kind::Sp, 0o116)));
+        check(Table::Discrete, 3584, None);
     }
 
     #[test]
@@ -265,7 +228,7 @@ mod tests {
         assert_eq!(memory.write_coil(2048 + 9, true), Ok(()));
         assert_eq!(memory.word(0o40500), Ok(0x0200));
         assert_eq!(memory.write_word(0o40600, 0x8001), Ok(()));
-        assert_eq!([0, 1, 15].map(|relay| memory.c.get(relay)), [true, false, true]);
+        assert_eq!([0, 1, 15].map(|relay| memory.bank(Kind::C).get(relay)), [true, false, true]);
         assert_eq!(memory.write_coil(2048 + 9, false), Ok(()));
         assert_eq!(memory.word(0o40500), Ok(0));
         assert_eq!(memory.write_coil(5120, true), Err(Refusal::Address));

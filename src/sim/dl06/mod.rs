@@ -5,12 +5,12 @@ pub mod sequence;
 
 use std::time::Duration;
 
-use memory::Memory;
+use memory::{Kind, Memory};
 use sequence::{Conditions, Sequence, Step};
 
-use super::pdu::{Bits, Identity, Refusal, Registers, Words};
+use super::pdu::{Identity, Refusal, Registers};
 use super::tank::{Actuators, Readings, control_level_cm};
-use crate::plant::{def::Limits, number::to_u16};
+use crate::plant::{def::Limits, number::to_u16, tag::Table};
 
 /// Time of one scan.
 pub const SCAN: Duration = Duration::from_millis(100);
@@ -114,23 +114,23 @@ impl Dl06 {
 
     /// Sets RUN and AUTO, as an operator would.
     pub fn start(&mut self) {
-        self.memory.c.set(C_RUN, true);
-        self.memory.c.set(C_AUTO, true);
+        self.memory.bank_mut(Kind::C).set(C_RUN, true);
+        self.memory.bank_mut(Kind::C).set(C_AUTO, true);
     }
 
     /// Turns a panel switch X0–X3 (pump, agitator, valve SV-1, valve SV-2); others do not exist.
     pub fn set_switch(&mut self, switch: u16, on: bool) {
         if switch < X_AT_SV {
-            self.memory.x.set(switch, on);
+            self.memory.bank_mut(Kind::X).set(switch, on);
         }
     }
 
     /// One scan: reads inputs, runs the programme, writes outputs and V memory. While stopped, outputs stay as written.
     pub fn scan(&mut self, at_sv: bool, readings: &Readings) {
-        self.memory.x.set(X_AT_SV, at_sv);
+        self.memory.bank_mut(Kind::X).set(X_AT_SV, at_sv);
         self.take_fill();
         let fill_cm = self.fill_cm();
-        let c = |relay| self.memory.c.get(relay);
+        let c = |relay| self.memory.bank(Kind::C).get(relay);
         let (run, auto) = (c(C_RUN), c(C_AUTO));
         if run && auto {
             self.sequence.advance(SCAN, &Conditions { at_sv, fill_cm, readings });
@@ -144,7 +144,7 @@ impl Dl06 {
             self.set_outputs(Outputs::default());
         }
         self.driving = run;
-        self.memory.c.set(C_FAULT, self.sequence.fault());
+        self.memory.bank_mut(Kind::C).set(C_FAULT, self.sequence.fault());
         self.publish(readings);
     }
 
@@ -162,7 +162,7 @@ impl Dl06 {
 
     /// The outputs as they are now.
     pub fn outputs(&self) -> Outputs {
-        let y = |output| self.memory.y.get(output);
+        let y = |output| self.memory.bank(Kind::Y).get(output);
         Outputs { pump: y(0), agitator: y(1), drain_valve: y(2), fill_valve: y(3), heater: y(4) }
     }
 
@@ -199,20 +199,20 @@ impl Dl06 {
 
     /// Each output follows its panel switch or its relay.
     fn manual(&self) -> Outputs {
-        let on = |switch, relay| self.memory.x.get(switch) || self.memory.c.get(relay);
+        let on = |switch, relay| self.memory.bank(Kind::X).get(switch) || self.memory.bank(Kind::C).get(relay);
         Outputs {
             pump: on(0, C_PUMP),
             agitator: on(1, C_AGITATOR),
             drain_valve: on(2, C_DRAIN),
             fill_valve: on(3, C_FILL),
-            heater: self.memory.c.get(C_HEATER),
+            heater: self.memory.bank(Kind::C).get(C_HEATER),
         }
     }
 
     fn set_outputs(&mut self, outputs: Outputs) {
         let lit = [outputs.pump, outputs.agitator, outputs.drain_valve, outputs.fill_valve, outputs.heater];
         for output in 0..16 {
-            self.memory.y.set(output, lit.get(usize::from(output)).copied().unwrap_or(false));
+            self.memory.bank_mut(Kind::Y).set(output, lit.get(usize::from(output)).copied().unwrap_or(false));
         }
     }
 
@@ -279,8 +279,8 @@ impl Registers for Dl06 {
         IDENTITY
     }
 
-    fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal> {
-        self.memory.bit(kind, address)
+    fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal> {
+        self.memory.bit(table, address)
     }
 
     fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
@@ -288,7 +288,7 @@ impl Registers for Dl06 {
     }
 
     /// Functions 03 and 04 both read V memory.
-    fn word(&self, _: Words, address: u16) -> Result<u16, Refusal> {
+    fn word(&self, _: Table, address: u16) -> Result<u16, Refusal> {
         self.memory.word(address)
     }
 
@@ -298,11 +298,11 @@ impl Registers for Dl06 {
 
     /// The relays C0–C7: run, automatic, four commands, fault.
     fn exception_status(&self) -> u8 {
-        (C_RUN..=C_FAULT).fold(0, |status, relay| status | u8::from(self.memory.c.get(relay)) << relay)
+        (C_RUN..=C_FAULT).fold(0, |status, relay| status | u8::from(self.memory.bank(Kind::C).get(relay)) << relay)
     }
 
     fn running(&self) -> bool {
-        self.memory.c.get(C_RUN)
+        self.memory.bank(Kind::C).get(C_RUN)
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::syntax::InjectedFault;
 use crate::{
-    bus::codec,
+    bus::{codec, pdu},
     plant::{
         PlantDef,
         def::DeviceDef,
@@ -142,22 +142,8 @@ struct Cells {
 impl Cells {
     /// Of an answer that fits its request to read; `None` for any other exchange.
     fn of(request: &[u8], answer: &[u8]) -> Option<Cells> {
-        let [function, high, low, count_high, count_low] = request else { return None };
-        let [answered, length, data @ ..] = answer else { return None };
-        let table = [Table::Coil, Table::Discrete, Table::Holding, Table::Input]
-            .into_iter()
-            .find(|table| table.read_fc() == *function)?;
-        let count = usize::from(u16::from_be_bytes([*count_high, *count_low]));
-        let bytes = if table.is_bits() { count.div_ceil(8) } else { 2 * count };
-        if answered != function || usize::from(*length) != bytes || data.len() != bytes {
-            return None;
-        }
-        let cells = if table.is_bits() {
-            (0..count).map(|bit| u16::from(data[bit / 8] >> (bit % 8) & 1)).collect()
-        } else {
-            data.chunks_exact(2).map(|word| u16::from_be_bytes([word[0], word[1]])).collect()
-        };
-        Some(Cells { table, first: u16::from_be_bytes([*high, *low]), cells })
+        let (table, first, cells) = pdu::values_read(request, answer)?;
+        Some(Cells { table, first, cells })
     }
 
     fn place(&self, (table, address): (Table, u16)) -> Option<usize> {

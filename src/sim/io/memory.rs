@@ -3,8 +3,8 @@
 use tokio::{io::duplex, sync::mpsc};
 
 use super::{
-    LineHandle, SimulatorHandle, Wire, serve_line,
-    serving::{FOR_EVER, Mode, Service},
+    LineHandle, SimulatorHandle, serve_line,
+    serving::{FOR_EVER, Service},
     tcp::{TcpFraming, serve_stream},
 };
 use crate::{bus::io::transport::Connector, plant::PlantDef};
@@ -31,10 +31,9 @@ pub fn in_memory(def: &PlantDef, simulator: &SimulatorHandle) -> Vec<Connector> 
 }
 
 async fn serve(stream: tokio::io::DuplexStream, units: LineHandle, service: Service) {
-    let wire = Wire { serial: service.serial, ascii: service.mode == Mode::Ascii };
-    let ended = match service.mode {
-        Mode::Tcp => serve_stream(stream, units, TcpFraming::Mbap).await,
-        Mode::Rtu | Mode::Ascii | Mode::RtuOverTcp => serve_line(stream, units, wire, FOR_EVER).await,
+    let ended = match service.tcp_framing() {
+        TcpFraming::Mbap => serve_stream(stream, units, TcpFraming::Mbap).await,
+        TcpFraming::Line(wire) => serve_line(stream, units, wire, FOR_EVER).await,
     };
     if let Err(error) = ended {
         tracing::debug!(%error, "a line in memory has ended");

@@ -9,13 +9,12 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::{LineHandle, Wire, serve_line};
+use crate::bus::frame::{self, Mbap};
 
 /// Clients at once; one more is turned away by closing its connection.
 const CLIENTS_MAX: usize = 16;
 /// A client that asks nothing for this long is taken for dead.
 const IDLE_MAX: Duration = Duration::from_secs(600);
-/// Unit and PDU, as the header counts them (Modbus messaging on TCP/IP V1.0b, 3.1.3).
-const LENGTHS: std::ops::RangeInclusive<u16> = 2..=254;
 
 /// What is spoken over TCP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,11 +60,10 @@ where
 /// Serves one client in the order of its requests until it leaves, falls silent or breaks the protocol. TCP knows no
 /// broadcast: a request to a unit that does not exist, 0 included, has no response.
 async fn serve_client<S: AsyncRead + AsyncWrite + Unpin>(mut stream: S, units: LineHandle) -> io::Result<()> {
-    while let Some((transaction, unit, pdu)) = timeout(IDLE_MAX, receive(&mut stream)).await?? {
-        if !units.has(unit) {
-            continue;
-        }
-        if let Some(answer) = units.ask(unit, &pdu).await {
+    let mut received = Vec::new();
+    while let Some((transaction, message)) = timeout(IDLE_MAX, receive(&mut stream, &mut received)).await?? {
+        let Some((unit, pdu)) = message.split_first().filter(|(unit, _)| units.has(**unit)) else { continue };
+        if let Some(answer) = units.ask(*unit, pdu).await {
             units.clock().sleep(answer.delay).await;
             timeout(IDLE_MAX, stream.write_all(&answer.tcp(transaction))).await??;
         }
@@ -73,18 +71,21 @@ async fn serve_client<S: AsyncRead + AsyncWrite + Unpin>(mut stream: S, units: L
     Ok(())
 }
 
-/// One request as transaction, unit and PDU; `None` when the header is not Modbus, as the place in the stream is lost.
-async fn receive<S: AsyncRead + Unpin>(stream: &mut S) -> io::Result<Option<(u16, u8, Vec<u8>)>> {
-    let mut header = [0; 7];
-    stream.read_exact(&mut header).await?;
-    let [t0, t1, p0, p1, l0, l1, unit] = header;
-    let length = u16::from_be_bytes([l0, l1]);
-    if (p0, p1) != (0, 0) || !LENGTHS.contains(&length) {
-        return Ok(None);
+/// One request as transaction and message; `None` when the header is not Modbus, as the place in the stream is lost.
+/// `received` keeps what has come of the next one.
+async fn receive<S: AsyncRead + Unpin>(stream: &mut S, received: &mut Vec<u8>) -> io::Result<Option<(u16, Vec<u8>)>> {
+    loop {
+        match frame::mbap(received) {
+            Mbap::Whole { transaction, end } => {
+                return Ok(Some((transaction, received.drain(..end).skip(6).collect())));
+            }
+            Mbap::Broken => return Ok(None),
+            Mbap::Incomplete => {}
+        }
+        if stream.read_buf(received).await? == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
     }
-    let mut pdu = vec![0; usize::from(length) - 1];
-    stream.read_exact(&mut pdu).await?;
-    Ok(Some((u16::from_be_bytes([t0, t1]), unit, pdu)))
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::{
         scale,
         tag::{Access, Bound, Decimals, Table, TagDef},
     },
-    sim::pdu::{Bits, Refusal, Registers, Words},
+    sim::pdu::{Refusal, Registers},
 };
 
 /// What a profile says of a device; never changes.
@@ -210,11 +210,7 @@ impl Registers for Model {
         self.chart.limits
     }
 
-    fn bit(&self, kind: Bits, address: u16) -> Result<bool, Refusal> {
-        let table = match kind {
-            Bits::Coils => Table::Coil,
-            Bits::Discretes => Table::Discrete,
-        };
+    fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal> {
         self.cells[place(table)].get(&address).map(|bit| *bit != 0).ok_or(Refusal::Address)
     }
 
@@ -226,11 +222,7 @@ impl Registers for Model {
         self.take(table, address, &[u16::from(on)])
     }
 
-    fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal> {
-        let table = match kind {
-            Words::Holding => Table::Holding,
-            Words::Input => Table::Input,
-        };
+    fn word(&self, table: Table, address: u16) -> Result<u16, Refusal> {
         self.cells[place(table)].get(&address).copied().ok_or(Refusal::Address)
     }
 

@@ -5,8 +5,8 @@ use super::display::Display;
 use super::map::{self, Meaning, Row};
 use super::{NARROWEST_K, Pxr, SENSOR_C};
 use crate::{
-    plant::{def::Limits, number::to_i16},
-    sim::pdu::{Bits, Refusal, Registers, Words},
+    plant::{def::Limits, number::to_i16, tag::Table},
+    sim::pdu::{Refusal, Registers},
 };
 
 /// The functions are those that its manual and working drivers name, so it cannot be asked who it is.
@@ -19,7 +19,7 @@ impl Registers for Pxr {
         Limits { read_registers_max: 60, write_registers_max: 60, ..Limits::STANDARD }
     }
 
-    fn bit(&self, _: Bits, _: u16) -> Result<bool, Refusal> {
+    fn bit(&self, _: Table, _: u16) -> Result<bool, Refusal> {
         Err(Refusal::Function)
     }
 
@@ -28,11 +28,11 @@ impl Registers for Pxr {
     }
 
     /// Places between the known settings read as 0, as in the sibling series.
-    fn word(&self, kind: Words, address: u16) -> Result<u16, Refusal> {
+    fn word(&self, table: Table, address: u16) -> Result<u16, Refusal> {
         let (area, place) = area(address)?;
-        let (raw, meaning) = match kind {
-            Words::Input => self.measurement(place)?,
-            Words::Holding => (self.settings[place], self.meaning(place)),
+        let (raw, meaning) = match table {
+            Table::Input => self.measurement(place)?,
+            Table::Holding | Table::Coil | Table::Discrete => (self.settings[place], self.meaning(place)),
         };
         let raw = if area == Area::Internal { self.to_internal(raw, meaning) } else { raw };
         Ok(raw.cast_unsigned())
