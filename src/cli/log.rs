@@ -9,7 +9,12 @@ use tracing_appender::{
     non_blocking::WorkerGuard,
     rolling::{self, RollingFileAppender},
 };
-use tracing_subscriber::{EnvFilter, fmt};
+use tracing_subscriber::{
+    filter::{LevelFilter, Targets},
+    fmt,
+    layer::SubscriberExt,
+    util::SubscriberInitExt,
+};
 
 use super::{CliError, own_files, paths};
 use crate::plant::visible::visible;
@@ -106,7 +111,9 @@ impl<W: Write> Write for Visible<W> {
 }
 
 fn init(writer: tracing_appender::non_blocking::NonBlocking) {
-    let level = EnvFilter::try_from_env("SIGHTGLASS_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let level = std::env::var("SIGHTGLASS_LOG").ok().and_then(|level| level.parse::<Targets>().ok());
+    let level = level.unwrap_or_else(|| Targets::new().with_default(LevelFilter::INFO));
+    let log = fmt().with_writer(writer).with_ansi(false).with_max_level(LevelFilter::TRACE).finish();
     // A second start in one process (tests) keeps the first log.
-    let _ = fmt().with_writer(writer).with_ansi(false).with_env_filter(level).try_init();
+    let _ = log.with(level).try_init();
 }
