@@ -8,8 +8,8 @@ pub use paced::PacedSlave;
 pub use tcp::TcpSlave;
 
 use sightglass::{
-    plant::def::Limits,
-    sim::pdu::{self, Bits, Refusal, Registers, Words},
+    plant::{def::Limits, tag::Table},
+    sim::pdu::{self, Refusal, Registers},
 };
 
 /// Every register holds its address, odd coils are on; what is written is acknowledged and forgotten.
@@ -25,7 +25,7 @@ impl Registers for Numbers {
         Limits::STANDARD
     }
 
-    fn bit(&self, _: Bits, address: u16) -> Result<bool, Refusal> {
+    fn bit(&self, _: Table, address: u16) -> Result<bool, Refusal> {
         Ok(address % 2 == 1)
     }
 
@@ -33,7 +33,7 @@ impl Registers for Numbers {
         Ok(())
     }
 
-    fn word(&self, _: Words, address: u16) -> Result<u16, Refusal> {
+    fn word(&self, _: Table, address: u16) -> Result<u16, Refusal> {
         Ok(address)
     }
 
