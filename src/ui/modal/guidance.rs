@@ -92,5 +92,5 @@ impl Guidance {
 
 /// Columns of the window.
 fn columns(body: Rect) -> u16 {
-    body.width.saturating_sub(8).min(76).max(LABELS_MIN + 1)
+    body.width.saturating_sub(8).clamp(LABELS_MIN + 1, 76)
 }
