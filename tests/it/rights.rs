@@ -224,7 +224,7 @@ fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
     match request {
         SessionRequest::Login { .. } => ("login", [DONE; 6]),
         SessionRequest::Logout => ("logout", ["no user is logged in here", DONE, DONE, DONE, DONE, DONE]),
-        SessionRequest::Lock => ("lock terminal", [LOG_IN, DONE, DONE, DONE, "locked already", DONE]),
+        SessionRequest::Lock => ("lock terminal", [LOG_IN, DONE, DONE, DONE, "already locked", DONE]),
         SessionRequest::Unlock(_) => {
             ("unlock terminal", ["not locked", "not locked", "not locked", "not locked", DONE, "not locked"])
         }

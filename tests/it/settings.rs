@@ -123,7 +123,7 @@ async fn a_plant_without_a_file_says_that_nothing_can_be_saved() {
     let mut session = station.session("anna");
     let outcome = send_command(&mut session, 1, CommandKind::SaveSettings(L1)).await;
     let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };
-    assert!(why.contains("part of the program"), "{why}");
+    assert!(why.contains("built into the program"), "{why}");
     drop(session);
     station.stop().await;
 }

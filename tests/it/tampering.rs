@@ -59,7 +59,7 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
     let doubled = [&lines[..3], &lines[2..]].concat().concat();
     let edited = good.replacen("\"outcome\":\"done\"", "\"outcome\":\"undone\"", 1);
     let cases = [
-        ("edited", edited, 1, "this line was changed or put in"),
+        ("edited", edited, 1, "this line was changed or inserted"),
         ("cut", without(2), 3, "lines before it were cut out or moved"),
         ("first line cut", without(0), 1, "lines before it were cut out or moved"),
         ("tail cut", lines[..count - 2].concat(), count - 1, &format!("the station has noted {count} entries")),

@@ -121,7 +121,7 @@ fn a_unit_that_answers_wrongly_is_not_called_silent() {
     let unit = peer(answers(|_| vec![0, 1, 0, 0, 0, 9, 1, 3, 6, 0, 7, 0, 7, 0, 7]));
     let (code, said) = run(&["probe", &unit, "--read", "holding:0:2"]);
     assert_eq!(code, Some(1));
-    assert!(said.contains("answers, but wrongly: answer with") && !said.contains("not responding"), "{said}");
+    assert!(said.contains("answers, but wrongly: response with") && !said.contains("not responding"), "{said}");
     let silent = peer(std::mem::forget);
     let (code, said) = run(&["probe", &silent, "--timeout", "20"]);
     assert!(code == Some(1) && said.contains("the unit does not respond"), "{code:?} {said}");
