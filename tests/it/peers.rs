@@ -140,9 +140,12 @@ fn a_faulty_answer_is_never_shown_as_a_value() {
     for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
         check(&said, &[(tag, "---- bad: device not responding")]);
     }
-    for (unit, why) in
-        [("LATE", "response timeout"), ("CORRUPT", "CRC error"), ("SILENT", "response timeout"), ("CUT", "incomplete response")]
-    {
+    for (unit, why) in [
+        ("LATE", "response timeout"),
+        ("CORRUPT", "CRC error"),
+        ("SILENT", "response timeout"),
+        ("CUT", "incomplete response"),
+    ] {
         assert!(said.iter().any(|line| line.contains(unit) && line.contains(why)), "{unit} {why}: {}", said.join("\n"));
     }
 }
