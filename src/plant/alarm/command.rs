@@ -42,7 +42,7 @@ pub enum AlarmCommand {
     Shelve {
         /// Which.
         alarm: AlarmId,
-        /// For how long, at most [`crate::plant::def::AlarmRules::shelve_max`].
+        /// For how long, at most `shelve_max` of the plant file.
         lasts: Duration,
     },
     /// Take an alarm back from the shelf before its time.
@@ -71,7 +71,7 @@ pub enum AlarmRefusal {
     /// Shelving and taking out of service need a reason.
     #[error("{}", t!("a reason is required"))]
     ReasonNeeded,
-    /// A note or reason is longer than [`NOTE_CHARS_MAX`] characters.
+    /// A note or reason is longer than `NOTE_CHARS_MAX` characters.
     #[error("{}", t!("more than {most} characters", most = NOTE_CHARS_MAX))]
     TooLong,
     /// Not for no time, and not for longer than the plant allows.
