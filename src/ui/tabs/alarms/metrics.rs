@@ -19,7 +19,7 @@ const EVERY_S: f64 = 30.0;
 /// An alarm that has been active for longer is stale.
 const STALE: Duration = Duration::from_secs(24 * 3_600);
 /// Columns of the table; where there are more than twice as many the bad actors stand beside it.
-const TABLE: u16 = 76;
+const TABLE: u16 = 80;
 
 /// State of the page.
 #[derive(Debug, Default)]
@@ -168,7 +168,7 @@ fn now_text(cx: &ViewContext) -> (String, bool) {
 fn line(theme: &Theme, [measure, figure, target, limit, verdict]: [&str; 5]) -> String {
     let sign = |bound: &str| {
         let bound = bound.replace("at most", theme.pick("≤", "<=")).replace("at least", theme.pick("≥", ">="));
-        pad(&bound.replace("below", "<"), 8)
+        pad(&bound.replace("below", "<"), 7)
     };
-    format!("{}  {} {} {verdict}", draw::columns([35, -8], [measure, figure]), sign(target), sign(limit))
+    format!("{}  {} {} {verdict}", draw::columns([33, -8], [measure, figure]), sign(target), sign(limit))
 }

@@ -218,6 +218,16 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     assert!(screen(&mut model, 80, 24).contains("last 24 hours: 220 alarms"));
 }
 
+#[test]
+fn a_result_is_shown_whole_at_every_size() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    type_keys(&mut model, "3vvvv");
+    for (width, height) in [(80, 24), (120, 40), (160, 50)] {
+        let picture = screen(&mut model, width, height);
+        assert!(picture.contains(" insufficient data"), "{picture}");
+    }
+}
+
 fn action(seconds: i64, by: &str, action: &str, target: &str, outcome: &str, note: Option<&str>) -> ActionRecord {
     ActionRecord {
         at: ago(seconds),
