@@ -17,7 +17,7 @@ pub fn redact(snapshot: &Snapshot) -> Snapshot {
         lost_since: line.lost_since,
         ..LineStatus::default()
     };
-    let answering = |device: &DeviceStatus| DeviceStatus {
+    let responding = |device: &DeviceStatus| DeviceStatus {
         state: device.state,
         diagnosis: device.diagnosis,
         ..DeviceStatus::default()
@@ -30,7 +30,7 @@ pub fn redact(snapshot: &Snapshot) -> Snapshot {
         samples: vec![Sample::bad(Cause::NotAuthorised, snapshot.at); blank.samples.len()],
         decimals: snapshot.decimals.clone(),
         lines: snapshot.lines.iter().map(reached).collect(),
-        devices: snapshot.devices.iter().map(answering).collect(),
+        devices: snapshot.devices.iter().map(responding).collect(),
         alarms: Arc::new(snapshot.alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect()),
         suppressed: snapshot.suppressed.clone(),
         sound: snapshot.sound,

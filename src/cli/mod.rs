@@ -75,7 +75,7 @@ enum Command {
     Ack(act::AckArgs),
     /// Write a tag at the running station and wait until it is verified
     Write(act::WriteArgs),
-    /// Verifies the audit log: `audit verify` names the first line that was changed, `audit key` has it sealed
+    /// Verify the audit log: `audit verify` names the first line that was changed, `audit key` has it sealed
     Audit(audit::Args),
     /// Stop the running station
     Stop(control::Args),

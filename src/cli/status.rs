@@ -110,7 +110,7 @@ fn line_words(state: &LineState) -> String {
 fn device_word(state: DeviceState) -> &'static str {
     match state {
         DeviceState::Unknown => "not polled yet",
-        DeviceState::Answering => "answers",
+        DeviceState::Responding => "responding",
         DeviceState::Failing(_) => "fails",
         DeviceState::Down { .. } => "not responding",
     }
@@ -134,7 +134,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
     let devices = def.devices.iter().zip(&snapshot.devices).map(|(device, status)| {
         json!({
             "name": device.name, "unit": device.unit, "state": device_word(status.state),
-            "responding": status.state == DeviceState::Answering,
+            "responding": status.state == DeviceState::Responding,
             "ne107": status.diagnosis.map(|reason| reason.to_string()),
             "reply_ms": status.reply.map(|reply| reply.as_secs_f64() * 1e3),
             "ok": count(status.ok), "failed": count(status.failed),

@@ -158,7 +158,7 @@ pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
     match input.device {
         DeviceState::Down { .. } => Some(Reason::Down),
         DeviceState::Unknown => None,
-        DeviceState::Answering | DeviceState::Failing(_) => {
+        DeviceState::Responding | DeviceState::Failing(_) => {
             out_of_specification(input.lately, input.timeout).or_else(|| maintenance(input.lately))
         }
     }
@@ -201,7 +201,7 @@ mod tests {
     use super::*;
     use crate::plant::event::Fault;
 
-    const UP: DeviceState = DeviceState::Answering;
+    const UP: DeviceState = DeviceState::Responding;
     const DOWN: DeviceState = DeviceState::Down { since: Timestamp::UNIX_EPOCH };
 
     /// `good` answers in `reply_ms`, then these faults.

@@ -138,7 +138,7 @@ impl Plant {
                 let tags = values.iter().map(|(tag, _)| *tag).chain(texts.iter().map(|(tag, _)| *tag));
                 self.keep_source_frames(tags, exchange);
                 let status = &mut self.devices[device.index()];
-                status.state = DeviceState::Answering;
+                status.state = DeviceState::Responding;
                 status.reply = Some(reply);
                 status.ok += 1;
                 status.values += (values.len() + texts.len()) as u64;

@@ -246,7 +246,7 @@ pub enum DeviceState {
     #[default]
     Unknown,
     /// Its last request was answered.
-    Answering,
+    Responding,
     /// The last `n` requests failed, not enough to give it up.
     Failing(u32),
     /// Given up, probed now and then.

@@ -39,7 +39,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     }
     check_names(tables, problems);
     check_order(tables, problems);
-    let of_devices = defs.devices.iter().map(|device| (&device.name, not_answering(device)));
+    let of_devices = defs.devices.iter().map(|device| (&device.name, not_responding(device)));
     let of_lines = defs.lines.iter().map(|line| (&line.name, overloaded(line)));
     for (name, alarm) in of_devices.chain(of_lines) {
         if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
@@ -161,7 +161,7 @@ fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
     }
 }
 
-fn not_answering(device: &DeviceDef) -> AlarmDef {
+fn not_responding(device: &DeviceDef) -> AlarmDef {
     AlarmDef {
         class: AlarmClass::System,
         // The link has already asked more than once; the delay keeps a single lost frame quiet.

@@ -58,10 +58,10 @@ fn device_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
                 let why = after.device(device.id).last_fault.map(|(_, fault)| format!(": {fault}")).unwrap_or_default();
                 lines.push(format!("device {} (unit {}): not responding{why}", device.name, device.unit));
             }
-            DeviceState::Answering if was_down => {
-                lines.push(format!("device {} (unit {}): answers", device.name, device.unit));
+            DeviceState::Responding if was_down => {
+                lines.push(format!("device {} (unit {}): responding", device.name, device.unit));
             }
-            DeviceState::Down { .. } | DeviceState::Answering | DeviceState::Failing(_) | DeviceState::Unknown => {}
+            DeviceState::Down { .. } | DeviceState::Responding | DeviceState::Failing(_) | DeviceState::Unknown => {}
         }
     }
     lines

@@ -75,13 +75,13 @@ impl Fixture {
             last_rx: Some(at),
             ..LineCounters::default()
         };
-        let answering = DeviceStatus {
-            state: DeviceState::Answering,
+        let responding = DeviceStatus {
+            state: DeviceState::Responding,
             reply: Some(Duration::from_millis(12)),
             ok: 406,
             ..DeviceStatus::default()
         };
-        let devices = vec![answering; def.devices.len()];
+        let devices = vec![responding; def.devices.len()];
         Fixture {
             source_frames: vec![None; def.tags.len()],
             sets: Vec::new(),

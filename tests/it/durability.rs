@@ -80,14 +80,14 @@ fn an_unplugged_port_comes_back() {
             .arg(folder.path().join("tank.duckdb"))
             .env("XDG_STATE_HOME", folder.path()),
     );
-    station.wait_for("TIC-1 (unit 1): answers");
+    station.wait_for("TIC-1 (unit 1): responding");
     for _ in 0..3 {
         sim.signal("KILL");
         sim.end();
         station.wait_for("not connected");
         sim = start_sim();
         station.wait_for("connected");
-        station.wait_for("TIC-1 (unit 1): answers");
+        station.wait_for("TIC-1 (unit 1): responding");
     }
     station.signal("TERM");
     assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
@@ -148,13 +148,13 @@ fn station_on(disk: &SmallDisk, port: &str, log: &[&str]) -> Process {
 fn survive(station: &mut Process, sim: Process, port: &str, disk: &SmallDisk, outage: &Outage) -> (Timestamp, Process) {
     station.expect(outage.words);
     outage.faults.iter().for_each(|fault| station.expect(&format!("RAISED: station {}", fault.word())));
-    station.expect("TIC-1 (unit 1): answers");
+    station.expect("TIC-1 (unit 1): responding");
     drop(sim);
     station.wait_for("line L1: not connected");
     station.wait_for("RAISED: TIC-1 not responding");
     let mut sim = Process::start(sightglass().args(["sim", "tank", "--tcp", port]));
     sim.wait_for(" on 127.0.0.1:");
-    station.wait_for("TIC-1 (unit 1): answers");
+    station.wait_for("TIC-1 (unit 1): responding");
     let ended = Timestamp::now();
     (outage.end)(disk);
     station.wait_for("history: recovered");

@@ -70,7 +70,7 @@ impl Place {
                 .env("XDG_RUNTIME_DIR", &self.sockets)
                 .env("XDG_STATE_HOME", self.folder.path()),
         );
-        station.wait_for("TIC-1 (unit 1): answers");
+        station.wait_for("TIC-1 (unit 1): responding");
         station
     }
 

@@ -85,7 +85,7 @@ impl Guarded {
         let socket = tokio::spawn(async move { listener.serve(&acceptor).await });
         let sv = def.tag_named("TIC-1.SV").unwrap();
         let known = |snapshot: &Arc<Snapshot>| {
-            let answers = snapshot.devices.iter().all(|device| device.state == DeviceState::Answering);
+            let answers = snapshot.devices.iter().all(|device| device.state == DeviceState::Responding);
             answers && snapshot.sample(sv).quality.is_good()
         };
         until(&mut truth, "the devices answer", known).await;

@@ -178,7 +178,7 @@ impl Place {
                 .env("XDG_STATE_HOME", self.folder.path())
                 .env("SIGHTGLASS_LOG", "warn"),
         );
-        station.wait_for("TIC-1 (unit 1): answers");
+        station.wait_for("TIC-1 (unit 1): responding");
         station
     }
 

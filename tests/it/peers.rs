@@ -264,7 +264,7 @@ fn half_an_answer_over_tcp_is_never_shown_as_a_value() {
     let _slave = slave(&python, "tcp", &port.to_string());
     let said = read_faults(&[WELL, CUT], "tcp", &format!("127.0.0.1:{port}"));
     check(&said, &[("CUT.N", "---- bad")]);
-    assert!(said.iter().any(|line| line.contains("WELL (unit 3): answers")), "{}", said.join("\n"));
+    assert!(said.iter().any(|line| line.contains("WELL (unit 3): responding")), "{}", said.join("\n"));
 }
 
 /// The fixed values of its unit-test.h, and the deliberate faults of its unit-test-server.c.

@@ -238,7 +238,7 @@ impl Running {
                 .env("XDG_RUNTIME_DIR", &sockets)
                 .env("XDG_STATE_HOME", folder.path()),
         );
-        station.wait_for("TIC-2 (unit 2): answers");
+        station.wait_for("TIC-2 (unit 2): responding");
         Running { folder, sockets, def, _processes: [sim, station] }
     }
 

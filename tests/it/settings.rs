@@ -70,7 +70,7 @@ async fn send_command(session: &mut Session, number: u32, kind: CommandKind) -> 
 }
 
 fn all_answer(snapshot: &Snapshot) -> bool {
-    snapshot.devices.iter().all(|device| device.state == DeviceState::Answering)
+    snapshot.devices.iter().all(|device| device.state == DeviceState::Responding)
 }
 
 fn faster(def: &PlantDef) -> LineDef {

@@ -113,9 +113,9 @@ fn value_of(def: &crate::plant::PlantDef, image: &ProcessImage, alarm: AlarmId) 
 /// A device that refuses everything is as good as silent.
 fn answers(state: DeviceState, no_values: bool) -> Option<bool> {
     match state {
-        DeviceState::Answering | DeviceState::Failing(_) if no_values => Some(false),
+        DeviceState::Responding | DeviceState::Failing(_) if no_values => Some(false),
         DeviceState::Unknown | DeviceState::Failing(_) => None,
-        DeviceState::Answering => Some(true),
+        DeviceState::Responding => Some(true),
         DeviceState::Down { .. } => Some(false),
     }
 }

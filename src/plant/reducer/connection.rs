@@ -30,13 +30,13 @@ impl Plant {
             }
             FaultKind::NotConnected => return,
             // An exception proves that the device is there, unless a gateway sent it.
-            FaultKind::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Answering,
-            FaultKind::NotANumber => status.state = DeviceState::Answering,
+            FaultKind::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Responding,
+            FaultKind::NotANumber => status.state = DeviceState::Responding,
             FaultKind::Exception(_) | FaultKind::Timeout | FaultKind::Corrupt | FaultKind::OutOfSync => {
                 status.state = match status.state {
                     DeviceState::Down { since } => DeviceState::Down { since },
                     DeviceState::Failing(n) => DeviceState::Failing(n.saturating_add(1)),
-                    DeviceState::Unknown | DeviceState::Answering => DeviceState::Failing(1),
+                    DeviceState::Unknown | DeviceState::Responding => DeviceState::Failing(1),
                 };
             }
         }

@@ -56,8 +56,8 @@ pub(super) const ROWS: [Row; 18] = [
         InjectedFault::Noise(10),
         "noise",
         TargetKind::Line,
-        "Interference, a missing termination or a bad screen: bits change on the way, in requests and in answers.",
-        "The check of a frame finds every single wrong bit: no value is wrong, some are missing. Corrupt answers and \
+        "Interference, a missing termination or a bad screen: bits change on the way, in requests and in responses.",
+        "The check of a frame finds every single wrong bit: no value is wrong, some are missing. Corrupt responses and \
          timeouts of all units on the line are counted on Bus; values grow old only when it is bad.",
         "Compare the units on Bus: all of them suffering points to the cable, one to that unit.",
     )
@@ -76,17 +76,17 @@ pub(super) const ROWS: [Row; 18] = [
         "late",
         TargetKind::Unit,
         "The unit is overloaded or sits behind a slow radio or converter.",
-        "An answer within the timeout is only slower. A later one is a timeout; when it then arrives it is thrown away \
-         as stale and never taken for the answer to the next request.",
-        "See the answer times on Bus; raise timeout_ms of the line if the unit is meant to be slow.",
+        "A response within the timeout is only slower. A later one is a timeout; when it then arrives it is thrown away \
+         as stale and never taken for the response to the next request.",
+        "See the response times on Bus; raise timeout_ms of the line if the unit is meant to be slow.",
     )
     .with_number("s", 0.05, 60.0, &[0.2, 0.5, 1.0, 2.0, 5.0]),
     row(
         InjectedFault::BadCrc,
         "bad crc",
         TargetKind::Unit,
-        "The check of each answer is wrong: a defective driver, or two units with one address.",
-        "No value is taken from such an answer. A write may have been done although its answer is not readable: its \
+        "The check of each response is wrong: a defective driver, or two units with one address.",
+        "No value is taken from such a response. A write may have been done although its response is not readable: its \
          outcome is \"may have taken effect\".",
         "Read the value back before writing again.",
     ),
@@ -94,8 +94,8 @@ pub(super) const ROWS: [Row; 18] = [
         InjectedFault::Cut,
         "cut",
         TargetKind::Unit,
-        "Each answer ends in the middle: the driver switches off too early, or the unit restarts.",
-        "An answer that is too short is no answer. As with a wrong check, a write may have been done.",
+        "Each response ends in the middle: the driver switches off too early, or the unit restarts.",
+        "A response that is too short is no response. As with a wrong check, a write may have been done.",
         "See the frames on Bus: where they end shows which side switches off.",
     ),
     row(
@@ -103,7 +103,7 @@ pub(super) const ROWS: [Row; 18] = [
         "exception",
         TargetKind::Unit,
         "The unit understands and refuses: no such register, busy, or its own failure.",
-        "Values are bad with the exception as their cause. The unit counts as answering, so its alarm \"not responding\" \
+        "Values are bad with the exception as their cause. The unit counts as responding, so its alarm \"not responding\" \
          does not come.",
         "Press w on a value and read why it is bad; the code says what the unit objects to.",
     )
@@ -112,7 +112,7 @@ pub(super) const ROWS: [Row; 18] = [
         InjectedFault::Stuck,
         "stuck value",
         TargetKind::Value,
-        "The measuring part of the unit hangs while its communication goes on: every answer is good and old.",
+        "The measuring part of the unit hangs while its communication goes on: every response is good and old.",
         "The line shows nothing. A master sees it only by a value that should move and does not: by another \
          measurement, by its effect, or by an alarm on no change, where there is one.",
         "Compare with what the process must do: heating without a change of temperature is not possible.",
@@ -122,7 +122,7 @@ pub(super) const ROWS: [Row; 18] = [
         "torn value",
         TargetKind::Value,
         "The unit updates a 32-bit value between its two words: one word is new, one is of the reading before.",
-        "Inside one good answer no master can see it. It shows as a jump that the next reading takes back; only a value \
+        "Inside one good response no master can see it. It shows as a jump that the next reading takes back; only a value \
          outside of the range of the tag is refused.",
         "Distrust single spikes; ask the maker for a register that latches.",
     ),

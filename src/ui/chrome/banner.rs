@@ -115,12 +115,12 @@ fn blind_text(model: &Model, cx: &ViewContext) -> Option<String> {
     let devices = cx.def().devices.iter().filter(|device| snapshot.line(device.line).state == LineState::Connected);
     let devices = devices.filter_map(|device| match snapshot.device(device.id).state {
         DeviceState::Down { .. } => Some(t!("{name} not responding", name = device.name)),
-        DeviceState::Answering | DeviceState::Failing(_)
+        DeviceState::Responding | DeviceState::Failing(_)
             if snapshot.device(device.id).diagnosis == Some(Reason::NoValues) =>
         {
             Some(t!("{name} has no valid values", name = device.name))
         }
-        DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_) => None,
+        DeviceState::Unknown | DeviceState::Responding | DeviceState::Failing(_) => None,
     });
     let blind: Vec<String> = silent.into_iter().chain(lines).chain(devices).collect();
     (!blind.is_empty()).then(|| not_judged(&blind.join(", ")))

@@ -42,7 +42,7 @@ impl Notice {
             (LineState::Connected, DeviceState::Down { since }) => {
                 t!("No data received since {clock}.", clock = clock(since, &cx.def().time_zone))
             }
-            (LineState::Connected, DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_)) => {
+            (LineState::Connected, DeviceState::Unknown | DeviceState::Responding | DeviceState::Failing(_)) => {
                 return None;
             }
         };

@@ -304,7 +304,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
         LineState::Waiting { why, .. } => (t!("{name} is not connected: {why}", name, why), false),
         LineState::Connected => {
             let devices = cx.def().devices.iter().filter(|device| device.line == line);
-            let well = |state| matches!(state, DeviceState::Answering | DeviceState::Unknown);
+            let well = |state| matches!(state, DeviceState::Responding | DeviceState::Unknown);
             let all_well = devices.clone().all(|device| well(cx.snapshot.device(device.id).state));
             let words: Vec<String> =
                 devices.map(|device| format!("{} {}", device.name, device_text(cx, device.id))).collect();

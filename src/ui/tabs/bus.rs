@@ -304,7 +304,7 @@ impl<'a> Place<'a> {
 pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
     let silent = |device: &&DeviceDef| match cx.snapshot.device(device.id).state {
         DeviceState::Failing(_) | DeviceState::Down { .. } => line.is_none_or(|line| line == device.line),
-        DeviceState::Unknown | DeviceState::Answering => false,
+        DeviceState::Unknown | DeviceState::Responding => false,
     };
     cx.def().devices.iter().filter(silent).map(|device| UiAction::Command(CommandKind::Refresh(device.id))).collect()
 }

@@ -34,7 +34,7 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     if let Some((failed, of)) = stats.map(|stats| stats.recent()).filter(|(failed, _)| 0 < *failed) {
         text += &t!(", {failed} of the last {of} failed", failed, of);
     }
-    let well = matches!(status.state, DeviceState::Answering | DeviceState::Unknown);
+    let well = matches!(status.state, DeviceState::Responding | DeviceState::Unknown);
     let mut rows = vec![Row::new(t!("device"), text, if well { theme.normal() } else { theme.trouble() })];
     rows.extend(status.diagnosis.map(|reason| {
         let signal = reason.signal();

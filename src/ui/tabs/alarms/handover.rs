@@ -230,7 +230,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
         let status = snapshot.device(device.id);
         let words = match (status.state, status.diagnosis) {
             (DeviceState::Down { .. }, _) => device_text(cx, device.id),
-            (DeviceState::Unknown | DeviceState::Answering | DeviceState::Failing(_), reason) => {
+            (DeviceState::Unknown | DeviceState::Responding | DeviceState::Failing(_), reason) => {
                 let signal = reason?.signal();
                 format!("{} {}", signal.word(), translate(signal.label()))
             }

@@ -263,7 +263,7 @@ fn devices(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec
 fn state(cx: &ViewContext, device: &DeviceDef) -> String {
     match cx.snapshot.device(device.id).state {
         DeviceState::Unknown => t!("not polled").to_owned(),
-        DeviceState::Answering => t!("OK").to_owned(),
+        DeviceState::Responding => t!("OK").to_owned(),
         DeviceState::Failing(times) => t!("failing {times}×", times),
         DeviceState::Down { since } => {
             let (running, retry_text) = (running(between(since, cx.now)), retry_text(cx, device.id));

@@ -102,7 +102,7 @@ pub fn status_text(cx: &ViewContext, device: DeviceId) -> (String, Style) {
             let retry = if reason == Reason::Down { retry_text(cx, device) } else { String::new() };
             (format!("{} {}: {reason}{retry}", signal_mark(signal), translate(signal.label())), theme.trouble())
         }
-        (None, DeviceState::Answering) => (format!("✓ {}", device_text(cx, device)), theme.normal()),
+        (None, DeviceState::Responding) => (format!("✓ {}", device_text(cx, device)), theme.normal()),
         (None, DeviceState::Unknown) => (format!("? {}", device_text(cx, device)), theme.dim()),
         (None, DeviceState::Failing(_) | DeviceState::Down { .. }) => {
             (format!("✗ {}", device_text(cx, device)), theme.trouble())

@@ -198,7 +198,7 @@ fn mode(cx: &ViewContext, device: &DeviceDef) -> String {
 }
 
 fn answers(cx: &ViewContext, device: DeviceId) -> bool {
-    matches!(cx.snapshot.device(device).state, DeviceState::Answering | DeviceState::Failing(_))
+    matches!(cx.snapshot.device(device).state, DeviceState::Responding | DeviceState::Failing(_))
 }
 
 /// The mark of NE 107 and its words; a device that is well has a tick.
@@ -206,7 +206,7 @@ fn state(cx: &ViewContext, device: DeviceId) -> (String, String, Style) {
     let status = cx.snapshot.device(device);
     match (status.diagnosis, status.state) {
         (Some(reason), _) => (signal_mark(reason.signal()), reason.to_string(), cx.theme.trouble()),
-        (None, DeviceState::Answering) => ("✓".to_owned(), t!("good").to_owned(), cx.theme.dim()),
+        (None, DeviceState::Responding) => ("✓".to_owned(), t!("good").to_owned(), cx.theme.dim()),
         (None, DeviceState::Unknown) => ("?".to_owned(), t!("not polled yet").to_owned(), cx.theme.dim()),
         (None, DeviceState::Failing(n)) => ("✗".to_owned(), t!("failing, {n} in a row", n), cx.theme.trouble()),
         (None, DeviceState::Down { .. }) => ("✗".to_owned(), t!("not responding").to_owned(), cx.theme.trouble()),
