@@ -17,7 +17,7 @@ pub(crate) struct Row {
     /// What an operator can see of it, and what not.
     pub symptoms: &'static str,
     /// What a good operator does.
-    pub response: &'static str,
+    pub action: &'static str,
     /// What its number can be, if it has one.
     pub parameter: Option<Parameter>,
 }
@@ -34,9 +34,9 @@ const fn row(
     target_kind: TargetKind,
     cause: &'static str,
     symptoms: &'static str,
-    response: &'static str,
+    action: &'static str,
 ) -> Row {
-    Row { fault, word, target_kind, cause, symptoms, response, parameter: None }
+    Row { fault, word, target_kind, cause, symptoms, action, parameter: None }
 }
 
 impl InjectedFault {

@@ -119,7 +119,7 @@ fn describe(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Injec
     };
     paragraph("", description.cause);
     paragraph(t!("Symptoms: "), description.symptoms);
-    paragraph(t!("Response: "), description.response);
+    paragraph(t!("Action: "), description.action);
 
     let truth = compare(cx, status, target);
     let wanted = (to_u16(truth.len()) + 1).min(canvas.height().saturating_sub(to_u16(lines.len()) + 1));
