@@ -186,6 +186,24 @@ pub enum HistoryError {
         /// Rows that are permitted.
         max: u64,
     },
+    /// Another version of the program wrote the file; only a station, which may change it, upgrades an older one.
+    #[error(
+        "the history {path} was written by {} version of sightglass (schema {found}, this one reads {expected}): {}",
+        if found < expected { "an older" } else { "a newer" },
+        if found < expected {
+            format!("start the station once to upgrade it, `sightglass run PLANT --history {path}`")
+        } else {
+            "use that version".to_owned()
+        }
+    )]
+    OtherSchema {
+        /// The file.
+        path: String,
+        /// The version of its schema.
+        found: u32,
+        /// That of this program.
+        expected: u32,
+    },
     /// The query makes no sense: empty or negative span.
     #[error("empty period")]
     EmptyPeriod,
@@ -209,6 +227,7 @@ impl HistoryError {
             HistoryError::Foreign { .. }
             | HistoryError::Missing { .. }
             | HistoryError::TooManyRows { .. }
+            | HistoryError::OtherSchema { .. }
             | HistoryError::EmptyPeriod
             | HistoryError::NotOpen
             | HistoryError::TooLong { .. } => self.to_string(),

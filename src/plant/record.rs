@@ -172,10 +172,8 @@ pub const SEAL_LOG: &str = "seal audit log";
 
 /// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
-pub const NOT_PROCESS_ACTIONS: [&str; 27] = [
+pub const NOT_PROCESS_ACTIONS: [&str; 31] = [
     WRITE_REQUESTED,
-    // The same in a history of an earlier version.
-    "order",
     SEAL_LOG,
     "attach",
     "detach",
@@ -201,6 +199,12 @@ pub const NOT_PROCESS_ACTIONS: [&str; 27] = [
     "start station",
     "stop station",
     "reload",
+    // In a history of an earlier version: write requested, lockout, reauthentication failed, audit log, and its reading.
+    "order",
+    "lock-out",
+    "signature failed",
+    "audit trail",
+    "read audit trail",
 ];
 
 /// The place of an entry in the hash chain of the audit log.

@@ -173,6 +173,33 @@ fn no_command_writes_a_report_an_export_or_a_log_into_the_history() {
 }
 
 #[test]
+fn a_history_of_an_older_version_is_read_after_one_start() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    history(&path, |_, _| Vec::new());
+    // The last migration only renames words.
+    let old = duckdb::Connection::open(&path).unwrap();
+    old.execute_batch("DELETE FROM schema_version WHERE version > 7; CHECKPOINT").unwrap();
+    drop(old);
+    let period = ["--from", START, "--to", "2026-03-02T08:00:00Z"];
+    let commands = [("report", &["--out", "-"][..]), ("export", &["--tags", "TIC-1.PV"]), ("alarms", &["--stats"])];
+    let start = format!("sightglass run PLANT --history {}", path.display());
+    for (command, args) in commands {
+        let (code, out, err) = run(command, &path, &[&period[..], args].concat());
+        assert_eq!((code, &*out), (Some(1), ""), "{command}: {err}");
+        assert!(err.contains("older version of sightglass (schema 7, this one reads 8)"), "{command}: {err}");
+        assert!(err.contains(&start), "{command}: {err}");
+    }
+    let started = ["--for", "1s", "--port", "L1=/dev/none"];
+    let (code, _, err) = run("run", &path, &started);
+    assert_eq!(code, Some(0), "{err}");
+    for (command, args) in commands {
+        let (code, _, err) = run(command, &path, &[&period[..], args].concat());
+        assert_eq!(code, Some(0), "{command}: {err}");
+    }
+}
+
+#[test]
 fn an_export_has_no_rows_beyond_the_present() {
     let folder = folder();
     let path = folder.path().join("tank.duckdb");

@@ -158,8 +158,7 @@ impl Store {
         let mut store = Store::around(db, path, def);
         let version = store.version().map_err(|_| HistoryError::Engine("the file is not a history".into()))?;
         if version as usize != sql::MIGRATIONS.len() {
-            let words = format!("schema version {version}, this program reads {}", sql::MIGRATIONS.len());
-            return Err(HistoryError::Engine(words));
+            return Err(other_schema(path, version));
         }
         store.ids = ids(def, &store.dictionary().map_err(engine)?);
         store.read_last_commit().map_err(engine)?;
@@ -172,11 +171,9 @@ impl Store {
         let db = connect(path, AccessMode::ReadWrite).map_err(failed)?;
         let mut store = Store::around(db, path, def);
         store.migrate().map_err(failed)?;
-        let newest = to_u32(sql::MIGRATIONS.len());
         let version = store.version().map_err(failed)?;
-        if version > newest {
-            let words = format!("schema version {version} is of a newer sightglass, this one writes {newest}");
-            return Err(Failure::Obstacle(HistoryError::Engine(words)));
+        if sql::MIGRATIONS.len() < version as usize {
+            return Err(Failure::Obstacle(other_schema(path, version)));
         }
         store.register_tags().map_err(failed)?;
         if store.ids.contains(&None) {
@@ -231,6 +228,11 @@ impl Store {
         self.ids = ids(&self.def, &known);
         Ok(())
     }
+}
+
+fn other_schema(path: &Path, found: u32) -> HistoryError {
+    let expected = to_u32(sql::MIGRATIONS.len());
+    HistoryError::OtherSchema { path: path.display().to_string(), found, expected }
 }
 
 /// The stored number of each tag, by `TagId`.

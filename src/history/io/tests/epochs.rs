@@ -1,4 +1,4 @@
-//! Epochs of the clock, minutes of lines, and migrations.
+//! Epochs of the clock and minutes of lines.
 
 use super::*;
 
@@ -18,24 +18,6 @@ fn what_a_line_counted_comes_back_minute_by_minute() {
     {
         assert_eq!(store.answer(&query, sec(300)).unwrap(), Answer::LineMinutes(expect.to_vec()), "{query:?}");
     }
-}
-
-#[test]
-fn an_older_history_is_migrated_and_keeps_its_rows() {
-    let (_folder, db) = folder();
-    let old = duckdb::Connection::open(&db).unwrap();
-    old.execute_batch(sql::CREATE_VERSION).unwrap();
-    old.execute_batch(sql::MIGRATIONS[0]).unwrap();
-    old.execute(sql::SET_VERSION, [1]).unwrap();
-    old.execute_batch(
-        "INSERT INTO tag VALUES (0, 'TIC-1.PV', '°C'); INSERT INTO sample VALUES ('1970-01-01', 0, 27.0, 0)",
-    )
-    .unwrap();
-    drop(old);
-    let store = open(&db, 10);
-    store.append(&[Record::Line(minute("L1", 60, 60)), Record::Action(action(5))]).unwrap();
-    // The value, the end of its curve, the minute, the action.
-    assert_eq!(store.count_rows().unwrap(), 4);
 }
 
 #[test]
@@ -67,21 +49,6 @@ fn a_start_before_the_last_record_begins_an_epoch() {
     assert_eq!(run(1_000), (0, 0));
     assert_eq!(run(2_000), (0, 0));
     assert_eq!(run(500), (1, 1));
-}
-
-#[test]
-fn migrations_are_numbered_and_run_once() {
-    let (_folder, db) = folder();
-    for _ in 0..2 {
-        let store = open(&db, 0);
-        let versions: u32 = store.db.query_row("SELECT count(*) FROM schema_version", [], |row| row.get(0)).unwrap();
-        assert_eq!(versions as usize, sql::MIGRATIONS.len());
-    }
-    open(&db, 0).db.execute_batch("INSERT INTO schema_version VALUES (999)").unwrap();
-    assert!(
-        matches!(Store::open(&db, &def(), sec(0)).err(), Some(HistoryError::Engine(words)) if words.contains("newer"))
-    );
-    assert!(db.exists());
 }
 
 #[test]

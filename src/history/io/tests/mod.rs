@@ -5,6 +5,7 @@ mod absent;
 mod damage;
 mod epochs;
 mod lists;
+mod migrations;
 mod flips;
 mod alarm_metrics;
 mod pieces;
