@@ -15,7 +15,6 @@ mod jobs;
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::Arc,
-    time::Duration,
 };
 
 use jiff::{SignedDuration, Timestamp};
@@ -361,8 +360,4 @@ fn enough(role: Role, needed: Role) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("this is for a {}, you are {}", needed.word(), role.word()))
-}
-
-fn passed(from: Timestamp, to: Timestamp) -> Duration {
-    Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }

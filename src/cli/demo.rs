@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use crate::{
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, Query},
-    plant::{PlantDef, Snapshot},
+    plant::{PlantDef, Snapshot, time::elapsed},
     profile::io::atomic::write_for_user,
     report::{self, Period, ShiftReport},
     sim::{
@@ -186,7 +186,7 @@ fn summary(last: &Snapshot, report: &ShiftReport) -> Vec<String> {
     }
     let values: u64 = last.devices.iter().map(|device| device.values).sum();
     let raised = report.alarms.iter().filter(|step| step.event == AlarmEvent::Raised).count();
-    let span = Duration::try_from(report.until.duration_since(report.period.from)).unwrap_or_default();
+    let span = elapsed(report.period.from, report.until);
     vec![
         format!("plant time     {} s", span.as_secs()),
         format!("polls          {polls} ({ok} good, {timeouts} timeouts, {corrupt} corrupt, {exceptions} exceptions)"),

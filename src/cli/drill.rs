@@ -1,13 +1,13 @@
 //! `sightglass drill`: a scenario in virtual time, with the operator of the scenario, and its verdict.
 
-use std::{path::Path, path::PathBuf, sync::Arc, time::Duration};
+use std::{path::Path, path::PathBuf, sync::Arc};
 
 use jiff::{Timestamp, civil::date};
 use tokio::sync::mpsc;
 
 use crate::{
     bus::io::clock::Clock,
-    plant::{PlantDef, Snapshot},
+    plant::{PlantDef, Snapshot, time::elapsed},
     profile::{self, Kind, Search},
     sim::{
         io::{SimulatorHandle, Trainer, in_memory, journal},
@@ -139,7 +139,7 @@ fn rehearse(
 }
 
 fn changes(began: Timestamp, before: &Snapshot, after: &Snapshot) -> Vec<String> {
-    let at = clock(Duration::try_from(after.at.duration_since(began)).unwrap_or_default());
+    let at = clock(elapsed(began, after.at));
     event_log::changes(before, after).into_iter().map(|line| format!("{at} {line}")).collect()
 }
 

@@ -12,7 +12,7 @@ use jiff::Timestamp;
 use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
     history::{Answer, Query},
-    plant::{PlantDef, def::TagId},
+    plant::{PlantDef, def::TagId, time::elapsed, time::instant_of_grid},
     report::{
         export,
         figures::{self, TagDescription},
@@ -103,7 +103,9 @@ async fn latest(
 /// Start and number of rows of each query about this many tags.
 fn pieces(from: Timestamp, every: Duration, rows: usize, tags: usize) -> impl Iterator<Item = (Timestamp, usize)> {
     let piece = (COLUMNS_MAX / tags.max(1)).clamp(1, BUCKETS_MAX);
-    (0..rows).step_by(piece).map(move |begin| (instant(from, every, begin), piece.min(rows - begin)))
+    (0..rows)
+        .step_by(piece)
+        .map_while(move |begin| Some((instant_of_grid(from, every, begin)?, piece.min(rows - begin))))
 }
 
 /// The tags that were named, or all that are stored.
@@ -122,8 +124,7 @@ fn rows(from: Timestamp, to: Timestamp, every: Duration, tags: usize) -> Result<
     if every < Duration::from_millis(1) {
         return Err(CliError::Usage("--every: expected 1ms or more".to_owned()));
     }
-    let span = Duration::try_from(to.duration_since(from)).unwrap_or_default();
-    let rows = span.as_nanos() / every.as_nanos();
+    let rows = elapsed(from, to).as_nanos() / every.as_nanos();
     let max = ROWS_MAX.min(VALUES_MAX / tags.max(1) as u128);
     if rows == 0 || max < rows {
         return Err(CliError::Usage(format!(
@@ -131,11 +132,6 @@ fn rows(from: Timestamp, to: Timestamp, every: Duration, tags: usize) -> Result<
         )));
     }
     Ok(rows as usize)
-}
-
-fn instant(from: Timestamp, every: Duration, count: usize) -> Timestamp {
-    let ahead = i128::try_from(every.as_nanos()).unwrap_or(i128::MAX).saturating_mul(count as i128);
-    from.checked_add(jiff::SignedDuration::from_nanos_i128(ahead)).unwrap_or(Timestamp::MAX)
 }
 
 fn values(answer: Answer) -> Result<Vec<Vec<Option<HeldValue>>>, CliError> {

@@ -17,6 +17,7 @@ use super::{
     record::{ActionRecord, WRITE_REQUESTED},
     scale,
 };
+use crate::plant::time::elapsed;
 use record::{record, value_text};
 
 pub use record::{HAND_OVER, TAKE_OVER, alarm_action};
@@ -190,7 +191,7 @@ impl CommandTracker {
             status.is_pending()
                 // The writes of a restore expire one by one.
                 && !matches!(status.command.kind, CommandKind::Restore(_))
-                && PENDING_MAX.mul_f64(speed) < Duration::try_from(at.duration_since(status.at)).unwrap_or_default()
+                && PENDING_MAX.mul_f64(speed) < elapsed(status.at, at)
         };
         let outcome = |status: &CommandStatus| match status.command.kind.written() {
             Some(_) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),

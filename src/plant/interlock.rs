@@ -11,6 +11,7 @@ use super::{
     id::TagId,
     sample::{Cause, Sample},
 };
+use crate::plant::time::elapsed;
 
 /// What the plant file says about commands.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -177,7 +178,7 @@ impl ActuatorTracker {
     pub fn disobeys(&self, logic: &ControlLogic, place: usize, at: Timestamp) -> Option<Duration> {
         let since = (*self.since.get(place)?)?;
         let travel = logic.actuators.get(place)?.travel?;
-        let lasts = Duration::try_from(at.duration_since(since)).unwrap_or_default();
+        let lasts = elapsed(since, at);
         (travel <= lasts).then_some(lasts)
     }
 }

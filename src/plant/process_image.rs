@@ -12,7 +12,7 @@ use super::{
     scale,
     tag::{Decimals, Poll, TagDef},
 };
-use crate::plant::number::to_i64;
+use crate::plant::{number::to_i64, time::elapsed};
 
 /// A value is uncertain after so many poll periods without an answer, and bad after [`PERIODS_BAD`].
 pub const PERIODS_UNCERTAIN: u32 = 3;
@@ -149,7 +149,7 @@ impl ProcessImage {
                 Poll::Never if sample.quality.is_good() => NEVER_READ_AGAIN / PERIODS_UNCERTAIN,
                 Poll::Never => continue,
             };
-            let age = Duration::try_from(at.duration_since(sample.at)).unwrap_or_default();
+            let age = elapsed(sample.at, at);
             if sample.quality.is_bad() {
                 continue;
             } else if period * PERIODS_BAD < age {

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::id::TagId;
-use crate::plant::number::to_usize;
+use crate::plant::{number::to_usize, time::elapsed};
 
 /// The tags of a controller's ramp/soak program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -88,10 +88,7 @@ pub struct ProgramWatch {
 impl ProgramWatch {
     /// Takes what is known at `at`: the position and the command, `None` where they are not good.
     pub fn take(&mut self, def: &ProgramDef, position: Option<f64>, command: Option<f64>, at: Timestamp) {
-        let since = self
-            .at
-            .replace(at)
-            .map_or(Duration::ZERO, |before| Duration::try_from(at.duration_since(before)).unwrap_or_default());
+        let since = self.at.replace(at).map_or(Duration::ZERO, |before| elapsed(before, at));
         match (position, self.position) {
             // What happens while the position is unknown is not counted, and that is remembered.
             (None, _) => self.seen = false,

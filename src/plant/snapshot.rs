@@ -30,6 +30,7 @@ use super::{
     traffic::Exchange,
     tuning::Tuning,
 };
+use crate::plant::time::elapsed;
 
 /// The plant at one instant. Losing an intermediate snapshot is harmless.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -121,7 +122,7 @@ impl Snapshot {
     }
     /// Age of a sample at this instant, zero for one that is newer.
     pub fn age(&self, tag: TagId) -> Duration {
-        Duration::try_from(self.at.duration_since(self.sample(tag).at)).unwrap_or_default()
+        elapsed(self.sample(tag).at, self.at)
     }
     /// The value of a tag as text with its decimals or enumeration label, without unit; `None` without a value.
     pub fn text(&self, tag: TagId) -> Option<String> {

@@ -9,6 +9,7 @@ use super::{
     def::{DeviceDef, Faceplate, TagId},
     sample::Sample,
 };
+use crate::plant::time::elapsed;
 
 /// Most extrema of PV that are kept; later ones are only counted.
 const EXTREMA_MAX: usize = 24;
@@ -65,7 +66,7 @@ impl Tuning {
 
     /// How long it took, or has taken by now.
     pub fn elapsed(&self, now: Timestamp) -> Duration {
-        Duration::try_from(self.ended.unwrap_or(now).duration_since(self.began)).unwrap_or_default()
+        elapsed(self.began, self.ended.unwrap_or(now))
     }
     /// All parameters were read after the end.
     pub fn is_known(&self) -> bool {

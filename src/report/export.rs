@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
-use jiff::{SignedDuration, Timestamp};
+use jiff::Timestamp;
 
 use super::{
     csv::{self, iso_millis, number, plain, text},
     step_series::HeldValue,
 };
 use crate::plant::def::{CsvDialect, PlantDef};
+use crate::plant::time::instant_of_grid;
 
 /// A tag to export.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,16 +50,10 @@ pub fn export_csv(
     let header = std::iter::once(plain("time")).chain(columns.iter().flat_map(head)).collect();
     let count = columns.iter().map(|column| column.values.len()).max().unwrap_or(0);
     let rows = (0..count).map_while(|row| {
-        let at = plain(iso_millis(&def.time_zone, instant(from, every, row + 1)?));
+        let at = plain(iso_millis(&def.time_zone, instant_of_grid(from, every, row + 1)?));
         Some(std::iter::once(at).chain(columns.iter().flat_map(|column| cells(column, row))).collect())
     });
     csv::write(std::iter::once(header).chain(rows), dialect)
-}
-
-/// Each instant is computed from the start, so that no rounding adds up.
-fn instant(from: Timestamp, every: Duration, count: usize) -> Option<Timestamp> {
-    let nanos = i128::try_from(every.as_nanos()).ok()?.checked_mul(count as i128)?;
-    from.checked_add(SignedDuration::from_nanos_i128(nanos)).ok()
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ use crate::plant::{
     record::{AlarmEvent, AlarmRecord},
     sample::Sample,
     tag::{Decimals, TagDef},
+    time::elapsed,
 };
 
 /// What a tag is called in a report.
@@ -120,7 +121,7 @@ pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Tim
     for step in steps.filter(|step| step.at < until) {
         let at = step.at.max(since);
         if !active.is_empty() {
-            total += Duration::try_from(at.duration_since(since)).unwrap_or_default();
+            total += elapsed(since, at);
         }
         since = at;
         match step.event {
@@ -134,7 +135,7 @@ pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Tim
         }
     }
     if !active.is_empty() {
-        total += Duration::try_from(until.duration_since(since)).unwrap_or_default();
+        total += elapsed(since, until);
     }
     total
 }
@@ -201,7 +202,7 @@ impl Quiet {
 
     fn set(&mut self, active: bool, quiet: bool, at: Timestamp) {
         if self.active && self.quiet {
-            self.found.active += Duration::try_from(at.duration_since(self.since)).unwrap_or_default();
+            self.found.active += elapsed(self.since, at);
         }
         (self.active, self.quiet, self.since) = (active, quiet, at);
     }

@@ -17,7 +17,7 @@ use super::{
     modal::Modal,
     rights,
     tabs::Tab,
-    widgets::text::{Canvas, between, clock, fit, fit_words, running, width},
+    widgets::text::{Canvas, clock, fit, fit_words, running, width},
 };
 use crate::plant::{
     command::{CommandKind, NotConfirmed, Outcome},

@@ -16,6 +16,7 @@ use crate::plant::{
     def::TagId,
     interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
     tag::{DataType, TagDef},
+    time::elapsed,
 };
 
 /// How long the end of a command is marked in the mimic, in seconds of the operator.
@@ -230,7 +231,7 @@ fn last_command<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a CommandS
 /// The latest command for a tag, while how it ended is news, and whether it went well.
 fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> {
     let status = last_command(cx, command)?;
-    let real = Duration::try_from(cx.now.duration_since(status.at)).unwrap_or_default().as_secs_f64();
+    let real = elapsed(status.at, cx.now).as_secs_f64();
     let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
     let (well, lasts) = match status.outcome {
         Outcome::Pending => (None, f64::MAX),

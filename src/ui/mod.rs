@@ -32,7 +32,9 @@ use ratatui::{Frame, layout::Rect};
 
 use crate::{
     access::SessionStatus,
-    plant::{alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot},
+    plant::{
+        alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot, time::elapsed,
+    },
     text::Language,
 };
 use extension::Extension;
@@ -132,7 +134,7 @@ impl<'a> ViewContext<'a> {
     }
     /// Age of a tag's sample now.
     pub fn age(&self, tag: crate::plant::def::TagId) -> Duration {
-        Duration::try_from(self.now.duration_since(self.snapshot.sample(tag).at)).unwrap_or_default()
+        elapsed(self.snapshot.sample(tag).at, self.now)
     }
 }
 

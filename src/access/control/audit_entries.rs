@@ -5,12 +5,12 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Asker, Effect, passed,
+    AccessControl, Asker, Effect,
     session::{Refusals, SessionState},
 };
 use crate::{
     access::{SessionRequest, user},
-    plant::{record::ActionRecord, visible::is_control_or_bidi},
+    plant::{record::ActionRecord, time::elapsed, visible::is_control_or_bidi},
 };
 
 /// Most characters of a text that a user can put into the audit log.
@@ -41,7 +41,7 @@ impl AccessControl {
     fn refusals_of(&mut self, origin: &Arc<str>, at: Timestamp) -> &mut Refusals {
         if ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin) {
             self.refusals
-                .retain(|_, refusals| refusals.unrecorded > 0 || passed(refusals.recorded_at, at) < SUMMARY_EVERY);
+                .retain(|_, refusals| refusals.unrecorded > 0 || elapsed(refusals.recorded_at, at) < SUMMARY_EVERY);
         }
         let full = ORIGINS_MAX <= self.refusals.len() && !self.refusals.contains_key(origin);
         let origin = if full { "of many users".into() } else { origin.clone() };
@@ -79,7 +79,7 @@ impl AccessControl {
     pub(super) fn summarise_refusals(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
         for (origin, refusals) in &mut self.refusals {
-            if refusals.unrecorded > 0 && passed(refusals.recorded_at, at) >= SUMMARY_EVERY {
+            if refusals.unrecorded > 0 && elapsed(refusals.recorded_at, at) >= SUMMARY_EVERY {
                 let outcome = format!("refused: {} requests", refusals.unrecorded);
                 let entry = ActionRecord::new(at, NOT_LOGGED_IN, "too many requests", "", outcome);
                 effects.push(Effect::Record(ActionRecord { from: format!("user {origin}").into(), ..entry }));

@@ -8,10 +8,10 @@ use super::{
     AccessControl, Asker, Effect, LOG_IN_FIRST, SessionState,
     audit_entries::audit,
     jobs::{JobError, JobPurpose},
-    passed,
     session_status::LOCK_NEAR,
 };
 use crate::access::{LoggedInUser, Secret, user};
+use crate::plant::time::elapsed;
 
 const NO_LOGIN: &str = "this station does not require login";
 const NO_PASSWORD: &str = "the operating system identifies you here; no password is needed";
@@ -155,7 +155,7 @@ impl AccessControl {
     pub(super) fn lock_idle(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = Vec::new();
         let idle = |access: &AccessControl, session: &SessionState| {
-            let left = access.idle_lock(session)?.saturating_sub(passed(session.active, at));
+            let left = access.idle_lock(session)?.saturating_sub(elapsed(session.active, at));
             (session.acting().is_some() && left <= LOCK_NEAR).then_some(left)
         };
         let near: Vec<_> = self.sessions.iter().filter_map(|(id, session)| Some((*id, idle(self, session)?))).collect();

@@ -4,10 +4,10 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{Peer, passed};
+use super::Peer;
 use crate::{
     access::{LoggedInUser, RateLimit},
-    plant::command::CommandId,
+    plant::{command::CommandId, time::elapsed},
 };
 
 /// Requests of one terminal.
@@ -127,5 +127,5 @@ impl Refusals {
 
 /// The time of the station, as rate limits count it.
 fn steady(at: Timestamp) -> Duration {
-    passed(Timestamp::UNIX_EPOCH, at)
+    elapsed(Timestamp::UNIX_EPOCH, at)
 }

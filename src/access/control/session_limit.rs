@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::{AccessControl, Effect, passed, session::SessionState};
+use super::{AccessControl, Effect, session::SessionState};
+use crate::plant::time::elapsed;
 
 /// A terminal without login and without a request for so long is closed when another needs its place.
 const IDLE: Duration = Duration::from_secs(600);
@@ -44,7 +45,7 @@ impl AccessControl {
         if there < most {
             return Ok(Vec::new());
         }
-        let idle = these().filter(|(_, session)| session.who.is_none() && IDLE <= passed(session.active, at));
+        let idle = these().filter(|(_, session)| session.who.is_none() && IDLE <= elapsed(session.active, at));
         let Some(longest) = idle.min_by_key(|(_, session)| session.active).map(|(terminal, _)| *terminal) else {
             return Err(format!("{there} terminals{whose} are attached, no more may be"));
         };

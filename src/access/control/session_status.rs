@@ -4,10 +4,10 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{AccessControl, Effect, passed, session::SessionState};
+use super::{AccessControl, Effect, session::SessionState};
 use crate::{
     access::{SessionRow, SessionStatus, UserRow, Users, user},
-    plant::role::Role,
+    plant::{role::Role, time::elapsed},
 };
 
 /// A lock for want of keys is announced so long before.
@@ -23,7 +23,7 @@ impl AccessControl {
         };
         let supervisor = session.acting().is_some_and(|who| who.role == Role::Supervisor && !who.must_change);
         let idle_lock = self.idle_lock(session);
-        let left = idle_lock.map(|span| span.saturating_sub(passed(session.active, at)));
+        let left = idle_lock.map(|span| span.saturating_sub(elapsed(session.active, at)));
         SessionStatus {
             who: session.who.clone(),
             locked: session.locked,

@@ -1,6 +1,8 @@
 //! What a user at a terminal sees of access control: logins, lockouts, locks, roles, reauthentication, in virtual time.
 #![allow(clippy::unwrap_used)]
 
+use std::time::Duration;
+
 use proptest::prelude::*;
 
 use super::*;
@@ -11,6 +13,7 @@ use crate::{
         def::Reauthentication,
         fixture,
         role::AccessDef,
+        time::elapsed,
     },
 };
 
@@ -365,7 +368,7 @@ proptest! {
         let (mut wrong, mut locked_at) = (0, None::<Timestamp>);
         for (terminal, right, later) in steps {
             bench.later(later);
-            if locked_at.is_some_and(|from| passed(from, bench.now) >= Duration::from_secs(300)) {
+            if locked_at.is_some_and(|from| elapsed(from, bench.now) >= Duration::from_secs(300)) {
                 (wrong, locked_at) = (0, None);
             }
             let key = Key { origin: "panel".into(), account: Some("tech".to_owned()), never_locked: false };

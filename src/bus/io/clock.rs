@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant as RealInstant, SystemTime},
 };
 
-use crate::plant::number::to_i64;
+use crate::plant::{number::to_i64, time::elapsed};
 use jiff::{SignedDuration, Timestamp};
 use tokio::time::Instant;
 
@@ -107,7 +107,7 @@ impl Clock {
 
     /// Sleeps until a moment of plant time; returns at once if it has passed.
     pub async fn sleep_until(&self, at: Timestamp) {
-        let ahead = Duration::try_from(at.duration_since(self.base)).unwrap_or_default();
+        let ahead = elapsed(self.base, at);
         tokio::time::sleep_until(self.start + self.real_span(ahead)).await;
     }
 

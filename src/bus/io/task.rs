@@ -32,6 +32,7 @@ use crate::{
         command::{BusRequest, WriteId},
         def::{DeviceId, LineDef, LineId, TagId},
         event::{Event, Fault, LineState, WriteResult},
+        time::elapsed,
         traffic::Exchange,
     },
 };
@@ -302,7 +303,7 @@ impl Task<'_> {
                 let started = self.clock.now();
                 let turn = self.write(link, schedule, &job).await;
                 let now = self.clock.now();
-                self.budget.spent(Duration::try_from(now.duration_since(started)).unwrap_or_default(), now);
+                self.budget.spent(elapsed(started, now), now);
                 turn
             }
         }
@@ -319,7 +320,7 @@ impl Task<'_> {
     /// Adds what the link has counted since the last call to the statistics.
     fn close_second(&mut self, link: &mut Link) {
         let now = self.clock.now();
-        let over = Duration::try_from(now.duration_since(self.closed_at)).unwrap_or_default();
+        let over = elapsed(self.closed_at, now);
         let busy = link.take_busy().as_secs_f32();
         self.stats.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
         self.stats.late(&self.def, &link.take_late());

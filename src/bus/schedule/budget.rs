@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use crate::plant::number::to_u64;
+use crate::plant::{number::to_u64, time::elapsed};
 use jiff::Timestamp;
 
 /// Share of the line's time for writes, while polls are due.
@@ -54,7 +54,7 @@ impl Budget {
     }
 
     fn saved_at(&self, now: Timestamp) -> f64 {
-        let passed = Duration::try_from(now.duration_since(self.at)).unwrap_or_default();
+        let passed = elapsed(self.at, now);
         (self.saved + passed.as_secs_f64() * self.share).min(SAVED_MAX.as_secs_f64())
     }
 }

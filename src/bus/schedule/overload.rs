@@ -11,6 +11,7 @@
 
 use std::time::Duration;
 
+use crate::plant::time::elapsed;
 use jiff::Timestamp;
 
 /// The line is back to normal when the reads take at most this share of its time.
@@ -106,8 +107,8 @@ impl Overload {
         match self.load {
             Load::Normal => {
                 self.over_since = (FULL < total).then(|| self.over_since.unwrap_or(now));
-                if late || self.over_since.is_some_and(|since| OVER_FOR <= span(since, now)) {
-                    let too_soon = self.eased_at.is_some_and(|eased| span(eased, now) <= 2 * self.hold);
+                if late || self.over_since.is_some_and(|since| OVER_FOR <= elapsed(since, now)) {
+                    let too_soon = self.eased_at.is_some_and(|eased| elapsed(eased, now) <= 2 * self.hold);
                     self.hold = if too_soon { (2 * self.hold).min(HOLD_MAX) } else { HOLD };
                     self.load = Load::Overload { factor: demand.factor() };
                     self.easy_since = None;
@@ -120,15 +121,11 @@ impl Overload {
                 }
                 if late || FITS < total {
                     self.easy_since = None;
-                } else if self.hold <= span(*self.easy_since.get_or_insert(now), now) {
+                } else if self.hold <= elapsed(*self.easy_since.get_or_insert(now), now) {
                     (self.load, self.over_since, self.eased_at) = (Load::Normal, None, Some(now));
                 }
             }
         }
         self.load != before
     }
-}
-
-fn span(from: Timestamp, to: Timestamp) -> Duration {
-    Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }

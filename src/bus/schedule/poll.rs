@@ -10,6 +10,7 @@ use crate::{
         def::DeviceId,
         event::ExceptionCode,
         tag::{Poll, PollClass, Table},
+        time::elapsed,
     },
 };
 
@@ -149,8 +150,8 @@ impl ScheduledPoll {
                 let served = if release <= started { periods_in(release, started, period) + 1 } else { 0 };
                 let over = periods_in(release, now, period).max(served);
                 if served > 0 {
-                    served_poll.jitter = Some(span(release + period * (served - 1), started));
-                    let waited = span(release.max(free), started);
+                    served_poll.jitter = Some(elapsed(release + period * (served - 1), started));
+                    let waited = elapsed(release.max(free), started);
                     self.late = if period <= waited { self.late.saturating_add(1) } else { 0 };
                 }
                 // Of the releases served together only the last was in time. What was shed was not to be read at all.
@@ -222,13 +223,9 @@ fn key(block: &Block) -> (DeviceId, Table, u16, u16) {
     (block.device, block.table, block.address, block.count)
 }
 
-fn span(from: Timestamp, to: Timestamp) -> Duration {
-    Duration::try_from(to.duration_since(from)).unwrap_or_default()
-}
-
 /// Whole periods between two moments.
 fn periods_in(from: Timestamp, to: Timestamp, period: Duration) -> u32 {
     // 64 bits hold centuries, and divide ten times as fast as the 128 that the library gives.
     let nanos = |span: Duration| u64::try_from(span.as_nanos()).unwrap_or(u64::MAX);
-    u32::try_from(nanos(span(from, to)) / nanos(period).max(1)).unwrap_or(u32::MAX)
+    u32::try_from(nanos(elapsed(from, to)) / nanos(period).max(1)).unwrap_or(u32::MAX)
 }

@@ -3,7 +3,7 @@
 use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use duckdb::{Row, params};
-use jiff::{SignedDuration, Timestamp};
+use jiff::Timestamp;
 
 use super::{
     samples::is_damage,
@@ -20,6 +20,7 @@ use crate::{
         keyword::Keyword,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut},
+        time::instant_of_grid,
     },
     report::step_series::{HeldValue, ValuesAt},
 };
@@ -94,7 +95,7 @@ impl Store {
         count: usize,
         now: Timestamp,
     ) -> Result<Vec<Vec<Option<HeldValue>>>, HistoryError> {
-        let instants = (1..=count).map_while(|number| grid(from, every, number)).take_while(|at| *at <= now);
+        let instants = (1..=count).map_while(|number| instant_of_grid(from, every, number)).take_while(|at| *at <= now);
         let instants: Arc<[Timestamp]> = instants.collect();
         let Some(last) = instants.last() else { return Ok(vec![vec![None; count]; tags.len()]) };
         let to = last.checked_add(Duration::from_micros(1)).unwrap_or(*last);
@@ -176,12 +177,6 @@ impl Distinct {
         let found: Vec<T> = found.collect();
         self.asked.iter().map(|place| found[*place].clone()).collect()
     }
-}
-
-/// An instant of an even grid, computed from the start, so that no rounding adds up.
-fn grid(from: Timestamp, every: Duration, number: usize) -> Option<Timestamp> {
-    let nanos = i128::try_from(every.as_nanos()).ok()?.checked_mul(number as i128)?;
-    from.checked_add(SignedDuration::from_nanos_i128(nanos)).ok()
 }
 
 pub(super) fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryError> {

@@ -16,6 +16,7 @@ use super::{
     rate::Rate,
 };
 use crate::plant::record::{AlarmEvent, AlarmRecord};
+use crate::plant::time::elapsed;
 
 /// Width of a window, seconds: windows begin at its multiples since 1970 UTC.
 const WINDOW_S: i64 = 600;
@@ -207,7 +208,7 @@ impl AlarmMonitor {
         if history.raised.len() > CHATTER {
             history.raised.pop_front();
         }
-        let spread = history.raised.front().map(|first| span(*first, event.at)).unwrap_or_default();
+        let spread = history.raised.front().map(|first| elapsed(*first, event.at)).unwrap_or_default();
         let chatters = history.raised.len() == CHATTER && spread < CHATTER_TIME;
         let window = second(event.at).div_euclid(WINDOW_S);
         let Some(sum) = self.sum(event.at) else { return };
@@ -224,7 +225,7 @@ impl AlarmMonitor {
     fn returned(&mut self, event: &AlarmRecord) {
         let name = named(event);
         let history = self.alarms.entry(name.clone()).or_default();
-        let fleeting = history.active.is_some_and(|since| span(since, event.at) < FLEETING) && !history.acknowledged;
+        let fleeting = history.active.is_some_and(|since| elapsed(since, event.at) < FLEETING) && !history.acknowledged;
         self.end(&name, event.at);
         if let Some(sum) = self.sum(event.at).filter(|_| fleeting) {
             sum.fleeting.insert(name);
@@ -374,10 +375,6 @@ fn named(event: &AlarmRecord) -> Named {
 
 fn second(at: Timestamp) -> i64 {
     at.as_microsecond().div_euclid(1_000_000)
-}
-
-fn span(from: Timestamp, to: Timestamp) -> Duration {
-    Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }
 
 #[cfg(test)]

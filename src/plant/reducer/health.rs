@@ -1,7 +1,5 @@
 //! Health over time: a minute of each line for the history, the diagnosis of each device.
 
-use std::time::Duration;
-
 use jiff::Timestamp;
 
 use super::Plant;
@@ -11,6 +9,7 @@ use crate::plant::{
     ne107::{self, DiagnosisInput},
     record::Record,
     snapshot::DeviceStatus,
+    time::elapsed,
     tuning::Noticed,
 };
 
@@ -62,7 +61,7 @@ impl Plant {
         let actions = &self.def.device(device).actions;
         self.commands.commands().any(|status| match (&status.command.kind, &status.outcome) {
             (CommandKind::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
-                let age = Duration::try_from(self.at.duration_since(status.at)).unwrap_or_default();
+                let age = elapsed(status.at, self.at);
                 actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)
             }
             _ => false,
@@ -72,6 +71,8 @@ impl Plant {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use std::sync::Arc;
 
     use super::*;

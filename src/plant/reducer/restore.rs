@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 
@@ -15,6 +15,7 @@ use crate::plant::{
     process_image::ProcessImage,
     record::Record,
     restore::{READ_MAX, Restore, RestoreRequest, State, Step},
+    time::elapsed,
 };
 
 /// The terminal number of the writes of a restore; terminals count from 1.
@@ -187,7 +188,7 @@ impl Plant {
 
     /// Begins the writes once the device was read and still needs the confirmed changes.
     fn begin_when_read(&self, run: &mut Restore, at: Timestamp) {
-        let waited = Duration::try_from(at.duration_since(run.at)).unwrap_or_default();
+        let waited = elapsed(run.at, at);
         if run.stopping {
             run.state = State::Stopped;
         } else if run.line_changed {

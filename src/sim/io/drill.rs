@@ -1,11 +1,8 @@
 //! The task of a trainer: injects faults on command or by a scenario, and evaluates the result.
 
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicU64, Ordering},
-    },
-    time::Duration,
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
 };
 
 use jiff::Timestamp;
@@ -17,6 +14,7 @@ use crate::{
         PlantDef, Snapshot,
         command::{Command, CommandId, CommandStatus},
         record::Record,
+        time::elapsed,
     },
     sim::{
         drill::{Progress, SimCommand, Status},
@@ -215,7 +213,7 @@ impl Task {
         now: Timestamp,
     ) -> Status {
         let scenario = self.judge.as_ref().map(|judge| {
-            let elapsed = Duration::try_from(now.duration_since(self.began)).unwrap_or_default();
+            let elapsed = elapsed(self.began, now);
             let Scenario { description, duration, .. } = &**judge.scenario();
             Progress { description: description.clone(), elapsed, duration: *duration, verdict: judge.verdict() }
         });

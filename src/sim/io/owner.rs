@@ -10,6 +10,7 @@ use crate::{
     plant::{
         PlantDef,
         def::{LineId, TagId},
+        time::elapsed,
     },
     sim::{
         faults::{ActiveFault, Answer, FaultTarget, Faults, InjectedFault},
@@ -210,7 +211,7 @@ async fn run(mut owned: Owned, clock: Clock, mut inbox: mpsc::Receiver<Request>)
             () = clock.sleep(idle) => None,
         };
         let now = clock.now();
-        let passed = Duration::try_from(now.duration_since(owned.now)).unwrap_or_default();
+        let passed = elapsed(owned.now, now);
         owned.simulator.advance(passed.min(CATCH_UP_MAX));
         owned.now = now;
         if let Some(request) = request {

@@ -1,6 +1,6 @@
 //! The line of alarms that is on every tab: the most urgent one, how many there are, and why some might not be seen.
 
-use super::{Canvas, Model, SILENCE, ViewContext, between, fit_words, running, width};
+use super::{Canvas, Model, SILENCE, ViewContext, fit_words, running, width};
 use crate::t;
 use crate::text::translate;
 use crate::{
@@ -10,6 +10,7 @@ use crate::{
         event::LineState,
         ne107::Reason,
         snapshot::{ActiveAlarm, DeviceState},
+        time::elapsed,
     },
     ui::{
         modal::{
@@ -175,7 +176,7 @@ fn state_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
         | AlarmState::SuppressedByDesign
         | AlarmState::OutOfService => alarm.raised_at,
     };
-    format!("{} {}", translate(alarm.state.word()), running(between(since, cx.now)))
+    format!("{} {}", translate(alarm.state.word()), running(elapsed(since, cx.now)))
 }
 
 /// How many of each priority: `[1]!1 (3)2`.

@@ -1,6 +1,7 @@
 //! The header: plant, lines, simulation, user and clock.
 
 use super::*;
+use crate::plant::time::elapsed;
 use crate::t;
 
 pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
@@ -76,7 +77,7 @@ pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
     let status = cx.snapshot.line(line.id);
     let counters = &status.counters;
     let recent = |at: Option<jiff::Timestamp>| {
-        at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
+        at.is_some_and(|at| elapsed(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
     };
     match &status.state {
         LineState::Connected => {
@@ -99,7 +100,7 @@ pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
         }
         LineState::Connecting => (t!("{name} connecting", name = line.name), cx.theme.trouble()),
         LineState::Waiting { retry_at, .. } => {
-            let left = between(cx.now, *retry_at).as_secs();
+            let left = elapsed(cx.now, *retry_at).as_secs();
             (t!("{name} DOWN retry {left}s", name = line.name, left), cx.theme.trouble())
         }
         LineState::Disconnected => (t!("{name} DISCONNECTED", name = line.name), cx.theme.trouble()),

@@ -18,13 +18,14 @@ use crate::{
         event::LineState,
         snapshot::DeviceState,
         tag::{Access, Poll},
+        time::elapsed,
     },
     ui::{
         ViewContext, interlock, keys,
         keys::Hint,
         tabs::mimic,
         widgets::{
-            text::{age, between, clock, fit, pad, width},
+            text::{age, clock, fit, pad, width},
             value,
         },
     },
@@ -246,7 +247,7 @@ pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> Str
 pub fn retry_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
     let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
     match report.and_then(|report| report.retry_at(device)) {
-        Some(at) if cx.now < at => t!(", retry {ceil} s", ceil = between(cx.now, at).as_secs_f64().ceil()),
+        Some(at) if cx.now < at => t!(", retry {ceil} s", ceil = elapsed(cx.now, at).as_secs_f64().ceil()),
         Some(_) => t!(", retrying").to_owned(),
         None => String::new(),
     }

@@ -321,8 +321,8 @@ fn state_text(cx: &ViewContext, at: &Place) -> String {
         LineState::Connecting => t!("connecting").to_owned(),
         LineState::Waiting { why, retry_at } => {
             let lost =
-                at.status.lost_since.map_or(String::new(), |lost| format!(" {}", running(between(lost, cx.now))));
-            t!("DOWN{lost}, next try in {between}s: {why}", lost, between = between(cx.now, *retry_at).as_secs(), why)
+                at.status.lost_since.map_or(String::new(), |lost| format!(" {}", running(elapsed(lost, cx.now))));
+            t!("DOWN{lost}, next try in {between}s: {why}", lost, between = elapsed(cx.now, *retry_at).as_secs(), why)
         }
         LineState::Disconnected => t!("DISCONNECTED by an operator{since}", since),
         LineState::Testing => t!("TEST{since}, polling stopped", since),

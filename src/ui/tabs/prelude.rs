@@ -20,6 +20,7 @@ pub(super) use crate::{
         number::to_u16,
         role::Role,
         snapshot::{DeviceState, Snapshot},
+        time::elapsed,
     },
     t,
     text::translate,
@@ -30,7 +31,7 @@ pub(super) use crate::{
         modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
         widgets::{
             list::{self, Motion, Scroll, Selected, Words, first, motions, on_screen},
-            text::{self, Canvas, between, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},
+            text::{self, Canvas, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},
             value,
         },
     },

@@ -7,7 +7,10 @@ use ratatui::{buffer::Buffer, layout::Rect, style::Style};
 use unicode_width::UnicodeWidthStr;
 
 use crate::{
-    plant::number::{Number, to_u16},
+    plant::{
+        number::{Number, to_u16},
+        time::elapsed,
+    },
     t,
     ui::glyph_filter::thai_cells,
 };
@@ -249,11 +252,6 @@ pub fn running(span: Duration) -> String {
     }
 }
 
-/// Time between two instants, zero if the second is not later.
-pub fn between(from: Timestamp, to: Timestamp) -> Duration {
-    Duration::try_from(to.duration_since(from)).unwrap_or_default()
-}
-
 /// Local time of day: `14:02:31`.
 pub fn clock(at: Timestamp, zone: &TimeZone) -> String {
     at.to_zoned(zone.clone()).strftime("%H:%M:%S").to_string()
@@ -261,7 +259,7 @@ pub fn clock(at: Timestamp, zone: &TimeZone) -> String {
 
 /// Local time in at most nine columns: `14:02:31` today, `Fri 14:02` in the last six days, else `11-02 14h`.
 pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
-    let (days, at) = (between(at, now).as_secs() / 86_400, at.to_zoned(zone.clone()));
+    let (days, at) = (elapsed(at, now).as_secs() / 86_400, at.to_zoned(zone.clone()));
     let today = at.date() == now.to_zoned(zone.clone()).date();
     at.strftime(if today {
         "%H:%M:%S"

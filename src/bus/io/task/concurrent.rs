@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use super::{
     LinkExit, Task,
-    poll::{Outcome, parse, span},
+    poll::{Outcome, parse},
 };
 use crate::{
     bus::{
@@ -18,7 +18,7 @@ use crate::{
         plan::Block,
         schedule::{Next, Schedule},
     },
-    plant::def::DeviceId,
+    plant::{def::DeviceId, time::elapsed},
 };
 
 /// A read that is under way over Modbus TCP.
@@ -117,7 +117,7 @@ impl Task<'_> {
             let ended = self.clock.at(at);
             let device = self.def.device(block.device);
             // It has taken one of the places that there are.
-            let took = span(began, ended) / u32::from(device.limits.in_flight_max.max(1));
+            let took = elapsed(began, ended) / u32::from(device.limits.in_flight_max.max(1));
             if let Some(index) = index {
                 let served = schedule.done(index, began, ended);
                 self.stats.served(index, served.jitter, served.missed);

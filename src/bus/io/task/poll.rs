@@ -21,6 +21,7 @@ use crate::{
         event::{Event, ExceptionCode, Fault},
         number::to_u16,
         tag::TagDef,
+        time::elapsed,
         traffic::Exchange,
     },
 };
@@ -75,7 +76,7 @@ impl Task<'_> {
         };
         // Nothing new was sent when patience was the only way.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
-        let took = span(began, ended);
+        let took = elapsed(began, ended);
         self.finish_poll(link, schedule, Some(index), &block, Outcome { began, ended, took, answer, exchange }).await?;
         Ok(())
     }
@@ -258,10 +259,6 @@ fn proven(link: &Link, block: &Block) -> Result<(), LinkError> {
 pub(super) enum Answer {
     Bits(Vec<bool>),
     Words(Vec<u16>),
-}
-
-pub(super) fn span(from: Timestamp, to: Timestamp) -> Duration {
-    Duration::try_from(to.duration_since(from)).unwrap_or_default()
 }
 
 /// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another shape,

@@ -12,12 +12,13 @@ use crate::{
         sample::Cause,
         snapshot::DeviceState,
         tag::{Poll, TagDef},
+        time::elapsed,
         traffic::Exchange,
     },
     ui::{
         ViewContext,
         modal::faceplate::device_text,
-        widgets::text::{age, between, running},
+        widgets::text::{age, running},
     },
 };
 
@@ -47,7 +48,7 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     );
     let verdict = exchange.and_then(|exchange| exchange.outcome.err());
     if let Some((at, fault)) = status.last_fault.filter(|(_, fault)| Some(*fault) != verdict) {
-        let ago = age(between(at, cx.now));
+        let ago = age(elapsed(at, cx.now));
         rows.push(Row::new("", t!("last fault {ago} ago: {fault}", ago, fault), theme.dim()));
     }
     rows
@@ -66,7 +67,7 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
         Poll::Once => t!("once, and on refresh").to_owned(),
         Poll::Never => t!("on request only").to_owned(),
     };
-    let next = poll.next.map(|next| match between(cx.now, next) {
+    let next = poll.next.map(|next| match elapsed(cx.now, next) {
         Duration::ZERO => t!(", due now").to_owned(),
         wait => t!(", next in {span}", span = span(wait)),
     });
@@ -101,7 +102,7 @@ pub(super) fn line_words(cx: &ViewContext, state: &LineState) -> Option<String> 
         LineState::Disconnected => Some(t!("disconnected by an operator").to_owned()),
         LineState::Testing => Some(t!("in use by a test").to_owned()),
         LineState::Waiting { why, retry_at } => {
-            Some(t!("not connected: {why}; retry in {running}", why, running = running(between(cx.now, *retry_at))))
+            Some(t!("not connected: {why}; retry in {running}", why, running = running(elapsed(cx.now, *retry_at))))
         }
     }
 }

@@ -15,11 +15,12 @@ use crate::{
         def::DeviceDef,
         event::LineState,
         tag::{Access, ByteOrder, Poll, TagDef},
+        time::elapsed,
         traffic::Exchange,
     },
     ui::{
         ViewContext,
-        widgets::text::{between, clock, running},
+        widgets::text::{clock, running},
     },
 };
 
@@ -62,7 +63,7 @@ pub(super) fn exchange_rows(
         if 1 < exchange.tries { t!(", second attempt: the first response was corrupt") } else { t!(", first attempt") };
     let (verdict, style) = match exchange.outcome {
         Ok(()) if old => {
-            let ago = running(between(exchange.at, cx.now));
+            let ago = running(elapsed(exchange.at, cx.now));
             (t!("ok {ago} ago, no good response since", ago), theme.trouble())
         }
         Ok(()) => (t!("ok").to_owned(), theme.normal()),

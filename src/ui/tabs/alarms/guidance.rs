@@ -156,7 +156,7 @@ pub fn now_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
 pub fn respond_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
     let respond = def.guidance.response_time?;
     let within = t!("respond within {div_ceil} min", div_ceil = respond.as_secs().div_ceil(60));
-    let gone = between(alarm.raised_at, cx.now);
+    let gone = elapsed(alarm.raised_at, cx.now);
     if !alarm.state.is_active() {
         return Some((within, false));
     }

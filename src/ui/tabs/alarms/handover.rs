@@ -188,7 +188,7 @@ pub fn suppressed_words(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Strin
     let mark = cx.theme.priority_tag(def.priority);
     let left = suppressed
         .until
-        .map(|until| t!(", {running} left", running = running(between(cx.now, until))))
+        .map(|until| t!(", {running} left", running = running(elapsed(cx.now, until))))
         .unwrap_or_default();
     let since = moment(suppressed.note.at, cx.now, &cx.def().time_zone);
     let by = suppressed.note.by.as_ref().map(|by| t!(", by {by}", by)).unwrap_or_default();
@@ -262,7 +262,7 @@ fn doubtful(cx: &ViewContext) -> Vec<String> {
         .collect();
     let more = bad.len().saturating_sub(NAMED);
     let stale = stale(cx).map(|alarm| {
-        let lasts = running(between(alarm.raised_at, cx.now));
+        let lasts = running(elapsed(alarm.raised_at, cx.now));
         t!(
             "{subject} {message} active for {lasts}",
             subject = subject(cx, alarm.id),

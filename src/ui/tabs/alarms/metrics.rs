@@ -131,7 +131,7 @@ impl Metrics {
         }
         if self.period.is_none() {
             lines.extend(stale(cx).map(|alarm| {
-                let (since, name) = (running(between(alarm.raised_at, cx.now)), subject(cx, alarm.id));
+                let (since, name) = (running(elapsed(alarm.raised_at, cx.now)), subject(cx, alarm.id));
                 let text = format!("{} {since:11}  {name}  {}", pad(t!("stale"), 10), cx.def().alarm(alarm.id).message);
                 (fit_words(&text, TABLE), style)
             }));
@@ -146,7 +146,7 @@ impl Metrics {
 /// Alarms that have been active for a day.
 pub fn stale<'a>(cx: &ViewContext<'a>) -> impl Iterator<Item = &'a ActiveAlarm> {
     let (now, alarms) = (cx.now, &cx.snapshot.alarms);
-    alarms.iter().filter(move |alarm| alarm.state.is_active() && STALE < between(alarm.raised_at, now))
+    alarms.iter().filter(move |alarm| alarm.state.is_active() && STALE < elapsed(alarm.raised_at, now))
 }
 
 /// The rates of this moment, and whether there is a flood.

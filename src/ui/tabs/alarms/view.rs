@@ -259,7 +259,7 @@ fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
             Subject::Device(_) | Subject::Line(_) | Subject::Station => "–".to_owned(),
         },
         translate(alarm.state.word()).to_owned(),
-        running(between(alarm.raised_at, cx.now)),
+        running(elapsed(alarm.raised_at, cx.now)),
         alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default().to_owned(),
     ]
 }

@@ -76,7 +76,7 @@ fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let lamp = |on: bool| if on { theme.pick("●", "@") } else { theme.pick("○", "o") };
     let counters = &at.status.counters;
     let recent = |at: Option<Timestamp>| {
-        at.is_some_and(|at| between(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
+        at.is_some_and(|at| elapsed(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
     };
     let (tx, rx) = (recent(counters.last_tx), recent(counters.last_rx));
     let deaf = tx && !rx;
@@ -266,7 +266,7 @@ fn state(cx: &ViewContext, device: &DeviceDef) -> String {
         DeviceState::Responding => t!("OK").to_owned(),
         DeviceState::Failing(times) => t!("failing {times}×", times),
         DeviceState::Down { since } => {
-            let (running, retry_text) = (running(between(since, cx.now)), retry_text(cx, device.id));
+            let (running, retry_text) = (running(elapsed(since, cx.now)), retry_text(cx, device.id));
             t!("DOWN {running}{retry_text}", running, retry_text)
         }
     }

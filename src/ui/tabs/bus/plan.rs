@@ -107,7 +107,7 @@ const COLUMNS: [rows::Column; 15] = [
 fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
     let (code, stats) = (poll.table.read_fc(), &poll.stats);
     let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
-    let next = poll.next.map_or("–".to_owned(), |next| format!("{:.1}", between(cx.now, next).as_secs_f64()));
+    let next = poll.next.map_or("–".to_owned(), |next| format!("{:.1}", elapsed(cx.now, next).as_secs_f64()));
     [
         if ill(poll) { "!" } else { " " }.to_owned(),
         cx.def().device(poll.device).name.clone(),

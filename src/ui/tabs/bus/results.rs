@@ -95,7 +95,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
 
 /// Time left, if the steps to come take as long as those before.
 fn remaining(cx: &ViewContext, run: &DiagnosticRun) -> Option<std::time::Duration> {
-    let spent = between(run.started, cx.now).as_secs_f64() / cx.snapshot.speed.clamp(0.01, 1e6);
+    let spent = elapsed(run.started, cx.now).as_secs_f64() / cx.snapshot.speed.clamp(0.01, 1e6);
     let each = spent / f64::from((0 < run.done).then_some(run.done)?);
     SignedDuration::try_from_secs_f64(each * f64::from(run.total.saturating_sub(run.done))).ok()?.try_into().ok()
 }

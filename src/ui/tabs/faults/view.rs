@@ -70,7 +70,7 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
             let name = tab.number(status, available.target, *fault).to_string();
             let (state, style) = match active {
                 Some(active) => {
-                    (t!("ON {running}", running = running(between(active.since, cx.now))), cx.theme.trouble())
+                    (t!("ON {running}", running = running(elapsed(active.since, cx.now))), cx.theme.trouble())
                 }
                 None => (t!("off").to_owned(), cx.theme.normal()),
             };

@@ -1,6 +1,7 @@
 //! Drawing of a chart: grid, curves, marks, gaps, axes and cursor.
 
 use super::*;
+use crate::plant::time::elapsed;
 use crate::t;
 
 impl Chart<'_> {
@@ -83,7 +84,7 @@ impl Chart<'_> {
         let count = usize::from(plot.width) * across;
         let past = self.cell(self.now, plot.width).map_or(count, |x| usize::from(x) * across);
         let known = |x: &usize| plan.columns.iter().any(|columns| columns[*x].is_some());
-        let span = Duration::try_from(self.to.duration_since(self.from)).unwrap_or_default();
+        let span = elapsed(self.from, self.to);
         let was_read = |x: usize| {
             let at = self
                 .from
