@@ -44,7 +44,7 @@
 //!
 //! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
 //! plant task never blocks and deadlock is ruled out by shape. Shutdown runs downstream: the links stop, the plant ends
-//! because nobody can send any more, the history thread drains, flushes and ends.
+//! because no sender is left, the history thread drains, flushes and ends.
 //!
 //! # Laws
 //!
@@ -85,7 +85,7 @@
 //! | outstanding reply, in sync | a response that may still come after its timeout; it is never taken for another |
 //! | gap registers | registers read only because they stand between two blocks |
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
-//! | epoch | counts the steps of the clock, so that records of a doubled time can be told apart |
+//! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
 //! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
 //! | fault, injected fault | why a request or the station failed; what a trainer puts into the simulated plant
 //! | scenario, drill | a scripted plant for tests; one that evaluates an operator |

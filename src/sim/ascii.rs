@@ -20,7 +20,7 @@ impl Receiver {
         Receiver { mask: if data_bits == 7 { 0x7F } else { 0xFF }, frame: Vec::new(), done: Vec::new() }
     }
 
-    /// Adds characters as they arrive. What stands before a `:` is nothing; a `:` inside begins anew.
+    /// Adds characters as they arrive. What stands before a `:` is dropped; a `:` inside begins a new message.
     pub fn push(&mut self, characters: &[u8]) {
         for character in characters {
             let character = character & self.mask;

@@ -43,13 +43,13 @@ const SENT: u8 = 1 << 6;
 pub trait Unit {
     /// Answers a request; an empty one has no answer, nor one that the device holds back.
     fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>>;
-    /// Does what a broadcast says; nobody hears whether it could.
+    /// Does what a broadcast says, without a response.
     fn obey(&mut self, pdu: &[u8]);
-    /// Refuses a request with a code of somebody's choice.
+    /// Refuses a request with a code of the caller's choice.
     fn refuse(&mut self, pdu: &[u8], code: u8) -> Option<Vec<u8>>;
     /// A message for another unit passed on the line.
     fn hear(&mut self);
-    /// A message passed that nobody could read.
+    /// Counts a message that could not be read.
     fn hear_corrupt(&mut self);
 }
 

@@ -295,8 +295,8 @@ fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option
         Vec::new()
     };
     // In seven bits the sign of Enter would be a slash, which is another key.
-    let told = |hint: &Hint| Hint { key: cx.theme.enter(&hint.key), ..hint.clone() };
-    let (hints, tail): (Vec<Hint>, Vec<Hint>) = (hints.iter().map(told).collect(), tail.iter().map(told).collect());
+    let shown = |hint: &Hint| Hint { key: cx.theme.enter(&hint.key), ..hint.clone() };
+    let (hints, tail): (Vec<Hint>, Vec<Hint>) = (hints.iter().map(shown).collect(), tail.iter().map(shown).collect());
     let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
     let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
     let mut x = 1;

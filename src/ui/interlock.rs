@@ -1,4 +1,4 @@
-//! What an operator is told before and after a command: what blocks it, when it acts, what it will change, how it went.
+//! What an operator sees before and after a command: what blocks it, when it acts, what it will change, how it went.
 
 use crate::t;
 use crate::text::translate;
@@ -289,8 +289,8 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     let logic = &cx.def().logic;
     let Some((place, actuator)) = logic.actuator(tag) else { return Vec::new() };
     let command = cx.def().tag(actuator.command);
-    let told = value::show(cx, actuator.command);
-    let mut rows = vec![(t!("command"), format!("{} {}", command.name, told.whole()), told.style)];
+    let commanded = value::show(cx, actuator.command);
+    let mut rows = vec![(t!("command"), format!("{} {}", command.name, commanded.whole()), commanded.style)];
     let modes: Vec<String> = actuator.needs.iter().map(|(need, _)| value::show(cx, *need).whole()).collect();
     let mode = modes.join(", ");
     match unmet_text(cx, actuator.command) {
@@ -301,7 +301,7 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     let locks = logic.interlocks.iter().filter(|lock| lock.tag == actuator.command);
     rows.extend(locks.filter_map(|lock| interlock_text(cx, lock)).map(|(words, style)| (t!("blocked"), words, style)));
     if let Some(lasts) = guards_disobeyed(cx, place) {
-        let (wanted, is) = (told.text, value::show(cx, actuator.output).with_unit());
+        let (wanted, is) = (commanded.text, value::show(cx, actuator.output).with_unit());
         let words = t!(
             "{pick} commanded {wanted}, still {is} after {age}",
             pick = theme.pick("≠", "!="),

@@ -50,9 +50,9 @@ pub fn type_keys(model: &mut Model, keys: &str) -> Vec<Effect> {
         c => KeyCode::Char(c),
     };
     let press = |c| update(model, Msg::Key(KeyEvent::new(code(c), KeyModifiers::NONE)));
-    // That a key was pressed at all is told to the station now and then.
-    let told = |effect: &Effect| !matches!(effect, Effect::SessionRequest(_, SessionRequest::Active));
-    keys.chars().flat_map(press).filter(told).collect()
+    // That a key was pressed at all is reported to the station now and then.
+    let is_sent = |effect: &Effect| !matches!(effect, Effect::SessionRequest(_, SessionRequest::Active));
+    keys.chars().flat_map(press).filter(is_sent).collect()
 }
 
 /// A key for a row that changed after it was drawn does nothing and says so; once the change is drawn, it acts.

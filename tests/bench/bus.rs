@@ -230,7 +230,7 @@ fn line_task(in_flight: u16, blocks: u16) -> (f64, f64) {
             let mut connector = Connector::Real(transport);
             task::run(def, LineId(0), clock, &mut connector, sender, &mut Requests::new(queue), stopped).await;
         });
-        // A task of its own hears what is told, as in the station: to wake the future of `block_on` costs a system call.
+        // A task of its own receives the events, as in the station: to wake the future of `block_on` costs a system call.
         let drain = async move {
             let (mut reads, start, used) = (0u64, Instant::now(), cpu(ClockId::ThreadCPUTime));
             while start.elapsed() < Duration::from_secs(2) {

@@ -96,7 +96,7 @@ fn wireshark_reads_serial_traffic_without_settings() {
     for framing in [Framing::Rtu, Framing::Ascii] {
         let frames = traffic(framing);
         let mut plain = NAMED;
-        // Their answer repeats them: without ports nobody can tell which is which.
+        // Their response repeats them: without ports the two directions look the same.
         (plain[2], plain[3]) = (&["Write Single Register"], &["Write Single Register"]);
         check(&tshark(&frames, &[]), &plain);
         let with_port = tshark(&frames, &["-o", "mbrtu.tcp.port:1502", "-o", "mbrtu.crc_verification:TRUE"]);

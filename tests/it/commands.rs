@@ -71,7 +71,7 @@ fn check_prints_the_read_plan_or_every_error() {
 }
 
 #[test]
-fn an_alarm_that_would_not_help_is_a_warning_and_strictly_a_refusal() {
+fn an_alarm_without_guidance_warns_and_strict_refuses_it() {
     let folder = folder();
     let file = folder.path().join("plant.toml");
     let (_, text, _) = run(&["profiles", "tank"]);
@@ -171,7 +171,7 @@ fn a_frame_is_told_in_words() {
     assert!(code == Some(2) && err.contains("position 5: `G` is not a hex digit"), "{err}");
 }
 
-/// Two good lines and a bad one between them: all are told, and scripts see that one was bad.
+/// Two good lines and a bad one between them: all are reported, and the exit code says that one was bad.
 #[test]
 fn frames_of_a_log_come_from_standard_input() {
     let log = "TX 01 03 03 EA 00 02 E5 BB\nhello\nRX 01 03 04 00 C8 FF FE BB BD\n";

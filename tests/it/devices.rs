@@ -59,7 +59,7 @@ fn shipped(kind: Kind) -> Vec<(String, PlantDef)> {
 }
 
 #[tokio::test(start_paused = true)]
-async fn every_shipped_plant_is_read_from_its_simulation_and_survives_every_fault() {
+async fn every_shipped_plant_is_simulated_and_survives_every_fault() {
     let plants = shipped(Kind::Plant);
     assert!(plants.len() >= 3, "the shipped plants were found");
     for (name, def) in plants {
@@ -69,7 +69,7 @@ async fn every_shipped_plant_is_read_from_its_simulation_and_survives_every_faul
 
 /// Each device in a plant of its own, with every row of its map polled, also those that plants seldom need.
 #[tokio::test(start_paused = true)]
-async fn every_shipped_device_is_read_from_its_simulation_and_survives_every_fault() {
+async fn every_shipped_device_is_simulated_and_survives_every_fault() {
     let devices = shipped(Kind::Device);
     assert!(devices.len() >= 7, "the shipped devices were found");
     for (name, mut def) in devices {

@@ -47,7 +47,7 @@ fn killed_twenty_times_while_writing() {
 fn number(line: &str, name: &str) -> Option<u64> {
     line.split(name).nth(1)?.chars().take_while(char::is_ascii_digit).collect::<String>().parse().ok()
 }
-/// Somebody's other file, named by mistake, is refused and stays as it is.
+/// Another file, named by mistake, is refused and stays as it is.
 #[test]
 fn a_file_that_is_no_history_is_left_alone() {
     let folder = folder();
@@ -93,7 +93,7 @@ fn an_unplugged_port_comes_back() {
     assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
 }
 
-/// A cable whose far end is dead: the devices are told to be silent, the line is not.
+/// A cable whose far end is dead: the devices are reported as not responding, the line is not.
 #[test]
 fn a_mute_line_is_not_a_missing_one() {
     if !have("socat", "socat") {

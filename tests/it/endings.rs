@@ -86,7 +86,7 @@ impl Place {
 }
 
 #[test]
-fn station_and_terminal_in_one_process_leave_the_terminal_as_it_was_in_every_way() {
+fn one_process_restores_the_terminal_however_it_ends() {
     for way in WAYS {
         let mut terminal = Terminal::start(100, 30, &["demo"]);
         terminal.wait_for("TK-1");
@@ -98,7 +98,7 @@ fn station_and_terminal_in_one_process_leave_the_terminal_as_it_was_in_every_way
 }
 
 #[test]
-fn an_attached_terminal_leaves_its_terminal_as_it_was_in_every_way_and_the_station_running() {
+fn an_attached_terminal_is_restored_however_it_ends() {
     let place = Place::new();
     let mut station = place.station();
     for way in WAYS {
@@ -115,7 +115,7 @@ fn an_attached_terminal_leaves_its_terminal_as_it_was_in_every_way_and_the_stati
 }
 
 #[test]
-fn a_terminal_says_that_its_station_was_killed_or_stopped_and_comes_back_when_it_is_started_again() {
+fn a_terminal_reports_a_lost_station_and_reconnects() {
     let place = Place::new();
     let mut station = place.station();
     let mut terminal = place.terminal();
@@ -150,7 +150,7 @@ fn a_terminal_says_that_its_station_was_killed_or_stopped_and_comes_back_when_it
 
 /// The far end of the pseudo-terminal goes, as when a window is closed or the connection of SSH is cut.
 #[test]
-fn a_terminal_whose_window_is_closed_ends_and_its_station_does_not() {
+fn a_closed_window_ends_its_terminal_and_not_the_station() {
     if !have("socat", "socat") {
         return;
     }
@@ -188,13 +188,13 @@ fn child_of(process: u32) -> String {
     children.split_whitespace().next().expect("socat runs it").to_owned()
 }
 
-/// A process that has ended stays in the list until somebody asks how; nobody may.
+/// A process that has ended stays in the list until its parent reaps it; others may not.
 fn is_alive(process: &str) -> bool {
     let stat = std::fs::read_to_string(Path::new("/proc").join(process).join("stat"));
     stat.is_ok_and(|stat| !stat.rsplit(')').next().is_some_and(|rest| rest.trim_start().starts_with('Z')))
 }
 
-/// Looks again and again: of another's child nobody is told when it ends.
+/// Polls, because a process is only notified of the end of its own children.
 fn until(what: &str, so: impl Fn() -> bool) {
     let end = Instant::now() + PATIENCE;
     while !so() {

@@ -39,7 +39,7 @@ use tokio::{
 
 use crate::support::{PATIENCE, folder};
 
-/// Plant seconds a second, so that nobody waits for a lockout.
+/// Plant seconds a second, so that no test waits for a lockout.
 const SPEED: f64 = 20.0;
 /// Everybody's.
 pub const PASSWORD: &str = "four wet horses in a tank";
@@ -93,8 +93,8 @@ impl Guarded {
         Guarded { def, truth, tap, station, clock, audit_log, path, socket, _simulated: simulated, _folder: folder }
     }
 
-    /// A terminal at the socket where nobody has logged in.
-    pub async fn nobody(&self) -> Session {
+    /// A terminal at the socket without a login.
+    pub async fn anonymous(&self) -> Session {
         let session = connect(&self.path).await.unwrap();
         assert!(session.status.borrow().who.is_none());
         session
@@ -102,7 +102,7 @@ impl Guarded {
 
     /// A terminal at the socket where this person has logged in.
     pub async fn person(&self, user: &str) -> Session {
-        let mut session = self.nobody().await;
+        let mut session = self.anonymous().await;
         login(&session, user, PASSWORD).await.unwrap();
         let there = session.status.wait_for(|status| status.who.as_ref().is_some_and(|who| &*who.user == user));
         tokio::time::timeout(PATIENCE, there).await.unwrap().unwrap();
@@ -134,13 +134,13 @@ impl Guarded {
     ) -> CommandStatus {
         let id = command.id;
         session.send(Request::Command(command, credentials)).unwrap();
-        // A terminal where nobody has logged in is not told: what is true is told here.
+        // A terminal without a login is sent no values: the outcome is taken from the unredacted snapshot.
         let mut truth = self.truth.clone();
         let of = |snapshot: &Arc<Snapshot>| {
             snapshot.commands.iter().find(|status| status.command.id == id && !status.is_pending()).cloned()
         };
-        let told = until(&mut truth, &format!("an outcome of {id:?}"), |snapshot| of(snapshot).is_some()).await;
-        of(&told).unwrap()
+        let with_outcome = until(&mut truth, &format!("an outcome of {id:?}"), |snapshot| of(snapshot).is_some()).await;
+        of(&with_outcome).unwrap()
     }
 
     pub fn tag(&self, name: &str) -> TagId {

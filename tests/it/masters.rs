@@ -29,7 +29,7 @@ fn mbpoll(args: &[&str]) -> (bool, String) {
 }
 
 #[test]
-fn mbpoll_reads_and_writes_the_simulated_plant_over_a_serial_line() {
+fn mbpoll_reads_and_writes_the_simulated_plant_over_serial() {
     if !have("mbpoll", "mbpoll") {
         return;
     }

@@ -120,7 +120,7 @@ fn wrong(row: &(Timestamp, u16, usize), lives: &[Timestamp], taken: &[Timestamp]
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_a_slow_device_owes_to_a_killed_station_is_no_value_of_the_next() {
+async fn a_reply_to_a_killed_station_is_no_value_of_the_next() {
     let rounds = std::env::var("SIGHTGLASS_KILLS").map_or(ROUNDS, |rounds| rounds.parse().unwrap());
     let (folder, sockets) = (folder(), sockets());
     let plant = write_plant(folder.path());

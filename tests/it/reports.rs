@@ -86,7 +86,7 @@ fn a_report_over_a_damaged_span_names_it_and_has_the_rest() {
 }
 
 #[test]
-fn alarms_that_were_suppressed_are_counted_beside_those_that_were_annunciated() {
+fn suppressed_and_annunciated_alarms_are_counted_apart() {
     let folder = folder();
     let path = folder.path().join("tank.duckdb");
     history(&path, |_, start| {
@@ -126,7 +126,7 @@ fn alarms_that_were_suppressed_are_counted_beside_those_that_were_annunciated() 
 }
 
 #[test]
-fn a_report_has_number_and_hash_of_the_last_entry_of_the_audit_log() {
+fn a_report_names_the_last_entry_of_the_audit_log() {
     let folder = folder();
     let path = folder.path().join("tank.duckdb");
     let begun = Timestamp::now();
@@ -149,7 +149,7 @@ fn a_report_has_number_and_hash_of_the_last_entry_of_the_audit_log() {
 }
 
 #[test]
-fn no_command_writes_a_report_an_export_or_a_log_into_the_history() {
+fn no_output_file_is_written_into_the_history() {
     let folder = folder();
     let path = folder.path().join("tank.duckdb");
     history(&path, |_, _| Vec::new());
@@ -280,7 +280,7 @@ impl Running {
 }
 
 #[test]
-fn a_running_station_exports_more_tags_than_one_question_takes_in_the_units_of_its_devices() {
+fn an_export_takes_more_tags_than_one_query_and_keeps_units() {
     let running = Running::start(TWO);
     let stored: Vec<&str> = running.def.tags.iter().filter(|tag| tag.store).map(|tag| &*tag.name).collect();
     assert!(64 < stored.len(), "{} tags fit into one query", stored.len());

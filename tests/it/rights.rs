@@ -27,7 +27,7 @@ use crate::guarded::{Guarded, PASSWORD, request};
 
 /// Who sits at the terminal, in the order of the columns below.
 const USERS: [&str; 6] = ["nobody", "vera", "tom", "sue", "lena", "mia"];
-/// What each of them is told who may not; `{}` is the role that is needed.
+/// The refusal for each of them; `{}` is the role that is needed.
 const WHY: [&str; 6] = [
     "log in first",
     "this is for a {}, you are viewer",
@@ -37,7 +37,7 @@ const WHY: [&str; 6] = [
     "choose a new password first",
 ];
 
-/// What is called so in the audit log may be done by whom: nobody, Viewer, Technician, Supervisor, Supervisor at a locked
+/// What is called so in the audit log may be done by whom: no user, Viewer, Technician, Supervisor, Supervisor at a locked
 /// terminal, Supervisor who must change the password.
 struct Row {
     action: &'static str,
@@ -51,7 +51,7 @@ impl Row {
         self.by.as_bytes()[person] != b'-'
     }
 
-    /// What somebody is told who may not.
+    /// The refusal for a user without the right.
     fn why(&self, person: usize) -> String {
         let least = if self.by.contains('T') { "technician" } else { "supervisor" };
         WHY[person].replace("{}", least)
@@ -151,7 +151,7 @@ fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
 /// A terminal of this person, as the column says.
 async fn sits(guarded: &Guarded, person: usize) -> Session {
     if person == 0 {
-        return guarded.nobody().await;
+        return guarded.anonymous().await;
     }
     let session = guarded.person(USERS[person]).await;
     if USERS[person] == "lena" {
@@ -164,13 +164,13 @@ fn is_permitted(status: &CommandStatus) -> bool {
     !matches!(status.outcome, Outcome::Refused(Refusal::NotPermitted(_)))
 }
 
-/// Is it this person, as the audit log has it? Of nobody it tells the user of the operating system.
+/// Is it this person, as the audit log has it? Without a login it names the user of the operating system.
 fn is_by(line: &Entry, person: usize) -> bool {
     if person == 0 { line.who.starts_with("not logged in (") } else { &*line.who == USERS[person] }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_command_is_let_through_or_refused_as_the_table_says_and_nothing_refused_reaches_the_line() {
+async fn every_command_is_permitted_or_refused_as_the_table_says() {
     let guarded = Guarded::start(|_| {}).await;
     let before = (guarded.tap.writes(), guarded.tap.connections());
     // Those who may nothing first, so that the line shows what came of it.
@@ -321,7 +321,7 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
         assert_eq!(
             (&*line.who, &*line.outcome),
             ("not logged in (stranger)", "refused: log in first"),
-            "told once it is there"
+            "sent once it is there"
         );
     }
     drop(stranger);
@@ -360,7 +360,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_question_is_answered_or_refused_as_the_table_says_and_who_asks_for_the_audit_trail_is_on_record() {
+async fn every_query_is_permitted_or_refused_as_the_table_says() {
     let guarded = Guarded::start(|_| {}).await;
     let at = guarded.truth.borrow().at;
     for (person, name) in USERS.into_iter().enumerate() {

@@ -80,7 +80,7 @@ fn faster(def: &PlantDef) -> LineDef {
 }
 
 #[tokio::test(start_paused = true)]
-async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_saved() {
+async fn saved_settings_are_in_the_plant_file() {
     let folder = folder();
     let path = folder.path().join("tank.toml");
     let text = profile::text_of("tank", &Search::shipped()).unwrap();
@@ -105,7 +105,7 @@ async fn settings_that_were_tried_out_are_in_the_plant_file_after_they_were_save
     assert_eq!(session.snapshots.borrow().lines[0].settings_before, None);
     assert_eq!(profile::load(&path, &Search::shipped()).unwrap().lines[0], new);
 
-    // Somebody edits the file meanwhile: theirs is not overwritten.
+    // The file is edited meanwhile: that edit is not overwritten.
     fs::write(&path, &text).unwrap();
     let outcome = send_command(&mut session, 3, CommandKind::SaveSettings(L1)).await;
     let Outcome::Refused(Refusal::NotSaved(why)) = outcome else { panic!("{outcome:?}") };

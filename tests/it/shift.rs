@@ -85,7 +85,7 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     );
     let day = last.alarm_metrics.day.clone();
     assert!(1 <= day.annunciated(), "the meter has seen the high alarm");
-    assert_eq!(store.alarm_metrics(day.from, day.until, now).unwrap(), *day, "the screen told what the journal tells");
+    assert_eq!(store.alarm_metrics(day.from, day.until, now).unwrap(), *day, "the screen shows what the journal has");
     let report = store.report(&period, now).unwrap();
     let file = folder.path().join("morning.csv");
     std::fs::write(&file, FORMATS[0].render(&report, &def, CsvDialect::default())).unwrap();

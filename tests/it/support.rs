@@ -28,7 +28,7 @@ pub fn sightglass() -> Command {
 
 /// A folder for sockets that no other call gets. Its name is short, because that of a socket has 107 bytes at the most.
 pub fn sockets() -> PathBuf {
-    // Nobody drops this: it stays behind in the temporary folder with nothing but dead sockets in it.
+    // This is never dropped: it stays behind in the temporary folder with nothing but dead sockets in it.
     static ALL: OnceLock<tempfile::TempDir> = OnceLock::new();
     static NEXT: AtomicU32 = AtomicU32::new(0);
     let number = NEXT.fetch_add(1, Ordering::Relaxed);

@@ -39,7 +39,7 @@ fn verify(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
 }
 
 #[test]
-fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
+fn the_first_bad_line_of_an_edited_audit_log_is_named() {
     let folder = folder();
     let audit_log = written(folder.path());
     let good = fs::read_to_string(&audit_log).unwrap();
@@ -93,7 +93,7 @@ fn whatever_is_done_to_the_book_by_hand_the_first_bad_line_is_named() {
 }
 
 #[test]
-fn an_audit_log_that_was_not_compared_with_the_history_is_no_success() {
+fn audit_without_a_comparison_with_the_history_fails() {
     let folder = folder();
     written(folder.path());
     let history = folder.path().join("tank.duckdb");
@@ -129,7 +129,7 @@ fn a_book_that_is_not_there_is_told_by_name() {
 }
 
 #[test]
-fn a_station_goes_on_after_a_book_that_was_changed_and_says_where_it_is_broken() {
+fn a_station_continues_an_edited_audit_log_and_names_the_break() {
     let folder = folder();
     let audit_log = written(folder.path());
     let good = fs::read_to_string(&audit_log).unwrap();
@@ -163,7 +163,7 @@ fn rewrite(audit_log: &Path, entries: &[Entry]) {
 }
 
 #[test]
-fn a_sealed_log_that_was_rewritten_with_its_chain_or_cut_with_its_seals_is_found() {
+fn a_sealed_log_that_was_rewritten_or_cut_is_found() {
     let folder = folder();
     let (code, key) = make_key(folder.path(), "kept");
     assert_eq!(code, Some(0), "{}", fs::read_to_string(&key).unwrap());

@@ -67,7 +67,7 @@ fn options_behind_the_bytes_are_options() {
 }
 
 #[test]
-fn bytes_that_are_no_answer_end_raw_with_an_error_and_are_counted_right() {
+fn send_fails_on_an_invalid_response_and_counts_its_bytes() {
     let garbage = peer(answers(|_| vec![0x55; 8_128]));
     for mode in ["tcp", "rtu-over-tcp"] {
         let (code, said) = run(&["send", &garbage, "--mode", mode, "--timeout", "100", "01 03 00 00 00 01"]);

@@ -21,9 +21,9 @@ use crate::guarded::{Guarded, PASSWORD, login, request, until};
 const TRIES: u16 = 3;
 /// For how long, plant time.
 const LOCK_OUT: Duration = Duration::from_secs(100);
-/// What everybody is told whose name or password was wrong.
+/// The reply to a wrong name or password.
 const WRONG: &str = "wrong name or password";
-/// What everybody is told whose password was not even checked.
+/// The reply to a password that was not even checked.
 const NOT_CHECKED: &str = "password not checked after wrong ones";
 
 fn strict(def: &mut PlantDef) {
@@ -44,22 +44,22 @@ async fn login_at_last(guarded: &Guarded, session: &Session, user: &str) -> Time
     guarded.written(written, "the login", |entry| &*entry.action == "login" && &*entry.target == user).await.utc
 }
 
-/// Waits until a wait that was told is over.
+/// Waits until an announced delay is over.
 async fn waited(guarded: &Guarded, seconds: u64) {
     guarded.pass(Duration::from_secs(seconds + 1)).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_script_with_wrong_passwords_waits_longer_each_time_is_locked_out_as_configured_and_sees_alarms_throughout() {
+async fn wrong_passwords_are_delayed_then_locked_out_alarms_stay() {
     let guarded = Guarded::start(strict).await;
-    let (script, mut looks) = (guarded.far("eve"), guarded.nobody().await);
+    let (script, mut looks) = (guarded.far("eve"), guarded.anonymous().await);
     let written = guarded.entries().len();
-    for (try_of, told) in [(1, 1), (2, 2)] {
-        assert_eq!(login(&script, "tom", "wrong").await, Err(wait(told)), "try {try_of}");
+    for (try_of, reply) in [(1, 1), (2, 2)] {
+        assert_eq!(login(&script, "tom", "wrong").await, Err(wait(reply)), "try {try_of}");
         // While it waits, nothing is even looked at: not the right password either.
         let why = login(&script, "tom", PASSWORD).await.unwrap_err();
         assert!(why.starts_with(NOT_CHECKED), "{why}");
-        waited(&guarded, told).await;
+        waited(&guarded, reply).await;
     }
     assert_eq!(login(&script, "tom", "wrong").await, Err(wait(LOCK_OUT.as_secs())));
     let locked = guarded.written(written, "the lockout", |entry| &*entry.action == "lockout").await;
@@ -72,7 +72,7 @@ async fn a_script_with_wrong_passwords_waits_longer_each_time_is_locked_out_as_c
     login(&script, "tina", PASSWORD).await.unwrap();
     script.request(SessionRequest::Logout).await.unwrap();
 
-    // The devices fall silent while the script is locked out: it is told, though no value of the process is.
+    // The devices fall silent while the script is locked out: its alarm is shown, though no value of the process is.
     assert!(looks.snapshots.borrow().alarms.is_empty());
     guarded.tap.mute();
     let alarmed = until(&mut looks.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;
@@ -91,12 +91,12 @@ async fn a_script_with_wrong_passwords_waits_longer_each_time_is_locked_out_as_c
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_system_user_who_tries_every_name_is_shut_though_no_account_is() {
+async fn a_system_user_who_tries_every_name_is_locked_out() {
     let guarded = Guarded::start(strict).await;
     let script = guarded.far("eve");
     for number in 0..TRIES * 8 {
-        let told = login(&script, &format!("name{number}"), "wrong").await.unwrap_err();
-        assert!(told.starts_with(WRONG), "{told}");
+        let reply = login(&script, &format!("name{number}"), "wrong").await.unwrap_err();
+        assert!(reply.starts_with(WRONG), "{reply}");
     }
     assert!(login(&script, "tina", PASSWORD).await.unwrap_err().starts_with(NOT_CHECKED));
     for user in ["vera", "tom", "sue"] {
@@ -107,7 +107,7 @@ async fn a_system_user_who_tries_every_name_is_shut_though_no_account_is() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_unknown_name_a_wrong_password_and_a_disabled_user_are_told_the_same() {
+async fn every_failed_login_gets_the_same_answer() {
     let guarded = Guarded::start(strict).await;
     let sue = guarded.person("sue").await;
     sue.request(SessionRequest::Disable { user: "vera".into(), disabled: true }).await.unwrap();
@@ -130,7 +130,7 @@ async fn an_unknown_name_a_wrong_password_and_a_disabled_user_are_told_the_same(
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_password_only() {
+async fn an_idle_terminal_is_locked_and_still_shows_alarms() {
     let guarded = Guarded::start(|def| def.access.idle_lock = Duration::from_secs(60)).await;
     let mut idle = guarded.person("sue").await;
     let touched = guarded.person("tom").await;
@@ -169,7 +169,7 @@ async fn a_terminal_that_nobody_touches_is_locked_shows_alarms_and_opens_to_the_
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed() {
+async fn a_tag_for_two_users_is_written_after_the_second_approves() {
     let guarded = Guarded::start(|def| {
         let tag = def.tag_named("TIC-1.SV").unwrap();
         def.tags[tag.index()].reauthenticate = Some(Reauthentication::SecondUser);
@@ -203,7 +203,7 @@ async fn a_tag_for_two_persons_is_written_once_a_second_one_who_may_has_signed()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn of_two_operators_at_once_the_second_is_told_that_the_value_has_changed_under_him() {
+async fn of_two_writes_at_once_the_second_finds_the_value_changed() {
     let guarded = Guarded::start(|_| {}).await;
     let (tom, tina) = (guarded.person("tom").await, guarded.person("tina").await);
     let (tag, seen) = (guarded.tag("TIC-1.SV"), guarded.value("TIC-1.SV"));

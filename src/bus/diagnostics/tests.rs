@@ -83,11 +83,11 @@ fn a_foreign_unit_that_chatters_is_not_every_unit() {
     assert_eq!(units(&scan(4)), 4, "a few may be units with other settings");
     let many = scan(20);
     assert_eq!((units(&many), verdict(&many)), (1, "1 answer"));
-    let told = many.findings.iter().find_map(|finding| match finding {
+    let text = many.findings.iter().find_map(|finding| match finding {
         Finding::Failed { what, .. } => Some(what.as_str()),
         _ => None,
     });
-    assert_eq!(told, Some("19 addresses: something else talks on this line"));
+    assert_eq!(text, Some("19 addresses: something else talks on this line"));
 }
 
 #[test]

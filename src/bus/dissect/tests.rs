@@ -15,7 +15,7 @@ fn check(message: &str, asked: &str, summary: &str) -> Dissection {
         assert_eq!(dissection.summary, summary);
         assert_eq!(dissection.verdict, "ok", "{summary}");
         assert_eq!(dissection.message, message);
-        // Every byte is told, once and in order.
+        // Every byte is described, once and in order.
         let mut at = 0;
         for field in &dissection.fields {
             assert_eq!(field.range.start, at, "{summary}: {field:?}");
@@ -171,7 +171,7 @@ fn an_answer_on_a_line_finds_its_request_before_it() {
 }
 
 proptest::proptest! {
-    /// Whatever came over the line, it is told, byte by byte.
+    /// Whatever came over the line is described, byte by byte.
     #[test]
     fn no_bytes_are_beyond_words(
         bytes in proptest::collection::vec(proptest::num::u8::ANY, 0..300),

@@ -24,7 +24,7 @@ impl Pause {
     pub fn exact() -> Pause {
         let flags = TimerfdFlags::NONBLOCK | TimerfdFlags::CLOEXEC;
         let timer = rustix::time::timerfd_create(TimerfdClockId::Monotonic, flags).map_err(std::io::Error::from);
-        // SAFETY: the descriptor is owned by what is registered, and nobody takes it out.
+        // SAFETY: the descriptor is owned by what is registered, and never taken out.
         #[allow(unsafe_code)]
         let registered = timer.and_then(|timer| unsafe { AsyncFd::register(timer) }.map_err(std::io::Error::from));
         match registered {

@@ -63,7 +63,7 @@ fn group_words(path: &str) -> String {
     let groups = fs::read_to_string("/etc/group").unwrap_or_default();
     let is_this = |line: &&str| line.split(':').nth(2) == Some(&gid.to_string());
     match groups.lines().find(is_this).and_then(|line| line.split(':').next()) {
-        // Nobody should join this one.
+        // No task joins this one.
         Some("root") => ": it belongs to root; ask the administrator for access (a udev rule)".to_owned(),
         Some(name) => format!(": it belongs to the group {name} (usermod -aG {name} USER, then log in again)"),
         None => format!(": it belongs to the group {gid}"),

@@ -215,7 +215,7 @@ async fn a_device_that_stays_out_of_step_is_read_again_after_a_rest() {
     line.read(&def).await;
 }
 
-/// A device that never stops talking: it is told as a failure, and the line still obeys.
+/// A device that never stops sending is reported as a failure, and the line still serves commands.
 #[tokio::test(start_paused = true)]
 async fn a_chattering_line_is_told_and_can_be_closed() {
     let def = plant(Mode::Rtu);
@@ -228,7 +228,7 @@ async fn a_chattering_line_is_told_and_can_be_closed() {
         }
     });
     let fault = line.fault(&def).await;
-    assert!(fault.is_corrupt(), "noise is told as noise, not as silence: {fault}");
+    assert!(fault.is_corrupt(), "noise is reported as noise, not as a timeout: {fault}");
     line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
 }
@@ -275,7 +275,7 @@ async fn a_port_that_goes_away_comes_back_by_itself() {
     line.read(&def).await;
 }
 
-/// An answer that comes after the port was opened anew – with a longer timeout, as a technician would – is still late.
+/// An answer that comes after the port was opened again – with a longer timeout, as a technician would – is still late.
 #[tokio::test(start_paused = true)]
 async fn a_late_reply_is_known_after_other_settings_too() {
     let def = plant(Mode::Rtu);

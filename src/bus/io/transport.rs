@@ -92,7 +92,7 @@ fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, Strin
         .flow_control(FlowControl::None);
     // The port is taken exclusively: a second master on the line is refused by the system.
     let stream: SerialStream = builder.open_native_async().map_err(|error| ports::why_not(path, &error))?;
-    // A driver remembers what an earlier opening has switched on; one that never could need not be told.
+    // A driver remembers what an earlier opening has switched on; one that never could needs no call.
     let switched = uart::set_rs485(&stream, rs485);
     if rs485 != Rs485::Off {
         switched.map_err(|error| {

@@ -326,7 +326,7 @@ impl Wire {
 
     async fn wait_for_silence(&mut self) {
         // A device that never stops talking, or a second master, must not hold the line for ever: it corrupts what is sent
-        // then, and that is told.
+        // then, and that is reported.
         let now = Instant::now();
         if self.quiet_until <= now {
             return;

@@ -117,7 +117,7 @@ fn a_dead_device_is_probed_with_backoff_and_read_when_back() {
     schedule.done(2, at(3000), at(3010));
     schedule.done(2, at(4000), at(4010));
     assert_eq!(schedule.next(at(4010)), Next::WaitUntil(at(4910)), "the next wait is two seconds");
-    assert!(!fail(&mut schedule, 4910, 5210), "it is told once");
+    assert!(!fail(&mut schedule, 4910, 5210), "it is reported once");
     schedule.done(2, at(5210), at(5220));
     assert_eq!(schedule.next(at(5220)), Next::WaitUntil(at(6000)), "the other device goes on at its rate");
     schedule.answered(device, Some(Duration::from_millis(10)), at(6100));

@@ -1,4 +1,4 @@
-//! The manager as a whole: what is told, acknowledged, suppressed, reminded of and restored.
+//! The manager as a whole: what is annunciated, acknowledged, suppressed, reminded of and restored.
 
 mod anything;
 mod suppression;

@@ -1,4 +1,4 @@
-//! Set files: what is written is read back, and what a person has spoiled is told with its place.
+//! Set files: what is written is read back, and each error is reported with its line.
 
 use proptest::prelude::*;
 

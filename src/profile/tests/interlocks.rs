@@ -14,7 +14,7 @@ fn an_interlock_says_what_blocks_which_value() {
     let found = &plant.logic.interlocks[0];
     assert_eq!((found.value, found.when, found.refuse), (1.0, InterlockCondition::Above(80.0), false));
     let off = interlocked(&lock.replace("\"on\"", "\"off\"")).unwrap();
-    assert!(!off.logic.interlocks[0].refuse, "switching off is told, never refused");
+    assert!(!off.logic.interlocks[0].refuse, "switching off is warned of, never refused");
     for (from, to, expect) in [
         ("value = \"on\"", "value = \"off\"\nrefuse = true", "switching off is never refused"),
         ("value = \"on\"", "value = \"full\"", "`full` is not a state of D1.MODE"),

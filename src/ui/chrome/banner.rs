@@ -50,7 +50,7 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let x = canvas.text(1, 0, cx.theme.priority_mark(def.priority), mark) + 1;
     let x = canvas.text(x, 0, &state_text(cx, alarm), style) + 2;
     let room = canvas.width();
-    // The key is told where it is meant for this very alarm: on the alarms tab it is for the selected one.
+    // The key is shown where it acts on this very alarm: on the alarms tab it acts on the selected one.
     let meant = model.alarm_to_acknowledge().is_some_and(|meant| meant.id == alarm.id);
     let may = rights::missing(cx, &alarm.acknowledge()).is_none();
     let ack = if waiting && meant && may { t!("a ack ") } else { "" };

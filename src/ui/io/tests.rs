@@ -25,7 +25,7 @@ const CHILD: &str = "SIGHTGLASS_UI_CHILD";
 /// No wait in these tests is longer.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// What runs on the pty: a terminal on a plant that does as it is told: `a` panics a task, `A` spoils the snapshot.
+/// What runs on the pty: a terminal on a plant driven by keys: `a` panics a task, `A` spoils the snapshot.
 /// Without the variable there is nothing to run.
 #[test]
 fn on_the_pty() {

@@ -1,4 +1,4 @@
-//! Keys through `update`: nothing is done unasked, and what was done is told.
+//! Keys through `update`: nothing is done unasked, and what was done is shown.
 
 mod numbers;
 mod alarms;
@@ -70,7 +70,7 @@ fn a_screen_too_small_to_see_takes_no_commands() {
     }
     for keys in ["s65", "r", "A", "4⏎T↓⏎", "?", "→⏎"] {
         let mut model = small(keys);
-        assert_eq!(model.modal, None, "{keys}: a window that nobody sees is closed");
+        assert_eq!(model.modal, None, "{keys}: a hidden window is closed");
         assert_eq!(type_keys(&mut model, "⏎"), [], "{keys}");
     }
     let mut model = small("3↓↓");

@@ -42,8 +42,8 @@ fn the_sv_in_use_stands_beside_the_one_that_was_set() {
         model.tabs.shown = tab;
         type_keys(&mut model, keys);
         let shown = screen(&mut model, 120, 40);
-        let told = |line: &str| line.contains("SV  42.0") && line.contains("set 70.0");
-        assert!(shown.lines().any(told), "{tab:?}\n{shown}");
+        let is_set = |line: &str| line.contains("SV  42.0") && line.contains("set 70.0");
+        assert!(shown.lines().any(is_set), "{tab:?}\n{shown}");
     }
 }
 

@@ -31,7 +31,7 @@ use crate::{
     },
 };
 
-/// Nobody is in, and nothing may be seen but alarms.
+/// No user is logged in, and nothing may be seen but alarms.
 fn closed() -> SessionStatus {
     let banner = "This is the control of the water tank. Only for those who work here; all that is done is recorded.";
     SessionStatus { who: None, view: false, banner: Some(banner.into()), ..(*fixture::session()).clone() }
@@ -293,7 +293,7 @@ fn the_users_and_what_can_be_done_with_them() {
         SessionRequest::AddUser { user: "jane".to_owned(), role: Role::Supervisor, password: password() },
     );
     let mut model = with(&Fixture::normal(), supervisor());
-    assert_eq!(sent_request(&type_keys(&mut model, "7↓xboriss⏎")), None, "another name deletes nobody");
+    assert_eq!(sent_request(&type_keys(&mut model, "7↓xboriss⏎")), None, "another name deletes no user");
     for (keys, own) in [("7d", true), ("7x", true), ("7↓↓d", false), ("7↓x", false)] {
         let mut model = with(&Fixture::normal(), supervisor());
         type_keys(&mut model, keys);
@@ -302,15 +302,15 @@ fn the_users_and_what_can_be_done_with_them() {
 }
 
 fn action(number: u64, by: &str, action: &str, target: &str, change: (&str, &str), outcome: &str) -> ActionRecord {
-    let told = |text: &str| (!text.is_empty()).then(|| Arc::from(text));
+    let optional = |text: &str| (!text.is_empty()).then(|| Arc::from(text));
     ActionRecord {
         at: fixture::now() - jiff::SignedDuration::from_secs(60 * (40 - number as i64)),
         by: by.into(),
         from: "pts/3 from 10.0.0.5, user panel".into(),
         action: action.into(),
         target: target.into(),
-        old: told(change.0),
-        new: told(change.1),
+        old: optional(change.0),
+        new: optional(change.1),
         outcome: outcome.into(),
         note: None,
         chain_hash: Some(ChainHash { number, hash: [0xA5; 32] }),

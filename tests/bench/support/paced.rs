@@ -90,7 +90,7 @@ fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 
     let character = serial.char_time();
     let (mut receiver, mut bytes) = (Receiver::default(), [0; 512]);
     let (mut began, mut latest, mut quiet) = (Instant::now(), Instant::now(), Instant::now());
-    // The read fails when nobody holds the other end any more.
+    // The read fails when the other end is closed.
     while let Ok(count) = line.read(&mut bytes) {
         let now = Instant::now();
         if now - latest > SILENCE {

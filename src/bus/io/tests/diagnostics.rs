@@ -59,11 +59,11 @@ async fn nonsense_is_sent_and_nonsense_is_told() {
                 _ => None,
             })
             .await;
-        let told = |found: &Finding| matches!(found, Finding::Bytes { bytes, .. } if bytes.ends_with(&[0, 9]));
+        let is_byte = |found: &Finding| matches!(found, Finding::Bytes { bytes, .. } if bytes.ends_with(&[0, 9]));
         match mode {
             // The poll before it was answered by nonsense too: the stream is out of sync, and the test with it.
             Mode::Tcp => assert_eq!(run.state, DiagnosticState::Failed("the stream is out of sync".into())),
-            _ => assert!(run.findings.iter().any(told), "{mode:?}: {run:?}"),
+            _ => assert!(run.findings.iter().any(is_byte), "{mode:?}: {run:?}"),
         }
     }
 }
@@ -93,11 +93,11 @@ async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, Diagn
     while result.is_none() {
         match line.next(&def).await {
             Event::Diagnostic { run, .. } => state = Some(run.state.clone()),
-            Event::Wrote { result: told, .. } => result = Some(told),
+            Event::Wrote { result: ended, .. } => result = Some(ended),
             _ => {}
         }
     }
-    (asked.elapsed(), result.expect("told"), state.expect("told"))
+    (asked.elapsed(), result.expect("reported"), state.expect("reported"))
 }
 
 #[tokio::test(start_paused = true)]

@@ -51,7 +51,7 @@ async fn a_write_is_sent_once_whatever_happens() {
     }
 }
 
-/// A broadcast is sent once, nobody waits for an answer, and it is told as accepted, not as verified.
+/// A broadcast is sent once, without waiting for a response, and reported as accepted, not as verified.
 #[tokio::test(start_paused = true)]
 async fn a_broadcast_is_sent_once_and_never_called_verified() {
     for mode in [Mode::Rtu, Mode::Ascii] {
@@ -173,7 +173,7 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
     assert!(!heard.contains(&vec![1, 6, 0, 20, 0, 1]), "the start is not sent after the stop");
 }
 
-/// A key that was turned stays turned though the value is refused: that is told, and the key is read again.
+/// A key that was turned stays turned though the value is refused: that is reported, and the key is read again.
 #[tokio::test(start_paused = true)]
 async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
     let def = plant(Mode::Rtu);
@@ -183,7 +183,7 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
         [1, 6, 0, 11, ..] => SlaveAction::Exception(3),
         _ => SlaveAction::Answer,
     });
-    // The key is read once at the start and then only when somebody asks for it.
+    // The key is read once at the start and then only on request.
     let holds = |event: &Event| match event {
         Event::Read { values, .. } => values.iter().any(|(tag, _)| *tag == key).then_some(()),
         _ => None,
@@ -192,12 +192,12 @@ async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
     let (id, unlock) = (WriteId(1), Some((key, 1.0)));
     let request = BusRequest::Write(WriteJob { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false });
     line.requests.send(request).await.expect("the line runs");
-    let told = |event: &Event| match event {
+    let is_result = |event: &Event| match event {
         Event::Unlocked { key, result, .. } => Some((Some(*key), result.clone())),
         Event::Wrote { result, .. } => Some((None, result.clone())),
         _ => None,
     };
-    assert_eq!(line.until(&def, told).await, (Some(key), WriteResult::Accepted));
-    assert_eq!(line.until(&def, told).await, (None, WriteResult::Refused(ExceptionCode(3))));
+    assert_eq!(line.until(&def, is_result).await, (Some(key), WriteResult::Accepted));
+    assert_eq!(line.until(&def, is_result).await, (None, WriteResult::Refused(ExceptionCode(3))));
     line.until(&def, holds).await;
 }

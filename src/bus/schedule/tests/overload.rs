@@ -29,7 +29,7 @@ fn overload_sheds_background_stretches_normal_and_ends() {
     assert_eq!((reads(&log, 0), reads(&log, 1)), (200, 100), "critical at full rate");
     let normal = reads(&log, 2) * 85;
     assert!((26_900..=28_000).contains(&normal), "normal has what is left of 40 s: {normal} ms");
-    assert_eq!(missed(&schedule), before, "what was told to be stretched is not missed");
+    assert_eq!(missed(&schedule), before, "a stretched poll is not missed");
     // The device has become faster: everything fits again.
     let light = |index: usize, _| [40, 40, 20, 40][index];
     play(&mut schedule, 60_000, 100_000, light);

@@ -147,7 +147,7 @@ fn a_restart_continues_and_the_time_in_between_is_a_gap() {
     let store = open(&db, 0);
     store.append(&[good(PV, 0, 27.0), good(SV, 0, 70.0), good(PV, 30, 28.0)]).unwrap();
     drop(store);
-    // Nobody ended the curves: the station died. It is known to have lived until 30 s.
+    // The curves have no end: the station died. It is known to have lived until 30 s.
     let store = open(&db, 100);
     store.append(&[good(PV, 100, 40.0)]).unwrap();
     let expect = [Some(27.0), Some(28.0), None, None, Some(40.0)];

@@ -108,7 +108,7 @@ fn an_alarm_is_fleeting_if_it_goes_before_anybody_could_read_it() {
     assert_eq!(names(&gone(10.9).fleeting), ["a"]);
     assert_eq!(names(&gone(11.0).fleeting), [""; 0]);
     let seen = figures(3_600.0, &[(1.0, "a", Raised), (2.0, "a", Acknowledged), (3.0, "a", ReturnedToNormal)]);
-    assert_eq!(names(&seen.fleeting), [""; 0], "somebody has seen it");
+    assert_eq!(names(&seen.fleeting), [""; 0], "it was acknowledged");
 }
 
 #[test]

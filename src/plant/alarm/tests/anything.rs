@@ -140,7 +140,7 @@ proptest! {
             journal.extend(found);
             let (machine, new) = (manager.machine(HIGH), &journal[known..]);
             let raised = new.iter().any(|event| matches!(event.event, AlarmEvent::Raised | AlarmEvent::ReAlarmed));
-            // Who is told is told once, and only where something was raised in the open.
+            // An alarm is annunciated once, and only if it was raised unsuppressed.
             prop_assert!(!manager.lists().sound || sounded || raised, "it sounds for nothing: {:?}", test_event);
             prop_assert!(!(machine.state().is_suppressed() && manager.lists().sound));
             let shown = manager.active().iter().any(|alarm| alarm.id == HIGH);
@@ -158,7 +158,7 @@ proptest! {
                 prop_assert!(!turned || delay > 0, "chatter inside the deadband: {:?}", new);
             }
             if raised && !new.iter().any(|event| event.event == AlarmEvent::ReAlarmed) {
-                prop_assert_eq!(machine.state(), AlarmState::Unacknowledged, "nobody has seen it");
+                prop_assert_eq!(machine.state(), AlarmState::Unacknowledged, "not acknowledged yet");
             }
             prop_assert!(!latch || !machine.latched || machine.state() != AlarmState::Normal);
             // Shelved for no longer than it was given for.

@@ -102,10 +102,10 @@ fn only_a_known_false_condition_disables_an_alarm() {
     let mut delayed = AlarmManager::new(enabled_by_design(|alarm| alarm.on_delay = Duration::from_secs(5)));
     delayed.evaluate(at(0), when(80.0, Some(false)));
     assert_eq!(events(&delayed.evaluate(at(5), when(80.0, Some(false)))), [AlarmEvent::RaisedSuppressed]);
-    let anew = [AlarmEvent::Unsuppressed, AlarmEvent::ReturnedSuppressed];
+    let unsuppressed = [AlarmEvent::Unsuppressed, AlarmEvent::ReturnedSuppressed];
     assert_eq!(
         events(&delayed.evaluate(at(10), when(80.0, Some(true)))),
-        anew,
+        unsuppressed,
         "the delay begins when the pump starts"
     );
     assert_eq!(events(&delayed.evaluate(at(14), when(80.0, Some(true)))), []);

@@ -230,8 +230,7 @@ fn only_an_action_that_saves_is_advised_after_a_restore() {
 #[test]
 fn a_restore_asks_what_each_of_its_writes_would_have_asked() {
     let mut fixture = many(1);
-    let words =
-        |n: usize| format!("Wrong values of number {n} can spoil a whole batch, and nobody notices it for long.");
+    let words = |n: usize| format!("Wrong values of number {n} can spoil a whole batch, and are noticed late.");
     let mut shown = |asking: &[&str]| {
         for tag in &mut fixture.def.tags {
             tag.confidence = if tag.short.starts_with("TM") { Confidence::Medium } else { Confidence::High };

@@ -11,15 +11,15 @@ pub(super) fn faceplate(fixture: &Fixture, tag: &str) -> Model {
 #[test]
 fn a_pump_is_switched_by_its_manual_command() {
     let mut fixture = Fixture::normal();
-    for (auto, told) in [(1.0, true), (0.0, false)] {
+    for (auto, warned) in [(1.0, true), (0.0, false)] {
         fixture.set("PLC-1.AUTO", auto);
         let mut model = faceplate(&fixture, "PLC-1.P-1");
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains("t ON P-1"), "{shown}");
-        assert_eq!(shown.contains("effective in MANUAL only (PLC-1.AUTO is"), told, "{shown}");
+        assert_eq!(shown.contains("effective in MANUAL only (PLC-1.AUTO is"), warned, "{shown}");
         assert_eq!(sent_kind(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
         let shown = screen(&mut model, 80, 24);
-        assert_eq!(shown.contains("! effective in MANUAL only (PLC-1.AUTO is AUTO)"), told, "{shown}");
+        assert_eq!(shown.contains("! effective in MANUAL only (PLC-1.AUTO is AUTO)"), warned, "{shown}");
         let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
         assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
     }
@@ -123,7 +123,7 @@ fn what_an_interlock_blocks_is_told_and_not_sent() {
     fixture.set("PLC-1.TK-2", 12.0);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     assert!(sent_kind(&type_keys(&mut model, "⏎")).is_some());
-    // What nobody can tell is told, and left to the PLC.
+    // An unknown state is shown, and left to the PLC.
     let level = fixture.tag("PLC-1.TK-2");
     fixture.samples[level.index()] = Sample::bad(Cause::Timeout, fixture::now());
     let mut model = faceplate(&fixture, "PLC-1.P-1");
@@ -139,12 +139,12 @@ fn a_key_that_is_sent_first_is_named_before_it_is() {
     let (pump, key) = (fixture.tag("PLC-1.MAN.P-1"), fixture.tag("PLC-1.P-1"));
     fixture.def.tags[pump.index()].write_unlock = Some((key, 1.0));
     fixture.set("PLC-1.AUTO", 0.0);
-    for (now, told) in [(0.0, true), (1.0, false)] {
+    for (now, warned) in [(0.0, true), (1.0, false)] {
         fixture.set("PLC-1.P-1", now);
         let mut model = faceplate(&fixture, "PLC-1.P-1");
         type_keys(&mut model, "t");
         let shown = screen(&mut model, 80, 24);
-        assert_eq!(shown.contains("First writes PLC-1.P-1 := RUN; it keeps this value."), told, "{now}: {shown}");
+        assert_eq!(shown.contains("First writes PLC-1.P-1 := RUN; it keeps this value."), warned, "{now}: {shown}");
     }
 }
 
@@ -158,7 +158,7 @@ fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("The sequence stops in HEAT.") && shown.contains("Switched off: P-1 RUN."), "{shown}");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&stop));
-    // Also while nobody knows whether it runs.
+    // Also while its state is unknown.
     let run = fixture.tag("PLC-1.RUN");
     fixture.samples[run.index()] = Sample::bad(Cause::NotRead, fixture::now());
     let mut model = self::model(&fixture, Theme::FULL);

@@ -1,4 +1,4 @@
-//! States and qualities are told by signs, words and colours; nothing old is left on the screen.
+//! States and qualities have signs, words and colours; nothing old is left on the screen.
 
 use super::*;
 

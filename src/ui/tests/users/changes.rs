@@ -10,7 +10,7 @@ fn refused_credentials_are_asked_again_in_their_window() {
     let Some(Effect::Command(first, _)) = effects.last() else { panic!("no command: {effects:?}") };
     shows(&mut model, "waiting for the station");
     assert_eq!(type_keys(&mut model, "1q⏎"), [], "while the answer is awaited");
-    let told = |request: &Command, outcome: Outcome| {
+    let outcome_of = |request: &Command, outcome: Outcome| {
         let mut snapshot = fixture.snapshot();
         Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
             old: Some(70.0),
@@ -21,7 +21,7 @@ fn refused_credentials_are_asked_again_in_their_window() {
     };
     update(
         &mut model,
-        told(first, Outcome::Refused(Refusal::NotReauthenticated("wrong password; wait 2 s".to_owned()))),
+        outcome_of(first, Outcome::Refused(Refusal::NotReauthenticated("wrong password; wait 2 s".to_owned()))),
     );
     shows(&mut model, "wrong password; wait 2 s");
     let effects = type_keys(&mut model, "r1q 3a⏎");
@@ -29,7 +29,7 @@ fn refused_credentials_are_asked_again_in_their_window() {
     assert!(!screen(&mut model, 80, 24).contains("r1q"));
     let Some(Effect::Command(second, credentials)) = effects.last() else { panic!("no command: {effects:?}") };
     assert_eq!(credentials.as_ref().map(|sign| sign.password.clone()), Some("r1q 3a".into()));
-    update(&mut model, told(second, Outcome::Pending));
+    update(&mut model, outcome_of(second, Outcome::Pending));
     assert_eq!(model.modal, None);
 }
 

@@ -18,7 +18,7 @@ fn a_suppressed_alarm_is_put_back() {
 fn a_technician_is_told_that_out_of_service_needs_a_supervisor() {
     let mut model = shown(&Fixture::alarm(), Theme::FULL, "");
     let mut session = Arc::unwrap_or_clone(fixture::session());
-    session.who.as_mut().expect("somebody sits here").role = Role::Technician;
+    session.who.as_mut().expect("a user is logged in").role = Role::Technician;
     update(&mut model, Msg::SessionStatus(Arc::new(session)));
     let footer = screen(&mut model, 120, 40).lines().last().map(str::to_owned).unwrap_or_default();
     assert!(footer.contains("z shelve") && !footer.contains("o out of service"), "{footer}");
@@ -87,7 +87,7 @@ fn every_priority_in_every_state_looks_different_without_colour() {
             let mut model = shown(&fixture, theme, if state.is_suppressed() { "v" } else { "" });
             let picture = screen(&mut model, 80, 24);
             let row = picture.lines().skip(5).find(|line| line.contains(state.word())).expect("its row").to_owned();
-            // The marks at the left alone tell it: nobody has to read the row.
+            // The marks at the left alone show it, without reading the row.
             let marks: String = if state.is_suppressed() { row.clone() } else { row.chars().take(7).collect() };
             assert!(looks.insert(marks), "{glyphs:?} {priority:?} {state:?} looks like another one: {row}");
         }
