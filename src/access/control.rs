@@ -217,7 +217,7 @@ impl AccessControl {
             if needed == Role::Viewer { self.may_look(terminal) } else { self.may(terminal, Some(needed)).map(drop) };
         let Err(why) = may else { return Ok(()) };
         // Only a refused read of the audit log is recorded.
-        let is_audit = needed != Role::Viewer;
+        let is_audit = matches!(query, Query::Audit { .. });
         let entry = if is_audit { self.refused(terminal, "read audit log", "", &why, at) } else { None };
         Err((why, entry.into_iter().collect()))
     }

@@ -95,6 +95,7 @@ pub fn needs_for_question(query: &Query) -> Role {
         | Query::Values { .. }
         | Query::Report { .. } => Right::Look,
         Query::Audit { .. } => Right::ManageUsers,
+        Query::Registers(_) => Right::Operate,
     };
     right.role()
 }

@@ -124,6 +124,10 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
             Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
         }
         Query::Report { .. } | Query::AlarmMetrics { .. } => Ok(()),
+        Query::Registers(read) => {
+            read.check()?;
+            line(def, read.line)
+        }
     }
 }
 

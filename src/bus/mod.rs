@@ -15,7 +15,7 @@
 //! | [`codec`] | words to numbers and back |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`line_stats`] | what is counted |
-//! | [`diagnostics`] | the steps of a diagnostic |
+//! | [`diagnostics`], [`live`] | the steps of a diagnostic, and of a live read |
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
@@ -37,5 +37,6 @@ pub mod schedule;
 pub mod admission;
 pub mod late_reply;
 pub mod diagnostics;
+pub mod live;
 pub mod line_stats;
 pub mod io;

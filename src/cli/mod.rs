@@ -14,6 +14,7 @@ mod export;
 mod decode;
 mod init;
 mod log;
+mod open;
 mod own_files;
 mod paths;
 mod profiles;
@@ -65,6 +66,8 @@ struct Args {
 enum Command {
     /// Run a simulated plant on a real pseudo-terminal line, with station and terminal in one process
     Demo(demo::Args),
+    /// Show the registers of any device, live: a port, or HOST[:TCPPORT]; no plant file, no login
+    Open(open::Args),
     /// Run the station without a terminal: poll, evaluate alarms, record the history
     Run(run::Args),
     /// Open a terminal at a running station; leaving it stops nothing
@@ -202,6 +205,7 @@ pub fn main() -> ExitCode {
             None => attach::main(attach::Args { plant: None }),
         },
         Some(Command::Demo(args)) => demo::main(args),
+        Some(Command::Open(args)) => open::main(args),
         Some(Command::Run(args)) => run::main(args),
         Some(Command::Attach(args)) => attach::main(args),
         Some(Command::Status(args)) => status::main(args),

@@ -15,6 +15,7 @@ use crate::{
         alarm::PeriodMetrics,
         def::{LineId, TagId},
         line_minute::LineMinute,
+        live::{LiveRead, LiveReading},
         record::{ActionRecord, AlarmRecord},
     },
     report::{Period, ShiftReport, step_series::HeldValue},
@@ -101,6 +102,8 @@ pub enum Query {
         /// Instants.
         count: usize,
     },
+    /// Registers of a unit as they are now: the line answers it, not the history.
+    Registers(LiveRead),
 }
 
 /// The answer to the query of the same name.
@@ -120,6 +123,8 @@ pub enum Answer {
     AlarmMetrics(Box<PeriodMetrics>),
     /// By tag the value in force at each instant; `None` where nothing is stored, or nothing recent enough.
     Values(Vec<Vec<Option<HeldValue>>>),
+    /// What the unit holds.
+    Registers(LiveReading),
 }
 
 /// A curve reduced to columns of equal width.

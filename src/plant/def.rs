@@ -86,6 +86,11 @@ impl Default for PlantDef {
 }
 
 impl PlantDef {
+    /// Is it only a device on a line, without a plant file that says what its registers mean?
+    pub fn is_bench(&self) -> bool {
+        self.tags.is_empty() && !self.devices.is_empty()
+    }
+
     /// The line of an id. Ids come from this very definition, so they are always there.
     pub fn line(&self, id: LineId) -> &LineDef {
         &self.lines[id.index()]
@@ -143,6 +148,35 @@ pub struct DeviceDef {
     pub actions: Vec<ActionDef>,
     /// Its ramp/soak program, if it has one.
     pub program: Option<ProgramDef>,
+}
+
+impl DeviceDef {
+    /// Unit 1 of which nothing is known: it gets what every device must take.
+    pub fn new(id: DeviceId, name: &str, line: LineId) -> DeviceDef {
+        DeviceDef {
+            id,
+            name: name.to_owned(),
+            title: String::new(),
+            line,
+            unit: 1,
+            profile: String::new(),
+            model: String::new(),
+            limits: Limits {
+                read_registers_max: 125,
+                read_bits_max: 2_000,
+                write_registers_max: 123,
+                gap_registers_max: 0,
+                alignment: 1,
+                in_flight_max: 1,
+            },
+            functions: Vec::new(),
+            gap: Duration::ZERO,
+            write_gap: Duration::ZERO,
+            faceplate: None,
+            actions: Vec::new(),
+            program: None,
+        }
+    }
 }
 
 /// What one request to a device may hold, and how blocks are cut.

@@ -33,6 +33,7 @@ pub mod request_stats;
 pub mod line_report;
 pub(crate) mod line_minute;
 pub mod diagnostics;
+pub mod live;
 pub mod command;
 pub mod record;
 pub(crate) mod interlock;

@@ -42,6 +42,8 @@ const EVENTS: usize = 256;
 const REQUESTS: usize = 16 + KEPT_FOR_STOPS;
 /// Commands waiting for the plant; a full queue refuses the command.
 const COMMANDS_MAX: usize = 64;
+/// Live reads waiting for one line; a full queue refuses the query.
+const LIVE_MAX: usize = 16;
 /// What a station is started with.
 #[derive(Debug)]
 pub struct Options {
@@ -176,10 +178,12 @@ fn assemble(
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
     let mut tasks = Vec::new();
-    let mut links = Vec::new();
+    let (mut links, mut live) = (Vec::new(), Vec::new());
     for (line, connector) in def.lines.iter().zip(connectors) {
         let (requests, request_queue) = mpsc::channel(REQUESTS);
+        let (live_reads, live_queue) = mpsc::channel(LIVE_MAX);
         links.push(requests);
+        live.push(live_reads);
         let (events, stopped) = (events.clone(), stopped.clone());
         tasks.push(tokio::spawn(supervisor::run(
             def.clone(),
@@ -188,6 +192,7 @@ fn assemble(
             connector,
             events,
             request_queue,
+            live_queue,
             stopped,
         )));
     }
@@ -198,7 +203,7 @@ fn assemble(
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
-    let outputs = Outputs { commands: commands.clone(), queries, audit, lifecycle: lifecycle_sender };
+    let outputs = Outputs { commands: commands.clone(), queries, live, audit, lifecycle: lifecycle_sender };
     let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(

@@ -23,8 +23,8 @@ use super::{
 };
 use crate::{
     access::{AccessControl, Durability, Effect, Peer, SessionStatus},
-    bus::io::clock::Clock,
-    history::{HistoryError, io::QueryRequest},
+    bus::io::{clock::Clock, live_reads::LiveRequest},
+    history::{Answer, HistoryError, Query, io::QueryRequest},
     plant::{Snapshot, command::CommandStatus},
 };
 
@@ -64,6 +64,8 @@ pub struct Outputs {
     pub commands: mpsc::Sender<CommandStatus>,
     /// To the history.
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
+    /// Live reads, to each line.
+    pub live: Vec<mpsc::Sender<LiveRequest>>,
     /// To the audit log.
     pub audit: mpsc::Sender<AuditMessage>,
     /// To the owner of the station.
@@ -206,12 +208,7 @@ impl SessionServer {
                 self.apply_effects(effects);
             }
             Request::Ask(query) => match self.access.may_ask(terminal, &query.query, now) {
-                Ok(()) => {
-                    if let Err(error) = self.outputs.queries.try_send((terminal, query)) {
-                        let (_, query) = error.into_inner();
-                        let _ = query.reply.send(Err(HistoryError::Engine("too busy, try again".to_owned())));
-                    }
-                }
+                Ok(()) => self.ask(terminal, query),
                 Err((why, effects)) => {
                     self.apply_effects(effects);
                     // A terminal that has left needs no answer.
@@ -225,6 +222,42 @@ impl SessionServer {
                 self.apply_effects(effects);
             }
         }
+    }
+
+    /// Hands a permitted query to the history, or to the line whose registers it reads.
+    fn ask(&self, terminal: u32, QueryRequest { query, reply }: QueryRequest) {
+        let refuse = |reply: oneshot::Sender<_>, why: &str| {
+            // A terminal that has left needs no answer.
+            let _ = reply.send(Err(HistoryError::Engine(why.to_owned())));
+        };
+        const BUSY: &str = "too busy, try again";
+        let read = match query {
+            Query::Registers(read) => read,
+            query => {
+                if let Err(error) = self.outputs.queries.try_send((terminal, QueryRequest { query, reply })) {
+                    refuse(error.into_inner().1.reply, BUSY);
+                }
+                return;
+            }
+        };
+        let Some(line) = self.outputs.live.get(read.line.index()) else { return refuse(reply, "no such line") };
+        if let Err(why) = read.check() {
+            return refuse(reply, &why);
+        }
+        let (to_line, answer) = oneshot::channel();
+        if line.try_send(LiveRequest { read, reply: to_line }).is_err() {
+            return refuse(reply, BUSY);
+        }
+        let mut reply = reply;
+        tokio::spawn(async move {
+            let answer = tokio::select! {
+                answer = answer => answer,
+                // The line drops what its terminal no longer waits for.
+                () = reply.closed() => return,
+            };
+            let _ = reply
+                .send(answer.map(Answer::Registers).map_err(|_| HistoryError::Engine("the line has ended".into())));
+        });
     }
 
     fn apply_effects(&mut self, effects: Vec<Effect>) {

@@ -11,7 +11,13 @@ use tokio::{
 use crate::{
     bus::{
         backoff::Backoff,
-        io::{clock::Clock, requests::Requests, task, transport::Connector},
+        io::{
+            clock::Clock,
+            live_reads::{LiveReads, LiveRequest},
+            requests::Requests,
+            task,
+            transport::Connector,
+        },
     },
     plant::{
         PlantDef,
@@ -25,6 +31,8 @@ use crate::{
 /// A task that has run for so long (real time) is started again after the shortest delay.
 const STEADY: Duration = Duration::from_secs(60);
 
+// Everything that a line is made of, each once.
+#[allow(clippy::too_many_arguments)]
 /// Runs a line until the station stops. Requests wait in their queue while it is down: it is up again within seconds.
 pub(super) async fn run(
     def: Arc<PlantDef>,
@@ -33,12 +41,14 @@ pub(super) async fn run(
     mut connector: Connector,
     events: mpsc::Sender<Event>,
     requests: mpsc::Receiver<BusRequest>,
+    live: mpsc::Receiver<LiveRequest>,
     mut stopped: watch::Receiver<bool>,
 ) {
-    let (mut backoff, mut requests) = (Backoff::for_ports(), Requests::new(requests));
+    let (mut backoff, mut requests, mut live) = (Backoff::for_ports(), Requests::new(requests), LiveReads::new(live));
     loop {
         let started = Instant::now();
-        let link = task::run(def.clone(), line, clock, &mut connector, events.clone(), &mut requests, stopped.clone());
+        let stop = stopped.clone();
+        let link = task::run(def.clone(), line, clock, &mut connector, events.clone(), &mut requests, &mut live, stop);
         // Nothing outlives the panic but the port's description and the requests, which it cannot leave half changed.
         if AssertUnwindSafe(link).catch_unwind().await.is_ok() || *stopped.borrow() {
             return;
@@ -87,7 +97,16 @@ mod tests {
         let (ports, streams) = mpsc::channel(4);
         let (_stop, stopped) = watch::channel(false);
         let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
-        tokio::spawn(run(def, LineId(0), clock, Connector::Memory(streams), sender, queue, stopped));
+        tokio::spawn(run(
+            def,
+            LineId(0),
+            clock,
+            Connector::Memory(streams),
+            sender,
+            queue,
+            mpsc::channel(1).1,
+            stopped,
+        ));
         // A tag that this plant does not have: inside, ids are taken on trust.
         let tag = TagId(u16::MAX);
         let request =

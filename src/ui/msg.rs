@@ -124,6 +124,8 @@ pub enum Leaving {
     Station,
     /// The station and the simulated plant.
     Demo,
+    /// Reading a device without a plant file.
+    Bench,
     /// Nothing else: the terminal is attached.
     Terminal,
 }

@@ -94,7 +94,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     let offered = Tab::offered(&model.cx()).contains(&shown);
     match back {
         Some(tab) => vec![UiAction::Show(tab)],
-        None if let_in || opened || locked || !offered => vec![UiAction::Show(Tab::Mimic)],
+        None if let_in || opened || locked || !offered => vec![UiAction::Show(Tab::home(&model.snapshot.def))],
         None => Vec::new(),
     }
 }
@@ -127,7 +127,7 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         let changing = session.who.is_some() && !session.locked;
         model.tabs.login.leave_form(&session);
         let leads = !changing && !is_closed(&session);
-        return if leads { vec![UiAction::Show(Tab::Mimic)] } else { Vec::new() };
+        return if leads { vec![UiAction::Show(Tab::home(&model.snapshot.def))] } else { Vec::new() };
     }
     match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Redraw)) if event.modifiers.contains(keys::CONTROL) => {
@@ -251,7 +251,7 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     ];
     with_tabs(model, |tabs, cx| {
         tabs.login.on_session_status(cx);
-        tabs.shown = if Tab::offered(cx).contains(&shown) { shown } else { Tab::Mimic };
+        tabs.shown = if Tab::offered(cx).contains(&shown) { shown } else { Tab::home(cx.def()) };
         Vec::new()
     });
     let closed = is_closed(&model.session);

@@ -8,6 +8,7 @@ pub mod pause;
 pub mod wire;
 pub mod link;
 pub mod testing;
+pub mod live_reads;
 pub mod requests;
 pub mod task;
 

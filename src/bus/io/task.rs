@@ -2,6 +2,7 @@
 
 mod concurrent;
 mod confirm;
+mod live;
 mod poll;
 mod test;
 mod wait;
@@ -15,6 +16,7 @@ use tokio::sync::{mpsc, watch};
 use super::{
     clock::Clock,
     link::{Link, LinkError},
+    live_reads::LiveReads,
     requests::{Closed, Requests},
     transport::{Connector, Opened},
     wire::Memory,
@@ -40,6 +42,8 @@ use crate::{
 /// A line report is sent this often, in plant time.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
+// Everything that a line is made of, each once.
+#[allow(clippy::too_many_arguments)]
 /// Runs a line until `stop` turns true or the request channel closes.
 pub async fn run(
     def: Arc<PlantDef>,
@@ -48,6 +52,7 @@ pub async fn run(
     connector: &mut Connector,
     events: mpsc::Sender<Event>,
     requests: &mut Requests,
+    live: &mut LiveReads,
     stop: watch::Receiver<bool>,
 ) {
     let unreadable = UnreadableRanges::default();
@@ -65,6 +70,7 @@ pub async fn run(
         connector,
         events,
         requests,
+        live,
         stop,
         blocks,
         closed_at: clock.now(),
@@ -116,6 +122,7 @@ struct Task<'a> {
     connector: &'a mut Connector,
     events: mpsc::Sender<Event>,
     requests: &'a mut Requests,
+    live: &'a mut LiveReads,
     stop: watch::Receiver<bool>,
     /// The read plan; a block that is refused is split while the search for the culprit goes on.
     blocks: Vec<Block>,
@@ -228,6 +235,7 @@ impl Task<'_> {
                 (Some(request), _) => self.serve_request(link, schedule, request).await?,
                 (None, _) if self.is_turn_of_confirm(now) => self.confirm(link, schedule).await?,
                 (None, next) if self.is_turn_of_diagnostic(next) => self.diagnostic_step(link).await?,
+                (None, next) if self.is_turn_of_live_read(next) => self.live_step(link).await?,
                 (None, Next::Run(index)) => self.poll(link, schedule, index).await?,
                 (None, Next::WaitUntil(at)) => self.listen(link, schedule, at.min(report_at)).await?,
                 (None, Next::Idle) => self.listen(link, schedule, report_at).await?,
@@ -250,6 +258,7 @@ impl Task<'_> {
             biased;
             _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
             request = self.requests.recv() => request?,
+            () = self.live.due(self.clock) => return Ok(()),
             ended = link.idle() => return ended.map_err(LinkExit::from),
             () = self.clock.sleep_until(until) => return Ok(()),
         };

@@ -31,12 +31,12 @@ pub struct PortArgs {
     /// rtu, ascii, tcp or rtu-over-tcp [default: rtu on a serial port, else tcp]
     #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp"])]
     mode: Option<String>,
-    /// Baud rate
-    #[arg(long, default_value = "9600")]
-    baud: u32,
-    /// Parity: N, E or O
-    #[arg(long, default_value = "N", ignore_case = true, value_parser = ["N", "E", "O"])]
-    parity: String,
+    /// Baud rate [default: 9600]
+    #[arg(long)]
+    baud: Option<u32>,
+    /// Parity: N, E or O [default: N]
+    #[arg(long, ignore_case = true, value_parser = ["N", "E", "O"])]
+    parity: Option<String>,
     /// Data bits [default: 8, in ASCII 7]
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(7..=8))]
     data: Option<u8>,
@@ -105,8 +105,19 @@ impl PortArgs {
         if framing == Framing::Rtu && data_bits != 8 {
             return Err(CliError::Usage("--data: found 7, expected 8: Modbus RTU sends whole bytes".into()));
         }
-        let parity = parity(&self.parity);
-        Ok(Serial { baud: baud(self.baud)?, data_bits, parity, stop_bits: self.stop })
+        let parity = self.parity.as_deref().map_or(Parity::None, parity);
+        Ok(Serial { baud: baud(self.baud.unwrap_or(Serial::USUAL.baud))?, data_bits, parity, stop_bits: self.stop })
+    }
+
+    /// Are baud rate and parity both given?
+    pub(super) fn is_exact(&self) -> bool {
+        self.baud.is_some() && self.parity.is_some()
+    }
+
+    /// Do these settings agree with what is given?
+    pub(super) fn fits(&self, serial: Serial) -> bool {
+        self.baud.is_none_or(|baud| baud == serial.baud)
+            && self.parity.as_deref().is_none_or(|letter| parity(letter) == serial.parity)
     }
 }
 
@@ -162,7 +173,7 @@ pub fn run(
 }
 
 /// Replaces the line of progress.
-fn show_progress(text: &str) {
+pub(super) fn show_progress(text: &str) {
     use std::io::Write;
     let _ = write!(std::io::stderr(), "\r\x1b[K{text}");
 }

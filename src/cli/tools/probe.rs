@@ -2,11 +2,12 @@
 
 use super::{UnitArgs, exchange_lines, run};
 use crate::{
-    bus::{codec, names},
+    bus::codec,
     cli::{CliError, say},
     plant::{
         diagnostics::{Diagnostic, Finding},
         event::Fault,
+        live::AddressSpan,
         number::{to_f32, to_u16},
         tag::{ByteOrder, DataType, Point, Table},
     },
@@ -18,16 +19,8 @@ pub struct Args {
     #[command(flatten)]
     of: UnitArgs,
     /// Read this: TABLE:ADDRESS[:COUNT] with the wire address (holding:1002:10), or a Modicon number (41003:10)
-    #[arg(long, short, value_name = "WHERE", value_parser = place)]
-    read: Option<Place>,
-}
-
-/// Registers or bits of a device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
-    table: Table,
-    address: u16,
-    count: u16,
+    #[arg(long, short, value_name = "WHERE", value_parser = |text: &str| text.parse::<AddressSpan>())]
+    read: Option<AddressSpan>,
 }
 
 /// Reads what is asked for, else the identification.
@@ -35,7 +28,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let (line, unit) = args.of.line_and_unit()?;
     say(&format!("unit {} on {}", unit, line.transport));
     let diagnostic = match args.read {
-        Some(Place { table, address, count }) => Diagnostic::Read { unit, table, address, count },
+        Some(AddressSpan { table, address, count }) => Diagnostic::Read { unit, table, address, count },
         None => Diagnostic::Identify { unit },
     };
     let run = run(&line, diagnostic, |finding| match finding {
@@ -93,60 +86,9 @@ fn short(value: f32) -> String {
     if plain.len() <= 10 { plain } else { format!("{value:.3e}") }
 }
 
-/// `holding:1002:10` or `41003:10`.
-fn place(text: &str) -> Result<Place, String> {
-    let wrong = || format!("found `{text}`, expected TABLE:ADDRESS[:COUNT] such as holding:1002:10, or 41003:10");
-    let parts: Vec<&str> = text.split(':').collect();
-    let number = |word: &str| match word.strip_prefix("0x") {
-        Some(hex) => u16::from_str_radix(hex, 16).map_err(|_| wrong()),
-        None => word.parse::<u16>().map_err(|_| wrong()),
-    };
-    let tables = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
-    let (table, address, count) = match parts.as_slice() {
-        [word, address, count @ ..] if word.parse::<u32>().is_err() => {
-            let table = tables.into_iter().find(|table| table.word() == *word).ok_or_else(wrong)?;
-            (table, number(address)?, count)
-        }
-        [modicon, count @ ..] => {
-            let found = tables.into_iter().find_map(|table| {
-                let digits = modicon.strip_prefix(char::from(b'0' + table.digit()))?;
-                let number: u32 = digits.parse().ok().filter(|number| matches!(digits.len(), 4 | 5) && *number != 0)?;
-                Some((table, u16::try_from(number - 1).ok()?))
-            });
-            let (table, address) = found.ok_or_else(wrong)?;
-            (table, address, count)
-        }
-        [] => return Err(wrong()),
-    };
-    let count = match count {
-        [] => 1,
-        [count] => number(count)?,
-        _ => return Err(wrong()),
-    };
-    let most = if table.is_bits() { 2_000 } else { 125 };
-    if !(1..=most).contains(&count) || u32::from(address) + u32::from(count) > 65_536 {
-        let what = names::function(table.read_fc()).unwrap_or("read");
-        return Err(format!("found {count} at {address}, expected 1 to {most} below address 65536 ({what})"));
-    }
-    Ok(Place { table, address, count })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_place_is_told_by_wire_address_or_modicon_number() {
-        let holding = |address, count| Ok(Place { table: Table::Holding, address, count });
-        assert_eq!(place("holding:1002:10"), holding(1002, 10));
-        assert_eq!(place("holding:0x3EA"), holding(1002, 1));
-        assert_eq!(place("41003:10"), holding(1002, 10));
-        assert_eq!(place("465536"), holding(65_535, 1));
-        assert_eq!(place("31001"), Ok(Place { table: Table::Input, address: 1000, count: 1 }));
-        for wrong in ["", "41003:0", "holding:5:126", "40000", "register:5", "holding", "holding:65535:2", "1:2:3:4"] {
-            assert!(place(wrong).is_err_and(|error| error.contains("expected")), "{wrong}");
-        }
-    }
 
     #[test]
     fn registers_are_shown_in_four_orders() {

@@ -182,7 +182,8 @@ fn counts_a_period(query: &Query) -> bool {
         | Query::Journal { .. }
         | Query::Actions { .. }
         | Query::Audit { .. }
-        | Query::LineMinutes { .. } => false,
+        | Query::LineMinutes { .. }
+        | Query::Registers(_) => false,
     }
 }
 

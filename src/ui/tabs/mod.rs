@@ -6,6 +6,7 @@ pub(crate) mod controllers;
 mod draw;
 mod periodic_query;
 mod prelude;
+pub(crate) mod registers;
 pub(crate) mod faults;
 pub(crate) mod login;
 pub(crate) mod mimic;
@@ -27,7 +28,7 @@ use super::{
 use crate::{
     access::{SessionRequest, audit_log::sha256},
     history::{Answer, HistoryError},
-    plant::{number::to_u32, snapshot::Snapshot},
+    plant::{PlantDef, number::to_u32, snapshot::Snapshot},
 };
 
 /// A file that is written once the station has put on record that it is.
@@ -169,7 +170,7 @@ macro_rules! tabs {
         impl Tabs {
             /// All tabs as they are at the start.
             pub fn new(snapshot: &Snapshot) -> Tabs {
-                Tabs { shown: Tab::Mimic, $($field: <$state>::new(snapshot)),+ }
+                                Tabs { shown: Tab::home(&snapshot.def), $($field: <$state>::new(snapshot)),+ }
             }
             fn of(&self, tab: Tab) -> &dyn TabView {
                 match tab { $(Tab::$tab => &self.$field),+ }
@@ -192,12 +193,27 @@ tabs! {
     Bus bus bus::Bus: "Bus", "bus: lines, frames, tests";
     Users users users::Users: "Users", "users and audit log: for a Supervisor";
     Faults faults faults::Faults: "Faults", "faults: of a simulated plant only";
+    Registers registers registers::Registers: "Registers", "the registers of a device, without a plant file";
 }
 
 impl Tab {
     /// Those that there are here.
     pub fn offered(cx: &ViewContext) -> Vec<Tab> {
-        Tab::ALL.into_iter().filter(|tab| tab.is_offered(cx)).collect()
+        Tab::ALL
+            .into_iter()
+            .filter(|tab| tab.is_of_bench() || !cx.def().is_bench())
+            .filter(|tab| tab.is_offered(cx))
+            .collect()
+    }
+
+    /// The tab that a terminal begins with.
+    pub fn home(def: &PlantDef) -> Tab {
+        if def.is_bench() { Tab::Registers } else { Tab::Mimic }
+    }
+
+    /// Has it something to show where no plant file says what the registers of a device mean?
+    fn is_of_bench(self) -> bool {
+        matches!(self, Tab::Bus | Tab::Registers)
     }
 
     /// The digit of its number key.

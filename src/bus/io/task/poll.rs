@@ -292,7 +292,7 @@ async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Resu
 
 /// Reads a block from a unit that is in sync. A `corrupt` answer is asked for once more; it counts as outstanding, so the unit is
 /// resynchronised before.
-async fn read_in_sync(
+pub(super) async fn read_in_sync(
     blocks: &[Block],
     link: &mut Link,
     block: &Block,

@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// A busy line gives a diagnostic every so many-th turn.
-const POLLS_BETWEEN: u32 = 4;
+pub(super) const POLLS_BETWEEN: u32 = 4;
 
 impl Task<'_> {
     pub(super) fn is_turn_of_diagnostic(&self, next: Next) -> bool {

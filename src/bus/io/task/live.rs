@@ -1,0 +1,65 @@
+//! Live reads: one request a turn, when the line has nothing else to do or polls have had their share.
+
+use super::{
+    LinkExit, Task,
+    poll::{Answer, read_in_sync},
+    test::POLLS_BETWEEN,
+};
+use crate::{
+    bus::{
+        io::link::{Link, LinkError},
+        plan::Block,
+        schedule::Next,
+    },
+    plant::{
+        def::DeviceId,
+        live::AddressSpan,
+        tag::{Poll, PollClass},
+    },
+};
+
+impl Task<'_> {
+    pub(super) fn is_turn_of_live_read(&mut self, next: Next) -> bool {
+        let idle = !matches!(next, Next::Run(_));
+        (idle || POLLS_BETWEEN <= self.polls_since_step) && self.live.begin(self.clock)
+    }
+
+    /// One request of the live read that is due, and its answer after the last.
+    pub(super) async fn live_step(&mut self, link: &mut Link) -> Result<(), LinkExit> {
+        self.polls_since_step = 0;
+        let Some((job, request)) = &mut self.live.job else { return Ok(()) };
+        if let Some(span) = job.next() {
+            let unit = request.read.unit;
+            let own = self.def.devices.iter().find(|device| device.line == self.line && device.unit == unit);
+            let block = block_of(own.map_or(DeviceId(0), |device| device.id), unit, span);
+            let mut cured = None;
+            let read = self.requests.unless_stopped(read_in_sync(&self.blocks, link, &block, &mut cured)).await;
+            let words = match read {
+                Some(Ok(Answer::Words(words))) => Ok(words),
+                Some(Ok(Answer::Bits(bits))) => Ok(bits.into_iter().map(u16::from).collect()),
+                Some(Err(LinkError::Fault(fault))) => Err(fault),
+                Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
+                // A stop comes first; the request is made again.
+                None => {
+                    link.abandon();
+                    return Ok(());
+                }
+            };
+            job.take(&mut self.live.known, self.clock.now(), words);
+        }
+        if job.next().is_none()
+            && let Some((job, request)) = self.live.job.take()
+        {
+            let reply = link.last.as_ref().and_then(|exchange| exchange.reply);
+            // A terminal that has left needs no answer.
+            let _ = request.reply.send(job.finish(reply));
+        }
+        Ok(())
+    }
+}
+
+/// A span as a block without tags.
+fn block_of(device: DeviceId, unit: u8, AddressSpan { table, address, count }: AddressSpan) -> Block {
+    let (tags, poll, class) = ([].into(), Poll::Once, PollClass::Background);
+    Block { device, unit, table, address, count, tags, poll, class, alignment: 1 }
+}

@@ -1,0 +1,186 @@
+//! `sightglass open PORT`: the registers of any device, live, without a plant file.
+
+use std::{io::IsTerminal, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+
+use super::{
+    CliError, in_runtime, log, paths, say,
+    tools::{PortArgs, show_progress},
+};
+use crate::{
+    bus::{
+        diagnostics::Job,
+        io::{clock::Clock, testing, transport::Connector},
+    },
+    plant::{
+        PlantDef,
+        command::CommandId,
+        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Parity, Serial, Transport},
+        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
+    },
+    station::io as station,
+    ui,
+};
+
+/// The usual baud rates and parities, the most frequent first.
+const USUAL: [(u32, Parity); 14] = [
+    (9_600, Parity::None),
+    (19_200, Parity::Even),
+    (9_600, Parity::Even),
+    (19_200, Parity::None),
+    (115_200, Parity::None),
+    (38_400, Parity::None),
+    (57_600, Parity::None),
+    (38_400, Parity::Even),
+    (115_200, Parity::Even),
+    (57_600, Parity::Even),
+    (4_800, Parity::None),
+    (4_800, Parity::Even),
+    (9_600, Parity::Odd),
+    (19_200, Parity::Odd),
+];
+/// Units that a device on TCP or its gateway usually has, the most frequent first.
+const USUAL_UNITS: [(u8, u8); 4] = [(1, 1), (255, 255), (0, 0), (2, 16)];
+/// How long an answer may take while settings are tried.
+const TRIAL: Duration = Duration::from_millis(250);
+
+/// Arguments of `open`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Unit address [default: the first usual one that answers]
+    #[arg(long, short, value_parser = clap::value_parser!(u8))]
+    unit: Option<u8>,
+}
+
+/// Finds settings and unit, and shows the registers.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let line = args.port.line()?;
+    ui::io::require_terminal()?;
+    let _log = log::start(None, None)?;
+    in_runtime(async {
+        let (line, unit) = find(line, &args).await?;
+        let def = Arc::new(bench(line, unit));
+        let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+        let station = station::rehearse(def, Clock::real(), connectors, Box::new(|_| {}));
+        let session = station.session(&paths::operator());
+        let result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Bench)).await;
+        station.stop().await;
+        Ok(result?)
+    })
+}
+
+/// A plant that is one device on one line, of which nothing is known.
+fn bench(line: LineDef, unit: u8) -> PlantDef {
+    let place = match &line.transport {
+        Transport::Serial { port, serial, .. } => format!("{port} {serial}"),
+        Transport::Tcp { host, port, .. } => format!("{host}:{port}"),
+    };
+    let device = DeviceDef { unit, ..DeviceDef::new(DeviceId(0), "device", LineId(0)) };
+    PlantDef { name: "bench".into(), title: place, lines: vec![line], devices: vec![device], ..PlantDef::default() }
+}
+
+/// The settings and the unit that answer; what is given is taken as it is.
+async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError> {
+    if let Some(serial) = line.transport.serial() {
+        let unit = args.unit.unwrap_or(1);
+        if args.port.is_exact() {
+            return Ok((line, unit));
+        }
+        let serials = USUAL.map(|(baud, parity)| Serial { baud, parity, ..serial });
+        let serials = serials.into_iter().filter(|serial| args.port.fits(*serial)).collect();
+        return match first_answer(&line, (unit, unit), serials).await? {
+            Some((unit, serial, words)) => {
+                let serial = serial.unwrap_or(serial_of(&line));
+                say(&format!("unit {unit} answers at {serial}: {words}"));
+                Ok((with_serial(line, serial), unit))
+            }
+            None => Err(CliError::Failed(format!(
+                "{}: unit {unit} answers at none of the usual settings. In the order of likelihood:\n\
+                 another unit address (`sightglass scan {0}`), A and B exchanged, the device without power or not set to \
+                 Modbus RTU,\nno common ground or termination, another master on the line.\n\
+                 `--baud` and `--parity` together open the line without trying",
+                port_of(&line)
+            ))),
+        };
+    }
+    if let Some(unit) = args.unit {
+        return Ok((line, unit));
+    }
+    for range in USUAL_UNITS {
+        if line.transport.framing() != Framing::Mbap && !(1..=247).contains(&range.0) {
+            continue;
+        }
+        if let Some((unit, _, words)) = first_answer(&line, range, Vec::new()).await? {
+            say(&format!("unit {unit} answers: {words}"));
+            return Ok((line, unit));
+        }
+    }
+    Err(CliError::Failed(format!(
+        "{}: the connection opens, but units 0 to 16 and 255 do not answer. In the order of likelihood:\n\
+         another unit address (`sightglass scan {0}`, then `--unit`), no device behind the gateway or not powered,\n\
+         another protocol on this TCP port",
+        port_of(&line)
+    )))
+}
+
+/// The first unit that answers, with the settings that it answers at, and what it has said.
+async fn first_answer(
+    line: &LineDef,
+    (first, last): (u8, u8),
+    serials: Vec<Serial>,
+) -> Result<Option<(u8, Option<Serial>, String)>, CliError> {
+    let diagnostic = Diagnostic::Scan(Scan { first, last, serials, timeout: line.timeout.min(TRIAL) });
+    let job = Job::new(CommandId::default(), "cli".into(), diagnostic, Timestamp::now());
+    let shown = std::io::stderr().is_terminal();
+    let run = testing::run(line, job, |run: &DiagnosticRun| {
+        if shown {
+            show_progress(&run.now);
+        }
+        answer(run).is_none()
+    });
+    let run = tokio::select! {
+        run = run => run,
+        _ = tokio::signal::ctrl_c() => return Err(CliError::Failed("stopped".into())),
+    };
+    if shown {
+        show_progress("");
+    }
+    match &run.state {
+        DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
+        DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => Ok(answer(&run)),
+    }
+}
+
+fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
+    run.findings.iter().find_map(|finding| match finding {
+        Finding::Unit { unit, serial, words } => Some((*unit, *serial, words.clone())),
+        Finding::Exchange(_)
+        | Finding::Bytes { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. }
+        | Finding::Failed { .. }
+        | Finding::Verdict(_) => None,
+    })
+}
+
+fn serial_of(line: &LineDef) -> Serial {
+    line.transport.serial().unwrap_or(Serial::USUAL)
+}
+
+fn port_of(line: &LineDef) -> String {
+    match &line.transport {
+        Transport::Serial { port, .. } => port.clone(),
+        Transport::Tcp { host, port, .. } => format!("{host}:{port}"),
+    }
+}
+
+fn with_serial(line: LineDef, wanted: Serial) -> LineDef {
+    let mut line = line;
+    if let Transport::Serial { serial, .. } = &mut line.transport {
+        *serial = wanted;
+    }
+    line
+}

@@ -1,0 +1,160 @@
+//! Live registers: what a technician reads of a unit beside the poll plan, again and again.
+
+use crate::t;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use super::{event::Fault, id::LineId, tag::Table};
+
+/// Most spans of one live read.
+const SPANS_MAX: usize = 64;
+/// Most registers and bits of one live read.
+const CELLS_MAX: u32 = 4_000;
+
+/// Registers or bits of one table that stand together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct AddressSpan {
+    /// Which table.
+    pub table: Table,
+    /// First address, 0-based.
+    pub address: u16,
+    /// Registers, or bits.
+    pub count: u16,
+}
+
+impl AddressSpan {
+    /// First address, and the one behind the last.
+    pub fn range(self) -> std::ops::Range<u32> {
+        u32::from(self.address)..u32::from(self.address) + u32::from(self.count)
+    }
+}
+
+/// Reads some registers of a unit once, at a moment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LiveRead {
+    /// On which line.
+    pub line: LineId,
+    /// Unit address.
+    pub unit: u8,
+    /// What, in the order in which it is to be read.
+    pub spans: Vec<AddressSpan>,
+    /// The line waits until then; `None`: as soon as it has time.
+    pub not_before: Option<Timestamp>,
+    /// Ask again for what the unit has refused before.
+    pub relearn: bool,
+}
+
+impl LiveRead {
+    /// Can a line carry it? `Err` says why not.
+    pub fn check(&self) -> Result<(), String> {
+        let cells: u32 = self.spans.iter().map(|span| u32::from(span.count)).sum();
+        if self.spans.is_empty() || SPANS_MAX < self.spans.len() || !(1..=CELLS_MAX).contains(&cells) {
+            let spans = self.spans.len();
+            return Err(t!("{cells} registers in {spans} spans: expected 1 to 4000 in 1 to 64", cells, spans));
+        }
+        match self.spans.iter().find(|span| span.range().end > 0x1_0000 || span.count == 0) {
+            Some(span) => Err(t!("address {last}: the last is 65535", last = span.range().end.saturating_sub(1))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a live read has found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct LiveReading {
+    /// Each part that was asked, in the order in which it was read.
+    pub parts: Vec<LivePart>,
+    /// From the last byte sent to the first byte received, of the last request that was answered.
+    pub reply: Option<Duration>,
+    /// Requests that it took.
+    pub requests: u32,
+}
+
+/// Part of a live read: what one request brought, or what is known of addresses that were not asked again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LivePart {
+    /// When its response was complete, or its request failed.
+    pub at: Timestamp,
+    /// Where.
+    pub span: AddressSpan,
+    /// A word each; bits are 0 or 1.
+    pub words: Result<Vec<u16>, Fault>,
+}
+
+/// `holding:1002:10` by wire address, or `41003:10` by Modicon number; without a count, one.
+impl std::str::FromStr for AddressSpan {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<AddressSpan, String> {
+        let wrong = || t!("found `{text}`, expected TABLE:ADDRESS[:COUNT] such as holding:1002:10, or 41003:10", text);
+        let parts: Vec<&str> = text.split(':').collect();
+        let (table, address, count) = match parts.as_slice() {
+            [word, address, count @ ..] if word.parse::<u32>().is_err() => {
+                let table = TABLES.into_iter().find(|table| table.word() == *word).ok_or_else(wrong)?;
+                (table, number(address).ok_or_else(wrong)?, count)
+            }
+            [modicon, count @ ..] => {
+                let (table, address) = of_modicon(modicon).ok_or_else(wrong)?;
+                (table, address, count)
+            }
+            [] => return Err(wrong()),
+        };
+        let count = match count {
+            [] => 1,
+            [count] => number(count).ok_or_else(wrong)?,
+            _ => return Err(wrong()),
+        };
+        let most = if table.is_bits() { 2_000 } else { 125 };
+        let span = AddressSpan { table, address, count };
+        if !(1..=most).contains(&count) || 0x1_0000 < span.range().end {
+            return Err(t!(
+                "found {count} at {address}, expected 1 to {most} below address 65536",
+                count,
+                address,
+                most
+            ));
+        }
+        Ok(span)
+    }
+}
+
+/// The tables in the order of their Modicon numbers.
+pub const TABLES: [Table; 4] = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
+
+/// A decimal number, or hexadecimal with `0x`.
+pub fn number(text: &str) -> Option<u16> {
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(hex) => u16::from_str_radix(hex, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+/// Table and wire address of a Modicon number of five or six digits.
+pub fn of_modicon(text: &str) -> Option<(Table, u16)> {
+    TABLES.into_iter().find_map(|table| {
+        let digits = text.strip_prefix(char::from(b'0' + table.digit()))?;
+        let number: u32 = digits.parse().ok().filter(|number| matches!(digits.len(), 4 | 5) && *number != 0)?;
+        Some((table, u16::try_from(number - 1).ok()?))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_span_is_read_by_wire_address_or_modicon_number() {
+        let parse = |text: &str| text.parse::<AddressSpan>();
+        let holding = |address, count| Ok(AddressSpan { table: Table::Holding, address, count });
+        assert_eq!(parse("holding:1002:10"), holding(1002, 10));
+        assert_eq!(parse("holding:0x3EA"), holding(1002, 1));
+        assert_eq!(parse("41003:10"), holding(1002, 10));
+        assert_eq!(parse("465536"), holding(65_535, 1));
+        assert_eq!(parse("31001"), Ok(AddressSpan { table: Table::Input, address: 1000, count: 1 }));
+        for wrong in ["", "41003:0", "holding:5:126", "40000", "register:5", "holding", "holding:65535:2", "1:2:3:4"] {
+            assert!(parse(wrong).is_err_and(|error| error.contains("expected")), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! The registers of a unit, live: every table from any address, each word as all that it may mean.
+//!
+//! The tab asks the line for what is on the screen; each answer brings the next question, due one period later.
+
+mod cells;
+mod decode;
+mod keys;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use self::{
+    cells::Cells,
+    keys::{Action, table},
+};
+use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::{
+        live::{AddressSpan, LiveRead, LiveReading, TABLES, number, of_modicon},
+        number::to_u32,
+        tag::{ByteOrder, Table},
+    },
+    ui::keys::{find, hints},
+};
+
+/// Periods to choose from.
+const PERIODS_MS: [i64; 8] = [200, 500, 1_000, 2_000, 5_000, 10_000, 30_000, 60_000];
+/// An answer that is not there after so long is asked for again: the line has dropped it.
+const LOST_AFTER: SignedDuration = SignedDuration::from_secs(15);
+/// Words behind the window that are read with it: the last row may be the first word of a 64-bit value.
+const BEHIND: u32 = 3;
+
+/// How an address is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Base {
+    /// Modicon number.
+    Modicon,
+    /// From 0, as on the wire.
+    Zero,
+    /// From 1, as in many manuals.
+    One,
+}
+
+/// State of this tab.
+#[derive(Debug)]
+pub struct Registers {
+    line: LineId,
+    unit: u8,
+    table: Table,
+    /// The first row of the window.
+    first: u16,
+    selected: u16,
+    order: ByteOrder,
+    base: Base,
+    period: SignedDuration,
+    paused: bool,
+    cells: Cells,
+    /// Number and steady time of the read on its way.
+    on_way: Option<(u32, Timestamp)>,
+    number: u32,
+    relearn: bool,
+    last: Option<LiveReading>,
+    /// Reads answered, and requests that they took.
+    reads: u64,
+    trouble: Option<String>,
+    /// What the open prompt asks for.
+    asking: Asking,
+}
+
+/// What a text that was entered means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Asking {
+    Address,
+    Unit,
+    Value,
+}
+
+impl TabView for Registers {
+    fn new(snapshot: &Snapshot) -> Registers {
+        let device = snapshot.def.devices.first();
+        Registers {
+            line: device.map_or(LineId(0), |device| device.line),
+            unit: device.map_or(1, |device| device.unit),
+            table: Table::Holding,
+            first: 0,
+            selected: 0,
+            order: ByteOrder::Abcd,
+            base: Base::Modicon,
+            period: SignedDuration::from_millis(PERIODS_MS[2]),
+            paused: false,
+            cells: Cells::default(),
+            on_way: None,
+            number: 0,
+            relearn: false,
+            last: None,
+            reads: 0,
+            trouble: None,
+            asking: Asking::Address,
+        }
+    }
+
+    /// Where a plant file says what the registers mean, the other tabs show them.
+    fn is_offered(cx: &ViewContext) -> bool {
+        cx.def().is_bench()
+    }
+
+    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        let Some(action) = find(&table(), event) else { return Vec::new() };
+        match action {
+            Action::Move(motion) => self.scroll(cx, motion),
+            Action::Table(by) => {
+                let at = TABLES.iter().position(|table| *table == self.table).unwrap_or(0);
+                self.table = TABLES[around(at, by, TABLES.len())];
+            }
+            Action::Order => self.order = next(&ByteOrder::ALL, self.order),
+            Action::Base => self.base = next(&[Base::Modicon, Base::Zero, Base::One], self.base),
+            Action::Pause => self.paused = !self.paused,
+            Action::Faster => self.change_period(-1),
+            Action::Slower => self.change_period(1),
+            Action::Relearn => self.relearn = true,
+            Action::GoTo => {
+                let hint = t!("1002, 0x3EA, 41003, or input:1000");
+                return self.ask_text(Asking::Address, t!("go to address"), hint);
+            }
+            Action::Unit => return self.ask_text(Asking::Unit, t!("unit address"), t!("1 to 247")),
+            Action::Find => {
+                let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
+                return self.ask_text(Asking::Value, t!("find a value in what was read"), hint);
+            }
+        }
+        self.read_now(cx)
+    }
+
+    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
+        hints(&table())
+    }
+
+    fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        view::view(self, cx, &mut Canvas::new(frame.buffer_mut(), area));
+    }
+
+    fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let now = cx.steady();
+        let lost = self.on_way.is_some_and(|(_, at)| (LOST_AFTER + self.period) < now.duration_since(at));
+        if self.paused || (self.on_way.is_some() && !lost) {
+            return Vec::new();
+        }
+        self.ask(cx, None)
+    }
+
+    fn awaits(&self, number: u32) -> bool {
+        self.on_way.is_some_and(|(on_way, _)| on_way == number)
+    }
+
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        if self.on_way.take_if(|(on_way, _)| *on_way == number).is_none() {
+            return Vec::new();
+        }
+        let reading = match answer {
+            Ok(Answer::Registers(reading)) => reading,
+            Ok(_) => return Vec::new(),
+            Err(error) => {
+                self.trouble = Some(error.to_string());
+                return Vec::new();
+            }
+        };
+        self.trouble = None;
+        self.reads += 1;
+        self.cells.take(&reading);
+        let began = reading.parts.first().map(|part| part.at);
+        self.last = Some(reading);
+        if self.paused {
+            return Vec::new();
+        }
+        self.ask(cx, began.and_then(|at| at.checked_add(self.period).ok()))
+    }
+
+    fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        let text = text.trim();
+        match self.asking {
+            Asking::Address => {
+                let (table, address) = self.parse_address(text)?;
+                (self.table, self.selected) = (table, address);
+                self.first = address;
+            }
+            Asking::Unit => {
+                let wrong = || t!("found `{text}`, expected 1 to 247", text);
+                self.unit = text.parse().ok().filter(|unit| (1..=247).contains(unit)).ok_or_else(wrong)?;
+                (self.cells, self.last) = (Cells::default(), None);
+            }
+            Asking::Value => {
+                let (table, address) = self.find(text)?;
+                (self.table, self.selected) = (table, address);
+                self.keep_in_sight(cx);
+            }
+        }
+        Ok(self.read_now(cx))
+    }
+
+    #[cfg(test)]
+    fn chords() -> crate::ui::keys::PageChords {
+        vec![("registers", crate::ui::keys::chords_of(&table()))]
+    }
+}
+
+impl Registers {
+    /// The rows of the window.
+    fn rows(&self, cx: &ViewContext) -> Range<u32> {
+        let first = u32::from(self.first);
+        first..(first + to_u32(view::rows(cx.area.height))).min(0x1_0000)
+    }
+
+    fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
+        let room = view::rows(cx.area.height);
+        self.selected = to_u16(motion.to(usize::from(self.selected), 0x1_0000, room));
+        self.keep_in_sight(cx);
+    }
+
+    fn keep_in_sight(&mut self, cx: &ViewContext) {
+        let room = to_u16(view::rows(cx.area.height)).max(1);
+        let last_first = u16::MAX - (room - 1);
+        self.first = self.first.clamp(self.selected.saturating_sub(room - 1), self.selected).min(last_first);
+    }
+
+    fn change_period(&mut self, by: isize) {
+        let at = PERIODS_MS.iter().position(|ms| SignedDuration::from_millis(*ms) == self.period).unwrap_or(0);
+        let at = at.saturating_add_signed(by).min(PERIODS_MS.len() - 1);
+        self.period = SignedDuration::from_millis(PERIODS_MS[at]);
+    }
+
+    fn ask_text(&mut self, asking: Asking, title: &str, hint: &str) -> Vec<UiAction> {
+        self.asking = asking;
+        vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, "")))]
+    }
+
+    /// Something else is shown: what is on its way is no longer wanted.
+    fn read_now(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if self.paused {
+            self.on_way = None;
+            return Vec::new();
+        }
+        self.ask(cx, None)
+    }
+
+    fn ask(&mut self, cx: &ViewContext, not_before: Option<Timestamp>) -> Vec<UiAction> {
+        if cx.def().lines.is_empty() {
+            return Vec::new();
+        }
+        let rows = self.rows(cx);
+        let count = to_u16((rows.end + BEHIND).min(0x1_0000) - rows.start);
+        let span = AddressSpan { table: self.table, address: self.first, count };
+        let relearn = std::mem::take(&mut self.relearn);
+        let read = LiveRead { line: self.line, unit: self.unit, spans: vec![span], not_before, relearn };
+        self.number = self.number.wrapping_add(1);
+        self.on_way = Some((self.number, cx.steady()));
+        vec![UiAction::query(Tab::Registers, self.number, Query::Registers(read))]
+    }
+
+    /// `1002`, `0x3EA`: in this table, by its base; `41003`, `input:1000`: in any.
+    fn parse_address(&self, text: &str) -> Result<(Table, u16), String> {
+        if let Some(modicon) = of_modicon(text) {
+            return Ok(modicon);
+        }
+        match (number(text), self.base) {
+            (Some(address), Base::One) if !text.starts_with("0x") => address
+                .checked_sub(1)
+                .map(|address| (self.table, address))
+                .ok_or_else(|| t!("the first is 1").to_owned()),
+            (Some(address), _) => Ok((self.table, address)),
+            (None, _) => text.parse::<AddressSpan>().map(|span| (span.table, span.address)),
+        }
+    }
+
+    /// The next address behind the selected one that holds a value, alone or with those that follow it, raw or with one
+    /// to three decimals.
+    fn find(&self, text: &str) -> Result<(Table, u16), String> {
+        let wrong = || t!("found `{text}`, expected a number such as 702, 70.2 or 0x2BE", text);
+        let wanted = match number(text) {
+            Some(word) => f64::from(word),
+            None => text.parse::<f64>().ok().filter(|wanted| wanted.is_finite()).ok_or_else(wrong)?,
+        };
+        let holds = |(table, address): &(Table, u16)| {
+            view::meanings(&self.cells.words(*table, *address, 4), self.order).iter().any(|value| {
+                // As exact as it was typed.
+                let digit = 0.5 * 10f64.powi(-to_i32(text.split_once('.').map_or(0, |(_, digits)| digits.len())));
+                (0..=3).any(|decimals| {
+                    (value / 10f64.powi(decimals) - wanted).abs() < digit * 1e-6 + f64::EPSILON * wanted.abs()
+                }) || (value.fract() != 0.0 && (value - wanted).abs() <= digit)
+            })
+        };
+        let here = (self.table, self.selected);
+        let good: Vec<(Table, u16)> = self.cells.good().collect();
+        let behind = good.iter().filter(|at| here < **at);
+        let around = behind.chain(good.iter().filter(|at| **at <= here));
+        around.copied().find(holds).ok_or_else(|| t!("{text} is in none of the registers read so far", text))
+    }
+}
+
+fn to_i32(count: usize) -> i32 {
+    i32::try_from(count).unwrap_or(i32::MAX)
+}
+
+fn next<T: PartialEq + Copy>(all: &[T], now: T) -> T {
+    let at = all.iter().position(|one| *one == now).unwrap_or(0);
+    all[(at + 1) % all.len()]
+}

@@ -1,0 +1,97 @@
+//! What was read of a unit: a cell for every register or bit, with what it held before.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use jiff::Timestamp;
+
+use crate::plant::{
+    event::Fault,
+    live::{AddressSpan, LiveReading},
+    number::to_u16,
+    tag::Table,
+};
+
+/// Values of a cell that are remembered.
+const SEEN_MAX: usize = 600;
+/// Cells that are remembered; older windows are forgotten.
+const CELLS_MAX: usize = 20_000;
+
+/// A register or bit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// As it was last read; `None` before the first good read.
+    pub word: Option<u16>,
+    /// When `word` was read.
+    pub at: Timestamp,
+    /// When it last became another value.
+    pub changed: Option<Timestamp>,
+    /// Why the last read brought nothing.
+    pub fault: Option<Fault>,
+    /// The last values, oldest first.
+    pub seen: VecDeque<(Timestamp, u16)>,
+}
+
+/// The cells of a unit.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Cells(BTreeMap<(Table, u16), Cell>);
+
+impl Cells {
+    /// What is known of an address.
+    pub fn get(&self, table: Table, address: u16) -> Option<&Cell> {
+        self.0.get(&(table, address))
+    }
+
+    /// Good words from an address on, as many as follow one another, at most `most`.
+    pub fn words(&self, table: Table, address: u16, most: u16) -> Vec<u16> {
+        let range = AddressSpan { table, address, count: most }.range();
+        let word = |address: u32| {
+            let cell = u16::try_from(address).ok().and_then(|address| self.get(table, address))?;
+            cell.word.filter(|_| cell.fault.is_none())
+        };
+        range.map_while(word).collect()
+    }
+
+    /// Everything good, in the order of tables and addresses.
+    pub fn good(&self) -> impl Iterator<Item = (Table, u16)> {
+        let good = self.0.iter().filter(|(_, cell)| cell.fault.is_none() && cell.word.is_some());
+        good.map(|(address, _)| *address)
+    }
+
+    /// Takes what a read has brought.
+    pub fn take(&mut self, reading: &LiveReading) {
+        if CELLS_MAX < self.0.len() {
+            self.0.clear();
+        }
+        for part in &reading.parts {
+            for (n, address) in part.span.range().map(to_u16).enumerate() {
+                let cell = self.0.entry((part.span.table, address)).or_insert_with(|| Cell::new(part.at));
+                match &part.words {
+                    Ok(words) => words.get(n).iter().for_each(|word| cell.take(**word, part.at)),
+                    Err(fault) => cell.fault = Some(*fault),
+                }
+            }
+        }
+    }
+}
+
+impl Cell {
+    fn new(at: Timestamp) -> Cell {
+        Cell { word: None, at, changed: None, fault: None, seen: VecDeque::new() }
+    }
+
+    fn take(&mut self, word: u16, at: Timestamp) {
+        if self.word.is_some_and(|old| old != word) {
+            self.changed = Some(at);
+        }
+        (self.word, self.at, self.fault) = (Some(word), at, None);
+        if self.seen.len() == SEEN_MAX {
+            self.seen.pop_front();
+        }
+        self.seen.push_back((at, word));
+    }
+
+    /// Is the device without this address?
+    pub fn is_hole(&self) -> bool {
+        matches!(self.fault, Some(Fault::Exception(code)) if code.0 == 2)
+    }
+}

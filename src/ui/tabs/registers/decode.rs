@@ -1,0 +1,92 @@
+//! Words as the numbers they may mean, and which meaning is likely.
+
+use crate::{
+    bus::codec,
+    plant::{
+        number::to_f32,
+        tag::{ByteOrder, DataType, Point, Table},
+    },
+};
+
+/// Words as a number of a type; `None` where there are too few of them or they hold none.
+pub fn number(kind: DataType, order: ByteOrder, words: &[u16]) -> Option<f64> {
+    let point = Point { table: Table::Holding, address: 0, kind, order, field: None };
+    codec::decode(point, words.get(..usize::from(kind.registers()))?)
+}
+
+/// Words as text: `·` for what cannot be printed.
+pub fn text(words: &[u16]) -> String {
+    let letters = words.iter().flat_map(|word| word.to_be_bytes());
+    letters.map(|byte| if (0x20..0x7F).contains(&byte) { char::from(byte) } else { codec::UNPRINTABLE }).collect()
+}
+
+/// A number in at most `most` characters: whole numbers whole, others with what fits.
+pub fn short(value: f64, most: usize) -> String {
+    let plain = if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value:.0}") } else { format!("{value}") };
+    let readable = value == 0.0 || (1e-4..1e9).contains(&value.abs());
+    if plain.len() <= most && (readable || value.fract() == 0.0) {
+        return plain;
+    }
+    let cut = (0..7).rev().map(|decimals| format!("{value:.decimals$}")).find(|text| text.len() <= most);
+    let powers = || (0..5).rev().map(|decimals| format!("{value:.decimals$e}")).find(|text| text.len() <= most);
+    if readable { cut.or_else(powers) } else { powers() }.unwrap_or_else(|| "#".repeat(most))
+}
+
+/// A float of two words as short as it can be told apart.
+pub fn float(order: ByteOrder, words: &[u16], most: usize) -> Option<String> {
+    let value = to_f32(number(DataType::F32, order, words)?);
+    let plain = format!("{value}");
+    Some(if plain.len() <= most { plain } else { short(f64::from(value), most) })
+}
+
+/// The byte order in which two words are likely a float: its size is one that people measure in, and as whole numbers
+/// they look like nothing. A small whole number beside a zero is no float in any order.
+pub fn likely_float(words: &[u16]) -> Option<ByteOrder> {
+    let [a, b] = *words.first_chunk::<2>()?;
+    // A measured value fills its mantissa, or ends in a whole word of zeros behind a full one.
+    let small = |word: u16| word < 0x2000 && word.swap_bytes() < 0x2000;
+    if small(a) && small(b) {
+        return None;
+    }
+    let plausible = |order: &&ByteOrder| {
+        let value = number(DataType::F32, **order, words).unwrap_or(0.0).abs();
+        let swapped = matches!(order, ByteOrder::Badc | ByteOrder::Dcba);
+        // A whole number below 256 has an empty high byte, which no swapped float of a usual size has in its first word.
+        let full = !swapped || (a & 0xFF != 0 && a >> 8 != 0 && b & 0xFF != 0);
+        full && (1e-3..1e7).contains(&value)
+    };
+    [ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba].iter().find(plausible).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_float_is_recognised_in_its_order_and_whole_numbers_are_not() {
+        for (words, expect) in [
+            ([0x42D1, 0x6353], Some(ByteOrder::Abcd)),
+            ([0x6353, 0x42D1], Some(ByteOrder::Cdab)),
+            ([0xD142, 0x5363], Some(ByteOrder::Badc)),
+            ([0x42C8, 0x0000], Some(ByteOrder::Abcd)),
+            ([700, 0], None),
+            ([0, 700], None),
+            ([66, 0], None),
+            ([700, 600], None),
+            ([1, 10], None),
+            ([0, 0], None),
+        ] {
+            assert_eq!(likely_float(&words), expect, "{words:04X?}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_cut_to_their_column() {
+        assert_eq!(short(700.0, 11), "700");
+        assert_eq!(short(104.69, 11), "104.69");
+        assert_eq!(short(1.0 / 3.0, 6), "0.3333");
+        assert_eq!(short(2.75e-37, 8), "2.75e-37");
+        assert_eq!(float(ByteOrder::Abcd, &[0x42D1, 0x6353], 9).as_deref(), Some("104.69399"));
+        assert_eq!(text(&[0x4142, 0x0043]), "AB·C");
+    }
+}

@@ -1,0 +1,54 @@
+//! The keys of the registers tab.
+
+use super::*;
+
+/// What a key means here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Another address.
+    Move(Motion),
+    /// The table so many further on.
+    Table(isize),
+    /// Asks for an address.
+    GoTo,
+    /// Asks for a value.
+    Find,
+    /// Asks for another unit.
+    Unit,
+    /// The next byte order.
+    Order,
+    /// The next way to write addresses.
+    Base,
+    /// Stops or resumes reading.
+    Pause,
+    /// A shorter period.
+    Faster,
+    /// A longer one.
+    Slower,
+    /// Asks again for what was refused.
+    Relearn,
+}
+
+const KEYS: &[Key<Action>] = &[
+    Key::new(
+        code(KeyCode::Right),
+        "table",
+        "next table: coils, discrete inputs, input and holding registers",
+        Action::Table(1),
+    ),
+    Key::new(code(KeyCode::Left), "", "previous table", Action::Table(-1)),
+    Key::new(char('j'), "go to", "go to an address: 1002, 0x3EA, 41003, input:1000", Action::GoTo),
+    Key::new(char('/'), "find", "find a value in what was read", Action::Find),
+    Key::new(char('o'), "order", "byte order: ABCD, CDAB, BADC, DCBA", Action::Order),
+    Key::new(char('b'), "base", "addresses as Modicon numbers, from 0 or from 1", Action::Base),
+    Key::new(char(' '), "pause", "pause or resume reading", Action::Pause),
+    Key::new(char('+'), "", "read more often", Action::Faster),
+    Key::new(char('-'), "", "read less often", Action::Slower),
+    Key::new(char('U'), "unit", "read another unit", Action::Unit),
+    Key::new(char('r'), "", "ask again for what the unit has refused", Action::Relearn),
+];
+
+/// All keys.
+pub(super) fn table() -> Vec<Key<Action>> {
+    [&motions!("", Action::Move), KEYS].concat()
+}

@@ -1,0 +1,195 @@
+use std::sync::Arc;
+
+use super::*;
+use crate::{
+    plant::{
+        PlantDef,
+        def::{LineDef, Transport},
+        event::{ExceptionCode, Fault, LineState},
+        live::LivePart,
+    },
+    ui::{
+        Effect, Model, Msg, QueryId,
+        fixture::{now, session},
+        tests::{screen, type_keys},
+        theme::Theme,
+        update,
+    },
+};
+
+/// A terminal at a device without a plant file, and the unit that it reads.
+struct Bench {
+    model: Model,
+    asked: Vec<(QueryId, LiveRead)>,
+}
+
+impl Bench {
+    fn new() -> Bench {
+        let line = LineDef::new(LineId(0), "line", Transport::tcp("10.0.0.7", 502));
+        let device = DeviceDef::new(DeviceId(0), "device", LineId(0));
+        let title = "10.0.0.7:502".to_owned();
+        let def = PlantDef { title, lines: vec![line], devices: vec![device], ..PlantDef::default() };
+        let mut snapshot = Snapshot { at: now(), ..Snapshot::blank(Arc::new(def)) };
+        snapshot.lines[0].state = LineState::Connected;
+        let model = Model::new(Arc::new(snapshot), Theme::FULL, 1, session());
+        let mut bench = Bench { model, asked: Vec::new() };
+        bench.send(Msg::Resize(80, 24));
+        bench
+    }
+
+    fn send(&mut self, msg: Msg) {
+        let effects = update(&mut self.model, msg);
+        self.note(effects);
+    }
+
+    fn keys(&mut self, keys: &str) {
+        let effects = type_keys(&mut self.model, keys);
+        self.note(effects);
+    }
+
+    fn note(&mut self, effects: Vec<Effect>) {
+        self.asked.extend(effects.into_iter().filter_map(|effect| match effect {
+            Effect::Query(id, Query::Registers(read)) => Some((id, read)),
+            _ => None,
+        }));
+    }
+
+    /// The unit answers the last question after so many seconds: each register has its value, `None` does not exist.
+    fn answer(&mut self, seconds: i64, value: impl Fn(u16) -> Option<u16>) -> LiveRead {
+        let (id, read) = self.asked.pop().expect("a question");
+        self.asked.clear();
+        let at = now() + SignedDuration::from_secs(seconds);
+        let part = |span: &AddressSpan, address: u32| LivePart {
+            at,
+            span: AddressSpan { address: to_u16(address), count: 1, ..*span },
+            words: value(to_u16(address)).map(|word| vec![word]).ok_or(Fault::Exception(ExceptionCode(2))),
+        };
+        let parts = read.spans.iter().flat_map(|span| span.range().map(|address| part(span, address))).collect();
+        let reading = LiveReading { parts, reply: Some(Duration::from_micros(6_600)), requests: 2 };
+        self.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
+        read
+    }
+
+    fn screen(&mut self, width: u16, height: u16) -> String {
+        screen(&mut self.model, width, height)
+    }
+}
+
+fn device(address: u16) -> Option<u16> {
+    match address {
+        1002 => Some(700),
+        1012 => Some(0x42D1),
+        1013 => Some(0x6353),
+        1000..=1020 => Some(address % 10),
+        _ => None,
+    }
+}
+
+#[test]
+fn a_bench_shows_registers_and_bus_only() {
+    let mut bench = Bench::new();
+    let shown = bench.screen(80, 24);
+    assert!(shown.contains("6 Bus") && shown.contains("9 Registers") && !shown.contains("Mimic"), "{shown}");
+    assert!(shown.contains("no plant file"), "{shown}");
+    bench.answer(0, device);
+    assert!(bench.screen(80, 24).contains("no such address"));
+}
+
+#[test]
+fn values_holes_and_a_likely_float_are_shown() {
+    let mut bench = Bench::new();
+    bench.keys("j1000⏎");
+    let read = bench.answer(0, |address| device(address).filter(|_| address != 1011));
+    assert_eq!(read.spans[0].address, 1000);
+    assert!(read.spans[0].count >= 10);
+    for (width, height) in [(80, 24), (120, 40), (160, 50)] {
+        insta::assert_snapshot!(format!("registers_{width}x{height}"), bench.screen(width, height));
+    }
+}
+
+#[test]
+fn each_answer_brings_the_next_question_one_period_later() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.answer(0, device).not_before, None, "at once");
+    let next = now() + SignedDuration::from_secs(1);
+    assert_eq!(bench.asked.last().map(|(_, read)| read.not_before), Some(Some(next)));
+    bench.send(Msg::Tick { silent: Duration::ZERO });
+    assert_eq!(bench.asked.len(), 1, "one is on its way");
+    bench.keys("+");
+    bench.answer(1, device);
+    let next = now() + SignedDuration::from_millis(1_500);
+    assert_eq!(bench.asked.last().map(|(_, read)| read.not_before), Some(Some(next)), "twice a second");
+    bench.keys(" ");
+    assert!(bench.screen(80, 24).contains("PAUSED"));
+    bench.asked.clear();
+    bench.send(Msg::Tick { silent: Duration::ZERO });
+    assert!(bench.asked.is_empty(), "nothing is asked while it pauses");
+    bench.keys(" ");
+    assert_eq!(bench.asked.len(), 1);
+}
+
+#[test]
+fn an_old_answer_is_not_shown_at_a_new_address() {
+    let mut bench = Bench::new();
+    let (old, _) = bench.asked[0].clone();
+    bench.keys("j1000⏎");
+    let reading = LiveReading::default();
+    bench.send(Msg::Answer(old, Ok(Answer::Registers(reading))));
+    assert!(bench.screen(80, 24).contains("reading"), "the old answer does not count");
+    assert_eq!(bench.answer(0, device).spans[0].address, 1000);
+}
+
+#[test]
+fn a_change_is_marked_with_its_age_and_a_failed_read_is_not_shown_as_good() {
+    let mut bench = Bench::new();
+    bench.keys("j1000⏎");
+    bench.answer(0, device);
+    bench.answer(1, |address| device(address).map(|word| if address == 1002 { 701 } else { word }));
+    let shown = bench.screen(80, 24);
+    let row = shown.lines().find(|row| row.contains("41003 /")).expect("the row is on the screen");
+    assert!(row.contains("▸") && row.contains("701") && row.contains("now"), "{row}");
+    let (id, read) = bench.asked.pop().expect("a question");
+    let words = Err(Fault::Timeout);
+    let part = LivePart { at: now() + SignedDuration::from_secs(5), span: read.spans[0], words };
+    let reading = LiveReading { parts: vec![part], reply: None, requests: 1 };
+    bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
+    let shown = bench.screen(80, 24);
+    let row = shown.lines().find(|row| row.contains("41003 /")).expect("the row is on the screen");
+    assert!(row.contains("02BD?"), "an old value is marked: {row}");
+    assert!(shown.contains("response timeout"), "{shown}");
+}
+
+#[test]
+fn addresses_are_read_in_every_form_and_wrong_ones_are_refused() {
+    let mut bench = Bench::new();
+    for (typed, table, address) in [
+        ("1002", Table::Holding, 1002),
+        ("0x3EA", Table::Holding, 1002),
+        ("31001", Table::Input, 1000),
+        ("coil:7", Table::Coil, 7),
+    ] {
+        bench.model.tabs.registers.table = Table::Holding;
+        bench.keys(&format!("j{typed}⏎"));
+        let tab = &bench.model.tabs.registers;
+        assert_eq!((tab.table, tab.selected), (table, address), "{typed}");
+    }
+    bench.keys("j70000⏎");
+    assert!(bench.screen(80, 24).contains("found `70000`"));
+    bench.keys("⎋");
+    assert_eq!(bench.model.modal, None);
+}
+
+#[test]
+fn a_value_is_found_raw_scaled_and_as_a_float() {
+    let mut bench = Bench::new();
+    bench.keys("j1000⏎");
+    bench.send(Msg::Resize(120, 40));
+    bench.answer(0, device);
+    for (typed, address) in [("700", 1002), ("70.0", 1002), ("0x2BC", 1002), ("104.69", 1012)] {
+        bench.model.tabs.registers.selected = 1000;
+        bench.keys(&format!("/{typed}⏎"));
+        assert_eq!((bench.model.tabs.registers.selected, &bench.model.modal), (address, &None), "{typed}");
+    }
+    bench.keys("/4711⏎");
+    assert!(bench.screen(120, 40).contains("in none of the registers"));
+}

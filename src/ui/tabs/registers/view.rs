@@ -1,0 +1,318 @@
+//! How the registers are drawn: a row each, and the selected one below in every meaning.
+
+use super::{Base, Registers, cells::Cell, decode};
+use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::{
+        event::LineState,
+        live::TABLES,
+        number::{to_f32, to_u32},
+        tag::{ByteOrder, DataType},
+    },
+    ui::widgets::spark,
+};
+
+/// Rows of the heading: tables, state, names of the columns.
+const HEAD: u16 = 3;
+/// Rows of the selected register.
+const DETAIL: u16 = 6;
+/// With fewer rows than this the registers have all of them.
+const DETAIL_FROM: u16 = 14;
+/// A change is marked for so long.
+const FRESH: SignedDuration = SignedDuration::from_secs(3);
+
+/// Registers on a screen of so many rows.
+pub fn rows(height: u16) -> usize {
+    let detail = if DETAIL_FROM <= height { DETAIL } else { 0 };
+    usize::from(height.saturating_sub(HEAD + detail)).max(1)
+}
+
+/// What words may mean as numbers, in this byte order.
+pub fn meanings(words: &[u16], order: ByteOrder) -> Vec<f64> {
+    let kinds = [DataType::U16, DataType::I16, DataType::U32, DataType::I32, DataType::F32, DataType::Bcd16];
+    let number = |kind| decode::number(kind, order, words);
+    kinds.into_iter().filter_map(number).collect()
+}
+
+/// Draws the tab.
+pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
+    heading(tab, cx, canvas);
+    let height = canvas.height();
+    let room = rows(height);
+    columns(tab, cx, canvas);
+    for (y, address) in tab.rows(cx).map(to_u16).enumerate() {
+        row(tab, cx, canvas, HEAD + to_u16(y), address);
+    }
+    if DETAIL_FROM <= height {
+        let (width, y) = (canvas.width(), HEAD + to_u16(room));
+        detail(tab, cx, &mut canvas.part(0, y, width, DETAIL));
+    }
+}
+
+/// Tables and byte order; then how reading goes.
+fn heading(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let mut x = 1;
+    for table in TABLES {
+        let (word, shown) = (translate(table.word()), table == tab.table);
+        let text = if shown { format!("‹{word}›") } else { format!(" {word} ") };
+        x = canvas.text(x, 0, &text, if shown { theme.focus() } else { theme.dim() });
+    }
+    x += 2;
+    for order in ByteOrder::ALL {
+        let shown = order == tab.order;
+        let text = if shown { format!("‹{}›", order.word()) } else { format!(" {} ", order.word()) };
+        x = canvas.text(x, 0, &text, if shown { theme.focus() } else { theme.dim() });
+    }
+    let (words, well) = state(tab, cx);
+    let room = canvas.width().saturating_sub(2);
+    canvas.text(1, 1, &fit_words(&words, room), if well { theme.normal() } else { theme.trouble() });
+}
+
+/// `unit 1   every 1 s   6.6 ms, 2 requests   214 reads`, or what is wrong; and whether all is well.
+fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
+    let unit = tab.unit;
+    let line = cx.snapshot.lines.get(tab.line.index());
+    let waiting = match line.map(|line| &line.state) {
+        Some(LineState::Connected) => None,
+        Some(LineState::Waiting { why, .. }) => Some(t!("not connected: {why}", why)),
+        Some(LineState::Testing) => Some(t!("the line is under test").to_owned()),
+        Some(LineState::Connecting | LineState::Disconnected) | None => Some(t!("not connected").to_owned()),
+    };
+    if let Some(why) = waiting.or_else(|| tab.trouble.clone()) {
+        return (t!("unit {unit}   {why}", unit, why), false);
+    }
+    if tab.paused {
+        return (t!("unit {unit}   PAUSED, space resumes", unit), false);
+    }
+    let Some(last) = &tab.last else { return (t!("unit {unit}   reading", unit), true) };
+    let faults = last.parts.iter().filter_map(|part| part.words.as_ref().err());
+    if last.parts.iter().all(|part| part.words.is_err())
+        && let Some(fault) = faults.into_iter().next()
+    {
+        return (t!("unit {unit}   {fault}", unit, fault), false);
+    }
+    let every = tab.period.as_secs_f64();
+    let reply = last.reply.map_or(String::new(), |reply| format!("{:.1} ms", reply.as_secs_f64() * 1e3));
+    let words = t!(
+        "unit {unit}   every {every} s   reply {reply}   requests per read {requests}   reads {reads}",
+        unit,
+        every,
+        reply,
+        requests = last.requests,
+        reads = tab.reads
+    );
+    (words, true)
+}
+
+/// Where each column begins; the widest screens have all of them.
+struct Columns {
+    unsigned: u16,
+    signed: u16,
+    long: Option<u16>,
+    float: u16,
+    bits: u16,
+    text: u16,
+    age: u16,
+    hint: u16,
+}
+
+fn layout(width: u16) -> Columns {
+    let long = (100 <= width).then_some(37);
+    let float = if long.is_some() { 50 } else { 36 };
+    let bits = float + 12;
+    Columns { unsigned: 22, signed: 29, long, float, bits, text: bits + 20, age: bits + 23, hint: bits + 30 }
+}
+
+fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
+    let (theme, at) = (cx.theme, layout(canvas.width()));
+    let base = match tab.base {
+        Base::Modicon => t!("Modicon"),
+        Base::Zero => t!("from 0"),
+        Base::One => t!("from 1"),
+    };
+    canvas.text(2, 2, &fit(&format!("{base}/{}", t!("wire")), 14), theme.dim());
+    if tab.table.is_bits() {
+        canvas.text(17, 2, t!("value"), theme.dim());
+        canvas.text(at.age, 2, t!("changed"), theme.dim());
+        return;
+    }
+    canvas.text(17, 2, t!("hex"), theme.dim());
+    canvas.text_right(at.unsigned + 6, 2, "uint16", theme.dim());
+    canvas.text_right(at.signed + 6, 2, "int16", theme.dim());
+    if let Some(long) = at.long {
+        canvas.text_right(long + 12, 2, "uint32", theme.dim());
+    }
+    canvas.text_right(at.float + 11, 2, &format!("float {}", tab.order.word()), theme.dim());
+    canvas.text(at.bits, 2, t!("bits"), theme.dim());
+    canvas.text(at.text, 2, "Aa", theme.dim());
+    canvas.text(at.age, 2, &fit(t!("changed"), canvas.width().saturating_sub(at.age).min(7)), theme.dim());
+}
+
+/// An address as the operator wants it, and as it is on the wire.
+fn address_text(tab: &Registers, address: u16) -> String {
+    let shown = match tab.base {
+        Base::Modicon => tab.table.modicon(address),
+        Base::Zero => address.to_string(),
+        Base::One => (u32::from(address) + 1).to_string(),
+    };
+    format!("{shown:>6} / {address:04X}")
+}
+
+fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: u16) {
+    let (theme, at) = (cx.theme, layout(canvas.width()));
+    let selected = address == tab.selected;
+    let cell = tab.cells.get(tab.table, address);
+    let fresh = cell.is_some_and(|cell| is_fresh(cx, cell));
+    canvas.text(
+        0,
+        y,
+        if selected {
+            theme.pick("▐", ">")
+        } else if fresh {
+            theme.pick("▸", "*")
+        } else {
+            " "
+        },
+        theme.strong(),
+    );
+    let place = if selected { theme.focus() } else { theme.dim() };
+    canvas.text(1, y, &address_text(tab, address), place);
+    let Some((cell, word)) = cell.and_then(|cell| cell.word.map(|word| (cell, word))) else {
+        let why = match cell {
+            Some(cell) if cell.is_hole() => t!("----   no such address").to_owned(),
+            Some(Cell { fault: Some(fault), .. }) => format!("----   {fault}"),
+            Some(_) | None => "----".to_owned(),
+        };
+        canvas.text(17, y, &why, theme.dim());
+        return;
+    };
+    let old = cell.fault.is_some();
+    let style = match (old, fresh) {
+        (true, _) => theme.trouble(),
+        (false, true) => theme.strong(),
+        (false, false) => theme.normal(),
+    };
+    let mark = if old { "?" } else { "" };
+    if tab.table.is_bits() {
+        canvas.text(17, y, &format!("{word}{mark}"), style);
+    } else {
+        numbers(tab, canvas, y, address, (&format!("{word:04X}{mark}"), word), style, &at);
+    }
+    let age = |since: Timestamp| text::age(between(since, cx.now));
+    let since = if old { Some(cell.at) } else { cell.changed };
+    let words = match (since, fresh && !old) {
+        (Some(_), true) => t!("now").to_owned(),
+        (Some(since), false) => age(since),
+        (None, _) => String::new(),
+    };
+    canvas.text(at.age, y, &fit(&words, 6), style);
+    let words = tab.cells.words(tab.table, address, 2);
+    if let Some(order) = decode::likely_float(&words)
+        && at.hint < canvas.width()
+        && !tab.table.is_bits()
+    {
+        canvas.text(at.hint, y, &t!("likely float {order}", order = order.word()), theme.dim());
+    }
+}
+
+fn numbers(
+    tab: &Registers,
+    canvas: &mut Canvas,
+    y: u16,
+    address: u16,
+    (hex, word): (&str, u16),
+    style: Style,
+    at: &Columns,
+) {
+    let words = tab.cells.words(tab.table, address, 2);
+    canvas.text(17, y, hex, style);
+    canvas.text_right(at.unsigned + 6, y, &word.to_string(), style);
+    canvas.text_right(at.signed + 6, y, &word.cast_signed().to_string(), style);
+    let long = decode::number(DataType::U32, tab.order, &words).map(|value| decode::short(value, 11));
+    if let Some(x) = at.long {
+        canvas.text_right(x + 12, y, long.as_deref().unwrap_or("–"), style);
+    }
+    let float = decode::float(tab.order, &words, 10);
+    canvas.text_right(at.float + 11, y, float.as_deref().unwrap_or("–"), style);
+    canvas.text(at.bits, y, &bits(word), style);
+    canvas.text(at.text, y, &decode::text(&[word]), style);
+}
+
+fn bits(word: u16) -> String {
+    [word >> 12, word >> 8 & 15, word >> 4 & 15, word & 15].map(|four| format!("{four:04b}")).join(" ")
+}
+
+fn is_fresh(cx: &ViewContext, cell: &Cell) -> bool {
+    cell.changed.is_some_and(|changed| cx.now.duration_since(changed) <= FRESH)
+}
+
+/// The selected register: what it means with those behind it, and what it has held.
+fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let address = tab.selected;
+    let (modicon, table) = (tab.table.modicon(address), translate(tab.table.word()));
+    let width = canvas.width();
+    canvas.run(0, 0, width, '─', theme.dim());
+    canvas.text(
+        2,
+        0,
+        &t!(" {modicon}   {table} {address} / 0x{hex} ", modicon, table, address, hex = format!("{address:04X}")),
+        theme.strong(),
+    );
+    let Some(cell) = tab.cells.get(tab.table, address) else { return };
+    let words = tab.cells.words(tab.table, address, 4);
+    if !tab.table.is_bits() {
+        let number = |kind, order| {
+            decode::number(kind, order, &words).map_or("–".to_owned(), |value| decode::short(value, 20))
+        };
+        let plain = t!(
+            "BCD {bcd}   64 bits {long}   double {double}   text {text}",
+            bcd = number(DataType::Bcd16, tab.order),
+            long = number(DataType::U64, tab.order),
+            double = number(DataType::F64, tab.order),
+            text = decode::text(&words)
+        );
+        canvas.text(1, 1, &fit(&plain, width.saturating_sub(2)), theme.normal());
+        // All four where two stand beside each other, else the usual one and the chosen one.
+        let other = if tab.order == ByteOrder::Abcd { ByteOrder::Cdab } else { tab.order };
+        let orders = if 108 <= width { ByteOrder::ALL.to_vec() } else { vec![ByteOrder::Abcd, other] };
+        for (n, order) in orders.into_iter().enumerate() {
+            let float = decode::float(order, &words, 12).unwrap_or_else(|| "–".to_owned());
+            let (unsigned, signed) = (number(DataType::U32, order), number(DataType::I32, order));
+            let text = format!("{}  {unsigned:>11} {signed:>12} {float:>13}", order.word());
+            let style = if order == tab.order { theme.normal() } else { theme.dim() };
+            canvas.text(1 + 60 * (to_u16(n) / 2), 2 + to_u16(n) % 2, &text, style);
+        }
+    }
+    seen(cx, cell, canvas);
+}
+
+/// `700 now   3 values in 0:42   least 690   greatest 702   mean 697.2  ▁▂▃`.
+fn seen(cx: &ViewContext, cell: &Cell, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    if let Some(fault) = cell.fault {
+        let why = fit_words(&fault.to_string(), canvas.width().saturating_sub(2));
+        canvas.text(1, 4, &why, theme.trouble());
+        return;
+    }
+    let values: Vec<f64> = cell.seen.iter().map(|(_, word)| f64::from(*word)).collect();
+    let (Some((from, _)), false) = (cell.seen.front(), values.is_empty()) else { return };
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mean = values.iter().sum::<f64>() / f64::from(to_u32(values.len()));
+    let words = t!(
+        "{count} reads in {span}   least {least}   greatest {greatest}   mean {mean}",
+        count = values.len(),
+        span = running(between(*from, cell.at)),
+        least,
+        greatest,
+        mean = decode::short((f64::from(to_f32(mean) * 10.0)).round() / 10.0, 9)
+    );
+    let x = canvas.text(1, 4, &words, theme.normal()) + 3;
+    let room = usize::from(canvas.width().saturating_sub(x + 1)).min(60);
+    let recent: Vec<Option<f64>> = values.iter().rev().take(room).rev().map(|value| Some(value - least)).collect();
+    if 4 <= room {
+        canvas.text(x, 4, &spark::bars(&recent, (greatest - least).max(1.0), theme.glyphs), theme.normal());
+    }
+}
