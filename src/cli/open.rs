@@ -1,21 +1,15 @@
 //! `sightglass open PORT`: the registers of any device, live, without a plant file.
 
-use std::{io::IsTerminal, sync::Arc, time::Duration};
-
-use jiff::Timestamp;
+use std::{sync::Arc, time::Duration};
 
 use super::{
     CliError, in_runtime, log, paths, say,
-    tools::{PortArgs, show_progress},
+    tools::{self, PortArgs},
 };
 use crate::{
-    bus::{
-        diagnostics::Job,
-        io::{clock::Clock, testing, transport::Connector},
-    },
+    bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef,
-        command::CommandId,
         def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Parity, Serial, Transport},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
     },
@@ -132,22 +126,8 @@ async fn first_answer(
     (first, last): (u8, u8),
     serials: Vec<Serial>,
 ) -> Result<Option<(u8, Option<Serial>, String)>, CliError> {
-    let diagnostic = Diagnostic::Scan(Scan { first, last, serials, timeout: line.timeout.min(TRIAL) });
-    let job = Job::new(CommandId::default(), "cli".into(), diagnostic, Timestamp::now());
-    let shown = std::io::stderr().is_terminal();
-    let run = testing::run(line, job, |run: &DiagnosticRun| {
-        if shown {
-            show_progress(&run.now);
-        }
-        answer(run).is_none()
-    });
-    let run = tokio::select! {
-        run = run => run,
-        _ = tokio::signal::ctrl_c() => return Err(CliError::Failed("stopped".into())),
-    };
-    if shown {
-        show_progress("");
-    }
+    let scan = Diagnostic::Scan(Scan { first, last, serials, timeout: line.timeout.min(TRIAL) });
+    let run = tools::search(line, scan, |run| answer(run).is_some()).await?;
     match &run.state {
         DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
         DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => Ok(answer(&run)),

@@ -19,7 +19,7 @@ use std::{
 use jiff::Timestamp;
 use rustix::time::{ClockId, clock_gettime};
 use sightglass::{
-    bus::io::{clock::Clock, requests::Requests, task, transport::Connector},
+    bus::io::{clock::Clock, live_reads::LiveReads, requests::Requests, task, transport::Connector},
     plant::{
         PlantDef,
         def::{DeviceDef, DeviceId, Limits, LineDef, LineId, Serial, TagId, Transport},
@@ -228,7 +228,17 @@ fn line_task(in_flight: u16, blocks: u16) -> (f64, f64) {
         let clock = Clock::starting_at(Timestamp::now(), 1.0);
         tokio::spawn(async move {
             let mut connector = Connector::Real(transport);
-            task::run(def, LineId(0), clock, &mut connector, sender, &mut Requests::new(queue), stopped).await;
+            task::run(
+                def,
+                LineId(0),
+                clock,
+                &mut connector,
+                sender,
+                &mut Requests::new(queue),
+                &mut LiveReads::new(mpsc::channel(1).1),
+                stopped,
+            )
+            .await;
         });
         // A task of its own receives the events, as in the station: to wake the future of `block_on` costs a system call.
         let drain = async move {

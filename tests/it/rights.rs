@@ -13,6 +13,7 @@ use sightglass::{
         command::{CommandKind, CommandStatus, Outcome, Refusal},
         def::{AlarmId, DeviceId, LineId, Serial},
         diagnostics::{Diagnostic, Scan},
+        live::{AddressSpan, LiveRead},
         parameter_set::ParameterSet,
         restore::RestoreRequest,
         role::Role,
@@ -340,8 +341,15 @@ fn of_question(query: &Query) -> Row {
         Query::Values { .. } => look("", "-VTSL-"),
         Query::AlarmMetrics { .. } => look("", "-VTSL-"),
         Query::Report { .. } => look("", "-VTSL-"),
+        Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
+}
+
+fn registers(def: &PlantDef) -> LiveRead {
+    let (device, point) = (&def.devices[0], def.tags[0].point);
+    let spans = vec![AddressSpan { table: point.table, address: point.address, count: 1 }];
+    LiveRead { line: device.line, unit: device.unit, spans, not_before: None, relearn: false }
 }
 
 fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
@@ -356,6 +364,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::AlarmMetrics { from, to },
         Query::Report { period: Period { name: "period".into(), from, to } },
         Query::Audit { from, to, words, by, action, limit },
+        Query::Registers(registers(def)),
     ]
 }
 

@@ -172,8 +172,32 @@ pub fn run(
     }
 }
 
+/// Runs a diagnostic until something is `found`, and shows how far it has come. Ctrl-C is an error.
+pub async fn search(
+    line: &LineDef,
+    diagnostic: Diagnostic,
+    found: impl Fn(&DiagnosticRun) -> bool,
+) -> Result<DiagnosticRun, CliError> {
+    let job = Job::new(CommandId::default(), Arc::from("cli"), diagnostic, Timestamp::now());
+    let shown = std::io::stderr().is_terminal();
+    let work = testing::run(line, job, |run: &DiagnosticRun| {
+        if shown {
+            show_progress(&run.now);
+        }
+        !found(run)
+    });
+    let run = tokio::select! {
+        run = work => Ok(run),
+        _ = tokio::signal::ctrl_c() => Err(CliError::Failed("stopped".into())),
+    };
+    if shown {
+        show_progress("");
+    }
+    run
+}
+
 /// Replaces the line of progress.
-pub(super) fn show_progress(text: &str) {
+fn show_progress(text: &str) {
     use std::io::Write;
     let _ = write!(std::io::stderr(), "\r\x1b[K{text}");
 }

@@ -58,8 +58,8 @@ pub struct Registers {
     period: SignedDuration,
     paused: bool,
     cells: Cells,
-    /// Number and steady time of the read on its way.
-    on_way: Option<(u32, Timestamp)>,
+    /// Number and steady time of the read on its way, and what it reads.
+    on_way: Option<(u32, Timestamp, AddressSpan)>,
     number: u32,
     relearn: bool,
     last: Option<LiveReading>,
@@ -144,19 +144,21 @@ impl TabView for Registers {
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let now = cx.steady();
-        let lost = self.on_way.is_some_and(|(_, at)| (LOST_AFTER + self.period) < now.duration_since(at));
-        if self.paused || (self.on_way.is_some() && !lost) {
+        let wanted = self
+            .on_way
+            .is_some_and(|(_, at, span)| span != self.span(cx) || (LOST_AFTER + self.period) < now.duration_since(at));
+        if self.paused || (self.on_way.is_some() && !wanted) {
             return Vec::new();
         }
         self.ask(cx, None)
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.on_way.is_some_and(|(on_way, _)| on_way == number)
+        self.on_way.is_some_and(|(on_way, ..)| on_way == number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if self.on_way.take_if(|(on_way, _)| *on_way == number).is_none() {
+        if self.on_way.take_if(|(on_way, ..)| *on_way == number).is_none() {
             return Vec::new();
         }
         let reading = match answer {
@@ -213,6 +215,13 @@ impl Registers {
         first..(first + to_u32(view::rows(cx.area.height))).min(0x1_0000)
     }
 
+    /// What is read: the window, and what its last row may need.
+    fn span(&self, cx: &ViewContext) -> AddressSpan {
+        let rows = self.rows(cx);
+        let count = to_u16((rows.end + BEHIND).min(0x1_0000) - rows.start);
+        AddressSpan { table: self.table, address: self.first, count }
+    }
+
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let room = view::rows(cx.area.height);
         self.selected = to_u16(motion.to(usize::from(self.selected), 0x1_0000, room));
@@ -249,13 +258,11 @@ impl Registers {
         if cx.def().lines.is_empty() {
             return Vec::new();
         }
-        let rows = self.rows(cx);
-        let count = to_u16((rows.end + BEHIND).min(0x1_0000) - rows.start);
-        let span = AddressSpan { table: self.table, address: self.first, count };
+        let span = self.span(cx);
         let relearn = std::mem::take(&mut self.relearn);
         let read = LiveRead { line: self.line, unit: self.unit, spans: vec![span], not_before, relearn };
         self.number = self.number.wrapping_add(1);
-        self.on_way = Some((self.number, cx.steady()));
+        self.on_way = Some((self.number, cx.steady(), span));
         vec![UiAction::query(Tab::Registers, self.number, Query::Registers(read))]
     }
 

@@ -12,7 +12,13 @@ use tokio::{
 use crate::{
     bus::{
         frame::{self, Mbap},
-        io::{clock::Clock, requests::Requests, task, transport::Connector},
+        io::{
+            clock::Clock,
+            live_reads::{LiveReads, LiveRequest},
+            requests::Requests,
+            task,
+            transport::Connector,
+        },
     },
     plant::{
         PlantDef,
@@ -217,6 +223,7 @@ async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usiz
 pub struct Line {
     pub events: mpsc::Receiver<Event>,
     pub requests: mpsc::Sender<BusRequest>,
+    pub live: mpsc::Sender<LiveRequest>,
     pub ports: mpsc::Sender<DuplexStream>,
     task: tokio::task::JoinHandle<()>,
     _stop: watch::Sender<bool>,
@@ -225,14 +232,17 @@ pub struct Line {
 pub fn line(def: PlantDef) -> Line {
     let (sender, events) = mpsc::channel(64);
     let (requests, queue) = mpsc::channel(4);
+    let (live, live_queue) = mpsc::channel(4);
     let (ports, streams) = mpsc::channel(8);
     let (stop, stopped) = watch::channel(false);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
     let task = tokio::spawn(async move {
         let mut connector = Connector::Memory(streams);
-        task::run(Arc::new(def), LineId(0), clock, &mut connector, sender, &mut Requests::new(queue), stopped).await;
+        let (mut requests, mut live) = (Requests::new(queue), LiveReads::new(live_queue));
+        let def = Arc::new(def);
+        task::run(def, LineId(0), clock, &mut connector, sender, &mut requests, &mut live, stopped).await;
     });
-    Line { events, requests, ports, task, _stop: stop }
+    Line { events, requests, live, ports, task, _stop: stop }
 }
 
 impl Line {

@@ -53,7 +53,7 @@ pub fn likely_float(words: &[u16]) -> Option<ByteOrder> {
         let swapped = matches!(order, ByteOrder::Badc | ByteOrder::Dcba);
         // A whole number below 256 has an empty high byte, which no swapped float of a usual size has in its first word.
         let full = !swapped || (a & 0xFF != 0 && a >> 8 != 0 && b & 0xFF != 0);
-        full && (1e-3..1e7).contains(&value)
+        full && if swapped { (1e-2..1e6).contains(&value) } else { (1e-3..1e7).contains(&value) }
     };
     [ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba].iter().find(plausible).copied()
 }

@@ -1,3 +1,5 @@
+//! A terminal at a device without a plant file, and a scripted unit behind it.
+
 use std::sync::Arc;
 
 use super::*;
@@ -17,7 +19,7 @@ use crate::{
     },
 };
 
-/// A terminal at a device without a plant file, and the unit that it reads.
+/// The terminal, and what it has asked.
 struct Bench {
     model: Model,
     asked: Vec<(QueryId, LiveRead)>,
@@ -140,14 +142,14 @@ fn an_old_answer_is_not_shown_at_a_new_address() {
 }
 
 #[test]
-fn a_change_is_marked_with_its_age_and_a_failed_read_is_not_shown_as_good() {
+fn a_change_is_marked_and_a_failed_read_is_not_shown_as_good() {
     let mut bench = Bench::new();
     bench.keys("j1000⏎");
     bench.answer(0, device);
     bench.answer(1, |address| device(address).map(|word| if address == 1002 { 701 } else { word }));
     let shown = bench.screen(80, 24);
     let row = shown.lines().find(|row| row.contains("41003 /")).expect("the row is on the screen");
-    assert!(row.contains("▸") && row.contains("701") && row.contains("now"), "{row}");
+    assert!(row.starts_with('*') && row.contains("701") && row.contains("now"), "{row}");
     let (id, read) = bench.asked.pop().expect("a question");
     let words = Err(Fault::Timeout);
     let part = LivePart { at: now() + SignedDuration::from_secs(5), span: read.spans[0], words };
@@ -160,7 +162,7 @@ fn a_change_is_marked_with_its_age_and_a_failed_read_is_not_shown_as_good() {
 }
 
 #[test]
-fn addresses_are_read_in_every_form_and_wrong_ones_are_refused() {
+fn addresses_are_taken_in_every_form_and_wrong_ones_refused() {
     let mut bench = Bench::new();
     for (typed, table, address) in [
         ("1002", Table::Holding, 1002),

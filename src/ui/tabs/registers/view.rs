@@ -15,7 +15,7 @@ use crate::{
 /// Rows of the heading: tables, state, names of the columns.
 const HEAD: u16 = 3;
 /// Rows of the selected register.
-const DETAIL: u16 = 6;
+const DETAIL: u16 = 5;
 /// With fewer rows than this the registers have all of them.
 const DETAIL_FROM: u16 = 14;
 /// A change is marked for so long.
@@ -164,18 +164,12 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
     let selected = address == tab.selected;
     let cell = tab.cells.get(tab.table, address);
     let fresh = cell.is_some_and(|cell| is_fresh(cx, cell));
-    canvas.text(
-        0,
-        y,
-        if selected {
-            theme.pick("▐", ">")
-        } else if fresh {
-            theme.pick("▸", "*")
-        } else {
-            " "
-        },
-        theme.strong(),
-    );
+    let mark = match (selected, fresh) {
+        (true, _) => ">",
+        (false, true) => "*",
+        (false, false) => " ",
+    };
+    canvas.text(0, y, mark, theme.strong());
     let place = if selected { theme.focus() } else { theme.dim() };
     canvas.text(1, y, &address_text(tab, address), place);
     let Some((cell, word)) = cell.and_then(|cell| cell.word.map(|word| (cell, word))) else {
@@ -193,13 +187,13 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
         (false, true) => theme.strong(),
         (false, false) => theme.normal(),
     };
-    let mark = if old { "?" } else { "" };
+    let doubt = if old { "?" } else { "" };
     if tab.table.is_bits() {
-        canvas.text(17, y, &format!("{word}{mark}"), style);
+        canvas.text(17, y, &format!("{word}{doubt}"), style);
     } else {
-        numbers(tab, canvas, y, address, (&format!("{word:04X}{mark}"), word), style, &at);
+        numbers(tab, canvas, y, address, (&format!("{word:04X}{doubt}"), word), style, &at);
     }
-    let age = |since: Timestamp| text::age(between(since, cx.now));
+    let age = |since: Timestamp| text::age(elapsed(since, cx.now));
     let since = if old { Some(cell.at) } else { cell.changed };
     let words = match (since, fresh && !old) {
         (Some(_), true) => t!("now").to_owned(),
@@ -302,9 +296,9 @@ fn seen(cx: &ViewContext, cell: &Cell, canvas: &mut Canvas) {
     let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mean = values.iter().sum::<f64>() / f64::from(to_u32(values.len()));
     let words = t!(
-        "{count} reads in {span}   least {least}   greatest {greatest}   mean {mean}",
+        "read {count} times in {span}   least {least}   greatest {greatest}   mean {mean}",
         count = values.len(),
-        span = running(between(*from, cell.at)),
+        span = running(elapsed(*from, cell.at)),
         least,
         greatest,
         mean = decode::short((f64::from(to_f32(mean) * 10.0)).round() / 10.0, 9)

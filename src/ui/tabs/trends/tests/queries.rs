@@ -13,7 +13,8 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
         | Query::LineMinutes { .. }
         | Query::Report { .. }
         | Query::AlarmMetrics { .. }
-        | Query::Values { .. } => "other",
+        | Query::Values { .. }
+        | Query::Registers(_) => "other",
     };
     asked.iter().map(|(_, query)| kind(query)).collect::<Vec<_>>().join(" ")
 }
