@@ -4,7 +4,7 @@
 //! in DuckDB, draws the process as a living mimic, sets controllers with verified writes and writes shift reports.
 //! It never shows a wrong value as a right one.
 //!
-//! # One binary, four ways to run it
+//! # One binary, five ways to run it
 //!
 //! | command | what runs |
 //! |---|---|
@@ -12,8 +12,9 @@
 //! | `sightglass` | a **terminal** attached to the running station; any number at once |
 //! | `sightglass PLANT` | station and terminal in one process, or a terminal at the station of that plant |
 //! | `sightglass demo` | a simulated plant on real pseudo-terminals and sockets, station and terminal in one process |
+//! | `sightglass open PORT` | a **bench**: station without history and terminal in one process, on one device without a plant file |
 //!
-//! `sightglass drill` is the fifth, without a terminal: station and simulated plant in virtual time, judged by a scenario.
+//! `sightglass drill` is the sixth, without a terminal: station and simulated plant in virtual time, judged by a scenario.
 //!
 //! # How data flows
 //!
@@ -40,6 +41,7 @@
 //! alone decides what is permitted. What it refuses goes on to the plant as a refused command, so that it is seen and on
 //! record like any other. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
 //! outcome as recorded; the history follows within a second.
+//! Queries go to the history; one that reads registers goes to the line, which answers it between polls.
 //! The history thread only writes; a second one answers queries, each on a connection of its own and for a bounded time.
 //!
 //! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
@@ -70,6 +72,8 @@
 //! | tag, block | one value of a device by name; registers that one request reads |
 //! | sample, quality | value with quality and time; good, uncertain or bad (OPC UA) |
 //! | snapshot | everything that is true now, immutable, for terminals and the history |
+//! | bench, live read | one device without tags, for `open`; a read of its registers beside the polls |
+//! | hole | an address that a device does not have |
 //! | source frame | the request and response that a sample was decoded from |
 //! | command | what an operator asks of the plant, with a status from pending to verified, refused, failed or not confirmed |
 //! | session request | what a user asks of access control: log in, log out, change users, lock |
