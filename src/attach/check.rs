@@ -212,7 +212,7 @@ mod tests {
         for wait in [Duration::ZERO, Duration::from_secs(11), Duration::MAX] {
             assert!(check(LineDef { timeout: wait, ..used.clone() }).is_err(), "timeout {wait:?}");
         }
-        assert!(check(LineDef { idle: Duration::MAX, ..used.clone() }).is_err());
+        assert!(check(LineDef { frame_timeout: Duration::MAX, ..used.clone() }).is_err());
         assert!(check(LineDef { gap: Duration::MAX, ..used.clone() }).is_err());
         assert!(check(LineDef { turnaround: Duration::MAX, ..used.clone() }).is_err());
         let transport = Transport::rtu("/dev/null", Serial { baud: 0, ..Serial::USUAL });

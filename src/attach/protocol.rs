@@ -24,7 +24,7 @@ use crate::{
 pub const PROTOCOL: u32 = 4;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Longest hello, bytes.
+/// Longest handshake, bytes.
 pub const HANDSHAKE_BYTES_MAX: usize = 4 * 1024;
 /// Longest message of a terminal, bytes.
 pub const REQUEST_BYTES_MAX: usize = 64 * 1024;
@@ -199,7 +199,7 @@ pub fn client_handshake(bytes: &[u8]) -> Result<Place, ProtocolError> {
     decode(rest, "handshake of a terminal")
 }
 
-/// What the station says first: welcome, or why not.
+/// Parses the first message of a station: its handshake reply, or why it refuses.
 pub fn handshake_reply(bytes: &[u8]) -> Result<Result<HandshakeReply, String>, ProtocolError> {
     let (handshake, rest) = parse_handshake(bytes, "handshake of a station")?;
     if let Some(why) = handshake.rejection {

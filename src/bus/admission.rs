@@ -215,7 +215,7 @@ fn warnings(def: &PlantDef, line: &LineDef, blocks: &[Block], utilisation: f64) 
     let serial = line.transport.serial().filter(|serial| (serial.parity, serial.stop_bits) == (Parity::None, 1));
     let answer = |block: &Block| {
         let wire = Wire::of(line, def.device(block.device));
-        wire.read(block.table, u32::from(block.count)) - wire.request - wire.turn - wire.rest
+        wire.read(block.table, u32::from(block.count)) - wire.request - wire.turnaround - wire.silent_interval
     };
     let longest = blocks.iter().max_by_key(|block| answer(block)).filter(|block| line.timeout < answer(block));
     let timeout = longest.map(|block| Warning::TimeoutBelowAnswer {

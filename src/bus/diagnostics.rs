@@ -16,7 +16,7 @@ use crate::plant::{
 };
 
 /// Most units of a scan with the same settings of which only corrupt bytes may come.
-const TRACES_MAX: usize = 3;
+const CORRUPT_UNITS_MAX: usize = 3;
 
 /// What is to be sent next.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +60,7 @@ pub struct Job {
     /// How many it has.
     planned: u32,
     /// Units of a scan that gave corrupt bytes, with which settings: each by itself may be a unit, all together are none.
-    traces: Vec<(u8, Option<Serial>, Fault)>,
+    corrupt_units: Vec<(u8, Option<Serial>, Fault)>,
 }
 
 impl Job {
@@ -78,9 +78,9 @@ impl Job {
             state: DiagnosticState::Running,
             findings: Vec::new(),
         };
-        let mut job = Job { run, step: None, queued: VecDeque::new(), made: 0, planned, traces: Vec::new() };
+        let mut job = Job { run, step: None, queued: VecDeque::new(), made: 0, planned, corrupt_units: Vec::new() };
         job.advance();
-        job.tell_now();
+        job.update_now();
         job
     }
 
@@ -106,18 +106,18 @@ impl Job {
         }
     }
 
-    /// Takes the result of the step that was next.
-    pub fn take(&mut self, result: StepResult) {
+    /// Handles the result of the step that was next.
+    pub fn on_result(&mut self, result: StepResult) {
         let Some(step) = self.step.take() else { return };
         self.run.done += 1;
         match (&self.run.diagnostic, result) {
             (_, StepResult::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
-            (Diagnostic::Scan(_), StepResult::Answer(answer, _)) => self.take_unit(&step, answer),
+            (Diagnostic::Scan(_), StepResult::Answer(answer, _)) => self.add_unit(&step, answer),
             // It only had an adapter with echo give itself away.
             (Diagnostic::Loopback { .. }, StepResult::Answer(..)) if self.run.done == 1 => {}
             (_, StepResult::Answer(answer, exchange)) => {
                 self.found(Finding::Exchange(exchange));
-                self.take_answer(&step, answer);
+                self.on_response(&step, answer);
             }
         }
         self.run.total = self.run.done + to_u32(self.queued.len()) + (self.planned - self.made);
@@ -126,7 +126,7 @@ impl Job {
             self.conclude();
             self.run.state = DiagnosticState::Done;
         }
-        self.tell_now();
+        self.update_now();
     }
 
     /// Makes the step that is next.
@@ -138,7 +138,7 @@ impl Job {
         });
     }
 
-    fn take_answer(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
+    fn on_response(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
         let Ask::Message(request) = &step.ask else { return };
         let answer = match answer {
             Ok(answer) => answer,
@@ -149,7 +149,7 @@ impl Job {
             }
         };
         match (request.get(1), answer.get(1)) {
-            (Some(0x2B), _) => self.take_identification(request, &answer),
+            (Some(0x2B), _) => self.on_identification(request, &answer),
             (Some(0x11), _) => {
                 let text = text_of(answer.get(3..).unwrap_or_default());
                 self.found(Finding::Object { name: "ServerId".into(), text });
@@ -182,7 +182,7 @@ impl Job {
     }
 
     /// Objects: id, length, text. If more follow, they are asked for (V1.1b3, 6.21).
-    fn take_identification(&mut self, request: &[u8], answer: &[u8]) {
+    fn on_identification(&mut self, request: &[u8], answer: &[u8]) {
         let [unit, _, _, code, ..] = *request else { return };
         let [_, _, _, _, _, more, next, _, ..] = *answer else { return };
         for (id, text) in pdu::identification_objects(&answer[1..]) {
@@ -194,7 +194,7 @@ impl Job {
         }
     }
 
-    fn take_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
+    fn add_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
         let Ask::Message(request) = &step.ask else { return };
         let words = match answer {
             // A broadcast has no response.
@@ -205,18 +205,18 @@ impl Job {
             },
             Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => fault.to_string(),
             // Corrupt bytes are a trace too: a unit may be there with another parity or baud rate.
-            Err(fault) if fault.is_corrupt() => return self.traces.push((request[0], step.serial, fault)),
+            Err(fault) if fault.is_corrupt() => return self.corrupt_units.push((request[0], step.serial, fault)),
             Err(_) => return,
         };
         self.found(Finding::Unit { unit: request[0], serial: step.serial, words });
     }
 
     /// A few corrupt responses may be units; more of them with the same settings come from another sender.
-    fn conclude_traces(&mut self) {
-        let traces = std::mem::take(&mut self.traces);
-        for same in traces.chunk_by(|one, other| one.1 == other.1) {
+    fn conclude_corrupt_units(&mut self) {
+        let corrupt_units = std::mem::take(&mut self.corrupt_units);
+        for same in corrupt_units.chunk_by(|one, other| one.1 == other.1) {
             let (_, serial, fault) = same[0];
-            if same.len() <= TRACES_MAX {
+            if same.len() <= CORRUPT_UNITS_MAX {
                 let unit = |(unit, serial, fault): &(u8, Option<Serial>, Fault)| Finding::Unit {
                     unit: *unit,
                     serial: *serial,
@@ -232,8 +232,8 @@ impl Job {
     }
 
     fn conclude(&mut self) {
-        self.conclude_traces();
-        let verdict = match &self.run.diagnostic {
+        self.conclude_corrupt_units();
+        let summary = match &self.run.diagnostic {
             Diagnostic::Loopback { .. } => loopback_words(&self.run.findings, self.run.done - 1),
             Diagnostic::Scan(scan) => {
                 let units = self.run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
@@ -245,7 +245,7 @@ impl Job {
             }
             Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => return,
         };
-        self.found(Finding::Verdict(verdict));
+        self.found(Finding::Verdict(summary));
     }
 
     /// Keeps a finding; the last place is for what is concluded from all of them.
@@ -256,7 +256,7 @@ impl Job {
         }
     }
 
-    fn tell_now(&mut self) {
+    fn update_now(&mut self) {
         self.run.now = match self.step.as_ref().map(|step| (&step.ask, step.serial)) {
             Some((Ask::Message(request), Some(serial))) => format!("{} at {serial}", words(request)),
             Some((Ask::Message(request), None)) => words(request),

@@ -6,7 +6,7 @@
 //! therefore proves that nothing older is still to come, and nothing is outstanding any more.
 //!
 //! A unit whose outstanding reply comes after such a proof does not answer in order: from then on only the outstanding reply itself, or
-//! patience, clears what is outstanding.
+//! time, clears what is outstanding.
 //!
 //! A unit that was never asked before may still answer an earlier process that was killed, and one that sends what it was
 //! not asked for may do so again: both are *unproven*, and are first asked something that is no usual block of theirs.
@@ -142,7 +142,7 @@ struct Unit {
     disproved: Vec<(Shape, Duration)>,
     /// It does not answer in order.
     reorders: bool,
-    /// More than one answer of a shape may be under way: only patience clears what is outstanding.
+    /// More than one answer of a shape may be under way: only time clears what is outstanding.
     is_unsure: bool,
 }
 
@@ -154,7 +154,7 @@ impl Unit {
     }
 
     /// It has given an answer that cannot have been an older one.
-    fn prove(&mut self, patience: Duration, now: Duration) {
+    fn prove(&mut self, quarantine: Duration, now: Duration) {
         let (shapes, arrived) = (std::mem::take(&mut self.outstanding.shapes), std::mem::take(&mut self.arrived));
         let (failed_at, is_unsure) = (self.failed_at, self.is_unsure);
         self.resynchronise();
@@ -163,20 +163,20 @@ impl Unit {
             (self.outstanding.shapes, self.failed_at, self.is_unsure) = (shapes, Some(failed_at), is_unsure);
             return;
         }
-        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < patience);
+        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < quarantine);
         let missing = shapes.into_iter().filter(|shape| !arrived.contains(shape)).map(|shape| (shape, failed_at));
         self.disproved.extend(missing.take(OUTSTANDING_MAX.saturating_sub(self.disproved.len())));
     }
 
     /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its shape is outstanding but what
     /// cannot come any more from a unit that answers in order. All of that may still come now.
-    fn detect_reordering(&mut self, message: &[u8], patience: Duration, now: Duration) -> bool {
+    fn detect_reordering(&mut self, message: &[u8], quarantine: Duration, now: Duration) -> bool {
         let fits = |shape: &&Shape| shape.fits(message);
         if let Some(shape) = self.outstanding.shapes.iter().find(fits).filter(|shape| !self.arrived.contains(shape)) {
             self.arrived.push(*shape);
             return false;
         }
-        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < patience);
+        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < quarantine);
         let Some(place) = self.disproved.iter().position(|(shape, _)| shape.fits(message)) else { return false };
         self.disproved.swap_remove(place);
         (self.reorders, self.is_unsure) = (true, !self.disproved.is_empty() || !self.outstanding.shapes.is_empty());
@@ -188,7 +188,7 @@ impl Unit {
     }
 
     /// It is left alone so long for each outstanding reply, where nothing can prove that it is in sync.
-    fn patience(&self, timeout: Duration) -> Duration {
+    fn quarantine(&self, timeout: Duration) -> Duration {
         (2 * self.late_max).max(10 * timeout)
     }
 }
@@ -223,7 +223,7 @@ impl LineReplies {
         let timeout = self.timeout;
         let unit = &mut self.units[unit];
         if proof && !unsettled {
-            unit.prove(unit.patience(timeout), now);
+            unit.prove(unit.quarantine(timeout), now);
         }
         answer.clone_into(&mut unit.answer);
         let is_usual = shape_of(request).is_some_and(|shape| unit.outstanding.usual.contains(&shape));
@@ -291,7 +291,7 @@ impl LineReplies {
     pub fn clear(&mut self, unit: u8, now: Duration) {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
-        unit.prove(unit.patience(timeout), now);
+        unit.prove(unit.quarantine(timeout), now);
     }
 
     /// A request was not answered, or only by something corrupt.
@@ -327,7 +327,7 @@ impl LineReplies {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
         let is_repeated = unit.answer == message;
-        !unit.reorders && !is_repeated && unit.detect_reordering(message, unit.patience(timeout), now)
+        !unit.reorders && !is_repeated && unit.detect_reordering(message, unit.quarantine(timeout), now)
     }
 
     /// Can only time, or the outstanding reply, make sure that the answer to this message is no older one?
@@ -344,11 +344,11 @@ impl LineReplies {
 
     /// For a unit that no probe can resynchronise: how much longer it must rest before its outstanding replies may be forgotten,
     /// `None` once it is forgotten. For each outstanding reply it is left alone twice as long as it has ever been late, ten
-    /// timeouts at the least: patience, not proof, and needed only for devices that do not answer a loopback at all.
+    /// timeouts at the least: a delay, not a proof, and needed only for devices that do not answer a loopback at all.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
-        let rest = (unit.patience(timeout) * to_u32(unit.outstanding.count().max(1))).min(REST_MAX);
+        let rest = (unit.quarantine(timeout) * to_u32(unit.outstanding.count().max(1))).min(REST_MAX);
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
         if waited < rest {
             return Some(rest - waited);

@@ -323,13 +323,13 @@ impl Schedule {
     }
 
     /// How long the answer to a block is waited for (real time), at most the timeout of its line.
-    pub fn patience(&self, index: usize, line: &LineDef) -> Duration {
+    pub fn response_timeout(&self, index: usize, line: &LineDef) -> Duration {
         let neighbour = || self.devices.iter().filter_map(Health::slowest).max();
-        self.devices[self.polls[index].place].patience(line, neighbour)
+        self.devices[self.polls[index].place].response_timeout(line, neighbour)
     }
 
     /// The device is not to be asked before `until`.
-    pub fn rest(&mut self, device: DeviceId, until: Timestamp) {
+    pub fn hold_off(&mut self, device: DeviceId, until: Timestamp) {
         let Some(place) = self.place_of(device) else { return };
         let health = &mut self.devices[place];
         health.rests_until = health.rests_until.max(until);

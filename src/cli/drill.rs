@@ -47,7 +47,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             say(line);
         }
     };
-    let verdict = rehearse(scenario.clone(), def, !args.no_operator, print)?;
+    let verdict = run_drill(scenario.clone(), def, !args.no_operator, print)?;
     say_verdict(&verdict);
     if verdict.passed() { Ok(()) } else { Err(CliError::Failed(format!("{}: not passed", scenario.name))) }
 }
@@ -89,7 +89,7 @@ fn list() -> Result<(), CliError> {
 }
 
 /// A drill from its start to its verdict, in virtual time: one thread, no port, no file, no real clock.
-fn rehearse(
+fn run_drill(
     scenario: Arc<Scenario>,
     def: Arc<PlantDef>,
     with_operator: bool,
@@ -104,7 +104,7 @@ fn rehearse(
         let time = Clock::starting_at(morning(&def), 1.0);
         let simulator = SimulatorHandle::spawn_for(&def, simulator(&def, Some(&scenario))?, time);
         let (observer, journal) = journal();
-        let station = station::rehearse(def.clone(), time, in_memory(&def, &simulator), Box::new(observer));
+        let station = station::start_drill(def.clone(), time, in_memory(&def, &simulator), Box::new(observer));
         let session = station.session("drill");
         // Without an operator the commands are dropped.
         let commands = if with_operator { station.commands.clone() } else { mpsc::channel(1).0 };
@@ -158,7 +158,7 @@ mod tests {
         let printed = std::cell::RefCell::new(Vec::new());
         let (scenario, def) = read::load(Path::new(name), &Search::shipped()).expect("a shipped scenario");
         let verdict =
-            rehearse(Arc::new(scenario), def, with_operator, |line| printed.borrow_mut().push(line.to_owned()));
+            run_drill(Arc::new(scenario), def, with_operator, |line| printed.borrow_mut().push(line.to_owned()));
         (verdict.expect("the drill comes to its end"), printed.into_inner())
     }
 
@@ -193,7 +193,7 @@ mod tests {
         let (scenario, def) =
             read::read("s", "s.toml", text.as_bytes(), &find).unwrap_or_else(|errors| panic!("{errors}"));
         let printed = std::cell::RefCell::new(Vec::new());
-        let verdict = rehearse(Arc::new(scenario), def, true, |line| printed.borrow_mut().push(line.to_owned()));
+        let verdict = run_drill(Arc::new(scenario), def, true, |line| printed.borrow_mut().push(line.to_owned()));
         (verdict.expect("the drill comes to its end"), printed.into_inner())
     }
 

@@ -1,4 +1,4 @@
-//! The text of the alarm-state file: of each alarm the last step of every kind, one checked line each, oldest first.
+//! The text of the alarm-state file: of each alarm the last event of every kind, one checked line each, oldest first.
 //!
 //! ```text
 //! sightglass alarm state 2
@@ -18,29 +18,29 @@ use crate::plant::record::AlarmRecord;
 
 /// The first line; its number goes up with every change of the others.
 pub const HEADER: &str = "sightglass alarm state 2\n";
-/// Most steps that are kept: thirteen kinds of some thousand alarms, also of those that the plant file no longer has.
-const STEPS_MAX: usize = 50_000;
+/// Most events that are kept: thirteen kinds of some thousand alarms, also of those that the plant file no longer has.
+const EVENTS_MAX: usize = 50_000;
 /// Hexadecimal digits of a checksum.
 const DIGITS: usize = 16;
 
-/// All that the state of the alarms depends on: of each alarm the last step of every kind, oldest first.
+/// All that the state of the alarms depends on: of each alarm the last event of every kind, oldest first.
 #[derive(Debug, Clone, Default)]
-pub struct LatestSteps {
-    steps: BTreeMap<u64, AlarmRecord>,
+pub struct LatestEvents {
+    events: BTreeMap<u64, AlarmRecord>,
     places: HashMap<Key, u64>,
     next: u64,
 }
 
-impl LatestSteps {
-    /// Takes the next step; the one of the same kind before it counts no more.
-    pub fn take(&mut self, step: AlarmRecord) {
-        if let Some(old) = self.places.insert(key(&step), self.next) {
-            self.steps.remove(&old);
+impl LatestEvents {
+    /// Takes the next event; the one of the same kind before it counts no more.
+    pub fn take(&mut self, event: AlarmRecord) {
+        if let Some(old) = self.places.insert(key(&event), self.next) {
+            self.events.remove(&old);
         }
-        self.steps.insert(self.next, step);
+        self.events.insert(self.next, event);
         self.next += 1;
-        if STEPS_MAX < self.steps.len()
-            && let Some((_, oldest)) = self.steps.pop_first()
+        if EVENTS_MAX < self.events.len()
+            && let Some((_, oldest)) = self.events.pop_first()
         {
             self.places.remove(&key(&oldest));
         }
@@ -48,30 +48,30 @@ impl LatestSteps {
 
     /// Oldest first.
     pub fn iter(&self) -> impl Iterator<Item = &AlarmRecord> {
-        self.steps.values()
+        self.events.values()
     }
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.steps.len()
+        self.events.len()
     }
 
-    /// No alarm has ever taken a step.
+    /// No alarm has ever had an event.
     pub fn is_empty(&self) -> bool {
-        self.steps.is_empty()
+        self.events.is_empty()
     }
 }
 
-/// Which alarm, and the kind of its step.
+/// Which alarm, and the kind of its event.
 type Key = (Arc<str>, Arc<str>, &'static str);
 
-fn key(step: &AlarmRecord) -> Key {
-    (step.subject.clone(), step.message.clone(), step.event.word())
+fn key(event: &AlarmRecord) -> Key {
+    (event.subject.clone(), event.message.clone(), event.event.word())
 }
 
-/// A step as a line, with its end.
-pub fn line(step: &AlarmRecord) -> String {
-    let text = serde_json::to_string(step).expect("texts, numbers and times can always be written");
+/// An event as a line, with its end.
+pub fn line(event: &AlarmRecord) -> String {
+    let text = serde_json::to_string(event).expect("texts, numbers and times can always be written");
     format!("{} {text}\n", checksum(&text))
 }
 
@@ -85,9 +85,9 @@ fn checksum(text: &str) -> String {
 }
 
 /// Reads a file. `Err` names what is damaged. The beginning of a line at the end was never confirmed: it is left out.
-pub fn parse(bytes: &[u8]) -> Result<LatestSteps, String> {
+pub fn parse(bytes: &[u8]) -> Result<LatestEvents, String> {
     let end = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
-    let mut steps = LatestSteps::default();
+    let mut events = LatestEvents::default();
     let mut lines = bytes[..end].split_inclusive(|byte| *byte == b'\n');
     let header = lines.next().unwrap_or_default();
     if header != HEADER.as_bytes() && header.starts_with(b"sightglass alarm state ") {
@@ -97,12 +97,12 @@ pub fn parse(bytes: &[u8]) -> Result<LatestSteps, String> {
         return Err(format!("line 1 is not `{}`", HEADER.trim_end()));
     }
     for (number, line) in (2..).zip(lines) {
-        steps.take(step_of(line).ok_or_else(|| format!("line {number} is not as it was written"))?);
+        events.take(event_of(line).ok_or_else(|| format!("line {number} is not as it was written"))?);
     }
-    Ok(steps)
+    Ok(events)
 }
 
-fn step_of(line: &[u8]) -> Option<AlarmRecord> {
+fn event_of(line: &[u8]) -> Option<AlarmRecord> {
     let (sum, text) = std::str::from_utf8(line).ok()?.strip_suffix('\n')?.split_once(' ')?;
     (sum == checksum(text)).then(|| serde_json::from_str(text).ok())?
 }
@@ -119,15 +119,15 @@ mod tests {
         record::{AlarmEvent, FirstOut},
     };
 
-    fn step() -> impl Strategy<Value = AlarmRecord> {
+    fn event() -> impl Strategy<Value = AlarmRecord> {
         let words = || proptest::option::of("\\PC{0,20}").prop_map(|words| words.map(Arc::from));
         let number = || proptest::option::of(-1e9..1e9f64);
         let kind = (0..AlarmEvent::ALL.len()).prop_map(|place| AlarmEvent::ALL[place]);
         let time = || (0i64..2_000_000_000_000_000).prop_map(|micros| Timestamp::from_microsecond(micros).unwrap());
         let more = (number(), number(), words(), words(), proptest::option::of(time()));
-        (time(), 0..3u8, kind, more, any::<bool>()).prop_map(|(at, subject, step, more, first_out)| {
+        (time(), 0..3u8, kind, more, any::<bool>()).prop_map(|(at, subject, event, more, first_out)| {
             let (value, limit, by, reason, until) = more;
-            let record = AlarmRecord::new(at, &format!("TIC-{subject}.PV"), "high", Priority::High, step);
+            let record = AlarmRecord::new(at, &format!("TIC-{subject}.PV"), "high", Priority::High, event);
             let first_out = first_out.then_some(FirstOut { began: at, rank: 7 });
             AlarmRecord { value, limit, by, reason, until, first_out, ..record }
         })
@@ -136,14 +136,14 @@ mod tests {
     proptest! {
         #[test]
         fn the_last_step_of_each_kind_is_read_back(
-            journal in proptest::collection::vec(step(), 0..80),
+            journal in proptest::collection::vec(event(), 0..80),
             cut in 0usize..400,
         ) {
             let mut text = HEADER.to_owned();
-            journal.iter().for_each(|step| text += &line(step));
+            journal.iter().for_each(|event| text += &line(event));
             let parsed = parse(text.as_bytes()).unwrap();
-            let later = |place: usize, step: &AlarmRecord| journal[place + 1..].iter().any(|other| key(other) == key(step));
-            let expected = journal.iter().enumerate().filter(|(place, step)| !later(*place, step)).map(|(_, step)| step);
+            let later = |place: usize, event: &AlarmRecord| journal[place + 1..].iter().any(|other| key(other) == key(event));
+            let expected = journal.iter().enumerate().filter(|(place, event)| !later(*place, event)).map(|(_, event)| event);
             prop_assert_eq!(parsed.iter().collect::<Vec<_>>(), expected.collect::<Vec<_>>());
             // A loss of power leaves whole lines and at most the beginning of one.
             let cut = &text.as_bytes()[..(HEADER.len() + cut).min(text.len())];
@@ -152,9 +152,9 @@ mod tests {
         }
 
         #[test]
-        fn a_flipped_bit_in_a_whole_line_is_found(steps in proptest::collection::vec(step(), 1..5), at in 0usize..5_000, bit in 0u8..8) {
+        fn a_flipped_bit_in_a_whole_line_is_found(events in proptest::collection::vec(event(), 1..5), at in 0usize..5_000, bit in 0u8..8) {
             let mut bytes = HEADER.as_bytes().to_vec();
-            steps.iter().for_each(|step| bytes.extend(line(step).into_bytes()));
+            events.iter().for_each(|event| bytes.extend(line(event).into_bytes()));
             // Not the last end of line: without it the line was never confirmed.
             let place = at % (bytes.len() - 1);
             bytes[place] ^= 1 << bit;

@@ -18,44 +18,44 @@ use super::{
 };
 
 /// Moves an instant; one that would leave the calendar stays.
-fn shift(at: &mut Timestamp, by: SignedDuration) {
+fn move_by(at: &mut Timestamp, by: SignedDuration) {
     *at = at.checked_add(by).unwrap_or(*at);
 }
 
 impl Record {
     /// The same in UTC.
-    pub fn shift(&mut self, by: SignedDuration) {
+    pub fn move_to_utc(&mut self, by: SignedDuration) {
         match self {
-            Record::Sample(_, sample) => shift(&mut sample.at, by),
-            Record::Alarm(step) => step.shift(by),
-            Record::Action(action) => shift(&mut action.at, by),
-            Record::Line(minute) => shift(&mut minute.at, by),
+            Record::Sample(_, sample) => move_by(&mut sample.at, by),
+            Record::Alarm(step) => step.move_to_utc(by),
+            Record::Action(action) => move_by(&mut action.at, by),
+            Record::Line(minute) => move_by(&mut minute.at, by),
             Record::ClockSet => {}
         }
     }
 }
 
 impl AlarmRecord {
-    fn shift(&mut self, by: SignedDuration) {
-        shift(&mut self.at, by);
-        self.until.iter_mut().for_each(|until| shift(until, by));
-        shift_first_out(&mut self.first_out, by);
+    fn move_to_utc(&mut self, by: SignedDuration) {
+        move_by(&mut self.at, by);
+        self.until.iter_mut().for_each(|until| move_by(until, by));
+        move_first_out(&mut self.first_out, by);
     }
 }
 
-fn shift_first_out(first_out: &mut Option<FirstOut>, by: SignedDuration) {
-    first_out.iter_mut().for_each(|first_out| shift(&mut first_out.began, by));
+fn move_first_out(first_out: &mut Option<FirstOut>, by: SignedDuration) {
+    first_out.iter_mut().for_each(|first_out| move_by(&mut first_out.began, by));
 }
 
-fn shift_note(note: &mut OperatorNote, by: SignedDuration) {
-    shift(&mut note.at, by);
+fn move_note(note: &mut OperatorNote, by: SignedDuration) {
+    move_by(&mut note.at, by);
 }
 
 impl CommandKind {
     /// The same in the plant's own time: what names an alarm by the instant that a snapshot showed.
-    pub fn unshift(&mut self, by: SignedDuration) {
+    pub fn move_from_utc(&mut self, by: SignedDuration) {
         match self {
-            CommandKind::Alarm(AlarmCommand::Acknowledge { annunciated_at, .. }) => shift(annunciated_at, -by),
+            CommandKind::Alarm(AlarmCommand::Acknowledge { annunciated_at, .. }) => move_by(annunciated_at, -by),
             CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms }) => {
                 *alarms = alarms.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
             }
@@ -66,68 +66,68 @@ impl CommandKind {
 
 impl Snapshot {
     /// The same in UTC. What the bus has noted (frames, requests, last bytes) is in UTC already.
-    pub fn shift(&mut self, by: SignedDuration) {
+    pub fn move_to_utc(&mut self, by: SignedDuration) {
         if by.is_zero() {
             return;
         }
         self.stepped = self.stepped.saturating_add(by);
-        shift(&mut self.at, by);
-        self.samples.iter_mut().for_each(|sample| shift(&mut sample.at, by));
-        self.lines.iter_mut().for_each(|line| line.shift(by));
-        self.devices.iter_mut().for_each(|device| device.shift(by));
-        Arc::make_mut(&mut self.alarms).iter_mut().for_each(|alarm| alarm.shift(by));
-        Arc::make_mut(&mut self.suppressed).iter_mut().for_each(|alarm| alarm.shift(by));
-        self.alarm_metrics.flood_since.iter_mut().for_each(|since| shift(since, by));
+        move_by(&mut self.at, by);
+        self.samples.iter_mut().for_each(|sample| move_by(&mut sample.at, by));
+        self.lines.iter_mut().for_each(|line| line.move_to_utc(by));
+        self.devices.iter_mut().for_each(|device| device.move_to_utc(by));
+        Arc::make_mut(&mut self.alarms).iter_mut().for_each(|alarm| alarm.move_to_utc(by));
+        Arc::make_mut(&mut self.suppressed).iter_mut().for_each(|alarm| alarm.move_to_utc(by));
+        self.alarm_metrics.flood_since.iter_mut().for_each(|since| move_by(since, by));
         let day = Arc::make_mut(&mut self.alarm_metrics.day);
-        shift(&mut day.from, by);
-        shift(&mut day.until, by);
+        move_by(&mut day.from, by);
+        move_by(&mut day.until, by);
         self.commands.iter_mut().for_each(|status| {
-            shift(&mut status.at, by);
-            status.command.kind.unshift(-by);
+            move_by(&mut status.at, by);
+            status.command.kind.move_from_utc(-by);
         });
-        self.watch.times().for_each(|since| shift(since, by));
+        self.watch.times().for_each(|since| move_by(since, by));
         self.restores.iter_mut().for_each(|run| {
             let at: &mut Restore = Arc::make_mut(run);
-            shift(&mut at.at, by);
+            move_by(&mut at.at, by);
         });
         self.tunings.iter_mut().flatten().for_each(|tuning| {
             let tuning: &mut Tuning = Arc::make_mut(tuning);
-            tuning.times().for_each(|at| shift(at, by));
+            tuning.times().for_each(|at| move_by(at, by));
         });
     }
 }
 
 impl LineStatus {
-    fn shift(&mut self, by: SignedDuration) {
+    fn move_to_utc(&mut self, by: SignedDuration) {
         if let LineState::Waiting { retry_at, .. } = &mut self.state {
-            shift(retry_at, by);
+            move_by(retry_at, by);
         }
-        self.since.iter_mut().chain(&mut self.lost_since).for_each(|at| shift(at, by));
+        self.since.iter_mut().chain(&mut self.lost_since).for_each(|at| move_by(at, by));
     }
 }
 
 impl DeviceStatus {
-    fn shift(&mut self, by: SignedDuration) {
+    fn move_to_utc(&mut self, by: SignedDuration) {
         if let DeviceState::Down { since } = &mut self.state {
-            shift(since, by);
+            move_by(since, by);
         }
-        self.last_fault.iter_mut().for_each(|(at, _)| shift(at, by));
+        self.last_fault.iter_mut().for_each(|(at, _)| move_by(at, by));
     }
 }
 
 impl ActiveAlarm {
-    fn shift(&mut self, by: SignedDuration) {
+    fn move_to_utc(&mut self, by: SignedDuration) {
         let times = [&mut self.raised_at, &mut self.annunciated_at].into_iter().chain(&mut self.returned_at);
-        times.for_each(|at| shift(at, by));
-        self.acknowledged.iter_mut().for_each(|note| shift_note(note, by));
-        shift_first_out(&mut self.first_out, by);
+        times.for_each(|at| move_by(at, by));
+        self.acknowledged.iter_mut().for_each(|note| move_note(note, by));
+        move_first_out(&mut self.first_out, by);
     }
 }
 
 impl SuppressedAlarm {
-    fn shift(&mut self, by: SignedDuration) {
-        shift_note(&mut self.note, by);
-        self.until.iter_mut().for_each(|until| shift(until, by));
+    fn move_to_utc(&mut self, by: SignedDuration) {
+        move_note(&mut self.note, by);
+        self.until.iter_mut().for_each(|until| move_by(until, by));
     }
 }
 
@@ -163,27 +163,27 @@ mod tests {
             plant.on_tick(at(1_000_003));
             let (age, good) = (plant.snapshot().age(PV), plant.snapshot().sample(PV).quality);
             let mut snapshot = plant.snapshot();
-            snapshot.shift(by);
+            snapshot.move_to_utc(by);
             assert_eq!(snapshot.at, at(1_000_003) + by);
             assert_eq!((snapshot.age(PV), snapshot.sample(PV).quality), (age, good));
             let tags = fixture::plant().tags_of(TIC).map(|tag| tag.id).collect();
             let silent =
                 Event::Failed { at: at(1_000_004), device: TIC, tags, fault: Fault::BackedOff, exchange: None };
             let mut records = plant.on_event(silent).records;
-            records.iter_mut().for_each(|record| record.shift(by));
+            records.iter_mut().for_each(|record| record.move_to_utc(by));
             let Some(Record::Alarm(raised)) = records.iter().find(|record| matches!(record, Record::Alarm(_))) else {
                 panic!("no alarm: {records:?}")
             };
             let mut snapshot = plant.snapshot();
-            snapshot.shift(by);
+            snapshot.move_to_utc(by);
             assert_eq!((raised.at, snapshot.alarms[0].raised_at), (at(1_000_004) + by, at(1_000_004) + by));
             // What a terminal sends is what it was shown.
             let mut kind = snapshot.alarms[0].acknowledge();
-            kind.unshift(by);
+            kind.move_from_utc(by);
             let id = CommandId { terminal: 1, number: 1 };
             plant.on_command(CommandStatus::new(Command::new(1, id, kind), "anna", at(0)), at(1_000_005));
             let mut snapshot = plant.snapshot();
-            snapshot.shift(by);
+            snapshot.move_to_utc(by);
             assert_eq!(snapshot.commands[0].outcome, Outcome::Verified);
             assert_eq!(snapshot.alarms[0].acknowledged.as_ref().map(|note| note.at), Some(at(1_000_005) + by));
         }

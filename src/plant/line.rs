@@ -21,7 +21,7 @@ pub struct LineDef {
     pub gap: Duration,
     /// Silence that ends an answer which is not complete. Frames end by their length first; USB adapters hand bytes over
     /// in batches (16 ms is common) and gateways later still, so this is far more than 3.5 characters.
-    pub idle: Duration,
+    pub frame_timeout: Duration,
     /// Time after a broadcast in which devices act on it (serial lines; Modbus over serial line V1.02, 2.4.1: 100–200 ms).
     pub turnaround: Duration,
 }
@@ -35,7 +35,7 @@ impl LineDef {
             transport,
             timeout: Duration::from_secs(1),
             gap: Duration::ZERO,
-            idle: Duration::from_millis(50),
+            frame_timeout: Duration::from_millis(50),
             turnaround: Duration::from_millis(100),
         }
     }
@@ -168,7 +168,7 @@ impl Serial {
         Duration::from_nanos(u64::from(self.bits_per_char()) * 1_000_000_000 / u64::from(self.baud))
     }
     /// The silence between frames: 3.5 characters, fixed 1.75 ms above 19200 baud (Modbus serial line V1.02, 2.5.1.1).
-    pub fn silence(self) -> Duration {
+    pub fn silent_interval(self) -> Duration {
         if self.baud > 19_200 { Duration::from_micros(1_750) } else { self.char_time() * 7 / 2 }
     }
 }

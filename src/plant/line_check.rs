@@ -71,13 +71,13 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
     for (key, span) in [
         ("timeout_ms", line.timeout),
         ("request_gap_ms", line.gap),
-        ("frame_timeout_ms", line.idle),
+        ("frame_timeout_ms", line.frame_timeout),
         ("turnaround_ms", line.turnaround),
     ] {
         check(WAIT_MAX < span, key, "too long: the line is blocked for this time".into(), "expected at most 10000 ms");
     }
     let short = "too short: responses may arrive in fragments";
-    check(line.idle < Duration::from_millis(2), "frame_timeout_ms", short.into(), "expected at least 2 ms");
+    check(line.frame_timeout < Duration::from_millis(2), "frame_timeout_ms", short.into(), "expected at least 2 ms");
     all
 }
 

@@ -91,7 +91,7 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
     entries.extend([
         or_usual("timeout_ms", ms(settings.timeout), ms(usual.timeout)),
         or_usual("request_gap_ms", ms(settings.gap), ms(usual.gap)),
-        or_usual("frame_timeout_ms", ms(settings.idle), ms(usual.idle)),
+        or_usual("frame_timeout_ms", ms(settings.frame_timeout), ms(usual.frame_timeout)),
     ]);
     Some(entries)
 }

@@ -69,7 +69,7 @@ fn serial(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &
     let line = LineDef {
         timeout: millis(table.timeout_ms, usual.timeout),
         gap: millis(table.request_gap_ms, usual.gap),
-        idle: millis(table.frame_timeout_ms, usual.idle),
+        frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout),
         turnaround: millis(table.turnaround_ms, usual.turnaround),
         ..usual
     };
@@ -85,7 +85,7 @@ fn tcp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut
     let line = LineDef {
         timeout: millis(table.timeout_ms, usual.timeout),
         gap: millis(table.request_gap_ms, usual.gap),
-        idle: millis(table.frame_timeout_ms, usual.idle),
+        frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout),
         ..usual
     };
     report_wrong(&line, |key| table.span_of(key), problems);

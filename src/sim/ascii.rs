@@ -48,7 +48,7 @@ impl Receiver {
     }
 
     /// The line was silent for longer than characters of a frame may be apart: what has come of it is lost.
-    pub fn silence(&mut self) {
+    pub fn on_silent_interval(&mut self) {
         self.break_off();
     }
 
@@ -113,7 +113,7 @@ mod tests {
             let mut receiver = Receiver::new(8);
             receiver.push(&rubbish);
             prop_assert!(receiver.frame.len() <= FRAME_MAX);
-            receiver.silence();
+            receiver.on_silent_interval();
             prop_assert!(receiver.is_empty());
             while receiver.take().is_some() {}
             receiver.push(&ascii::encode(READ));

@@ -113,7 +113,7 @@ impl Simulator {
     pub fn broadcast(&mut self, line: LineId, pdu: &[u8], receives: impl Fn(u8) -> bool) {
         for unit in self.units(line).into_iter().filter(|unit| receives(*unit)) {
             if let Some(unit) = self.unit(line, unit) {
-                unit.obey(pdu);
+                unit.serve_broadcast(pdu);
             }
         }
     }
@@ -128,7 +128,7 @@ impl Simulator {
     pub fn count_for_others(&mut self, line: LineId, unit: u8) {
         for other in self.units(line).into_iter().filter(|other| *other != unit) {
             if let Some(other) = self.unit(line, other) {
-                other.hear();
+                other.on_foreign_message();
             }
         }
     }
@@ -137,7 +137,7 @@ impl Simulator {
     pub fn corrupt(&mut self, line: LineId) {
         for unit in self.units(line) {
             if let Some(unit) = self.unit(line, unit) {
-                unit.hear_corrupt();
+                unit.on_corrupt_message();
             }
         }
     }

@@ -44,13 +44,13 @@ pub trait Unit {
     /// Answers a request; an empty one has no answer, nor one that the device holds back.
     fn respond(&mut self, pdu: &[u8]) -> Option<Vec<u8>>;
     /// Does what a broadcast says, without a response.
-    fn obey(&mut self, pdu: &[u8]);
+    fn serve_broadcast(&mut self, pdu: &[u8]);
     /// Refuses a request with a code of the caller's choice.
     fn refuse(&mut self, pdu: &[u8], code: u8) -> Option<Vec<u8>>;
-    /// A message for another unit passed on the line.
-    fn hear(&mut self);
+    /// Counts a message for another unit.
+    fn on_foreign_message(&mut self);
     /// Counts a message that could not be read.
-    fn hear_corrupt(&mut self);
+    fn on_corrupt_message(&mut self);
 }
 
 impl<D> Slave<D> {
@@ -61,11 +61,11 @@ impl<D> Slave<D> {
 }
 
 impl<D: Registers> Unit for Slave<D> {
-    fn hear(&mut self) {
+    fn on_foreign_message(&mut self) {
         self.counters.count(HEARD);
     }
 
-    fn hear_corrupt(&mut self) {
+    fn on_corrupt_message(&mut self) {
         self.counters.count(CORRUPT);
         self.counters.note(RECEIVED_CORRUPT);
     }
@@ -87,7 +87,7 @@ impl<D: Registers> Unit for Slave<D> {
         Some(reply)
     }
 
-    fn obey(&mut self, pdu: &[u8]) {
+    fn serve_broadcast(&mut self, pdu: &[u8]) {
         self.counters.addressed(RECEIVED_BROADCAST);
         self.counters.count(UNANSWERED);
         let writes = |function: u8| bus::pdu::function(function).is_some_and(bus::pdu::Function::writes);
@@ -212,9 +212,9 @@ mod tests {
         let slave = &mut Slave::new(Dl06::new());
         assert_reply(slave, &[3, 4, 0, 0, 1], &[3, 2, 0, 0]);
         assert_reply(slave, &[3, 4, 0, 0, 0], &[0x83, 3]);
-        slave.hear();
-        slave.hear_corrupt();
-        slave.obey(&[6, 4, 0x10, 0, 1]);
+        slave.on_foreign_message();
+        slave.on_corrupt_message();
+        slave.serve_broadcast(&[6, 4, 0x10, 0, 1]);
         slave.refuse(&[3, 4, 0, 0, 1], 6);
         slave.refuse(&[3, 4, 0, 0, 1], 7);
         assert_eq!(counters(slave), [6, 1, 3, 5, 1, 1, 1, 0]);
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn the_log_keeps_the_latest_64_events() {
         let slave = &mut Slave::new(Dl06::new());
-        (0..100).for_each(|_| slave.hear_corrupt());
+        (0..100).for_each(|_| slave.on_corrupt_message());
         let reply = slave.respond(&[0x0C]).expect("an answer");
         assert_eq!((reply.len(), reply[1], reply[8], reply[9], reply[71]), (72, 70, 0x80, 0x82, 0x82));
     }
@@ -237,9 +237,9 @@ mod tests {
     #[test]
     fn a_broadcast_is_obeyed_only_where_it_writes() {
         let slave = &mut Slave::new(Dl06::new());
-        slave.obey(&[8, 0, 0x0A, 0, 0]);
-        slave.obey(&[6, 4, 0x20, 0x12, 0x34]);
-        slave.obey(&[]);
+        slave.serve_broadcast(&[8, 0, 0x0A, 0, 0]);
+        slave.serve_broadcast(&[6, 4, 0x20, 0x12, 0x34]);
+        slave.serve_broadcast(&[]);
         assert_reply(slave, &[3, 4, 0x20, 0, 1], &[3, 2, 0x12, 0x34]);
         assert_eq!(counters(slave)[ADDRESSED], 4);
     }

@@ -54,12 +54,12 @@ impl FrameReceiver {
     }
 
     /// The line was silent for long enough to end a frame.
-    pub fn silence(&mut self) -> Option<Option<Request>> {
+    pub fn on_silent_interval(&mut self) -> Option<Option<Request>> {
         match self {
             FrameReceiver::Rtu(receiver) if receiver.is_empty() => None,
-            FrameReceiver::Rtu(receiver) => Some(receiver.silence().map(request)),
+            FrameReceiver::Rtu(receiver) => Some(receiver.on_silent_interval().map(request)),
             FrameReceiver::Ascii(receiver) => {
-                receiver.silence();
+                receiver.on_silent_interval();
                 receiver.take()
             }
         }
@@ -109,7 +109,7 @@ impl Receiver {
     }
 
     /// The line was silent: what is here is one whole request, or rubbish.
-    pub fn silence(&mut self) -> Option<Vec<u8>> {
+    pub fn on_silent_interval(&mut self) -> Option<Vec<u8>> {
         let (frame, lost) = (std::mem::take(&mut self.bytes), std::mem::take(&mut self.lost));
         (!lost && frame.len() >= 4 && crc16(&frame) == 0).then_some(frame)
     }
@@ -181,7 +181,7 @@ mod tests {
             let mut receiver = Receiver::default();
             receiver.push(&rubbish);
             take_all(&mut receiver);
-            receiver.silence();
+            receiver.on_silent_interval();
             receiver.push(&requests()[0]);
             prop_assert_eq!(receiver.take(), Some(requests()[0].clone()));
         }
@@ -194,7 +194,7 @@ mod tests {
         assert_eq!(receiver.take(), None);
         receiver.push(&requests()[0]);
         assert_eq!(receiver.take(), None);
-        assert_eq!(receiver.silence(), None);
+        assert_eq!(receiver.on_silent_interval(), None);
         receiver.push(&requests()[0]);
         assert_eq!(receiver.take(), Some(requests()[0].clone()));
     }
@@ -205,7 +205,7 @@ mod tests {
             let (mut receiver, frame) = (Receiver::default(), with_crc(message));
             receiver.push(&frame);
             assert_eq!(receiver.take(), None);
-            assert_eq!(receiver.silence(), Some(frame));
+            assert_eq!(receiver.on_silent_interval(), Some(frame));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The plant-side end of the recorder: sends actions and alarm steps to disk, and replies once they are there.
+//! The plant-side end of the recorder: sends actions and alarm events to disk, and replies once they are there.
 
 use std::{collections::VecDeque, sync::mpsc as queue, time::Duration};
 
@@ -17,7 +17,7 @@ use crate::{
         Durability,
         io::recorder::{Batch, Handle, Message, Recorded},
     },
-    history::alarm_state::LatestSteps,
+    history::alarm_state::LatestEvents,
     plant::{
         Snapshot,
         record::{ActionRecord, AlarmRecord, ChainHash},
@@ -74,9 +74,9 @@ pub(super) struct AuditQueue {
     queue: queue::SyncSender<Message>,
     recorded: watch::Receiver<Recorded>,
     began: Instant,
-    /// The next batch. Its steps are bounded by the alarms of the plant.
+    /// The next batch. Its events are bounded by the alarms of the plant.
     backlog: Vec<ActionRecord>,
-    backlog_steps: LatestSteps,
+    backlog_events: LatestEvents,
     barrier: CommitBarrier,
     /// Actions that only the history has: the queue was full.
     left_out: u64,
@@ -94,7 +94,7 @@ impl AuditQueue {
             recorded: recorder.recorded.clone(),
             began: Instant::now(),
             backlog: Vec::new(),
-            backlog_steps: LatestSteps::default(),
+            backlog_events: LatestEvents::default(),
             barrier: CommitBarrier::new(Duration::ZERO),
             left_out: 0,
             lost: 0,
@@ -119,26 +119,26 @@ impl AuditQueue {
         self.files.plant_file(file, at)
     }
 
-    /// Sends actions and alarm steps to disk; the recorder passes the actions on to the history. Returns actions that do not
+    /// Sends actions and alarm events to disk; the recorder passes the actions on to the history. Returns actions that do not
     /// fit.
-    pub fn put(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) -> Vec<ActionRecord> {
-        self.barrier.put(&actions, &steps, self.disk(), self.began.elapsed());
+    pub fn put(&mut self, actions: Vec<ActionRecord>, events: Vec<AlarmRecord>) -> Vec<ActionRecord> {
+        self.barrier.put(&actions, &events, self.disk(), self.began.elapsed());
         self.backlog.extend(actions);
-        steps.into_iter().for_each(|step| self.backlog_steps.take(step));
+        events.into_iter().for_each(|event| self.backlog_events.take(event));
         self.send_backlog()
     }
 
     /// Sends the backlog as one batch. Returns the actions above [`BACKLOG_MAX`] if the queue is full.
     fn send_backlog(&mut self) -> Vec<ActionRecord> {
-        if self.backlog.is_empty() && self.backlog_steps.is_empty() {
+        if self.backlog.is_empty() && self.backlog_events.is_empty() {
             return Vec::new();
         }
-        let steps = self.backlog_steps.iter().cloned().collect();
-        let batch = Batch { actions: std::mem::take(&mut self.backlog), steps };
+        let events = self.backlog_events.iter().cloned().collect();
+        let batch = Batch { actions: std::mem::take(&mut self.backlog), events };
         let (message, most) = match self.queue.try_send(Message::Batch(batch)) {
             Ok(()) => {
                 self.barrier.sent();
-                self.backlog_steps = LatestSteps::default();
+                self.backlog_events = LatestEvents::default();
                 return Vec::new();
             }
             Err(queue::TrySendError::Full(message)) => (message, BACKLOG_MAX),

@@ -1,4 +1,4 @@
-//! When an outcome may be shown as recorded: which batches of actions and alarm steps the disk has. Pure: the state of the
+//! When an outcome may be shown as recorded: which batches of actions and alarm events the disk has. Pure: the state of the
 //! disk and the time since the start are arguments.
 
 use std::{
@@ -60,26 +60,26 @@ pub(super) struct CommitBarrier {
     needed: Wait,
     /// Ended commands, each with the batch of its action.
     ended: VecDeque<(CommandId, u64)>,
-    /// Alarms, by subject and message, with the batch of the last step of an operator that is not on disk.
-    steps: HashMap<(Arc<str>, Arc<str>), u64>,
+    /// Alarms, by subject and message, with the batch of the last event of an operator that is not on disk.
+    events: HashMap<(Arc<str>, Arc<str>), u64>,
 }
 
 impl CommitBarrier {
     pub fn new(now: Duration) -> CommitBarrier {
         let needed = Wait { batch: 0, since: now };
-        CommitBarrier { sent: 0, needed, ended: VecDeque::new(), steps: HashMap::new() }
+        CommitBarrier { sent: 0, needed, ended: VecDeque::new(), events: HashMap::new() }
     }
 
-    /// Actions and steps join the next batch.
-    pub fn put(&mut self, actions: &[ActionRecord], steps: &[AlarmRecord], disk: RecorderProgress, now: Duration) {
-        let by_operators = || steps.iter().filter(|step| step.by.is_some());
+    /// Actions and events join the next batch.
+    pub fn put(&mut self, actions: &[ActionRecord], events: &[AlarmRecord], disk: RecorderProgress, now: Duration) {
+        let by_operators = || events.iter().filter(|event| event.by.is_some());
         if !actions.is_empty() || by_operators().next().is_some() {
             // The wait of an earlier batch goes on.
             let since = if self.needed.batch == disk.batches { now } else { self.needed.since };
             self.needed = Wait { batch: self.sent + 1, since };
         }
         let batch = self.needed.batch;
-        self.steps.extend(by_operators().map(|step| ((step.subject.clone(), step.message.clone()), batch)));
+        self.events.extend(by_operators().map(|event| ((event.subject.clone(), event.message.clone()), batch)));
     }
 
     /// The next batch has been sent.
@@ -116,14 +116,14 @@ impl CommitBarrier {
         }
         let excess = self.ended.len().saturating_sub(COMMANDS_MAX);
         self.ended.drain(..excess);
-        self.steps.retain(|_, batch| disk.batches < *batch);
-        if self.steps.is_empty() {
+        self.events.retain(|_, batch| disk.batches < *batch);
+        if self.events.is_empty() {
             return;
         }
         let is_recorded = |id: AlarmId| {
             let alarm = snapshot.def.alarm(id);
             let name = (subject_name(&snapshot.def, alarm.subject).into(), alarm.message.as_str().into());
-            !self.steps.contains_key(&name)
+            !self.events.contains_key(&name)
         };
         for alarm in Arc::make_mut(&mut snapshot.alarms) {
             alarm.acknowledged.iter_mut().for_each(|note| note.recorded = is_recorded(alarm.id));

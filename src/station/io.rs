@@ -67,7 +67,7 @@ pub struct Station {
     pub commands: mpsc::Sender<CommandStatus>,
     /// What terminals request of the station as a whole.
     pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
-    /// `None` for a rehearsal, which keeps nothing.
+    /// `None` for a drill, which keeps nothing.
     history: Option<history::Handle>,
     /// The thread of the audit log, which ends before the history.
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
@@ -117,8 +117,8 @@ fn begin(
     let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
     let mut audit_queue = AuditQueue::new(&recorder);
     // Without such a file, at the first start or after it was damaged, the journal has the state.
-    let from_journal = recorder.alarms.steps.is_none();
-    recorder.alarms.steps.iter().for_each(|steps| plant.restore(steps));
+    let from_journal = recorder.alarms.events.is_none();
+    recorder.alarms.events.iter().for_each(|events| plant.restore(events));
     let users = guarded.as_ref().and_then(|(access, _)| access.users_digest());
     if let Some(state) = guarded.as_ref().and_then(|(access, _)| users_fault(access, &recorder.opened)) {
         plant.on_fault(StationFault::UsersFile, state);
@@ -144,7 +144,7 @@ fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
 
 /// A station that keeps nothing, for virtual time, where no other thread may take part. Queries to the history
 /// are refused.
-pub fn rehearse(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, observer: RecordObserver) -> Station {
+pub fn start_drill(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, observer: RecordObserver) -> Station {
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);

@@ -8,7 +8,7 @@ use crate::plant::{
 };
 
 /// A connected line that has reported nothing for so long (real time) hangs; it reports about once a second, but not while it
-/// waits for answers: see [`patience`].
+/// waits for answers: see [`stall_max`].
 const LINE_MAX: Duration = Duration::from_secs(15);
 /// Answers that one turn of a line may wait for in vain: a probe, a loopback and a block, each of them twice.
 const WAITS_MAX: u32 = 6;
@@ -33,7 +33,7 @@ impl Liveness {
             if !same || line.state != LineState::Connected {
                 (*last, *since) = (line.report.clone(), now);
             }
-            now.saturating_sub(*since) < patience(line)
+            now.saturating_sub(*since) < stall_max(line)
         });
         // Checks every line: stopping at the first silent one would not update the others.
         alive.filter(|alive| !alive).count() == 0
@@ -41,7 +41,7 @@ impl Liveness {
 }
 
 /// How long a line may be silent: one turn of its task, with every answer that it waits for missing.
-fn patience(line: &LineStatus) -> Duration {
+fn stall_max(line: &LineStatus) -> Duration {
     let timeout = line.report.as_ref().map_or(Duration::ZERO, |report| report.settings.timeout);
     let tested = line.test.as_ref().is_some_and(|run| run.state == DiagnosticState::Running);
     LINE_MAX + WAITS_MAX * if tested { timeout.max(WAIT_MAX) } else { timeout }

@@ -28,10 +28,10 @@ impl Past {
         Past { restored, from_journal, early: Vec::new() }
     }
 
-    /// A step of an alarm, before the past is known.
-    pub fn note(&mut self, step: &AlarmRecord) {
+    /// An event of an alarm, before the past is known.
+    pub fn note(&mut self, event: &AlarmRecord) {
         if self.early.len() < EARLY_MAX {
-            self.early.push(step.clone());
+            self.early.push(event.clone());
         }
     }
 
@@ -48,12 +48,12 @@ impl Past {
         }
     }
 
-    /// Joins the past with what has happened since: the steps to restore leave out alarms that have changed meanwhile.
+    /// Joins the past with what has happened since: the events to restore leave out alarms that have changed meanwhile.
     pub fn join(self, mut restored: Restored) -> Restored {
-        let name = |step: &AlarmRecord| (step.subject.clone(), step.message.clone());
+        let name = |event: &AlarmRecord| (event.subject.clone(), event.message.clone());
         let changed: HashSet<_> = self.early.iter().map(name).collect();
-        restored.steps.retain(|step| self.from_journal && !changed.contains(&name(step)));
-        restored.recent.steps.extend(self.early);
+        restored.events.retain(|event| self.from_journal && !changed.contains(&name(event)));
+        restored.recent.events.extend(self.early);
         restored
     }
 }
@@ -69,22 +69,22 @@ mod tests {
         plant::{def::Priority, record::AlarmEvent},
     };
 
-    fn step(second: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
-        AlarmRecord::new(Timestamp::from_second(second).unwrap(), "TIC-1.PV", text, Priority::High, step)
+    fn event(second: i64, text: &str, event: AlarmEvent) -> AlarmRecord {
+        AlarmRecord::new(Timestamp::from_second(second).unwrap(), "TIC-1.PV", text, Priority::High, event)
     }
 
     #[test]
     fn a_late_restore_changes_no_newer_alarm() {
-        let before = vec![step(1, "high", AlarmEvent::Raised), step(2, "low", AlarmEvent::Raised)];
-        let recent = Recent { steps: before.clone(), ..Recent::default() };
-        let restored = Restored { steps: before.clone(), recent, chain_hashes: None };
-        let now = step(9, "low", AlarmEvent::ReturnedToNormal);
+        let before = vec![event(1, "high", AlarmEvent::Raised), event(2, "low", AlarmEvent::Raised)];
+        let recent = Recent { events: before.clone(), ..Recent::default() };
+        let restored = Restored { events: before.clone(), recent, chain_hashes: None };
+        let now = event(9, "low", AlarmEvent::ReturnedToNormal);
         for from_journal in [true, false] {
             let mut past = Past::new(None, from_journal);
             past.note(&now);
             let joined = past.join(restored.clone());
-            assert_eq!(joined.steps, if from_journal { vec![before[0].clone()] } else { vec![] });
-            assert_eq!(joined.recent.steps, [before[0].clone(), before[1].clone(), now.clone()], "all are counted");
+            assert_eq!(joined.events, if from_journal { vec![before[0].clone()] } else { vec![] });
+            assert_eq!(joined.recent.events, [before[0].clone(), before[1].clone(), now.clone()], "all are counted");
         }
     }
 }

@@ -166,7 +166,7 @@ impl PlantTask {
     }
 
     fn on_command(&mut self, mut status: CommandStatus) {
-        status.command.kind.unshift(self.clock.behind_utc());
+        status.command.kind.move_from_utc(self.clock.behind_utc());
         let effects = self.plant.on_command(status, self.clock.now());
         self.apply_effects(effects);
     }
@@ -216,7 +216,7 @@ impl PlantTask {
 
     fn publish(&mut self) {
         let mut snapshot = self.plant.snapshot();
-        snapshot.shift(self.clock.behind_utc());
+        snapshot.move_to_utc(self.clock.behind_utc());
         if let Some(audit) = &mut self.persistence.audit {
             audit.mark(&mut snapshot);
         }
@@ -226,16 +226,16 @@ impl PlantTask {
     /// Restores alarm states and metrics from the history.
     fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
-        let Restored { steps, recent, chain_hashes } = past.join(restored);
+        let Restored { events, recent, chain_hashes } = past.join(restored);
         if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
             audit.compare(chain_hashes);
         }
-        if !steps.is_empty() {
-            tracing::info!(steps = steps.len(), "the alarm state is restored from the journal");
-            self.plant.restore(&steps);
-            self.send_to_audit_log(Vec::new(), steps);
+        if !events.is_empty() {
+            tracing::info!(events = events.len(), "the alarm state is restored from the journal");
+            self.plant.restore(&events);
+            self.send_to_audit_log(Vec::new(), events);
         }
-        self.plant.restore_alarm_counts(&recent.active, &recent.steps, &recent.watched, self.clock.now());
+        self.plant.restore_alarm_counts(&recent.active, &recent.events, &recent.watched, self.clock.now());
     }
 
     fn handle_audit_message(&mut self, message: AuditMessage) {
@@ -308,33 +308,33 @@ impl PlantTask {
             return;
         }
         let behind = self.clock.behind_utc();
-        records.iter_mut().for_each(|record| record.shift(behind));
+        records.iter_mut().for_each(|record| record.move_to_utc(behind));
         if let Some(observer) = &self.persistence.observer {
             observer(&records);
         }
-        let (mut actions, mut steps, mut others) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut actions, mut events, mut others) = (Vec::new(), Vec::new(), Vec::new());
         for record in records {
             match record {
                 Record::Action(action) => actions.push(action),
-                Record::Alarm(step) => {
-                    self.persistence.past.iter_mut().for_each(|past| past.note(&step));
-                    steps.push(step.clone());
-                    others.push(Record::Alarm(step));
+                Record::Alarm(event) => {
+                    self.persistence.past.iter_mut().for_each(|past| past.note(&event));
+                    events.push(event.clone());
+                    others.push(Record::Alarm(event));
                 }
                 Record::Sample(..) | Record::Line(_) | Record::ClockSet => others.push(record),
             }
         }
-        self.send_to_audit_log(actions, steps);
+        self.send_to_audit_log(actions, events);
         self.send_to_history(others);
     }
 
     /// To the disk, and actions from there to the history; straight there where there is no room.
-    fn send_to_audit_log(&mut self, actions: Vec<ActionRecord>, steps: Vec<AlarmRecord>) {
-        if actions.is_empty() && steps.is_empty() {
+    fn send_to_audit_log(&mut self, actions: Vec<ActionRecord>, events: Vec<AlarmRecord>) {
+        if actions.is_empty() && events.is_empty() {
             return;
         }
         let left = match &mut self.persistence.audit {
-            Some(audit) => audit.put(actions, steps),
+            Some(audit) => audit.put(actions, events),
             None => actions,
         };
         self.send_to_history(left.into_iter().map(Record::Action).collect());

@@ -66,7 +66,7 @@ pub(super) async fn run(
         let states = [Event::Station { at, fault, state: occurred }, Event::Line { at, line, state }];
         // It cannot be known how far these writes had come.
         let lost = |id| Event::Wrote { at, id, result: WriteResult::Lost(Fault::NotConnected) };
-        for event in requests.take_under_way().into_iter().map(lost).chain(states) {
+        for event in requests.take_started().into_iter().map(lost).chain(states) {
             if events.send(event).await.is_err() {
                 return;
             }

@@ -69,7 +69,7 @@ fn cycle(libmodbus: Option<&Path>) {
     println!("cycle over the wire's minimum, 10 blocks of 10 registers, 8N1 paced:");
     for baud in [9_600, 19_200, 115_200] {
         let serial = Serial { baud, ..Serial::USUAL };
-        let transaction = serial.char_time() * (8 + 5 + 2 * u32::from(WORDS)) + 2 * serial.silence();
+        let transaction = serial.char_time() * (8 + 5 + 2 * u32::from(WORDS)) + 2 * serial.silent_interval();
         let minimum = transaction * u32::from(BLOCKS);
         let over = minimum * 20;
         let (path, slave) = PacedSlave::start(baud);

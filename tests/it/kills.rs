@@ -282,7 +282,7 @@ fn number_in(round: u64, note: Option<Arc<str>>) -> u32 {
 fn reason_of(history: &Path, kind: AlarmEvent, text: Option<&str>) -> Option<Arc<str>> {
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
     assert_eq!(found.trouble, None);
-    let steps = found.steps.unwrap_or_default();
+    let steps = found.events.unwrap_or_default();
     let is_it = |step: &&AlarmRecord| step.event == kind && text.is_none_or(|text| &*step.message == text);
     steps.iter().find(is_it).and_then(|step| step.reason.clone())
 }

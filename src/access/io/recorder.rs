@@ -45,13 +45,13 @@ const CHECK_EVERY: Duration = Duration::from_secs(60);
 /// Pause before a failed open is retried: it reads the whole log.
 const REOPEN: Duration = Duration::from_secs(10);
 
-/// What belongs together: actions, and the steps of alarms that they made.
+/// What belongs together: actions, and the alarm events that they caused.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Batch {
     /// For the audit log.
     pub actions: Vec<ActionRecord>,
     /// For the alarm-state file.
-    pub steps: Vec<AlarmRecord>,
+    pub events: Vec<AlarmRecord>,
 }
 
 /// What the thread is sent.
@@ -208,11 +208,11 @@ impl Recorder {
         self.status().last
     }
 
-    fn take(&mut self, Batch { actions, steps }: Batch) {
+    fn take(&mut self, Batch { actions, events }: Batch) {
         self.taken += 1;
         // The history says the same as the log.
         self.pending.extend(actions.into_iter().map(|action| Pending { action: fit(action), stored: false }));
-        self.alarms.take(steps);
+        self.alarms.take(events);
     }
 
     /// Compares the history with the log as both were at the start, and sends it what it lacks: a station that was killed

@@ -255,7 +255,7 @@ impl ClientTask {
             };
             match opened {
                 Ok(line) => {
-                    self.start_over(&line.welcome);
+                    self.start_over(&line.reply);
                     return Some(line);
                 }
                 Err(AttachError::NoStation { .. }) => {}
@@ -281,10 +281,10 @@ impl ClientTask {
     }
 
     /// Nothing is known of the plant again. A definition that is equal stays the very same.
-    fn start_over(&mut self, welcome: &HandshakeReply) {
-        self.id_map.on_connected(welcome.run, welcome.terminal);
+    fn start_over(&mut self, reply: &HandshakeReply) {
+        self.id_map.on_connected(reply.run, reply.terminal);
         let def = &self.assembly.latest().def;
-        let def = if is_equal(def, &welcome.def) { def.clone() } else { welcome.def.clone() };
+        let def = if is_equal(def, &reply.def) { def.clone() } else { reply.def.clone() };
         self.assembly = Assembly::new(def);
     }
 }

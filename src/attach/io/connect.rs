@@ -33,7 +33,7 @@ use crate::{
 };
 
 /// The station answers a handshake within this time, or is taken for stuck.
-pub const WELCOME_MAX: Duration = Duration::from_secs(5);
+pub const HANDSHAKE_REPLY_MAX: Duration = Duration::from_secs(5);
 /// Requests that may wait for the socket; more are refused.
 pub const REQUESTS: usize = 32;
 
@@ -52,9 +52,9 @@ pub enum AttachError {
     #[error("{0}")]
     Refused(String),
     /// It listens, but says nothing.
-    #[error("no reply from the station for {} s", WELCOME_MAX.as_secs())]
+    #[error("no reply from the station for {} s", HANDSHAKE_REPLY_MAX.as_secs())]
     Silent,
-    /// What it says is no welcome, or it has closed.
+    /// Its first message is no handshake reply, or it has closed.
     #[error("malformed message from the station: {0}")]
     Wire(#[from] WireError),
     /// What it says first does not fit together.
@@ -66,7 +66,7 @@ pub enum AttachError {
 pub(super) struct Line {
     pub read: OwnedReadHalf,
     pub write: OwnedWriteHalf,
-    pub welcome: HandshakeReply,
+    pub reply: HandshakeReply,
 }
 
 /// Attaches to the station that listens at this path. The session feeds itself from now on: when the station goes, the
@@ -74,8 +74,9 @@ pub(super) struct Line {
 pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let place = here();
     let mut line = open(path, &place).await?;
-    let (status, assembly) = timeout(WELCOME_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
-    let HandshakeReply { run, terminal, .. } = line.welcome;
+    let (status, assembly) =
+        timeout(HANDSHAKE_REPLY_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
+    let HandshakeReply { run, terminal, .. } = line.reply;
     let (publish, snapshots) = watch::channel(assembly.latest().clone());
     let (status_sender, status) = watch::channel(Arc::new(status));
     let (requests, requested) = mpsc::channel(REQUESTS);
@@ -86,23 +87,23 @@ pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     Ok(Session { snapshots, status, requests, terminal })
 }
 
-/// Says hello and waits for the welcome.
+/// Sends the handshake and waits for the reply.
 pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError> {
     let no_station = |error| AttachError::NoStation { path: path.to_owned(), error };
     let opened = async {
         let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
-        let hello = protocol::encode(&(Handshake::current(), place), HANDSHAKE_BYTES_MAX);
-        wire::write(&mut write, &hello.map_err(WireError::from)?).await?;
+        let handshake = protocol::encode(&(Handshake::current(), place), HANDSHAKE_BYTES_MAX);
+        wire::write(&mut write, &handshake.map_err(WireError::from)?).await?;
         let bytes = wire::read(&mut read, SERVER_MESSAGE_BYTES_MAX).await?;
-        let welcome = protocol::handshake_reply(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;
-        Ok(Line { read, write, welcome })
+        let reply = protocol::handshake_reply(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;
+        Ok(Line { read, write, reply })
     };
-    timeout(WELCOME_MAX, opened).await.unwrap_or(Err(AttachError::Silent))
+    timeout(HANDSHAKE_REPLY_MAX, opened).await.unwrap_or(Err(AttachError::Silent))
 }
 
 /// The session status and the snapshot with which a session begins.
 async fn first(line: &mut Line) -> Result<(SessionStatus, Assembly), AttachError> {
-    let (mut status, mut assembly) = (SessionStatus::default(), Assembly::new(line.welcome.def.clone()));
+    let (mut status, mut assembly) = (SessionStatus::default(), Assembly::new(line.reply.def.clone()));
     loop {
         match next(&mut line.read).await? {
             ServerMessage::SessionStatus(latest) => status = *latest,

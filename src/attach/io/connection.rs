@@ -206,9 +206,9 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
             Ok(Err(_)) => return Err(ConnectionEnd::SentAway),
             Err(_) => tracing::warn!(terminal = self.session.terminal, "no session status for a terminal"),
         }
-        let welcome = HandshakeReply { run, terminal: self.session.terminal, def: self.def.clone() };
-        let welcome = protocol::encode(&(Handshake::current(), welcome), SERVER_MESSAGE_BYTES_MAX);
-        self.write(&welcome.map_err(WireError::from)?, STUCK_MAX).await?;
+        let reply = HandshakeReply { run, terminal: self.session.terminal, def: self.def.clone() };
+        let reply = protocol::encode(&(Handshake::current(), reply), SERVER_MESSAGE_BYTES_MAX);
+        self.write(&reply.map_err(WireError::from)?, STUCK_MAX).await?;
         self.send_session_status().await?;
         let mut sent = Arc::new(Snapshot::blank(self.def.clone()));
         let (mut due, mut next) = (Some(Instant::now()), Instant::now());

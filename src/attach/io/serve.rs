@@ -1,4 +1,4 @@
-//! The listener: one socket a station, made again when it is removed. Connections that do not say hello are dropped.
+//! The listener: one socket a station, made again when it is removed. Connections without a handshake are dropped.
 
 use std::{
     fs::{DirBuilder, File, OpenOptions, Permissions},
@@ -33,7 +33,7 @@ use crate::{
     station::SessionAcceptor,
 };
 
-/// A connection says hello within this time.
+/// A connection completes its handshake within this time.
 pub const HANDSHAKE_MAX: Duration = Duration::from_secs(2);
 /// Pause after the system had no connection to give.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -176,8 +176,8 @@ struct Handshaken {
     peer: Peer,
 }
 
-/// What became of a stranger.
-struct Greeted {
+/// How the handshake of a connection ended.
+struct HandshakeEnd {
     user: u32,
     /// `Err` for one that said something else; `None` for one that has said nothing.
     handshaken: Option<Result<Handshaken, WireError>>,
@@ -198,7 +198,7 @@ struct Connections<'a> {
     snapshots: SnapshotReceiver,
     began: Instant,
     callers: Callers,
-    strangers: JoinSet<Greeted>,
+    handshaking: JoinSet<HandshakeEnd>,
     /// Those that have not completed the handshake, the oldest first.
     waiting: Vec<(u32, AbortHandle)>,
     serving: JoinSet<Left>,
@@ -221,7 +221,7 @@ impl Listener {
             snapshots: receiver,
             began: Instant::now(),
             callers: Callers::new(rustix::process::getuid().as_raw()),
-            strangers: JoinSet::new(),
+            handshaking: JoinSet::new(),
             waiting: Vec::new(),
             serving: JoinSet::new(),
         };
@@ -232,10 +232,10 @@ impl Listener {
                     Ok(()) => sender.publish(snapshots.borrow_and_update().clone()),
                     Err(_) => break,
                 },
-                Some(greeted) = connections.strangers.join_next() => if let Ok(greeted) = greeted { connections.on_greeted(greeted) },
+                Some(ended) = connections.handshaking.join_next() => if let Ok(ended) = ended { connections.on_handshake_end(ended) },
                 Some(left) = connections.serving.join_next() => if let Ok(left) = left { connections.on_left(left) },
                 _ = check.tick() => {
-                    self.keep();
+                    self.repair_socket();
                     connections.log_left_out();
                 }
                 accepted = self.socket.accept() => match accepted {
@@ -250,12 +250,12 @@ impl Listener {
     }
 
     /// Makes the socket, its lock and their folder again if they were removed. Attached terminals stay attached.
-    fn keep(&mut self) {
+    fn repair_socket(&mut self) {
         let locked = is_at(&self.lock, &with_suffix(&self.path, ".lock"));
         if locked && self.file.is_some() && file_at(&self.path) == self.file {
             return;
         }
-        match self.again(locked) {
+        match self.recreate(locked) {
             Ok(()) => {
                 tracing::warn!(path = %self.path.display(), "the socket or its lock was removed: created again");
                 self.troubled = false;
@@ -268,7 +268,7 @@ impl Listener {
         }
     }
 
-    fn again(&mut self, locked: bool) -> Result<(), ListenError> {
+    fn recreate(&mut self, locked: bool) -> Result<(), ListenError> {
         self.folder.restore(&self.path)?;
         // Without it a second station could start.
         if !locked {
@@ -294,10 +294,10 @@ impl Connections<'_> {
             tracing::debug!("too many connections without a handshake: the oldest is dropped");
             self.waiting.remove(place).1.abort();
         }
-        self.waiting.push((credentials.uid(), self.strangers.spawn(greet(stream, credentials))));
+        self.waiting.push((credentials.uid(), self.handshaking.spawn(receive_handshake(stream, credentials))));
     }
 
-    fn on_greeted(&mut self, Greeted { user, handshaken }: Greeted) {
+    fn on_handshake_end(&mut self, HandshakeEnd { user, handshaken }: HandshakeEnd) {
         let now = self.now();
         let Handshaken { read, write, peer } = match handshaken {
             Some(Ok(handshaken)) => handshaken,
@@ -344,18 +344,18 @@ impl Connections<'_> {
 }
 
 /// Waits for the handshake of a connection.
-async fn greet(stream: UnixStream, credentials: UCred) -> Greeted {
+async fn receive_handshake(stream: UnixStream, credentials: UCred) -> HandshakeEnd {
     let user = credentials.uid();
     let (mut read, write) = stream.into_split();
-    let place = match timeout(HANDSHAKE_MAX, hello(&mut read)).await {
+    let place = match timeout(HANDSHAKE_MAX, read_handshake(&mut read)).await {
         Ok(Ok(place)) => place,
-        Ok(Err(WireError::Closed)) | Err(_) => return Greeted { user, handshaken: None },
+        Ok(Err(WireError::Closed)) | Err(_) => return HandshakeEnd { user, handshaken: None },
         Ok(Err(error)) => {
             if let WireError::Protocol(ProtocolError::OtherVersion(why)) = &error {
                 // Nothing was sent before, so the socket has room for one line.
                 let _ = write.try_write(&rejection(why.clone()));
             }
-            return Greeted { user, handshaken: Some(Err(error)) };
+            return HandshakeEnd { user, handshaken: Some(Err(error)) };
         }
     };
     // The list of users may be on another machine.
@@ -364,10 +364,10 @@ async fn greet(stream: UnixStream, credentials: UCred) -> Greeted {
     let process = credentials.pid().and_then(|process| u32::try_from(process).ok());
     let from = place.words(name.as_deref(), process).into();
     let peer = Peer { from, unix_user: name.map(Into::into), own: false };
-    Greeted { user, handshaken: Some(Ok(Handshaken { read, write, peer })) }
+    HandshakeEnd { user, handshaken: Some(Ok(Handshaken { read, write, peer })) }
 }
 
-async fn hello(read: &mut OwnedReadHalf) -> Result<Place, WireError> {
+async fn read_handshake(read: &mut OwnedReadHalf) -> Result<Place, WireError> {
     Ok(protocol::client_handshake(&wire::read(read, HANDSHAKE_BYTES_MAX).await?)?)
 }
 

@@ -25,7 +25,7 @@ fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>)
                 StepResult::Answer(answer, Arc::new(exchange))
             }
         };
-        job.take(result);
+        job.on_result(result);
     }
     panic!("it never ends")
 }

@@ -72,7 +72,7 @@ pub struct Link {
     /// The same over Modbus TCP.
     asked_id: Option<u16>,
     timeout: Duration,
-    idle: Duration,
+    frame_timeout: Duration,
     turnaround: Duration,
     /// Units that are not to be asked before a moment.
     gaps: Vec<(u8, Instant)>,
@@ -99,7 +99,7 @@ impl Link {
             asked_id: None,
             gaps: Vec::new(),
             timeout: line.timeout,
-            idle: wire.idle,
+            frame_timeout: wire.frame_timeout,
             turnaround: clock.real_span(line.turnaround),
             uart,
             echoes: false,
@@ -167,9 +167,9 @@ impl Link {
         let rest = if message.first() == Some(&0) {
             sent_at.saturating_duration_since(Instant::now()) + self.turnaround
         } else {
-            self.wire.silence
+            self.wire.silent_interval
         };
-        self.wire.rest(rest);
+        self.wire.hold_off(rest);
         match &received.answer {
             Ok(answer) => {
                 self.wire.counters.ok += 1;
@@ -179,7 +179,7 @@ impl Link {
             Err(fault) => self.account(message, *fault),
         }
         self.note_silence(matches!(received.answer, Err(Fault::Timeout)));
-        self.keep(frame, received, sent_at).map_err(LinkError::Fault)
+        self.remember_exchange(frame, received, sent_at).map_err(LinkError::Fault)
     }
 
     /// The caller of the exchange under way has given it up, for something that cannot wait. Its answer may still come.
@@ -189,13 +189,13 @@ impl Link {
         if self.framing() != Framing::Mbap && !message.is_empty() {
             self.wire.replies.failed(&message, self.wire.age());
         }
-        self.wire.rest_after_sending(self.idle);
+        self.wire.hold_off_after_sending(self.frame_timeout);
     }
 
     /// A stop is sent next: it waits for what is just coming in, not for what may still come.
     pub fn hurry(&mut self) {
-        self.wire.rest_at_most(self.idle);
-        let latest = Instant::now() + self.idle;
+        self.wire.limit_hold_off(self.frame_timeout);
+        let latest = Instant::now() + self.frame_timeout;
         self.gaps.iter_mut().for_each(|(_, until)| *until = (*until).min(latest));
     }
 
@@ -251,7 +251,7 @@ impl Link {
     /// What is sent next waits for the end of its unit's gap.
     fn keep_gap(&mut self, unit: Option<u8>) {
         if let Some(until) = unit.and_then(|unit| self.gap_of(unit)) {
-            self.wire.rest(until.saturating_duration_since(Instant::now()));
+            self.wire.hold_off(until.saturating_duration_since(Instant::now()));
         }
     }
 
@@ -262,15 +262,15 @@ impl Link {
     }
 
     /// Nothing is sent for this long (plant time), for devices that need it.
-    pub fn rest(&mut self, plant: Duration) {
-        self.wire.rest(self.wire.clock().real_span(plant));
+    pub fn hold_off(&mut self, plant: Duration) {
+        self.wire.hold_off(self.wire.clock().real_span(plant));
     }
 
     /// Takes what comes while nothing is sent. Returns when a request under way has ended, or an error when the port is gone.
-    pub async fn idle(&mut self) -> Result<(), LinkError> {
+    pub async fn listen(&mut self) -> Result<(), LinkError> {
         match self.framing() {
             Framing::Mbap => self.idle_mbap().await,
-            Framing::Rtu | Framing::Ascii => Err(self.wire.idle().await),
+            Framing::Rtu | Framing::Ascii => Err(self.wire.listen().await),
         }
     }
 
@@ -324,7 +324,12 @@ impl Link {
         self.wire.record(true, frame, Cow::Borrowed("sent"));
     }
 
-    fn keep(&mut self, request: Arc<[u8]>, received: Received, sent_at: Instant) -> Result<Vec<u8>, Fault> {
+    fn remember_exchange(
+        &mut self,
+        request: Arc<[u8]>,
+        received: Received,
+        sent_at: Instant,
+    ) -> Result<Vec<u8>, Fault> {
         self.last = Some(Arc::new(Exchange {
             at: self.wire.clock().to_utc(self.wire.clock().at(sent_at)),
             framing: self.framing(),
@@ -369,6 +374,6 @@ impl Link {
         self.wire.replies.failed(message, self.wire.age());
         let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
         let chars = to_u32(frame::wrapped_length(self.framing(), longest));
-        self.wire.rest(self.wire.char_time * chars + self.wire.silence);
+        self.wire.hold_off(self.wire.char_time * chars + self.wire.silent_interval);
     }
 }

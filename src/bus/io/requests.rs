@@ -16,19 +16,19 @@ use crate::plant::{
 /// then, and an answer that is just coming in would collide with the stop.
 pub const STOP_WAIT: Duration = Duration::from_millis(500);
 /// More requests that are served first than this stay in their queue, where the plant sees that it is full.
-const FIRST_MAX: usize = 64;
+const PRIORITY_MAX: usize = 64;
 
 /// The requests to one line. They outlive a task that panics.
 #[derive(Debug)]
 pub struct Requests {
     queue: mpsc::Receiver<BusRequest>,
     /// Served before all others: stops, then what is neither a write nor a refresh.
-    first: VecDeque<BusRequest>,
+    priority: VecDeque<BusRequest>,
     /// Writes that wait for their share of the line's time, and one refresh for each device. The plant has no more than one
     /// write under way for a tag.
     waiting: VecDeque<BusRequest>,
     /// Writes that were handed out and have not ended.
-    under_way: Vec<WriteId>,
+    started: Vec<WriteId>,
 }
 
 /// The station is ending.
@@ -38,54 +38,54 @@ pub struct Closed;
 impl Requests {
     /// All of `queue`.
     pub fn new(queue: mpsc::Receiver<BusRequest>) -> Requests {
-        Requests { queue, first: VecDeque::new(), waiting: VecDeque::new(), under_way: Vec::new() }
+        Requests { queue, priority: VecDeque::new(), waiting: VecDeque::new(), started: Vec::new() }
     }
 
     /// The next request as they come; may be dropped before there is one.
     pub async fn recv(&mut self) -> Result<BusRequest, Closed> {
-        let request = match self.first.pop_front() {
+        let request = match self.priority.pop_front() {
             Some(first) => first,
             None => self.queue.recv().await.ok_or(Closed)?,
         };
-        Ok(self.hand_out(request))
+        Ok(self.mark_started(request))
     }
 
     /// The next request, if one has come.
     pub fn try_recv(&mut self) -> Result<Option<BusRequest>, Closed> {
-        let request = match self.first.pop_front() {
+        let request = match self.priority.pop_front() {
             Some(first) => Some(first),
-            None => self.take_queued()?,
+            None => self.try_queue()?,
         };
-        Ok(request.map(|request| self.hand_out(request)))
+        Ok(request.map(|request| self.mark_started(request)))
     }
 
     /// The request to serve now: a stop before all others, writes last and only if they `may_write`.
     pub fn next(&mut self, may_write: bool) -> Result<Option<BusRequest>, Closed> {
-        self.fetch()?;
+        self.receive_queued()?;
         let is_write = |request: &BusRequest| matches!(request, BusRequest::Write(_));
-        let request = self.first.pop_front().or_else(|| {
+        let request = self.priority.pop_front().or_else(|| {
             let refresh = self.waiting.iter().position(|request| !is_write(request));
             self.waiting.remove(refresh.or(may_write.then_some(0))?)
         });
-        Ok(request.map(|request| self.hand_out(request)))
+        Ok(request.map(|request| self.mark_started(request)))
     }
 
     /// Is a stop waiting?
     pub fn stop_waits(&mut self) -> bool {
         // That the station ends shows itself at the next request.
-        let _ = self.fetch();
+        let _ = self.receive_queued();
         self.has_stop()
     }
 
     /// Serves this before all others.
-    pub fn put_first(&mut self, request: BusRequest) {
-        self.take_back(&request);
-        self.first.push_front(request);
+    pub fn requeue_first(&mut self, request: BusRequest) {
+        self.unmark_started(&request);
+        self.priority.push_front(request);
     }
 
     /// Serves a write or a refresh later. One refresh of a device is as good as two.
-    pub fn put_off(&mut self, request: BusRequest) {
-        self.take_back(&request);
+    pub fn defer(&mut self, request: BusRequest) {
+        self.unmark_started(&request);
         let same = |other: &BusRequest| match (other, &request) {
             (BusRequest::Refresh { device, .. }, BusRequest::Refresh { device: wanted, .. }) => device == wanted,
             _ => false,
@@ -101,7 +101,7 @@ impl Requests {
         let mut closed = false;
         let mut until = self.has_stop().then(later);
         loop {
-            let listens = !closed && until.is_none() && self.first.len() < FIRST_MAX;
+            let listens = !closed && until.is_none() && self.priority.len() < PRIORITY_MAX;
             let request = tokio::select! {
                 biased;
                 done = &mut work => return Some(done),
@@ -109,7 +109,7 @@ impl Requests {
                 request = self.queue.recv(), if listens => request,
             };
             match request {
-                Some(request) => self.sort(request),
+                Some(request) => self.enqueue(request),
                 None => closed = true,
             }
             until = self.has_stop().then(later);
@@ -130,28 +130,28 @@ impl Requests {
 
     /// A write has ended.
     pub fn ended(&mut self, id: WriteId) {
-        self.under_way.retain(|write| *write != id);
+        self.started.retain(|write| *write != id);
     }
 
     /// The task of the line is gone: the writes that it had begun and not ended.
-    pub fn take_under_way(&mut self) -> Vec<WriteId> {
-        std::mem::take(&mut self.under_way)
+    pub fn take_started(&mut self) -> Vec<WriteId> {
+        std::mem::take(&mut self.started)
     }
 
     fn has_stop(&self) -> bool {
-        self.first.front().is_some_and(is_stop)
+        self.priority.front().is_some_and(is_stop)
     }
 
     /// Looks through the queue for what goes first.
-    fn fetch(&mut self) -> Result<(), Closed> {
-        while !self.has_stop() && self.first.len() < FIRST_MAX {
-            let Some(request) = self.take_queued()? else { break };
-            self.sort(request);
+    fn receive_queued(&mut self) -> Result<(), Closed> {
+        while !self.has_stop() && self.priority.len() < PRIORITY_MAX {
+            let Some(request) = self.try_queue()? else { break };
+            self.enqueue(request);
         }
         Ok(())
     }
 
-    fn take_queued(&mut self) -> Result<Option<BusRequest>, Closed> {
+    fn try_queue(&mut self) -> Result<Option<BusRequest>, Closed> {
         match self.queue.try_recv() {
             Ok(request) => Ok(Some(request)),
             Err(TryRecvError::Empty) => Ok(None),
@@ -159,23 +159,23 @@ impl Requests {
         }
     }
 
-    fn sort(&mut self, request: BusRequest) {
+    fn enqueue(&mut self, request: BusRequest) {
         match request {
-            stop if is_stop(&stop) => self.first.push_front(stop),
-            BusRequest::Write(_) | BusRequest::Refresh { .. } => self.put_off(request),
-            other => self.first.push_back(other),
+            stop if is_stop(&stop) => self.priority.push_front(stop),
+            BusRequest::Write(_) | BusRequest::Refresh { .. } => self.defer(request),
+            other => self.priority.push_back(other),
         }
     }
 
-    fn hand_out(&mut self, request: BusRequest) -> BusRequest {
+    fn mark_started(&mut self, request: BusRequest) -> BusRequest {
         if let BusRequest::Write(job) = request {
-            self.under_way.push(job.id);
+            self.started.push(job.id);
         }
         request
     }
 
     /// It was handed out, and is not begun.
-    fn take_back(&mut self, request: &BusRequest) {
+    fn unmark_started(&mut self, request: &BusRequest) {
         if let BusRequest::Write(job) = request {
             self.ended(job.id);
         }

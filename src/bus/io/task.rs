@@ -80,7 +80,7 @@ pub async fn run(
         def,
     };
     // It returns only when the station ends, and then no receiver is left.
-    let _ = task.outer().await;
+    let _ = task.connect_loop().await;
 }
 
 /// Why a port is left.
@@ -147,7 +147,7 @@ struct Task<'a> {
 
 impl Task<'_> {
     /// Opens, serves and waits until the station ends.
-    async fn outer(mut self) -> Result<(), LinkExit> {
+    async fn connect_loop(mut self) -> Result<(), LinkExit> {
         let mut backoff = Backoff::for_ports();
         loop {
             self.publish_state(LineState::Connecting).await?;
@@ -202,14 +202,14 @@ impl Task<'_> {
         let on_line = self.def.devices.iter().filter(|device| device.line == self.line);
         on_line.for_each(|device| link.allow(device.unit, device.limits.in_flight_max));
         self.closed_at = self.clock.now();
-        let Err(exit) = self.take_turns(&mut link, &mut schedule).await;
-        self.close_second(&mut link);
+        let Err(exit) = self.serve_loop(&mut link, &mut schedule).await;
+        self.collect_stats(&mut link);
         self.stats.rest(&mut self.memory.counters);
         self.refuse_waiting().await.err().unwrap_or(exit)
     }
 
     /// Operators first, then the schedule and the running diagnostic, else it waits.
-    async fn take_turns(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<Infallible, LinkExit> {
+    async fn serve_loop(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<Infallible, LinkExit> {
         let mut report_at = self.clock.now() + REPORT_EVERY;
         // Other settings show at once.
         self.publish_report(Some(schedule)).await?;
@@ -224,7 +224,7 @@ impl Task<'_> {
             if report_at <= now {
                 report_at = now + REPORT_EVERY;
                 link.count_uart();
-                self.close_second(link);
+                self.collect_stats(link);
                 self.publish_report(Some(schedule)).await?;
             }
             self.publish_unsolicited(link).await?;
@@ -254,12 +254,12 @@ impl Task<'_> {
     /// Nothing is due: drops unsolicited bytes until something is.
     async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Result<(), LinkExit> {
         let request = tokio::select! {
-            // What comes at one moment is taken in this order, so that a rehearsal ends as the one before.
+            // What comes at one moment is taken in this order, so that two runs of a drill give the same result.
             biased;
             _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
             request = self.requests.recv() => request?,
             () = self.live.due(self.clock) => return Ok(()),
-            ended = link.idle() => return ended.map_err(LinkExit::from),
+            ended = link.listen() => return ended.map_err(LinkExit::from),
             () = self.clock.sleep_until(until) => return Ok(()),
         };
         self.serve_request(link, schedule, request).await
@@ -301,7 +301,7 @@ impl Task<'_> {
                 match self.clear_way(link, schedule, def.tag(job.tag).device, job.urgent).await {
                     Ok(true) => {}
                     Ok(false) => {
-                        self.requests.put_off(BusRequest::Write(job));
+                        self.requests.defer(BusRequest::Write(job));
                         return Ok(());
                     }
                     Err(exit) => {
@@ -327,7 +327,7 @@ impl Task<'_> {
     }
 
     /// Adds what the link has counted since the last call to the statistics.
-    fn close_second(&mut self, link: &mut Link) {
+    fn collect_stats(&mut self, link: &mut Link) {
         let now = self.clock.now();
         let over = elapsed(self.closed_at, now);
         let busy = link.take_busy().as_secs_f32();

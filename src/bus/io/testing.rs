@@ -76,7 +76,7 @@ pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&Diagnos
             },
         };
         match step(&mut link, &next).await {
-            Ok(result) => job.take(result),
+            Ok(result) => job.on_result(result),
             Err(LinkError::Gone(why)) => job.stop(DiagnosticState::Failed(why)),
             Err(LinkError::Fault(fault)) => job.stop(DiagnosticState::Failed(fault.to_string())),
         }

@@ -196,7 +196,7 @@ async fn a_hole_in_a_block_costs_only_itself() {
     assert_eq!(holes.into_iter().collect::<Vec<_>>(), ["U1.21", "U2.21"]);
 }
 
-/// A device with a single register that ignores loopbacks: nothing tells its answers apart, so only patience helps – and
+/// A device with a single register that ignores loopbacks: nothing tells its answers apart, so only time helps – and
 /// it does help.
 #[tokio::test(start_paused = true)]
 async fn a_device_that_stays_out_of_step_is_read_again_after_a_rest() {

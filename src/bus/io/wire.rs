@@ -64,7 +64,7 @@ pub struct Wire {
     /// Time of one character, real time; zero over TCP.
     pub char_time: Duration,
     /// Silence between frames, real time.
-    pub silence: Duration,
+    pub silent_interval: Duration,
     timeout: Duration,
     /// Nothing is sent before this.
     quiet_until: Instant,
@@ -76,7 +76,7 @@ pub struct Wire {
     /// Bytes that no request waits for, until silence shows that their frame has ended.
     stray: Vec<u8>,
     /// Bytes that are further apart than this (real time) are of two frames.
-    pub idle: Duration,
+    pub frame_timeout: Duration,
     /// Frames since they were last taken.
     frames: Vec<Frame>,
     /// Units whose answers came late since this was last taken.
@@ -92,10 +92,10 @@ impl Wire {
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: Memory) -> Wire {
         let Memory { counters, mut replies, born } = memory;
         replies.set_timeout(line.timeout);
-        let (char_time, silence) = match line.transport.serial() {
+        let (char_time, silent_interval) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
             Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
-            Some(serial) => (serial.char_time(), serial.silence().max(line.gap)),
+            Some(serial) => (serial.char_time(), serial.silent_interval().max(line.gap)),
             None => (Duration::ZERO, line.gap),
         };
         let framing = line.transport.framing();
@@ -107,14 +107,14 @@ impl Wire {
             clock,
             framing,
             char_time: clock.real_span(char_time),
-            silence: clock.real_span(silence),
+            silent_interval: clock.real_span(silent_interval),
             timeout: line.timeout,
             quiet_until: Instant::now() + if may_come { line.timeout } else { Duration::ZERO },
             left_at: Instant::now(),
             born,
             replies,
             stray: Vec::new(),
-            idle: clock.real_span(silence).max(line.idle),
+            frame_timeout: clock.real_span(silent_interval).max(line.frame_timeout),
             frames: Vec::new(),
             late: Vec::new(),
             unsolicited: Vec::new(),
@@ -143,7 +143,7 @@ impl Wire {
     }
 
     /// Nothing is sent for this long (real time).
-    pub fn rest(&mut self, real: Duration) {
+    pub fn hold_off(&mut self, real: Duration) {
         if real.is_zero() {
             return;
         }
@@ -156,12 +156,12 @@ impl Wire {
     }
 
     /// Nothing is sent for this long (real time) after the last byte sent has left.
-    pub fn rest_after_sending(&mut self, real: Duration) {
+    pub fn hold_off_after_sending(&mut self, real: Duration) {
         self.quiet_until = self.quiet_until.max(self.left_at.max(Instant::now()) + real);
     }
 
     /// A rest under way lasts no longer than this (real time), and never less than what was sent needs to leave.
-    pub fn rest_at_most(&mut self, real: Duration) {
+    pub fn limit_hold_off(&mut self, real: Duration) {
         self.quiet_until = self.quiet_until.min(self.left_at.max(Instant::now()) + real);
     }
 
@@ -172,7 +172,7 @@ impl Wire {
             // What is just coming in is received to its end: it may be an outstanding reply.
             self.drain()?;
             if self.has_begun() {
-                self.rest(self.idle);
+                self.hold_off(self.frame_timeout);
                 self.wait_for_silence().await;
                 self.drain()?;
             }
@@ -228,9 +228,9 @@ impl Wire {
     }
 
     /// Reads and drops unsolicited bytes; returns only when the port is gone.
-    pub async fn idle(&mut self) -> LinkError {
+    pub async fn listen(&mut self) -> LinkError {
         loop {
-            let pause = if self.stray.is_empty() { Duration::from_secs(3_600) } else { self.idle };
+            let pause = if self.stray.is_empty() { Duration::from_secs(3_600) } else { self.frame_timeout };
             self.stray.reserve(frame::MESSAGE_MAX);
             match tokio::time::timeout(pause, self.port.read_buf(&mut self.stray)).await.map(received) {
                 Err(_) => self.drop_stray(),
@@ -345,7 +345,7 @@ impl Wire {
                 break;
             };
             self.took_stray(count);
-            self.rest(if self.has_begun() { self.idle } else { self.silence });
+            self.hold_off(if self.has_begun() { self.frame_timeout } else { self.silent_interval });
         }
         self.quiet_until = self.quiet_until.min(limit);
     }

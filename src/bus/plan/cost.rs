@@ -27,13 +27,13 @@ pub struct Wire {
     /// The request on the wire.
     pub request: Duration,
     /// Between the last byte of the request and the first of the answer, with a device that takes no time.
-    pub turn: Duration,
+    pub turnaround: Duration,
     /// An answer without data.
     pub answer: Duration,
     /// One byte of data.
     pub byte: Duration,
     /// Silence that is kept after the answer.
-    pub rest: Duration,
+    pub silent_interval: Duration,
 }
 
 impl Wire {
@@ -47,25 +47,27 @@ impl Wire {
             Framing::Mbap => (6, 1),
         };
         let gap = line.gap.max(device.gap);
-        let (character, turn, rest) = match &line.transport {
+        let (character, turnaround, silent_interval) = match &line.transport {
             Transport::Serial { serial, .. } => match framing {
-                Framing::Rtu | Framing::Mbap => (serial.char_time(), serial.silence(), gap.max(serial.silence())),
+                Framing::Rtu | Framing::Mbap => {
+                    (serial.char_time(), serial.silent_interval(), gap.max(serial.silent_interval()))
+                }
                 Framing::Ascii => (serial.char_time(), Duration::ZERO, gap),
             },
             Transport::Tcp { .. } => (TCP_BYTE, TCP_ROUND_TRIP, gap),
         };
         let frame = |message: u32| character * (fixed + per_byte * message);
-        Wire { request: frame(REQUEST), turn, answer: frame(ANSWER), byte: character * per_byte, rest }
+        Wire { request: frame(REQUEST), turnaround, answer: frame(ANSWER), byte: character * per_byte, silent_interval }
     }
 
     /// A good read of so many registers or bits.
     pub fn read(self, table: Table, count: u32) -> Duration {
-        self.request + self.turn + self.answer + self.byte * data_bytes(table, count) + self.rest
+        self.request + self.turnaround + self.answer + self.byte * data_bytes(table, count) + self.silent_interval
     }
 
     /// A read that is not answered, with all its retries.
     pub fn failing(self, timeout: Duration) -> Duration {
-        (self.request + timeout + self.rest) * (1 + RETRIES)
+        (self.request + timeout + self.silent_interval) * (1 + RETRIES)
     }
 }
 

@@ -25,9 +25,9 @@ const ANSWERS_MIN: u32 = 32;
 /// A device that has always answered faster is waited for so many times its slowest answer …
 const SLOWER_MAX: u32 = 4;
 /// … but not less than this: systems and adapters pause now and then …
-const PATIENCE_MIN: Duration = Duration::from_millis(100);
+const RESPONSE_TIMEOUT_MIN: Duration = Duration::from_millis(100);
 /// … and what is lost on a network is sent again after 200 to 300 ms.
-const NETWORK_PATIENCE_MIN: Duration = Duration::from_millis(500);
+const NETWORK_RESPONSE_TIMEOUT_MIN: Duration = Duration::from_millis(500);
 /// Every so many-th try in a row waits for the whole timeout: the device may have become slow.
 const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
@@ -144,9 +144,9 @@ impl Health {
 
     /// How long an answer is waited for (real time), at most the timeout of the line. One that has never answered is waited
     /// for so long once; then as if it were as slow as the slowest `neighbour` that answers, if there is one.
-    pub fn patience(&self, line: &LineDef, neighbour: impl FnOnce() -> Option<Duration>) -> Duration {
+    pub fn response_timeout(&self, line: &LineDef, neighbour: impl FnOnce() -> Option<Duration>) -> Duration {
         let timeout = line.timeout;
-        let least = if line.transport.serial().is_some() { PATIENCE_MIN } else { NETWORK_PATIENCE_MIN };
+        let least = if line.transport.serial().is_some() { RESPONSE_TIMEOUT_MIN } else { NETWORK_RESPONSE_TIMEOUT_MIN };
         let whole = self.thorough || self.failures % WHOLE_TIMEOUT_EVERY == WHOLE_TIMEOUT_EVERY - 1;
         let slowest = match self.answers {
             0 if 0 < self.failures => neighbour().map(|neighbour| neighbour.max(self.slowest)),

@@ -64,8 +64,8 @@ impl Model {
             };
             let (unit, started) = (&self.units[index], self.now);
             let (device, dead) = (DeviceId(index as u16), unit.dead.contains(&started));
-            let patience = self.schedule.patience(index, &self.line);
-            let took = if dead { patience } else { Duration::from_millis(unit.cost as u64) };
+            let response_timeout = self.schedule.response_timeout(index, &self.line);
+            let took = if dead { response_timeout } else { Duration::from_millis(unit.cost as u64) };
             self.now += took.as_millis() as i64;
             self.schedule.done(index, at(started), at(self.now));
             if dead {

@@ -184,7 +184,7 @@ fn a_try_of_which_nothing_is_told_is_not_made_again_at_once() {
 #[test]
 fn a_device_at_rest_is_not_asked() {
     let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
-    schedule.rest(DeviceId(0), at(700));
+    schedule.hold_off(DeviceId(0), at(700));
     assert_eq!(schedule.next(at(0)), Next::WaitUntil(at(700)));
     assert!(schedule.is_resting(DeviceId(0), at(699)) && !schedule.is_resting(DeviceId(0), at(700)));
 }
@@ -321,7 +321,7 @@ proptest! {
                 (next, expect) => prop_assert_eq!(next, expect, "turn {} at {} ms", turn, now),
             }
             match action {
-                37 => schedule.rest(device, at(now + ms)),
+                37 => schedule.hold_off(device, at(now + ms)),
                 38 => schedule.refresh(device, at(now)),
                 39 => schedule.replan(&blocks, at(now)),
                 _ => {}

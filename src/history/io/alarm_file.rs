@@ -11,7 +11,7 @@ use std::{
 use jiff::Timestamp;
 
 use crate::{
-    history::alarm_state::{HEADER, LatestSteps, line, parse},
+    history::alarm_state::{HEADER, LatestEvents, line, parse},
     plant::record::AlarmRecord,
     profile::io::atomic,
 };
@@ -29,9 +29,9 @@ pub fn beside(history: &Path) -> PathBuf {
 /// What was found when it was opened.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Found {
-    /// The steps to restore, oldest first; `None` where the file does not say: the journal of the history is used
+    /// The events to restore, oldest first; `None` where the file does not say: the journal of the history is used
     /// then.
-    pub steps: Option<Vec<AlarmRecord>>,
+    pub events: Option<Vec<AlarmRecord>>,
     /// What is wrong with it, in words for the operator.
     pub trouble: Option<String>,
 }
@@ -40,7 +40,7 @@ pub struct Found {
 #[derive(Debug)]
 pub struct AlarmFile {
     path: PathBuf,
-    steps: LatestSteps,
+    events: LatestEvents,
     /// Steps that the file does not hold yet; gone after a failure, when the whole file is due.
     unwritten: Vec<AlarmRecord>,
     file: Option<Written>,
@@ -58,15 +58,15 @@ impl AlarmFile {
     /// Opens the file. One that is damaged is set aside, never deleted.
     pub fn open(path: &Path, now: Timestamp) -> (AlarmFile, Found) {
         let mut alarms =
-            AlarmFile { path: path.to_owned(), steps: LatestSteps::default(), unwritten: Vec::new(), file: None };
+            AlarmFile { path: path.to_owned(), events: LatestEvents::default(), unwritten: Vec::new(), file: None };
         let name = path.display();
         let found = match read(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Found::default(),
-            Err(error) => Found { steps: None, trouble: Some(format!("{name} cannot be read: {error}")) },
+            Err(error) => Found { events: None, trouble: Some(format!("{name} cannot be read: {error}")) },
             Ok(bytes) => match parse_whole(&bytes) {
-                Ok(steps) => {
-                    alarms.steps = steps;
-                    Found { steps: Some(alarms.steps.iter().cloned().collect()), trouble: None }
+                Ok(events) => {
+                    alarms.events = events;
+                    Found { events: Some(alarms.events.iter().cloned().collect()), trouble: None }
                 }
                 Err(why) => {
                     let aside = path.with_extension(format!("damaged-{}", now.strftime("%Y%m%dT%H%M%SZ")));
@@ -75,26 +75,26 @@ impl AlarmFile {
                         Err(error) => format!("cannot be set aside: {error}"),
                     };
                     let why = format!("the state of the alarms is damaged ({name}: {why}), {kept}");
-                    Found { steps: None, trouble: Some(format!("{why}; taken from the journal instead")) }
+                    Found { events: None, trouble: Some(format!("{why}; taken from the journal instead")) }
                 }
             },
         };
         (alarms, found)
     }
 
-    /// Takes steps; [`AlarmFile::write`] brings them to the disk.
-    pub fn take(&mut self, steps: impl IntoIterator<Item = AlarmRecord>) {
-        for step in steps {
+    /// Takes events; [`AlarmFile::write`] brings them to the disk.
+    pub fn take(&mut self, events: impl IntoIterator<Item = AlarmRecord>) {
+        for event in events {
             if self.file.is_some() {
-                self.unwritten.push(step.clone());
+                self.unwritten.push(event.clone());
             }
-            self.steps.take(step);
+            self.events.take(event);
         }
     }
 
     /// Writes what is not on disk yet, and syncs it. After a failure the next try writes the whole file.
     pub fn write(&mut self) -> io::Result<()> {
-        let file = self.file.take().filter(|written| written.may_grow(&self.path, self.steps.len()));
+        let file = self.file.take().filter(|written| written.may_grow(&self.path, self.events.len()));
         let unwritten = std::mem::take(&mut self.unwritten);
         self.file = Some(match file {
             Some(written) if unwritten.is_empty() => written,
@@ -106,9 +106,9 @@ impl AlarmFile {
 
     /// A power failure leaves the old file or the new one.
     fn write_whole(&self) -> io::Result<Written> {
-        let text: String = std::iter::once(HEADER.to_owned()).chain(self.steps.iter().map(line)).collect();
+        let text: String = std::iter::once(HEADER.to_owned()).chain(self.events.iter().map(line)).collect();
         let file = atomic::write_placed(&self.path, text.as_bytes(), 0o640, |_, new| fs::rename(new, &self.path))?;
-        Ok(Written { file, bytes: text.len() as u64, lines: self.steps.len() })
+        Ok(Written { file, bytes: text.len() as u64, lines: self.events.len() })
     }
 }
 
@@ -122,16 +122,16 @@ impl Written {
         same && self.lines <= 2 * live + SPARE_LINES
     }
 
-    fn append(mut self, steps: &[AlarmRecord]) -> io::Result<Written> {
-        let text: String = steps.iter().map(line).collect();
+    fn append(mut self, events: &[AlarmRecord]) -> io::Result<Written> {
+        let text: String = events.iter().map(line).collect();
         self.file.write_all(text.as_bytes())?;
         self.file.sync_data()?;
-        Ok(Written { bytes: self.bytes + text.len() as u64, lines: self.lines + steps.len(), ..self })
+        Ok(Written { bytes: self.bytes + text.len() as u64, lines: self.lines + events.len(), ..self })
     }
 }
 
 /// The beginning of a file that is too large to be read is not taken for all of it.
-fn parse_whole(bytes: &[u8]) -> Result<LatestSteps, String> {
+fn parse_whole(bytes: &[u8]) -> Result<LatestEvents, String> {
     if BYTES_MAX < bytes.len() as u64 {
         return Err(format!("it is larger than {} MiB", BYTES_MAX >> 20));
     }
@@ -155,9 +155,9 @@ mod tests {
     use super::*;
     use crate::plant::{def::Priority, record::AlarmEvent};
 
-    fn step(number: i64, step: AlarmEvent) -> AlarmRecord {
+    fn event(number: i64, event: AlarmEvent) -> AlarmRecord {
         let at = Timestamp::from_second(number).unwrap();
-        AlarmRecord::new(at, &format!("T-{}", number % 3), "high", Priority::High, step)
+        AlarmRecord::new(at, &format!("T-{}", number % 3), "high", Priority::High, event)
     }
 
     /// What the next station finds.
@@ -171,20 +171,20 @@ mod tests {
         let path = beside(&folder.path().join("tank.duckdb"));
         assert_eq!(found(&path), Found::default(), "no file yet");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmEvent::Raised)]);
+        alarms.take([event(1, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         for number in 0..3_000 {
-            alarms.take([step(number, AlarmEvent::Raised), step(number, AlarmEvent::ReturnedToNormal)]);
+            alarms.take([event(number, AlarmEvent::Raised), event(number, AlarmEvent::ReturnedToNormal)]);
             if number % 10 == 0 {
                 alarms.write().unwrap();
             }
         }
         alarms.write().unwrap();
         let last = [2_997, 2_998, 2_999]
-            .map(|number| [AlarmEvent::Raised, AlarmEvent::ReturnedToNormal].map(|kind| step(number, kind)));
-        assert_eq!(found(&path), Found { steps: Some(last.concat()), trouble: None });
+            .map(|number| [AlarmEvent::Raised, AlarmEvent::ReturnedToNormal].map(|kind| event(number, kind)));
+        assert_eq!(found(&path), Found { events: Some(last.concat()), trouble: None });
         let lines = fs::read_to_string(&path).unwrap().lines().count();
-        assert!(lines < 2 * SPARE_LINES, "{lines} lines for 6 steps");
+        assert!(lines < 2 * SPARE_LINES, "{lines} lines for 6 events");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside");
     }
 
@@ -193,16 +193,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmEvent::Raised)]);
+        alarms.take([event(1, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         fs::remove_file(&path).unwrap();
-        alarms.take([step(1, AlarmEvent::Acknowledged)]);
+        alarms.take([event(1, AlarmEvent::Acknowledged)]);
         alarms.write().unwrap();
-        let both = vec![step(1, AlarmEvent::Raised), step(1, AlarmEvent::Acknowledged)];
-        assert_eq!(found(&path).steps, Some(both.clone()));
+        let both = vec![event(1, AlarmEvent::Raised), event(1, AlarmEvent::Acknowledged)];
+        assert_eq!(found(&path).events, Some(both.clone()));
         fs::write(&path, "nonsense").unwrap();
         alarms.write().unwrap();
-        assert_eq!(found(&path).steps, Some(both));
+        assert_eq!(found(&path).events, Some(both));
     }
 
     #[test]
@@ -210,13 +210,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("later").join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmEvent::Raised)]);
+        alarms.take([event(1, AlarmEvent::Raised)]);
         assert!(alarms.write().is_err());
-        alarms.take([step(1, AlarmEvent::Acknowledged)]);
+        alarms.take([event(1, AlarmEvent::Acknowledged)]);
         assert!(alarms.write().is_err());
         fs::create_dir(folder.path().join("later")).unwrap();
         alarms.write().unwrap();
-        assert_eq!(found(&path).steps.unwrap().len(), 2);
+        assert_eq!(found(&path).events.unwrap().len(), 2);
     }
 
     #[test]
@@ -224,24 +224,24 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([step(1, AlarmEvent::Raised), step(2, AlarmEvent::Raised)]);
+        alarms.take([event(1, AlarmEvent::Raised), event(2, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("T-1", "T-7", 1)).unwrap();
-        let Found { steps, trouble } = found(&path);
-        assert_eq!(steps, None);
+        let Found { events, trouble } = found(&path);
+        assert_eq!(events, None);
         assert!(trouble.unwrap().contains("line 2 is not as it was written"));
         assert!(!path.exists() && folder.path().join("tank.alarms.damaged-19700112T134640Z").exists());
         // A part of a file is never taken for all of it.
         let large = File::options().write(true).create(true).truncate(true).open(&path).unwrap();
         (&large).write_all(text.as_bytes()).unwrap();
         large.set_len(BYTES_MAX + 1).unwrap();
-        let Found { steps, trouble } = found(&path);
-        assert_eq!(steps, None);
+        let Found { events, trouble } = found(&path);
+        assert_eq!(events, None);
         assert!(trouble.unwrap().contains("larger than 64 MiB"));
         // The beginning of a line that was never confirmed is no damage.
         fs::write(&path, &text[..text.len() - 9]).unwrap();
-        let Found { steps, trouble } = found(&path);
-        assert_eq!((steps.map(|steps| steps.len()), trouble), (Some(1), None));
+        let Found { events, trouble } = found(&path);
+        assert_eq!((events.map(|events| events.len()), trouble), (Some(1), None));
     }
 }

@@ -29,15 +29,15 @@ const WINDOW: i64 = 600_000_000;
 /// Windows that are read one by one: two days.
 const LOOKED_INTO_MAX: i64 = 288;
 /// Steps of alarms behind the figures of one answer: years of a plant that is run well.
-const STEPS_MAX: u64 = 2_000_000;
+const EVENTS_MAX: u64 = 2_000_000;
 
 /// What the monitor of a plant that starts again must know.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recent {
-    /// The raising steps of the alarms that were active before the last day.
+    /// The raising events of the alarms that were active before the last day.
     pub active: Vec<AlarmRecord>,
-    /// The steps of the last day, oldest first.
-    pub steps: Vec<AlarmRecord>,
+    /// The events of the last day, oldest first.
+    pub events: Vec<AlarmRecord>,
     /// The windows of the last day in which a station ran, see [`AlarmMonitor::watched`].
     pub watched: Vec<i64>,
 }
@@ -50,7 +50,7 @@ impl Store {
         check_span(from, until)?;
         let known = from.checked_sub(LEAD).unwrap_or(Timestamp::MIN);
         let mut monitor = AlarmMonitor::of_period(from, until);
-        self.standing_at(known)?.iter().for_each(|step| monitor.already(step));
+        self.standing_at(known)?.iter().for_each(|event| monitor.already(event));
         self.watched(from, until)?.into_iter().for_each(|window| monitor.watched(window));
         let journaled = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?));
         let (first, last): (Option<i64>, Option<i64>) =
@@ -61,10 +61,10 @@ impl Store {
         let end = until.min(last.unwrap_or(known));
         while next < end {
             let to = next.checked_add(CHUNK).unwrap_or(end).min(end);
-            let steps = self.steps(next, to)?;
-            rows += steps.len() as u64;
-            within(rows, STEPS_MAX)?;
-            steps.iter().for_each(|step| monitor.take(step));
+            let events = self.events(next, to)?;
+            rows += events.len() as u64;
+            within(rows, EVENTS_MAX)?;
+            events.iter().for_each(|event| monitor.take(event));
             next = to;
         }
         Ok(monitor.figures())
@@ -76,8 +76,8 @@ impl Store {
         if now <= since {
             return Ok(Recent::default());
         }
-        let (active, steps) = (self.standing_at(since)?, self.steps(since, now)?);
-        Ok(Recent { active, steps, watched: self.watched(since, now)?.into_iter().collect() })
+        let (active, events) = (self.standing_at(since)?, self.events(since, now)?);
+        Ok(Recent { active, events, watched: self.watched(since, now)?.into_iter().collect() })
     }
 
     /// The windows in which anything was stored. Lines have a row every minute; where there is none, single windows are
@@ -118,18 +118,18 @@ impl Store {
         }
     }
 
-    /// The raising steps of the alarms that were active at an instant and not suppressed: a suppressed alarm is not stale.
+    /// The raising events of the alarms that were active at an instant and not suppressed: a suppressed alarm is not stale.
     pub(super) fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)
     }
 
-    /// The raising steps of the alarms that were active at an instant, also of those that were suppressed.
+    /// The raising events of the alarms that were active at an instant, also of those that were suppressed.
     pub(super) fn active_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)
     }
 
-    /// The steps of alarms in a span, oldest first.
-    pub(super) fn steps(&self, from: Timestamp, to: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+    /// The events of alarms in a span, oldest first.
+    pub(super) fn events(&self, from: Timestamp, to: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::journal(sql::OLDEST), params![utc(from), utc(to), ROWS_MAX + 1], alarm)
     }
 }

@@ -38,8 +38,8 @@ pub struct Opened<T = ()> {
 /// What a station restores from its history when it starts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Restored {
-    /// The steps of alarms that the plant restores.
-    pub steps: Vec<AlarmRecord>,
+    /// The events of alarms that the plant restores.
+    pub events: Vec<AlarmRecord>,
     /// What the alarm monitor must know of the last day.
     pub recent: Recent,
     /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
@@ -52,7 +52,7 @@ impl Store {
     pub fn open_at_start(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened<Restored>, HistoryError> {
         Store::open_and(path, def, now, |store| {
             store.end_curves_left_behind(now)?;
-            let steps = store.restore()?;
+            let events = store.restore()?;
             let recent = match store.recent(now) {
                 // A plant must start even if its journal is too long to be measured.
                 Err(error @ HistoryError::TooManyRows { .. }) => {
@@ -65,7 +65,7 @@ impl Store {
                 .chain_hashes()
                 .inspect_err(|error| tracing::warn!(%error, "not compared with the audit log"))
                 .ok();
-            Ok(Restored { steps, recent, chain_hashes })
+            Ok(Restored { events, recent, chain_hashes })
         })
     }
 

@@ -72,7 +72,7 @@ impl Store {
         }
     }
 
-    /// Of each alarm the last step of every kind, oldest first: from these the plant restores what is active and
+    /// Of each alarm the last event of every kind, oldest first: from these the plant restores what is active and
     /// what is acknowledged.
     pub fn restore(&self) -> Result<Vec<AlarmRecord>, HistoryError> {
         self.whole_list(&sql::restore(), params![ROWS_MAX + 1], alarm)

@@ -62,7 +62,7 @@ impl Store {
         let tags = tags_to_read(def, &reported, recorded.as_ref());
         self.bounded(tags.len(), from, until, now, SAMPLES_MAX)?;
         let active = self.active_at(from)?;
-        let alarms = self.steps(from, until)?;
+        let alarms = self.events(from, until)?;
         let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
         let actions =
             self.whole_list(&sql::actions(sql::OLDEST), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
@@ -92,12 +92,12 @@ impl Store {
             }
             None => (Vec::new(), None),
         };
-        let mut steps: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
-        active.iter().chain(&alarms).for_each(|step| steps.entry(&step.subject).or_default().push(step));
+        let mut events: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
+        active.iter().chain(&alarms).for_each(|event| events.entry(&event.subject).or_default().push(event));
         let row = |tag: &TagId| {
             let label = TagDescription::at(def.tag(*tag), &latest);
-            let steps = steps.get(label.tag.as_str()).into_iter().flatten().copied();
-            let in_alarm = figures::time_in_alarm(steps, from, until);
+            let events = events.get(label.tag.as_str()).into_iter().flatten().copied();
+            let in_alarm = figures::time_in_alarm(events, from, until);
             Some(gathered.get_mut(tag)?.figures.take()?.end(label, in_alarm))
         };
         let tags = reported.iter().filter_map(row).collect();

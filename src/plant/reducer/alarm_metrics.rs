@@ -1,4 +1,4 @@
-//! The alarm monitor in the reducer: it counts every step of an alarm, and after a restart those of the last day.
+//! The alarm monitor in the reducer: it counts every event of an alarm, and after a restart those of the last day.
 
 use jiff::Timestamp;
 
@@ -9,31 +9,31 @@ use crate::plant::{
 };
 
 impl Plant {
-    /// Counts the journal of the last day in the alarm monitor. `active` are the raising steps of alarms
-    /// that were active before it, `steps` what came since; both oldest first, none after `now`. `watched` are the windows
+    /// Counts the journal of the last day in the alarm monitor. `active` are the raising events of alarms
+    /// that were active before it, `events` what came since; both oldest first, none after `now`. `watched` are the windows
     /// of that day in which a station ran.
     pub fn restore_alarm_counts(
         &mut self,
         active: &[AlarmRecord],
-        steps: &[AlarmRecord],
+        events: &[AlarmRecord],
         watched: &[i64],
         now: Timestamp,
     ) {
-        let began = steps.first().map_or(now, |step| step.at.min(now));
+        let began = events.first().map_or(now, |event| event.at.min(now));
         self.alarm_monitor = AlarmMonitor::running(began);
         watched.iter().for_each(|window| self.alarm_monitor.watched(*window));
-        active.iter().for_each(|step| self.alarm_monitor.already(step));
-        steps.iter().for_each(|step| self.alarm_monitor.take(step));
+        active.iter().for_each(|event| self.alarm_monitor.already(event));
+        events.iter().for_each(|event| self.alarm_monitor.take(event));
         self.alarm_monitor.advance(now);
         self.alarm_metrics = self.alarm_monitor.metrics();
     }
 
-    /// Counts the steps of alarms among what is to be stored.
+    /// Counts the events of alarms among what is to be stored.
     pub(super) fn count_alarms(&mut self, records: &[Record]) {
         self.alarm_monitor.advance(self.at);
         for record in records {
             match record {
-                Record::Alarm(step) => self.alarm_monitor.take(step),
+                Record::Alarm(event) => self.alarm_monitor.take(event),
                 Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => {}
             }
         }
@@ -60,11 +60,11 @@ mod tests {
         let values = vec![(DP, 0.0), (FAULT, 0.0), (PV, value)];
         let (device, texts, reply) = (TIC, Vec::new(), Duration::from_millis(12));
         let event = Event::Read { at: at(second), device, values, texts, reply, exchange: None };
-        let steps = plant.on_event(event).records.into_iter().filter_map(|record| match record {
-            Record::Alarm(step) => Some(step),
+        let events = plant.on_event(event).records.into_iter().filter_map(|record| match record {
+            Record::Alarm(event) => Some(event),
             Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
         });
-        steps.collect()
+        events.collect()
     }
 
     #[test]

@@ -15,8 +15,8 @@ use crate::plant::{
 
 impl Plant {
     /// Restores the alarms from the journal after a restart, oldest event first.
-    pub fn restore(&mut self, steps: &[AlarmRecord]) {
-        self.alarm_manager.restore(steps);
+    pub fn restore(&mut self, events: &[AlarmRecord]) {
+        self.alarm_manager.restore(events);
     }
 
     /// Carries out a command about alarms.
@@ -41,8 +41,8 @@ impl Plant {
             }
             AlarmCommand::AcknowledgeAll { alarms } => {
                 let each = alarms.iter().map(|(alarm, since)| manager.acknowledge(*alarm, *since, &note));
-                let (steps, outcome) = together(each);
-                effects.records.extend(steps.into_iter().map(Record::Alarm));
+                let (events, outcome) = together(each);
+                effects.records.extend(events.into_iter().map(Record::Alarm));
                 return outcome;
             }
             AlarmCommand::Silence => manager.silence().then(Vec::new).ok_or(AlarmRefusal::NothingSounds),
@@ -52,7 +52,7 @@ impl Plant {
             AlarmCommand::OutOfService(alarm) => one(manager.out_of_service(alarm, &note)),
             AlarmCommand::InService(alarm) => manager.reinstate(alarm, AlarmEvent::InService, value(alarm), &note),
         };
-        let done = done.map(|steps| effects.records.extend(steps.into_iter().map(Record::Alarm)));
+        let done = done.map(|events| effects.records.extend(events.into_iter().map(Record::Alarm)));
         done.map_err(Refusal::Alarm).into()
     }
 
@@ -78,19 +78,19 @@ impl Plant {
             (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),
             (Subject::Tag(_) | Subject::Station, _) => None,
         };
-        let mut steps = self.alarm_manager.evaluate(self.at, |alarm| facts(image, ill(alarm), alarm));
-        steps.iter_mut().for_each(|step| explain(step, faults));
-        steps
+        let mut events = self.alarm_manager.evaluate(self.at, |alarm| facts(image, ill(alarm), alarm));
+        events.iter_mut().for_each(|event| explain(event, faults));
+        events
     }
 }
 
 /// Adds the detail of a station fault to its alarm event.
-fn explain(step: &mut AlarmRecord, faults: &StationFaults) {
-    if step.event != AlarmEvent::Raised || &*step.subject != STATION {
+fn explain(event: &mut AlarmRecord, faults: &StationFaults) {
+    if event.event != AlarmEvent::Raised || &*event.subject != STATION {
         return;
     }
-    let fault = StationFault::ALL.into_iter().find(|fault| fault.word() == &*step.message);
-    step.reason = fault.and_then(|fault| faults.details.get(&fault).cloned());
+    let fault = StationFault::ALL.into_iter().find(|fault| fault.word() == &*event.message);
+    event.reason = fault.and_then(|fault| faults.details.get(&fault).cloned());
 }
 
 /// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
@@ -145,18 +145,18 @@ fn is_overloaded(line: &LineStatus) -> Option<bool> {
 
 /// The events and the common outcome of several acknowledgements; a refusal is not hidden.
 fn together(each: impl Iterator<Item = Result<AlarmRecord, AlarmRefusal>>) -> (Vec<AlarmRecord>, Outcome) {
-    let (mut steps, mut refused, mut count) = (Vec::new(), Vec::new(), 0);
+    let (mut events, mut refused, mut count) = (Vec::new(), Vec::new(), 0);
     for done in each {
         count += 1;
         match done {
-            Ok(step) => steps.push(step),
+            Ok(event) => events.push(event),
             Err(refusal) => refused.push(refusal),
         }
     }
-    let outcome = match (steps.len(), refused.first()) {
+    let outcome = match (events.len(), refused.first()) {
         (0, first) => Outcome::Refused(Refusal::Alarm(first.cloned().unwrap_or(AlarmRefusal::NothingToAcknowledge))),
         (_, None) => Outcome::Verified,
         (done, Some(first)) => Outcome::NotConfirmed(NotConfirmed::Partly(format!("{done} of {count}; {first}"))),
     };
-    (steps, outcome)
+    (events, outcome)
 }

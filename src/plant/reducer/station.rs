@@ -58,11 +58,11 @@ mod tests {
     }
 
     fn tick(plant: &mut Plant, second: i64) -> Vec<AlarmRecord> {
-        let steps = plant.on_tick(at(second)).records.into_iter().filter_map(|record| match record {
-            Record::Alarm(step) => Some(step),
+        let events = plant.on_tick(at(second)).records.into_iter().filter_map(|record| match record {
+            Record::Alarm(event) => Some(event),
             Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
         });
-        steps.collect()
+        events.collect()
     }
 
     #[test]
@@ -90,8 +90,8 @@ mod tests {
         let raised = tick(&mut plant, 1);
         assert_eq!(raised[0].reason.as_deref(), Some("7 records lost since the start"));
         plant.on_history(lost(7));
-        let steps: Vec<_> = (2..20).flat_map(|second| tick(&mut plant, second)).map(|step| step.event).collect();
-        assert_eq!(steps, [AlarmEvent::ReturnedToNormal]);
+        let events: Vec<_> = (2..20).flat_map(|second| tick(&mut plant, second)).map(|event| event.event).collect();
+        assert_eq!(events, [AlarmEvent::ReturnedToNormal]);
         plant.on_history(lost(8));
         assert_eq!(tick(&mut plant, 20)[0].event, AlarmEvent::Raised);
     }
@@ -112,7 +112,7 @@ mod tests {
         let mut plant = plant();
         let fault = |state| Event::Station { at: at(1), fault: StationFault::LineTask, state };
         let effects = plant.on_event(fault(FaultState::Occurred("line L1 was started again".into())));
-        let Some(Record::Alarm(step)) = effects.records.last() else { panic!("no alarm: {effects:?}") };
-        assert_eq!((&*step.subject, &*step.message), ("station", "line task restarted"));
+        let Some(Record::Alarm(event)) = effects.records.last() else { panic!("no alarm: {effects:?}") };
+        assert_eq!((&*event.subject, &*event.message), ("station", "line task restarted"));
     }
 }

@@ -41,7 +41,7 @@ pub struct Wire {
 impl Wire {
     /// Silence between a request and its answer.
     fn gap(self) -> Duration {
-        if self.ascii { Duration::ZERO } else { self.serial.silence() }
+        if self.ascii { Duration::ZERO } else { self.serial.silent_interval() }
     }
 
     fn spell(self, answer: &Answer) -> Vec<u8> {
@@ -170,13 +170,13 @@ impl Line {
     }
 
     fn silent_at(&self) -> Instant {
-        let silence = if self.wire.ascii { SILENCE_ASCII } else { self.wire.serial.silence() };
+        let silence = if self.wire.ascii { SILENCE_ASCII } else { self.wire.serial.silent_interval() };
         self.latest + self.clock.real_span(silence).max(SILENCE_REAL_MIN)
     }
 
     fn due(&mut self, now: Instant) -> Due {
         if !self.receiver.is_empty() && self.silent_at() <= now {
-            if let Some(frame) = self.receiver.silence() {
+            if let Some(frame) = self.receiver.on_silent_interval() {
                 self.accept(frame);
             }
             return Due::Nothing;

@@ -95,7 +95,7 @@ impl Station {
 
 fn steps(history: &Path) -> Vec<AlarmEvent> {
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
-    let steps = found.steps.unwrap_or_default();
+    let steps = found.events.unwrap_or_default();
     steps.iter().filter(|step| &*step.subject == "TIC-1").map(|step| step.event).collect()
 }
 

@@ -146,7 +146,7 @@ pub fn dead(libmodbus: Option<&Path>) {
 
 /// Use of the wire and shares of the polls where they want more than it can carry.
 pub fn overload(libmodbus: Option<&Path>) {
-    let read = SERIAL.char_time() * (8 + 5 + 2 * u32::from(WORDS)) + 2 * SERIAL.silence();
+    let read = SERIAL.char_time() * (8 + 5 + 2 * u32::from(WORDS)) + 2 * SERIAL.silent_interval();
     let critical = NORMAL + 1;
     let sets: Vec<Vec<Unit>> = DEMANDS.iter().map(|demand| wanted(*demand, read)).collect();
     let lines = vec![Transport::rtu("", SERIAL); DEMANDS.len()];

@@ -94,7 +94,7 @@ fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 
     while let Ok(count) = line.read(&mut bytes) {
         let now = Instant::now();
         if now - latest > SILENCE {
-            receiver.silence();
+            receiver.on_silent_interval();
         }
         if receiver.is_empty() {
             began = now;
@@ -113,8 +113,10 @@ fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 
             let Some(answer) = received.and_then(super::answer) else { continue };
             // Before its last byte: who has read it finds it counted.
             served[usize::from(answer[0] % 64)].fetch_add(1, Ordering::Relaxed);
-            let Ok(end) = say(&mut line, &with_crc(&answer), over + serial.silence(), character) else { return };
-            quiet = end + serial.silence();
+            let Ok(end) = say(&mut line, &with_crc(&answer), over + serial.silent_interval(), character) else {
+                return;
+            };
+            quiet = end + serial.silent_interval();
         }
     }
 }

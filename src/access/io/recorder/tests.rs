@@ -40,10 +40,10 @@ fn clock() -> Clock {
     Clock::starting_at(jiff::Timestamp::from_second(1_000_000).unwrap(), 1.0)
 }
 
-fn batch(actions: &[&str], steps: &[AlarmEvent]) -> Batch {
+fn batch(actions: &[&str], events: &[AlarmEvent]) -> Batch {
     let at = jiff::Timestamp::from_second(1_000_000).unwrap();
-    let step = |kind: &AlarmEvent| AlarmRecord::new(at, "TIC-1.PV", "high", Priority::High, *kind);
-    Batch { actions: actions.iter().map(|what| record(what)).collect(), steps: steps.iter().map(step).collect() }
+    let event = |kind: &AlarmEvent| AlarmRecord::new(at, "TIC-1.PV", "high", Priority::High, *kind);
+    Batch { actions: actions.iter().map(|what| record(what)).collect(), events: events.iter().map(event).collect() }
 }
 
 /// What went to the history.
@@ -192,8 +192,8 @@ fn refused_writes_are_unrecorded_until_the_disk_is_back() {
     let sealed: Vec<_> = rows.iter().filter(|row| row.chain_hash.is_some()).map(|row| &*row.action).collect();
     assert_eq!(sealed, ["start", "acknowledge", "write"]);
     assert_eq!(verify(&beside(&history_file), &chain_hashes(&rows)).unwrap().compared, 3);
-    let steps = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1.steps.unwrap();
-    assert_eq!(steps, batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).steps);
+    let events = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1.events.unwrap();
+    assert_eq!(events, batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
 }
 
 #[test]
@@ -263,7 +263,7 @@ fn acknowledgements_survive_without_a_history() {
     runtime.block_on(recorded.wait_for(|recorded| recorded.batches == 1)).unwrap();
     // Killed here: only what is on disk counts.
     let found = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1;
-    assert_eq!(found.steps.unwrap(), batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).steps);
+    assert_eq!(found.events.unwrap(), batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
     drop(batches);
     join.join().unwrap();
 }

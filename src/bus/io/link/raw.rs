@@ -33,7 +33,7 @@ impl Link {
             reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
             // One frame answers a request; after other bytes only silence ends the response.
             if request.is_empty() {
-                until = (Instant::now() + self.idle).min(deadline);
+                until = (Instant::now() + self.frame_timeout).min(deadline);
                 continue;
             }
             let whole = match framing {
@@ -50,7 +50,7 @@ impl Link {
         if !buffer.is_empty() {
             self.wire.record(false, buffer[..].into(), Cow::Borrowed("received"));
         }
-        self.wire.rest(self.wire.silence);
+        self.wire.hold_off(self.wire.silent_interval);
         // What was sent may have been a request whose answer is still to come.
         if framing != Framing::Mbap && !request.is_empty() && !(answered && proof) {
             self.expect_late(&request);

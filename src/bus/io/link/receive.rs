@@ -78,7 +78,7 @@ impl Link {
                 FrameMatch::Nothing => deadline,
                 // The frame may still grow, or it is corrupt; silence decides.
                 FrameMatch::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
-                FrameMatch::Begun | FrameMatch::Corrupt(_) => (Instant::now() + self.idle).min(deadline),
+                FrameMatch::Begun | FrameMatch::Corrupt(_) => (Instant::now() + self.frame_timeout).min(deadline),
             };
             if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= RECEIVE_MAX {
                 reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));

@@ -375,7 +375,7 @@ impl Link {
             };
             self.wire.record(false, frame.clone(), verdict);
         }
-        self.wire.rest(self.wire.silence);
+        self.wire.hold_off(self.wire.silent_interval);
         let exchange = Exchange {
             at: self.wire.clock().to_utc(self.wire.clock().at(sent_at)),
             framing: Framing::Mbap,

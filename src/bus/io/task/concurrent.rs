@@ -92,8 +92,8 @@ impl Task<'_> {
         began: Timestamp,
         tries: u8,
     ) {
-        let patience = schedule.patience(index, &self.settings);
-        let id = link.submit(&block.request(), patience);
+        let response_timeout = schedule.response_timeout(index, &self.settings);
+        let id = link.submit(&block.request(), response_timeout);
         self.under_way.push(UnderWay { id, index, block, began, tries });
     }
 

@@ -56,7 +56,7 @@ impl Task<'_> {
         let began = self.clock.now();
         let sent = link.last.clone();
         let timeout = link.timeout();
-        link.set_timeout(schedule.patience(index, &self.settings));
+        link.set_timeout(schedule.response_timeout(index, &self.settings));
         let read = self.read_unless_stopped(link, &block, Some(index)).await;
         link.set_timeout(timeout);
         let ended = self.clock.now();
@@ -74,7 +74,7 @@ impl Task<'_> {
                 return Ok(());
             }
         };
-        // Nothing new was sent when patience was the only way.
+        // If only time could resynchronise, nothing was sent and `last` is the previous exchange.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
         let took = elapsed(began, ended);
         self.finish_poll(link, schedule, Some(index), &block, Outcome { began, ended, took, answer, exchange }).await?;
@@ -262,7 +262,7 @@ pub(super) enum Answer {
 }
 
 /// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another shape,
-/// part of this block or of one of `blocks`, if there is one, else by a loopback, else by patience.
+/// part of this block or of one of `blocks`, if there is one, else by a loopback, else by time.
 async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), LinkError> {
     if !link.is_ambiguous(&block.request()) {
         return Ok(());

@@ -38,7 +38,7 @@ impl Task<'_> {
         match (result, &mut self.job) {
             (Ok(result), Some(job)) => {
                 let in_sync = stays_in_sync(link.framing(), &step.ask, &result);
-                job.take(result);
+                job.on_result(result);
                 self.publish_diagnostic().await?;
                 if in_sync { Ok(()) } else { Err(LinkExit::Reopen) }
             }
@@ -97,10 +97,10 @@ impl Task<'_> {
             };
             settings = wanted;
             let result = self.step_unless_cut(&mut link, &step, true).await?;
-            self.close_second(&mut link);
+            self.collect_stats(&mut link);
             let Some(result) = result else { break };
             match (result, &mut self.job) {
-                (Ok(result), Some(job)) => job.take(result),
+                (Ok(result), Some(job)) => job.on_result(result),
                 (Err(LinkError::Gone(why)), _) => {
                     self.end_diagnostic(&why).await?;
                     break;
@@ -122,12 +122,12 @@ impl Task<'_> {
             }
             BusRequest::Refresh { .. } if alone => Ok(true),
             BusRequest::Write(WriteJob { urgent: false, .. }) | BusRequest::Refresh { .. } => {
-                self.requests.put_off(request);
+                self.requests.defer(request);
                 Ok(true)
             }
             BusRequest::Write(WriteJob { urgent: true, .. }) => {
                 self.end_diagnostic("cancelled by an urgent stop").await?;
-                self.requests.put_first(request);
+                self.requests.requeue_first(request);
                 Ok(false)
             }
             BusRequest::StopTest => {
@@ -136,7 +136,7 @@ impl Task<'_> {
             }
             BusRequest::Connect(_) | BusRequest::Test { .. } | BusRequest::Configure(_) => {
                 self.stop_diagnostic().await?;
-                self.requests.put_first(request);
+                self.requests.requeue_first(request);
                 Ok(false)
             }
         }

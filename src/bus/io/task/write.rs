@@ -62,7 +62,7 @@ impl Task<'_> {
         let result = match written {
             // It waits again, unless the stop is one of its tag.
             Written::Ended(WriteResult::Superseded) => {
-                self.requests.put_off(BusRequest::Write(*job));
+                self.requests.defer(BusRequest::Write(*job));
                 return Ok(());
             }
             Written::Ended(result) => result,
@@ -189,7 +189,7 @@ impl Task<'_> {
         // An action such as saving to non-volatile memory wants the device left alone, not the line.
         let is_this = |action: &&ActionDef| action.tag == tag.id && scale::to_raw(tag, action.value, 0) == Some(raw);
         if let Some(action) = device.actions.iter().find(is_this) {
-            schedule.rest(tag.device, self.clock.now() + action.settle);
+            schedule.hold_off(tag.device, self.clock.now() + action.settle);
         }
         if !verify {
             return Written::Ended(WriteResult::Accepted);
@@ -227,7 +227,7 @@ impl Task<'_> {
     /// The device is left alone for a while after a write; the others are not, unless it was a broadcast.
     fn keep_write_gap(&self, link: &mut Link, schedule: &mut Schedule, device: &DeviceDef) {
         if device.unit == 0 {
-            link.rest(device.write_gap);
+            link.hold_off(device.write_gap);
         } else if !device.write_gap.is_zero() {
             schedule.keep_gap(device.id, self.clock.now() + device.write_gap);
             link.rest_unit(device.unit, device.write_gap);

@@ -203,7 +203,7 @@ fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
     let steps = [old, before, late].map(|(second, text)| AlarmRecord { at: at(second), ..step(0, &text, Raised) });
     store.append(&steps.clone().map(Record::Alarm)).unwrap();
     let recent = store.recent(at(0.0)).unwrap();
-    assert_eq!((recent.active.as_slice(), recent.steps.as_slice()), (&steps[..1], &steps[1..]));
+    assert_eq!((recent.active.as_slice(), recent.events.as_slice()), (&steps[..1], &steps[1..]));
 }
 
 #[test]

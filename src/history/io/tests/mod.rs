@@ -292,7 +292,7 @@ fn a_stop_ends_every_curve_and_a_run_answers_queries() {
     let (_folder, db) = folder();
     let clock = Clock::starting_at(sec(10), 1.0);
     let mut handle = thread::start(&db, def(), clock).unwrap();
-    assert_eq!(handle.restored.take().unwrap().blocking_recv().unwrap().steps, []);
+    assert_eq!(handle.restored.take().unwrap().blocking_recv().unwrap().events, []);
     handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmEvent::Raised))]).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period { name: "period".into(), from: sec(0), to: sec(10) };

@@ -1,4 +1,4 @@
-//! Which alarms of the audit log the list shows: by priority, state, area and words; pure.
+//! Which alarms the list shows: by priority, state, area and words; pure.
 
 use crate::plant::{
     alarm::{AlarmState, manager::subject_name},

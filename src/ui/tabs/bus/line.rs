@@ -70,8 +70,8 @@ fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
     let mut parts =
         vec![plain(line.transport.to_string(), theme.strong()), value(cx, t!("timeout"), &ms(line.timeout))];
     if let Some(serial) = line.transport.serial() {
-        parts.push(value(cx, t!("silence"), &ms(serial.silence().max(line.gap))));
-        parts.push(value(cx, t!("end of response"), &ms(line.idle)));
+        parts.push(value(cx, t!("silence"), &ms(serial.silent_interval().max(line.gap))));
+        parts.push(value(cx, t!("end of response"), &ms(line.frame_timeout)));
     }
     let lamp = |on: bool| if on { theme.pick("●", "@") } else { theme.pick("○", "o") };
     let counters = &at.status.counters;
