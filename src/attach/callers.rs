@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn endless_attaches_of_one_user_keep_out_nobody_else() {
+    fn endless_attaches_of_one_user_keep_no_other_user_out() {
         let mut callers = Callers::new(500);
         let attached = (0..10_000).filter(|_| callers.attach(EVE, seconds(1)).is_ok()).count();
         assert_eq!(attached, TERMINALS_OF_USER_MAX);

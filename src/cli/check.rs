@@ -127,7 +127,7 @@ mod tests {
     use crate::plant::fixture;
 
     #[test]
-    fn the_plan_is_told_in_both_number_bases_with_its_verdict() {
+    fn the_plan_is_reported_in_both_number_bases_with_its_verdict() {
         let text = describe(&fixture::plant(), LineId(0)).join("\n");
         for part in [
             "9600 8N1",

@@ -104,7 +104,7 @@ fn run_drill(
         let time = Clock::starting_at(morning(&def), 1.0);
         let simulator = SimulatorHandle::spawn_for(&def, simulator(&def, Some(&scenario))?, time);
         let (observer, journal) = journal();
-        let station = station::start_drill(def.clone(), time, in_memory(&def, &simulator), Box::new(observer));
+        let station = station::start_transient(def.clone(), time, in_memory(&def, &simulator), Box::new(observer));
         let session = station.session("drill");
         // Without an operator the commands are dropped.
         let commands = if with_operator { station.commands.clone() } else { mpsc::channel(1).0 };

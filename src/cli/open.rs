@@ -58,7 +58,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let (line, unit) = find(line, &args).await?;
         let def = Arc::new(bench(line, unit));
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
-        let station = station::rehearse(def, Clock::real(), connectors, Box::new(|_| {}));
+        let station = station::start_transient(def, Clock::real(), connectors, Box::new(|_| {}));
         let session = station.session(&paths::operator());
         let result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Bench)).await;
         station.stop().await;

@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn an_actuator_that_does_not_obey_is_told_after_its_travel() {
+    fn an_actuator_that_does_not_obey_is_reported_after_its_travel() {
         let check = |auto: Sample, command: Sample, output: Sample, level: Sample, expect: Option<u64>| {
             let (logic, mut watch) = (logic(true), ActuatorTracker::default());
             let sample = |tag: TagId| [auto, command, output, level][tag.index()];

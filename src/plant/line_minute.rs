@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn every_minute_is_told_once_at_its_end() {
+    fn every_minute_is_reported_once_at_its_end() {
         let mut watch = LineMinuteTracker::default();
         let mut minutes = Vec::new();
         for second in 30..250 {

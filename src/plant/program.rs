@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn time_in_halt_does_not_count_and_an_unseen_beginning_is_told() {
+    fn time_in_halt_does_not_count_and_an_unseen_begin_is_shown() {
         let at = |second| Timestamp::from_second(second).expect("a small number");
         let mut watch = ProgramWatch::default();
         let mut check = |second, position: Option<f64>, command: f64, expect: Option<(u64, bool)>| {

@@ -253,7 +253,7 @@ unit = 1
     }
 
     #[test]
-    fn what_cannot_be_saved_is_told() {
+    fn what_cannot_be_saved_is_reported() {
         let check = |text: &str, settings: &LineDef, expect: &str| {
             let refused = with_line(text, settings);
             assert!(refused.as_ref().is_err_and(|why| why.contains(expect)), "{refused:?}");

@@ -361,7 +361,7 @@ fn an_action_asks_before_it_acts() {
 }
 
 #[test]
-fn a_program_names_tags_that_can_be_told_what_to_do() {
+fn a_program_names_tags_that_take_commands() {
     let with = |program: &str| {
         let text = format!("status = \"manual\"\nsource = \"manual\"\n\n[program]\n{program}\n\n[limits]");
         move |expect: &[&str]| check("status = \"manual\"\nsource = \"manual\"\n\n[limits]", &text, expect)

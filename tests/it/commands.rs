@@ -31,7 +31,7 @@ fn help_names_every_command_and_the_exit_codes() {
 }
 
 #[test]
-fn a_missing_plant_is_told_by_name_with_exit_code_2() {
+fn a_missing_plant_is_reported_by_name_with_exit_code_2() {
     for args in [["run", "nowhere.toml"], ["check", "nowhere.toml"]] {
         let (code, _, err) = run(&args);
         assert_eq!(code, Some(2), "{err}");
@@ -97,7 +97,7 @@ fn an_alarm_without_guidance_warns_and_strict_refuses_it() {
 }
 
 #[test]
-fn the_quality_of_the_alarms_is_told_in_lines_and_in_json() {
+fn the_quality_of_the_alarms_is_reported_in_lines_and_in_json() {
     let folder = folder();
     let path = folder.path().join("tank.duckdb");
     let history = path.to_str().unwrap();
@@ -157,7 +157,7 @@ fn shipped_profiles_are_in_the_binary() {
 }
 
 #[test]
-fn a_frame_is_told_in_words() {
+fn a_frame_is_reported_in_words() {
     let (code, out, err) = run(&["decode", "01", "03", "03", "EA", "00", "01", "A5", "BA"]);
     assert_eq!(code, Some(0), "{err}");
     for word in

@@ -121,7 +121,7 @@ fn audit_without_a_comparison_with_the_history_fails() {
 }
 
 #[test]
-fn a_book_that_is_not_there_is_told_by_name() {
+fn a_book_that_is_not_there_is_reported_by_name() {
     let folder = folder();
     let (code, said) = verify(folder.path(), &["--log", "/nowhere/tank.audit.jsonl"]);
     assert_eq!(code, Some(1), "{said}");

@@ -68,7 +68,7 @@ proptest! {
 }
 
 #[test]
-fn a_plant_that_fits_is_told_with_its_cycle_and_its_dead_units() {
+fn a_plant_that_fits_has_its_cycle_and_its_dead_units() {
     let def = fixture::plant();
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
     assert_eq!((&admission.verdict, admission.factor), (&Verdict::Fits, Some(1.0)));

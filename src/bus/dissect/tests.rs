@@ -32,7 +32,7 @@ fn check(message: &str, asked: &str, summary: &str) -> Dissection {
 }
 
 #[test]
-fn requests_are_told_with_both_forms_of_the_address() {
+fn requests_are_reported_with_both_forms_of_the_address() {
     for (message, summary) in [
         ("01 03 03 EA 00 0A", "unit 1 read holding registers 41003–41012 (0x03EA, 10)"),
         ("01 04 00 00 00 01", "unit 1 read input registers 30001 (0x0000, 1)"),
@@ -63,7 +63,7 @@ fn requests_are_told_with_both_forms_of_the_address() {
 }
 
 #[test]
-fn answers_are_told_with_the_addresses_of_their_request() {
+fn answers_are_reported_with_the_addresses_of_their_request() {
     for (message, asked, summary) in [
         ("01 03 04 00 C8 FF FE", "01 03 03 EA 00 02", "2 registers: 00C8 FFFE"),
         ("11 01 05 CD 6B B2 0E 1B", "11 01 00 13 00 25", "37 bits: 1011 0011 1101 0110 0100 1101 0111 0000 1101 1"),

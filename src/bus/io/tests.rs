@@ -138,7 +138,7 @@ async fn an_answer_in_two_pieces_is_one_answer() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn each_corrupt_answer_is_told_by_its_name() {
+async fn each_corrupt_answer_is_reported_by_its_name() {
     // Twice, so that the one retry of a corrupt read does not hide it; the probes before each of the two answer well.
     let twice = |action: SlaveAction| {
         move |number, _: &[u8]| if number == 1 || number == 3 { action.clone() } else { SlaveAction::Answer }
@@ -218,7 +218,7 @@ async fn a_device_that_stays_out_of_step_is_read_again_after_a_rest() {
 
 /// A device that never stops sending is reported as a failure, and the line still serves commands.
 #[tokio::test(start_paused = true)]
-async fn a_chattering_line_is_told_and_can_be_closed() {
+async fn a_chattering_line_is_reported_and_can_be_closed() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     let (ours, mut theirs) = tokio::io::duplex(4096);

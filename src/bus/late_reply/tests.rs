@@ -49,7 +49,7 @@ fn a_loopback_is_never_ambiguous_and_its_first_refusal_is_proof() {
 }
 
 #[test]
-fn writes_are_told_apart_by_their_echo() {
+fn writes_are_distinguished_by_their_echo() {
     let mut outstanding = OutstandingReplies::default();
     outstanding.add(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap());
     assert!(!outstanding.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 6]).unwrap()));

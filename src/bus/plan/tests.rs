@@ -164,7 +164,7 @@ fn a_missing_register_is_found_and_not_read_over_again() {
 }
 
 #[test]
-fn a_missing_tag_is_told_and_its_neighbours_are_read() {
+fn a_missing_tag_is_reported_and_its_neighbours_are_read() {
     let def = words(&[0, 1, 2, 3, 4, 5, 6, 7]);
     let (unreadable, asked) = bisection(&def, &[5], 125);
     assert_eq!(refused(&def, LineId(0), &unreadable), [TagId(5)]);

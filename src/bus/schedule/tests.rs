@@ -171,7 +171,7 @@ fn units_that_never_answer_are_all_given_up_within_seconds() {
 }
 
 #[test]
-fn a_try_of_which_nothing_is_told_is_not_made_again_at_once() {
+fn a_try_of_which_nothing_is_reported_is_not_made_again_at_once() {
     let mut schedule = Schedule::new(&[block(0, every(1000))], at(0));
     schedule.answered(DeviceId(0), Some(Duration::from_millis(10)), at(0));
     schedule.done(0, at(0), at(300));
@@ -330,7 +330,7 @@ proptest! {
     }
 
     #[test]
-    fn nobody_starves_whatever_the_classes(load in polls(1..12), classes in proptest::collection::vec(0usize..3, 12)) {
+    fn no_poll_starves_whatever_the_classes(load in polls(1..12), classes in proptest::collection::vec(0usize..3, 12)) {
         let class = |n: usize| [PollClass::Critical, PollClass::Normal, PollClass::Background][classes[n]];
         let blocks = blocks(&load, class);
         let mut schedule = Schedule::new(&blocks, at(0));

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_settings_are_told_with_what_was_expected() {
+    fn wrong_settings_are_reported_with_what_was_expected() {
         for (args, part) in [
             ("/dev/ttyUSB0 --mode tcp", "expected HOST or HOST:TCPPORT for tcp"),
             ("plc --mode rtu", "expected a path such as /dev/ttyUSB0"),

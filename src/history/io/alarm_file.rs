@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_was_removed_or_changed_is_written_anew() {
+    fn a_file_that_was_removed_or_changed_is_rewritten() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);

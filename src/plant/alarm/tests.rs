@@ -48,7 +48,7 @@ fn events(records: &[AlarmRecord]) -> Vec<AlarmEvent> {
 }
 
 #[test]
-fn an_alarm_is_told_with_value_and_limit_and_survives_a_restart() {
+fn an_alarm_has_value_and_limit_and_survives_a_restart() {
     let mut manager = AlarmManager::new(fixture::shared());
     assert!(manager.evaluate(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
     let events = manager.evaluate(at(2), facts(81.0, true));
@@ -178,7 +178,7 @@ fn a_clock_that_goes_back_lengthens_no_shelf_and_no_delay() {
 }
 
 #[test]
-fn an_alarm_out_of_service_stays_so_until_somebody_puts_it_back() {
+fn an_alarm_out_of_service_stays_so_until_it_is_put_back() {
     let mut manager = AlarmManager::new(with(|alarm| alarm.on_delay = Duration::ZERO));
     assert_eq!(manager.out_of_service(HIGH, &note(at(0), Some(&" ".into()))), Err(AlarmRefusal::ReasonNeeded));
     assert_eq!(manager.reinstate(HIGH, AlarmEvent::InService, None, &note(at(0), None)), Err(AlarmRefusal::InService));

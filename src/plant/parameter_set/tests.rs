@@ -73,7 +73,7 @@ fn limits_that_widen_come_first_and_limits_that_narrow_last() {
 }
 
 #[test]
-fn what_cannot_be_written_is_told_before_anything_is() {
+fn what_cannot_be_written_is_reported_before_anything_is() {
     let check = |set: &ParameterSet, expect: &[&str]| {
         let expect: Vec<String> = expect.iter().map(|words| (*words).to_owned()).collect();
         assert_eq!(planned([0., 100., 50., 0.], set), Err(expect));
@@ -174,7 +174,7 @@ fn a_value_in_another_unit_is_another_value() {
 }
 
 #[test]
-fn what_an_interlock_forbids_is_told_before_anything_is_written() {
+fn what_an_interlock_forbids_is_shown_before_the_writes() {
     let mut def = def();
     def.logic.interlocks.push(InterlockDef {
         tag: MODE,

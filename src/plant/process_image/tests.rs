@@ -96,7 +96,7 @@ fn trust_goes_with_failures() {
 }
 
 #[test]
-fn nobody_elses_answer_revives_a_doubtful_value() {
+fn no_other_answer_revives_a_doubtful_value() {
     let mut image = image();
     image.failed(&[PV], Fault::Timeout, at(1));
     image.read(&[(FAULT, 0.0), (DP, 1.0)], at(2));

@@ -316,7 +316,7 @@ fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
 }
 
 #[test]
-fn a_full_queue_is_told_to_the_operator() {
+fn a_full_queue_is_reported_to_the_operator() {
     let mut plant = running();
     let effects = plant.on_command(shown(&plant, 1, SV, 72.5), at(1));
     plant.on_undeliverable(effects.bus[0].0, &effects.bus[0].1);

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_file_that_is_no_toml_is_told_from_one_that_is_wrong() {
+fn a_file_that_is_no_toml_is_not_taken_for_a_wrong_one() {
     let check = |bytes: &[u8], expect: &[&str]| {
         let text = load(bytes, METER, PLC).expect_err("it is no plant").to_string();
         for piece in expect {

@@ -70,7 +70,7 @@ where
                 Due::Execute { at, request } => line.execute(at, &request, &units).await,
                 Due::Send(frame) => match timeout(WRITE_MAX, stream.write_all(&frame)).await {
                     Ok(written) => written?,
-                    Err(_nobody_takes_it) => {}
+                    Err(_receiver_gone) => {}
                 },
             },
             () = sleep_until(line.latest + idle_max) => return Ok(()),

@@ -104,7 +104,7 @@ fn a_programme_moves_the_set_value_in_use_and_ends() {
 }
 
 #[test]
-fn a_broken_sensor_drives_the_output_where_it_was_told_to() {
+fn a_broken_sensor_drives_the_output_as_configured() {
     for (action, output) in [(0, 0.0), (1, 100.0), (2, 0.0), (3, 100.0)] {
         let pxr = &mut Pxr::new(27.0);
         write(pxr, 1013, action);
@@ -138,7 +138,7 @@ fn a_power_cut_during_the_saving_loses_it() {
 }
 
 #[test]
-fn a_burnt_out_heater_is_told_from_one_that_is_warming_up() {
+fn a_burnt_out_heater_is_not_taken_for_a_warm_up() {
     let pxr = &mut Pxr::new(27.0);
     write(pxr, 1038, 50);
     // 1600 W are 7.3 A at full output.

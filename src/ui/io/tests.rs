@@ -37,7 +37,7 @@ fn on_the_pty() {
         let (publish, snapshots) = watch::channel(Fixture::alarm().snapshot());
         let (requests, mut taken) = mpsc::channel(8);
         let who = LoggedInUser { user: "tech1".into(), role: Role::Supervisor, must_change: false };
-        let (_told, status) =
+        let (_reported, status) =
             watch::channel(Arc::new(SessionStatus { who: Some(who), view: true, ..SessionStatus::default() }));
         tokio::spawn(async move {
             while let Some((_, request)) = taken.recv().await {

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_number_is_told_before_it_is_sent() {
+    fn a_wrong_number_is_reported_before_it_is_sent() {
         let fixture = Fixture::normal();
         let check = |text: &str, expect: Result<f64, &str>| {
             assert_eq!(checked(&fixture, text), expect.map_err(str::to_owned), "{text}")

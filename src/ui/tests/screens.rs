@@ -183,7 +183,7 @@ fn a_screen_of_any_width_says_that_it_is_too_small() {
 }
 
 #[test]
-fn nobody_says_no_alarms_who_cannot_see_them() {
+fn no_alarms_is_not_said_where_they_are_not_shown() {
     let check = |state: LineState, expect: &str| {
         let mut fixture = Fixture::normal();
         fixture.line.state = state;

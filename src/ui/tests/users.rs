@@ -161,7 +161,7 @@ fn work_waits_while_the_terminal_is_locked() {
 }
 
 #[test]
-fn what_a_role_may_not_is_told_before_it_is_tried() {
+fn what_a_role_may_not_is_reported_before_it_is_tried() {
     let mut model = with(&Fixture::normal(), person("tom", Role::Viewer));
     shows(&mut model, "Technician: s r m");
     type_keys(&mut model, "s65");

@@ -1,4 +1,4 @@
-//! No text that people see uses a word that the vocabulary has replaced.
+//! No text that people see, no comment and no name in the code uses a word that the vocabulary has replaced.
 
 use std::fs;
 
@@ -84,6 +84,31 @@ fn in_literals(files: &[Facts]) -> Breaches {
     breaches
 }
 
+/// Words that neither comments nor names may use either.
+const BANNED_IN_CODE: &[&str] = &["anew", "deed", "deeds", "nobody", "somebody", "told", "wish", "wished", "wishes"];
+
+/// The comments and names of a line of code: all but its literals.
+fn without_literals(line: &str) -> String {
+    let line = line.replace("\\\"", "");
+    let (code, comment) = line.split_once("//").unwrap_or((&line, ""));
+    code.split('"').step_by(2).chain([comment]).collect::<Vec<_>>().join(" ")
+}
+
+/// Comments and names, in tests too. The lines of a literal that spans several count as well.
+fn in_code(files: &[(String, String)]) -> Breaches {
+    let mut breaches = Breaches::new();
+    // These laws have to name the words.
+    for (path, text) in files.iter().filter(|(path, _)| !path.starts_with("tests/it/architecture/")) {
+        for (line, code) in text.lines().enumerate().map(|(line, code)| (line + 1, without_literals(code))) {
+            let words = code.split(|letter: char| !letter.is_alphanumeric()).map(str::to_lowercase);
+            for word in words.filter(|word| BANNED_IN_CODE.contains(&word.as_str())) {
+                breaches.entry(path.clone()).or_default().push(format!("  line {line}: `{word}`"));
+            }
+        }
+    }
+    breaches
+}
+
 /// Files that people read or write themselves.
 fn in_documents() -> Breaches {
     let mut documents = vec![("README.md".to_owned(), fs::read_to_string(source::root().join("README.md")).unwrap())];
@@ -123,6 +148,28 @@ fn no_text_uses_a_banned_word() {
     breaches.append(&mut in_documents());
     in_help(&[], &mut breaches);
     assert_law_counted("banned_words", breaches);
+}
+
+#[test]
+fn no_comment_or_name_uses_a_banned_word() {
+    let mut files = Vec::new();
+    for folder in ["src", "tests"] {
+        walk(&source::root().join(folder), "rs", &mut files);
+    }
+    assert_law_counted("banned_in_code", in_code(&files));
+}
+
+#[test]
+fn a_banned_word_in_code_is_seen() {
+    let check = |path: &str, text: &str, expected: usize| {
+        let found = in_code(&[(path.to_owned(), text.to_owned())]);
+        assert_eq!(found.values().map(Vec::len).sum::<usize>(), expected, "{text}");
+    };
+    check("src/a.rs", "// Nobody is told.", 2);
+    check("src/a.rs", "fn nobody_is_there() {}", 1);
+    check("src/a.rs", "let user = \"nobody\"; // the user", 0);
+    check("src/a.rs", "let user = \"a \\\"wish\\\"\"; // a wish", 1);
+    check("tests/it/architecture/words.rs", "// nobody", 0);
 }
 
 #[test]

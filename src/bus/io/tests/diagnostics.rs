@@ -38,7 +38,7 @@ async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
 
 /// Bytes that are no request are sent as they are, and whatever comes back is reported.
 #[tokio::test(start_paused = true)]
-async fn nonsense_is_sent_and_nonsense_is_told() {
+async fn nonsense_is_sent_and_nonsense_is_reported() {
     for mode in [Mode::Rtu, Mode::Tcp] {
         let def = plant(mode);
         let mut line = line(def.clone());

@@ -7,7 +7,7 @@ async fn one_dead_unit_leaves_the_others_their_rate() {
     let def = plant(Mode::Rtu);
     let mut line = line(def.clone());
     line.plug(Mode::Rtu, |_, message| if message[0] == 1 { SlaveAction::Silent } else { SlaveAction::Answer });
-    let (mut reads, mut told_down) = (BTreeMap::new(), 0);
+    let (mut reads, mut reported_down) = (BTreeMap::new(), 0);
     let mut end = Timestamp::UNIX_EPOCH;
     while end < Timestamp::from_second(120).expect("a small number") {
         match line.next(&def).await {
@@ -17,12 +17,12 @@ async fn one_dead_unit_leaves_the_others_their_rate() {
             }
             Event::Failed { fault: Fault::BackedOff, device, tags, .. } => {
                 assert_eq!((device, tags.len()), (DeviceId(0), 10), "all its tags at once");
-                told_down += 1;
+                reported_down += 1;
             }
             _ => {}
         }
     }
-    assert_eq!(told_down, 1);
+    assert_eq!(reported_down, 1);
     // Three blocks a second for two minutes, and one block once.
     let rate = f64::from(reads[&DeviceId(1)]) / 361.0;
     assert!(0.9 <= rate, "the living unit keeps {rate} of its rate");

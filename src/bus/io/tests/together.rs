@@ -70,7 +70,7 @@ async fn a_dead_unit_does_not_hold_the_answers_of_the_others() {
 
 /// What was read before a write is not reported after it: the screen would show the old value once more.
 #[tokio::test(start_paused = true)]
-async fn no_value_that_was_read_before_a_write_is_told_after_it() {
+async fn no_value_that_was_read_before_a_write_is_reported_after_it() {
     let def = gateway();
     let mut line = line(def.clone());
     line.plug(Mode::Tcp16, |_, message| match message {

@@ -175,7 +175,7 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
 
 /// A key that was turned stays turned though the value is refused: that is reported, and the key is read again.
 #[tokio::test(start_paused = true)]
-async fn a_key_is_told_and_read_again_though_the_value_is_refused() {
+async fn a_key_is_reported_and_read_again_though_the_value_is_refused() {
     let def = plant(Mode::Rtu);
     let (value, key) = (TagId(1), TagId(9));
     let mut line = line(def.clone());

@@ -116,7 +116,7 @@ fn files_that_twice_never_opened_are_set_aside() {
 }
 
 #[test]
-fn a_second_process_is_told_who_has_the_file() {
+fn a_second_process_learns_who_has_the_file() {
     let (_folder, db) = folder();
     let mut holder = child("hold", &db);
     let mut ready = String::new();

@@ -89,7 +89,7 @@ fn a_value_that_stands_still_is_stuck_and_an_unknown_one_is_not() {
 }
 
 #[test]
-fn no_update_is_told_from_unknown_values_alone() {
+fn no_update_is_reported_for_unknown_values_alone() {
     let silent = Condition::NoUpdate { lasts: sec(30) };
     let (no, yes) = (Some(false), Some(true));
     let values = [(0, None), (29, None), (30, None), (31, None), (32, Some(1.0)), (61, None), (63, None)];
@@ -97,7 +97,7 @@ fn no_update_is_told_from_unknown_values_alone() {
 }
 
 #[test]
-fn a_signal_that_changes_too_often_is_told_until_it_calms_down() {
+fn a_chattering_signal_is_in_alarm_until_it_calms_down() {
     let busy = Condition::Changes { count: 3, within: sec(10), deadband: 0.0 };
     let (no, yes) = (Some(false), Some(true));
     let values = [(0, 0.0), (1, 1.0), (5, 0.0), (8, 1.0), (11, 1.0), (12, 1.0)].map(|(at, value)| (at, Some(value)));
@@ -123,7 +123,7 @@ fn a_restored_alarm_clears_only_by_what_was_measured_since() {
 }
 
 #[test]
-fn what_has_been_is_forgotten_when_an_alarm_is_enabled_anew() {
+fn what_has_been_is_forgotten_when_an_alarm_is_enabled_again() {
     let stuck = Condition::NoChange { lasts: sec(60), deadband: 0.2 };
     let (mut memory, facts) = (Memory::default(), Facts { value: Some(20.0), ..Facts::default() });
     assert_eq!(holds(stuck, facts, false, &mut memory, sec(0)), Some(false));

@@ -91,7 +91,7 @@ fn a_mistake_is_reported_with_line_found_and_expected() {
 }
 
 #[test]
-fn a_plant_that_is_not_there_is_told() {
+fn a_plant_that_is_not_there_is_reported() {
     let found = read_text("title = 't'\nplant = 'tnk'\nduration = '1m'\n[[expect]]\ngood = 'A.B'\n");
     assert!(found.is_err_and(|lines| lines[0].contains("tnk")));
 }

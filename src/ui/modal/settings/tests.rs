@@ -67,7 +67,7 @@ fn what_is_chosen_is_what_is_sent() {
 }
 
 #[test]
-fn what_cannot_be_is_told_before_anything_is_sent() {
+fn what_cannot_be_is_reported_before_anything_is_sent() {
     for (keys, expect) in [
         ("⏎", "these settings are active already"),
         ("↓→", "Modbus RTU always has 8 data bits"),

@@ -157,7 +157,7 @@ fn why_goes_through_the_values_of_a_block() {
 }
 
 #[test]
-fn typed_bytes_are_told_at_once_and_never_act_as_keys() {
+fn typed_bytes_are_reported_at_once_and_never_act_as_keys() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tt");
     assert_eq!(type_keys(&mut model, "01 03 03 EA 00 01"), []);
     insta::assert_snapshot!("window_send", screen(&mut model, 80, 24));

@@ -32,7 +32,7 @@ pub fn short(value: f64, most: usize) -> String {
     if readable { cut.or_else(powers) } else { powers() }.unwrap_or_else(|| "#".repeat(most))
 }
 
-/// A float of two words as short as it can be told apart.
+/// A float of two words as short as it is still exact.
 pub fn float(order: ByteOrder, words: &[u16], most: usize) -> Option<String> {
     let value = to_f32(number(DataType::F32, order, words)?);
     let plain = format!("{value}");

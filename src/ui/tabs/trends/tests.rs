@@ -213,7 +213,7 @@ fn the_list_of_all_values() {
 }
 
 #[test]
-fn the_past_is_told_from_the_present() {
+fn the_past_is_distinguished_from_the_present() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.answer();
     stand.press("←←←←←");

@@ -57,7 +57,7 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
 }
 
 #[test]
-fn what_manual_changes_at_once_is_told_before() {
+fn what_manual_changes_at_once_is_reported_before() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 1.0);
     fixture.set("PLC-1.MAN.P-1", 1.0);
@@ -71,7 +71,7 @@ fn what_manual_changes_at_once_is_told_before() {
 }
 
 #[test]
-fn a_mode_that_is_changed_under_the_question_is_told_in_it() {
+fn a_mode_that_is_changed_under_the_question_is_reported_in_it() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = faceplate(&fixture, "PLC-1.P-1");
@@ -83,7 +83,7 @@ fn a_mode_that_is_changed_under_the_question_is_told_in_it() {
 }
 
 #[test]
-fn a_line_that_goes_down_under_the_question_is_told_in_it() {
+fn a_line_that_goes_down_under_the_question_is_reported_in_it() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = faceplate(&fixture, "PLC-1.P-1");
@@ -107,7 +107,7 @@ fn all_actuators_are_in_one_window() {
 }
 
 #[test]
-fn what_an_interlock_blocks_is_told_and_not_sent() {
+fn what_an_interlock_blocks_is_reported_and_not_sent() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     fixture.set("PLC-1.TK-2", 19.5);

@@ -52,7 +52,7 @@ fn a_station_that_has_gone_is_shown_and_takes_no_commands() {
 }
 
 #[test]
-fn another_plant_file_builds_everything_anew() {
+fn another_plant_file_rebuilds_everything() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
     type_keys(&mut model, "2");
     type_keys(&mut model, "1s65");

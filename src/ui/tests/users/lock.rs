@@ -84,7 +84,7 @@ fn a_terminal_locked_on_the_login_page_shows_the_process() {
 }
 
 #[test]
-fn the_lock_is_told_beforehand_and_a_key_puts_it_off() {
+fn the_lock_is_reported_beforehand_and_a_key_puts_it_off() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
     let active = |effects: &[Effect]| {
         effects.iter().filter(|effect| matches!(effect, Effect::SessionRequest(_, SessionRequest::Active))).count()

@@ -67,7 +67,7 @@ fn the_first_supervisor_types_his_password_twice() {
 }
 
 #[test]
-fn a_password_given_by_somebody_else_is_changed_before_anything() {
+fn a_password_set_by_another_user_is_changed_before_anything() {
     let mut model = with(&Fixture::normal(), closed());
     type_keys(&mut model, "anna⏎given by boris⏎");
     answer(&mut model, Ok(()));

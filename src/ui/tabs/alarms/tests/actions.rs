@@ -15,7 +15,7 @@ fn a_suppressed_alarm_is_put_back() {
 }
 
 #[test]
-fn a_technician_is_told_that_out_of_service_needs_a_supervisor() {
+fn a_technician_reads_that_out_of_service_needs_a_supervisor() {
     let mut model = shown(&Fixture::alarm(), Theme::FULL, "");
     let mut session = Arc::unwrap_or_clone(fixture::session());
     session.who.as_mut().expect("a user is logged in").role = Role::Technician;

@@ -35,7 +35,7 @@ fn a_copy_between_controllers_can_be_turned_around() {
 }
 
 #[test]
-fn what_does_not_fit_is_told_and_cannot_be_written() {
+fn what_does_not_fit_is_reported_and_cannot_be_written() {
     let mut fixture = many(1);
     fixture.sets = vec![set(&fixture, "winter", &[("SV", 150.0)])];
     let mut model = model(&fixture, Theme::FULL);

@@ -88,7 +88,7 @@ fn live_values_are_on_the_screen_before_the_history_has_them() {
 }
 
 #[test]
-fn trouble_of_the_history_is_told() {
+fn trouble_of_the_history_is_reported() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     let (id, _) = stand.asked[0].clone();
     stand.send(Msg::Answer(id, Err(HistoryError::Engine("disk full".to_owned()))));
