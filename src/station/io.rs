@@ -144,7 +144,12 @@ fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
 
 /// A station that keeps nothing, for virtual time, where no other thread may take part. Queries to the history
 /// are refused.
-pub fn start_transient(def: Arc<PlantDef>, clock: Clock, connectors: Vec<Connector>, observer: RecordObserver) -> Station {
+pub fn start_transient(
+    def: Arc<PlantDef>,
+    clock: Clock,
+    connectors: Vec<Connector>,
+    observer: RecordObserver,
+) -> Station {
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
