@@ -5,6 +5,7 @@
 mod cells;
 mod decode;
 mod keys;
+mod names;
 mod view;
 
 #[cfg(test)]
@@ -15,6 +16,7 @@ use std::ops::Range;
 use self::{
     cells::Cells,
     keys::{Action, table},
+    names::Names,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -58,6 +60,7 @@ pub struct Registers {
     period: SignedDuration,
     paused: bool,
     cells: Cells,
+    names: Names,
     /// Number and steady time of the read on its way, and what it reads.
     on_way: Option<(u32, Timestamp, AddressSpan)>,
     number: u32,
@@ -92,6 +95,7 @@ impl TabView for Registers {
             period: SignedDuration::from_millis(PERIODS_MS[2]),
             paused: false,
             cells: Cells::default(),
+            names: Names::default(),
             on_way: None,
             number: 0,
             relearn: false,

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::*;
+use super::{names::Named, *};
 use crate::{
     plant::{
         PlantDef,
         def::{LineDef, Transport},
         event::{ExceptionCode, Fault, LineState},
         live::LivePart,
+        tag::DataType,
     },
     ui::{
         Effect, Model, Msg, QueryId,
@@ -194,4 +195,19 @@ fn a_value_is_found_raw_scaled_and_as_a_float() {
     }
     bench.keys("/4711⏎");
     assert!(bench.screen(120, 40).contains("in none of the registers"));
+}
+
+#[test]
+fn a_named_register_shows_its_name_and_value() {
+    let mut bench = Bench::new();
+    bench.keys("j1000⏎");
+    let sv = Named::new(Table::Holding, 1002, DataType::I16, ByteOrder::Abcd, "SV");
+    bench.model.tabs.registers.names.put(Named { scale: 0.1, decimals: 1, unit: "°C".into(), ..sv });
+    assert!(bench.screen(80, 24).contains("name and value"));
+    bench.answer(0, device);
+    for width in [80, 120] {
+        let shown = bench.screen(width, 24);
+        let row = shown.lines().find(|row| row.contains("41003 /")).expect("the row is on the screen");
+        assert!(row.contains("SV  70.0 °C"), "{width}: {row}");
+    }
 }

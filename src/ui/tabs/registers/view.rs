@@ -124,6 +124,12 @@ fn layout(width: u16) -> Columns {
     Columns { unsigned: 22, signed: 29, long, float, bits, text: bits + 20, age: bits + 23, hint: bits + 30 }
 }
 
+/// Where names stand, and their room: behind the other columns, else over the bits.
+fn name_column(at: &Columns, width: u16) -> (u16, u16) {
+    let behind = width.saturating_sub(at.hint);
+    if 20 <= behind { (at.hint, behind) } else { (at.bits, 22) }
+}
+
 fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let (theme, at) = (cx.theme, layout(canvas.width()));
     let base = match tab.base {
@@ -145,6 +151,10 @@ fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     }
     canvas.text_right(at.float + 11, 2, &format!("float {}", tab.order.word()), theme.dim());
     canvas.text(at.bits, 2, t!("bits"), theme.dim());
+    if !tab.names.is_empty() {
+        let (x, room) = name_column(&at, canvas.width());
+        canvas.text(x, 2, &pad(t!("name and value"), room), theme.dim());
+    }
     canvas.text(at.text, 2, "Aa", theme.dim());
     canvas.text(at.age, 2, &fit(t!("changed"), canvas.width().saturating_sub(at.age).min(7)), theme.dim());
 }
@@ -201,8 +211,12 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
         (None, _) => String::new(),
     };
     canvas.text(at.age, y, &fit(&words, 6), style);
-    let words = tab.cells.words(tab.table, address, 2);
-    if let Some(order) = decode::likely_float(&words)
+    let words = tab.cells.words(tab.table, address, 4);
+    if let Some(named) = tab.names.get(tab.table, address) {
+        let value = named.text(&words).unwrap_or_else(|| "----".to_owned());
+        let (x, room) = name_column(&at, canvas.width());
+        canvas.text(x, y, &pad(&format!("{}  {value}", named.name), room), style);
+    } else if let Some(order) = decode::likely_float(words.get(..2).unwrap_or(&words))
         && at.hint < canvas.width()
         && !tab.table.is_bits()
     {

@@ -1,0 +1,131 @@
+//! What registers are called and how their numbers become values: the one place for names of a unit, wherever they come
+//! from (a device profile, a list from a manual, by hand).
+
+use std::collections::BTreeMap;
+
+use super::decode;
+use crate::plant::tag::{ByteOrder, DataType, Table};
+
+/// A register, or some that stand together, with a name: `value = raw · scale + offset`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Named {
+    /// Which table.
+    pub table: Table,
+    /// First address on the wire, 0-based.
+    pub address: u16,
+    /// Type of the raw value.
+    pub kind: DataType,
+    /// Byte and word order.
+    pub order: ByteOrder,
+    /// Factor of the raw value.
+    pub scale: f64,
+    /// Added after scaling.
+    pub offset: f64,
+    /// Decimals to show.
+    pub decimals: u8,
+    /// `°C`; empty for none.
+    pub unit: String,
+    /// `SV`.
+    pub name: String,
+    /// Names of the numbers of an enumeration, before scaling; empty for a quantity.
+    pub labels: Vec<(i64, String)>,
+}
+
+#[allow(dead_code, reason = "what gives names comes next")]
+impl Named {
+    /// An unscaled number without unit.
+    pub fn new(table: Table, address: u16, kind: DataType, order: ByteOrder, name: &str) -> Named {
+        Named {
+            table,
+            address,
+            kind,
+            order,
+            scale: 1.0,
+            offset: 0.0,
+            decimals: 0,
+            unit: String::new(),
+            name: name.to_owned(),
+            labels: Vec::new(),
+        }
+    }
+
+    /// Registers or bits that it takes.
+    pub fn len(&self) -> u16 {
+        if self.table.is_bits() { 1 } else { self.kind.registers() }
+    }
+
+    /// Its value, of the words from its address on; `None` where there are too few or they hold no number.
+    pub fn value(&self, words: &[u16]) -> Option<f64> {
+        Some(self.raw(words)? * self.scale + self.offset)
+    }
+
+    /// `70.0 °C`, `RUN`; `None` as for [`Named::value`].
+    pub fn text(&self, words: &[u16]) -> Option<String> {
+        if let DataType::Text(_) = self.kind {
+            return words.get(..usize::from(self.len())).map(decode::text);
+        }
+        let raw = self.raw(words)?;
+        if let Some((_, label)) = self.labels.iter().find(|(number, _)| *number as f64 == raw) {
+            return Some(label.clone());
+        }
+        let value = format!("{:.*}", usize::from(self.decimals), raw * self.scale + self.offset);
+        Some(if self.unit.is_empty() { value } else { format!("{value} {}", self.unit) })
+    }
+
+    fn raw(&self, words: &[u16]) -> Option<f64> {
+        let bit = || words.first().map(|word| f64::from(*word));
+        if self.table.is_bits() { bit() } else { decode::number(self.kind, self.order, words) }
+    }
+}
+
+/// The names of a unit, by table and first address.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Names(BTreeMap<(Table, u16), Named>);
+
+#[allow(dead_code, reason = "what gives names comes next")]
+impl Names {
+    /// What begins at an address.
+    pub fn get(&self, table: Table, address: u16) -> Option<&Named> {
+        self.0.get(&(table, address))
+    }
+
+    /// Gives a name; the one that stood there before is gone.
+    pub fn put(&mut self, named: Named) {
+        self.0.insert((named.table, named.address), named);
+    }
+
+    /// Takes a name away.
+    pub fn remove(&mut self, table: Table, address: u16) -> Option<Named> {
+        self.0.remove(&(table, address))
+    }
+
+    /// All, in the order of tables and addresses.
+    pub fn iter(&self) -> impl Iterator<Item = &Named> {
+        self.0.values()
+    }
+
+    /// Has nothing a name yet?
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_named_register_is_shown_scaled_or_by_its_label() {
+        let plain = Named::new(Table::Holding, 1002, DataType::I16, ByteOrder::Abcd, "SV");
+        let scaled = Named { scale: 0.1, decimals: 1, unit: "°C".into(), ..plain.clone() };
+        assert_eq!(scaled.text(&[700]).as_deref(), Some("70.0 °C"));
+        assert_eq!(scaled.text(&[0xFFF6]).as_deref(), Some("-1.0 °C"));
+        assert_eq!(scaled.text(&[]), None);
+        let state = Named { labels: vec![(0, "RUN".into())], ..plain.clone() };
+        assert_eq!((state.text(&[0]).as_deref(), state.text(&[7]).as_deref()), (Some("RUN"), Some("7")));
+        let float = Named { kind: DataType::F32, decimals: 2, ..plain.clone() };
+        assert_eq!((float.text(&[0x42D1, 0x6353]).as_deref(), float.text(&[0x42D1])), (Some("104.69"), None));
+        let bit = Named { table: Table::Coil, kind: DataType::Bool, ..plain };
+        assert_eq!(bit.text(&[1]).as_deref(), Some("1"));
+    }
+}
