@@ -70,7 +70,7 @@ pub fn of_command(kind: &CommandKind) -> Right {
 fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
     match diagnostic {
         // Raw bytes may be a write.
-        Diagnostic::Send(_) => Right::Engineer,
+        Diagnostic::Send(_) | Diagnostic::Write(_) => Right::Engineer,
         // While other settings are tried the line is not polled.
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
         Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {

@@ -1,5 +1,7 @@
 //! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
+mod write;
+
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
@@ -8,7 +10,7 @@ use super::{names, pdu};
 use crate::plant::{
     command::CommandId,
     def::Serial,
-    diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, Scan},
+    diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, RegisterWrite, Scan},
     event::Fault,
     number::{to_u8, to_u16, to_u32},
     tag::Table,
@@ -61,6 +63,8 @@ pub struct Job {
     planned: u32,
     /// Units of a scan that gave corrupt bytes, with which settings: each by itself may be a unit, all together are none.
     corrupt_units: Vec<(u8, Option<Serial>, Fault)>,
+    /// The response to a write, once it was sent.
+    written: Result<(), Fault>,
 }
 
 impl Job {
@@ -78,7 +82,8 @@ impl Job {
             state: DiagnosticState::Running,
             findings: Vec::new(),
         };
-        let mut job = Job { run, step: None, queued: VecDeque::new(), made: 0, planned, corrupt_units: Vec::new() };
+        let (queued, corrupt_units) = (VecDeque::new(), Vec::new());
+        let mut job = Job { run, step: None, queued, made: 0, planned, corrupt_units, written: Ok(()) };
         job.advance();
         job.update_now();
         job
@@ -115,6 +120,11 @@ impl Job {
             (Diagnostic::Scan(_), StepResult::Answer(answer, _)) => self.add_unit(&step, answer),
             // It only had an adapter with echo give itself away.
             (Diagnostic::Loopback { .. }, StepResult::Answer(..)) if self.run.done == 1 => {}
+            (Diagnostic::Write(write), StepResult::Answer(answer, exchange)) => {
+                let write = write.clone();
+                self.found(Finding::Exchange(exchange));
+                self.on_written(&write, &step, answer);
+            }
             (_, StepResult::Answer(answer, exchange)) => {
                 self.found(Finding::Exchange(exchange));
                 self.on_response(&step, answer);
@@ -136,6 +146,23 @@ impl Job {
             self.made += u32::from(step.is_some());
             step
         });
+    }
+
+    fn on_written(&mut self, write: &RegisterWrite, step: &Step, answer: Result<Vec<u8>, Fault>) {
+        let Ask::Message(request) = &step.ask else { return };
+        let held = || answer.clone().and_then(|answer| write::words_of(request, &answer).ok_or(Fault::WrongEcho));
+        let ended = match self.made {
+            1 => write::after_first_read(write, held()),
+            2 => {
+                self.written = answer.map(drop);
+                write::after_write(&self.written)
+            }
+            _ => Some(write::after_read_back(write, self.written, held())),
+        };
+        if let Some(outcome) = ended {
+            self.made = self.planned;
+            self.found(Finding::Written(outcome));
+        }
     }
 
     fn on_response(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
@@ -243,7 +270,9 @@ impl Job {
                     count => format!("{count} answers"),
                 }
             }
-            Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => return,
+            Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_) => {
+                return;
+            }
         };
         self.found(Finding::Verdict(summary));
     }
@@ -272,6 +301,7 @@ fn steps_in(diagnostic: &Diagnostic) -> u32 {
         Diagnostic::Send(_) | Diagnostic::Read { .. } => 1,
         Diagnostic::Loopback { count, .. } => 1 + u32::from(*count),
         Diagnostic::Identify { .. } => 2,
+        Diagnostic::Write(_) => write::STEPS,
         Diagnostic::Scan(scan) => units_of(scan) * to_u32(scan.serials.len().max(1)),
     }
 }
@@ -295,6 +325,7 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
         // Basic objects, then the regular ones that follow them (id 3 and on).
         Diagnostic::Identify { unit } if n == 0 => step(vec![*unit, 0x2B, 0x0E, 0x01, 0]),
         Diagnostic::Identify { unit } => step(vec![*unit, 0x2B, 0x0E, 0x02, 3]),
+        Diagnostic::Write(write) => write::step_of(write, n),
         Diagnostic::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
         Diagnostic::Scan(scan) => {
             let units = units_of(scan).max(1);

@@ -142,6 +142,7 @@ fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
         | Finding::Object { .. }
         | Finding::Values { .. }
         | Finding::Failed { .. }
+        | Finding::Written(_)
         | Finding::Verdict(_) => None,
     })
 }

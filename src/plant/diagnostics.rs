@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    command::CommandId,
+    command::{CommandId, Outcome},
     event::Fault,
     line::Serial,
     line_check::{TIMEOUT_MIN, WAIT_MAX},
@@ -56,6 +56,8 @@ pub enum Diagnostic {
     },
     /// Looks for units.
     Scan(Scan),
+    /// Writes registers or bits once, and reads them back.
+    Write(RegisterWrite),
 }
 
 impl Diagnostic {
@@ -76,6 +78,7 @@ impl Diagnostic {
                 if last <= 0xFFFF { Ok(()) } else { Err(format!("address {last}: the last is 65535")) }
             }
             Diagnostic::Scan(scan) => scan.check(),
+            Diagnostic::Write(write) => write.check(),
         }
     }
 }
@@ -103,7 +106,50 @@ impl std::fmt::Display for Diagnostic {
                     count => f.write_str(&t!(" at {count} settings", count)),
                 }
             }
+            Diagnostic::Write(RegisterWrite { unit, table, address, words, expected, .. }) => {
+                let text = |words: &[u16]| words.iter().map(u16::to_string).collect::<Vec<_>>().join(" ");
+                let (place, old, new) = (table.modicon(*address), text(expected), text(words));
+                f.write_str(&t!("write unit {unit} {place}: {old} to {new}", unit, place, old, new))
+            }
         }
+    }
+}
+
+/// A write past all plant files: what a technician sets on a device of which nothing else is known.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RegisterWrite {
+    /// To whom; not 0, because a broadcast cannot be read back.
+    pub unit: u8,
+    /// Coils or holding registers.
+    pub table: Table,
+    /// First address, 0-based.
+    pub address: u16,
+    /// What is written, one a register or bit (0 or 1).
+    pub words: Vec<u16>,
+    /// What the operator saw there: over anything else nothing is written.
+    pub expected: Vec<u16>,
+    /// With function 15 or 16 also for one.
+    pub multiple: bool,
+}
+
+impl RegisterWrite {
+    fn check(&self) -> Result<(), String> {
+        let most = match self.table {
+            Table::Coil => 1_968,
+            Table::Holding => 123,
+            Table::Discrete | Table::Input => return Err(t!("inputs cannot be written").to_owned()),
+        };
+        let count = self.words.len();
+        if self.unit == 0 {
+            return Err(t!("unit 0: a broadcast cannot be read back").to_owned());
+        }
+        if !(1..=most).contains(&count) || self.expected.len() != count {
+            return Err(t!("{count} values, expected 1 to {most}", count, most));
+        }
+        if usize::from(u16::MAX - self.address) < count - 1 {
+            return Err(t!("the last address is 65535").to_owned());
+        }
+        Ok(())
     }
 }
 
@@ -211,6 +257,8 @@ pub enum Finding {
         /// One a register or bit.
         words: Vec<u16>,
     },
+    /// How a write has ended.
+    Written(Outcome),
     /// A step failed.
     Failed {
         /// What was asked: `unit 3, loopback 08/00`.

@@ -1,7 +1,11 @@
 //! Diagnostics against a device that is a function from request to response.
 
 use super::*;
-use crate::plant::{def::Framing, event::ExceptionCode};
+use crate::plant::{
+    command::{NotConfirmed, Outcome, Refusal},
+    def::Framing,
+    event::ExceptionCode,
+};
 
 /// Runs a diagnostic against a device given as a function from request to answer.
 fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
@@ -156,4 +160,77 @@ fn a_block_with_a_hole_is_read_register_by_register() {
         .collect();
     assert_eq!(read, [(10, vec![10]), (12, vec![12])]);
     assert_eq!((found.done, found.total), (4, 4));
+}
+
+/// Runs a write of 601 over 700 against a register; the outcome, and how often a write was sent.
+fn written(held: &std::cell::Cell<u16>, on_write: impl Fn(u16) -> Result<(), Fault>) -> (Outcome, u32) {
+    let write = RegisterWrite {
+        unit: 1,
+        table: Table::Holding,
+        address: 1_002,
+        words: vec![601],
+        expected: vec![700],
+        multiple: false,
+    };
+    let sent = std::cell::Cell::new(0);
+    let done = run(Diagnostic::Write(write), |request| match request[1] {
+        3 => Ok([&[1, 3, 2][..], &held.get().to_be_bytes()].concat()),
+        6 => {
+            assert_eq!(request, [1, 6, 0x03, 0xEA, 0x02, 0x59]);
+            sent.set(sent.get() + 1);
+            on_write(601).map(|()| request.to_vec())
+        }
+        _ => Err(Fault::Exception(ExceptionCode(1))),
+    });
+    let outcome = done.findings.iter().find_map(|finding| match finding {
+        Finding::Written(outcome) => Some(outcome.clone()),
+        _ => None,
+    });
+    (outcome.expect("a write ends with its outcome"), sent.get())
+}
+
+#[test]
+fn a_write_is_sent_once_and_read_back() {
+    let held = std::cell::Cell::new(700);
+    let obeys = |word| {
+        held.set(word);
+        Ok(())
+    };
+    assert_eq!(written(&held, obeys), (Outcome::Verified, 1));
+    held.set(702);
+    let changed = Outcome::Refused(Refusal::ChangedTo("702".to_owned()));
+    assert_eq!(written(&held, obeys), (changed, 0), "another value than the one that was seen");
+    held.set(700);
+    let refused = Outcome::Refused(Refusal::Exception(ExceptionCode(3)));
+    assert_eq!(written(&held, |_| Err(Fault::Exception(ExceptionCode(3)))), (refused, 1));
+    let differs = Outcome::NotConfirmed(NotConfirmed::Different(700.0));
+    assert_eq!(written(&held, |_| Ok(())), (differs, 1), "accepted and not done");
+    let silent = Outcome::NotConfirmed(NotConfirmed::NotApplied(700.0));
+    assert_eq!(written(&held, |_| Err(Fault::Timeout)), (silent, 1), "never repeated");
+    let late = |word| {
+        held.set(word);
+        Err(Fault::Timeout)
+    };
+    assert_eq!(written(&held, late), (Outcome::Verified, 1), "what it holds counts, not what it said");
+}
+
+#[test]
+fn writes_of_several_and_of_bits_have_their_functions() {
+    let sent = std::cell::RefCell::new(Vec::new());
+    let write = |table, words: Vec<u16>, multiple| {
+        let expected = vec![0; words.len()];
+        let write = RegisterWrite { unit: 1, table, address: 5, words, expected: expected.clone(), multiple };
+        run(Diagnostic::Write(write), |request| match request[1] {
+            1 => Ok(vec![1, 1, 2, 0, 0]),
+            3 => Ok([vec![1, 3, 2 * expected.len() as u8], vec![0; 2 * expected.len()]].concat()),
+            _ => {
+                sent.borrow_mut().push(request.to_vec());
+                Err(Fault::Timeout)
+            }
+        });
+        sent.borrow_mut().pop().unwrap_or_default()
+    };
+    assert_eq!(write(Table::Holding, vec![1, 2], false), [1, 16, 0, 5, 0, 2, 4, 0, 1, 0, 2]);
+    assert_eq!(write(Table::Holding, vec![7], true), [1, 16, 0, 5, 0, 1, 2, 0, 7]);
+    assert_eq!(write(Table::Coil, vec![1, 0, 1, 1, 0, 0, 0, 0, 1], false), [1, 15, 0, 5, 0, 9, 2, 0x0D, 0x01]);
 }

@@ -29,6 +29,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Failed { what, fault } if !args.of.verbose => vec![format!("{what}: {fault}")],
         Finding::Verdict(words) => vec![words.clone()],
         Finding::Exchange(_)
+        | Finding::Written(_)
         | Finding::Failed { .. }
         | Finding::Bytes { .. }
         | Finding::Unit { .. }

@@ -36,7 +36,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Object { name, text } => vec![format!("{name:20}  {text}")],
         Finding::Values { table, address, words } => value_lines(*table, *address, words),
         Finding::Failed { what, fault } => vec![format!("{what}: {fault}")],
-        Finding::Exchange(_) | Finding::Bytes { .. } | Finding::Unit { .. } | Finding::Verdict(_) => Vec::new(),
+        Finding::Exchange(_)
+        | Finding::Written(_)
+        | Finding::Bytes { .. }
+        | Finding::Unit { .. }
+        | Finding::Verdict(_) => Vec::new(),
     })?;
     let found = |finding: &Finding| matches!(finding, Finding::Object { .. } | Finding::Values { .. });
     if run.findings.iter().any(found) {

@@ -53,7 +53,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
         }
         Finding::Verdict(words) => vec![words.clone()],
         Finding::Failed { what, fault } => vec![format!("{what} ({fault})")],
-        Finding::Exchange(_) | Finding::Bytes { .. } | Finding::Object { .. } | Finding::Values { .. } => Vec::new(),
+        Finding::Exchange(_)
+        | Finding::Written(_)
+        | Finding::Bytes { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. } => Vec::new(),
     })?;
     let found = run.findings.iter().any(|finding| matches!(finding, Finding::Unit { .. }));
     if found { Ok(()) } else { Err(CliError::Failed("no unit was found".into())) }

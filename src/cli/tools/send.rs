@@ -61,6 +61,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
             lines
         }
         Finding::Exchange(_)
+        | Finding::Written(_)
         | Finding::Unit { .. }
         | Finding::Object { .. }
         | Finding::Values { .. }

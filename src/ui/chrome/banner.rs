@@ -36,7 +36,7 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
         match [blind, trouble].into_iter().flatten().reduce(|blind, trouble| format!("{blind}   {trouble}")) {
             Some(words) => canvas.text(1, 0, &fit_words(&words, room), cx.theme.trouble()),
             None if cx.def().is_bench() => {
-                canvas.text(1, 0, t!("no plant file: no alarms, no history; nothing is written"), cx.theme.dim())
+                canvas.text(1, 0, t!("no plant file: no alarms, no history"), cx.theme.dim())
             }
             None => canvas.text(1, 0, t!("no alarms"), cx.theme.dim()),
         };

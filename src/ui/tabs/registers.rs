@@ -7,6 +7,7 @@ mod decode;
 mod keys;
 mod names;
 mod view;
+mod writing;
 
 #[cfg(test)]
 mod tests;
@@ -69,6 +70,7 @@ pub struct Registers {
     /// Reads answered, and requests that they took.
     reads: u64,
     trouble: Option<String>,
+    writing: writing::Writing,
     /// What the open prompt asks for.
     asking: Asking,
 }
@@ -79,6 +81,8 @@ enum Asking {
     Address,
     Unit,
     Value,
+    Enable,
+    Write,
 }
 
 impl TabView for Registers {
@@ -102,6 +106,7 @@ impl TabView for Registers {
             last: None,
             reads: 0,
             trouble: None,
+            writing: writing::Writing::default(),
             asking: Asking::Address,
         }
     }
@@ -125,6 +130,10 @@ impl TabView for Registers {
             Action::Faster => self.change_period(-1),
             Action::Slower => self.change_period(1),
             Action::Relearn => self.relearn = true,
+            Action::Write => return self.ask_write(),
+            Action::Add(by) => return self.add(by),
+            Action::Undo => return self.undo(cx),
+            Action::Writes => return vec![self.writing.window(cx)],
             Action::GoTo => {
                 let hint = t!("1002, 0x3EA, 41003, or input:1000");
                 return self.ask_text(Asking::Address, t!("go to address"), hint);
@@ -147,6 +156,7 @@ impl TabView for Registers {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.writing.follow(cx, self.line);
         let now = cx.steady();
         let wanted = self
             .on_way
@@ -197,6 +207,8 @@ impl TabView for Registers {
                 self.unit = text.parse().ok().filter(|unit| (1..=247).contains(unit)).ok_or_else(wrong)?;
                 (self.cells, self.last) = (Cells::default(), None);
             }
+            Asking::Enable => return self.enable_writing(text),
+            Asking::Write => return self.write_typed(text),
             Asking::Value => {
                 let (table, address) = self.find(text)?;
                 (self.table, self.selected) = (table, address);

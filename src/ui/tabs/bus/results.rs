@@ -7,7 +7,7 @@ use super::{
     rows::{Row, bar, plain},
     window::{dissection_rows, exchange_rows},
 };
-use crate::ui::tabs::prelude::*;
+use crate::ui::{chrome::outcome_words, tabs::prelude::*};
 use crate::{
     bus::dissect::{self, Direction},
     plant::diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
@@ -60,6 +60,10 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
             // The exchange before it has said so already.
             Finding::Failed { .. } if !bare => {}
             Finding::Failed { what, fault } => rows.push(plain(format!("✗ {what}: {fault}"), theme.trouble())),
+            Finding::Written(outcome) => {
+                let (words, trouble) = outcome_words(outcome);
+                rows.push(plain(words, if trouble { theme.trouble() } else { theme.strong() }));
+            }
             Finding::Verdict(words) => rows.push(plain(words.clone(), theme.strong())),
         }
     }
@@ -81,6 +85,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
         diagnostic @ (Diagnostic::Loopback { .. }
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. }
+        | Diagnostic::Write(_)
         | Diagnostic::Scan(_)) => diagnostic.to_string(),
     };
     let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
@@ -123,9 +128,11 @@ fn came_back(
     }
     let asked = match &run.diagnostic {
         Diagnostic::Send(sent) => dissect::message_of(sent, framing),
-        Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Scan(_) => {
-            None
-        }
+        Diagnostic::Loopback { .. }
+        | Diagnostic::Identify { .. }
+        | Diagnostic::Read { .. }
+        | Diagnostic::Write(_)
+        | Diagnostic::Scan(_) => None,
     };
     let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());
     let mut rows: Vec<Row> = broken(&t!("RX {bytes_text}", bytes_text = bytes_text(framing, bytes)), room)

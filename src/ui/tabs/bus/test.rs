@@ -154,7 +154,8 @@ impl Bench {
 fn begin(at: &Place) -> usize {
     match at.status.test.as_ref().map(|run| &run.diagnostic) {
         Some(Diagnostic::Loopback { .. } | Diagnostic::Scan(_)) => usize::MAX,
-        Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. }) | None => 0,
+        Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_))
+        | None => 0,
     }
 }
 
@@ -195,6 +196,9 @@ fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
         )),
         Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
             None
+        }
+        Diagnostic::Write(_) => {
+            Some(t!("{diagnostic}. This bypasses all limits of the plant file. Write it?", diagnostic))
         }
         Diagnostic::Send(bytes) => {
             let framing = at.settings.transport.framing();

@@ -27,6 +27,14 @@ pub enum Action {
     Slower,
     /// Asks again for what was refused.
     Relearn,
+    /// Asks for a value to write.
+    Write,
+    /// Adds to the selected register.
+    Add(i16),
+    /// Writes back what was replaced.
+    Undo,
+    /// Lists what was written.
+    Writes,
 }
 
 const KEYS: &[Key<Action>] = &[
@@ -44,6 +52,17 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char(' '), "pause", "pause or resume reading", Action::Pause),
     Key::new(char('+'), "", "read more often", Action::Faster),
     Key::new(char('-'), "", "read less often", Action::Slower),
+    Key::new(
+        char('w'),
+        "write",
+        "write the selected register; asks first, and once whether writing is wanted at all",
+        Action::Write,
+    )
+    .needs(Role::Supervisor),
+    Key::new(char('I'), "", "write one more than it holds (asks first)", Action::Add(1)).needs(Role::Supervisor),
+    Key::new(char('D'), "", "write one less than it holds (asks first)", Action::Add(-1)).needs(Role::Supervisor),
+    Key::new(char('u'), "", "undo the last verified write (asks first)", Action::Undo).needs(Role::Supervisor),
+    Key::new(char('W'), "", "list what was written", Action::Writes),
     Key::new(char('U'), "unit", "read another unit", Action::Unit),
     Key::new(char('r'), "", "ask again for what the unit has refused", Action::Relearn),
 ];

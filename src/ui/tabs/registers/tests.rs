@@ -7,6 +7,7 @@ use crate::{
     plant::{
         PlantDef,
         def::{LineDef, Transport},
+        diagnostics::{Diagnostic, RegisterWrite},
         event::{ExceptionCode, Fault, LineState},
         live::LivePart,
         tag::DataType,
@@ -14,7 +15,7 @@ use crate::{
     ui::{
         Effect, Model, Msg, QueryId,
         fixture::{now, session},
-        tests::{screen, type_keys},
+        tests::{screen, sent_kind, type_keys},
         theme::Theme,
         update,
     },
@@ -210,4 +211,43 @@ fn a_named_register_shows_its_name_and_value() {
         let row = shown.lines().find(|row| row.contains("41003 /")).expect("the row is on the screen");
         assert!(row.contains("SV  70.0 °C"), "{width}: {row}");
     }
+}
+
+#[test]
+fn nothing_is_written_before_it_was_enabled_and_confirmed() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    assert!(bench.screen(80, 24).contains("READ ONLY"));
+    bench.keys("w601⏎");
+    assert!(bench.screen(80, 24).contains("expected yes"), "the first entry only enables");
+    bench.keys("⎋wyes⏎");
+    assert!(bench.screen(80, 24).contains("WRITING ENABLED"));
+    bench.keys("w");
+    let shown = bench.screen(80, 24);
+    assert!(shown.contains("write 41003, now 700") && !shown.contains("│ 700"), "the entry is empty: {shown}");
+    assert_eq!(type_keys(&mut bench.model, "601⏎⏎"), [], "Enter does not confirm");
+    assert!(bench.screen(80, 24).contains("700 to 601"), "{}", bench.screen(80, 24));
+    let effects = type_keys(&mut bench.model, "y");
+    let write = RegisterWrite {
+        unit: 1,
+        table: Table::Holding,
+        address: 1002,
+        words: vec![601],
+        expected: vec![700],
+        multiple: false,
+    };
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(LineId(0), Diagnostic::Write(write))));
+}
+
+#[test]
+fn what_is_not_known_is_not_written_over() {
+    let mut bench = Bench::new();
+    bench.keys("wyes⏎");
+    bench.keys("w");
+    assert!(bench.screen(80, 24).contains("It is not known what this address holds"));
+    bench.keys("⎋j1002⏎");
+    bench.answer(0, |address| Some(address).filter(|address| *address == 1002));
+    bench.keys("w1 2⏎");
+    assert!(bench.screen(80, 24).contains("what all of them hold"), "{}", bench.screen(80, 24));
 }

@@ -64,6 +64,11 @@ fn heading(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         let text = if shown { format!("‹{}›", order.word()) } else { format!(" {} ", order.word()) };
         x = canvas.text(x, 0, &text, if shown { theme.focus() } else { theme.dim() });
     }
+    let end = canvas.width().saturating_sub(1);
+    match tab.writing.enabled {
+        false => canvas.text_right(end, 0, t!("READ ONLY"), theme.dim()),
+        true => canvas.text_right(end, 0, t!("WRITING ENABLED"), theme.strong()),
+    }
     let (words, well) = state(tab, cx);
     let room = canvas.width().saturating_sub(2);
     canvas.text(1, 1, &fit_words(&words, room), if well { theme.normal() } else { theme.trouble() });
@@ -268,6 +273,10 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         &t!(" {modicon}   {table} {address} / 0x{hex} ", modicon, table, address, hex = format!("{address:04X}")),
         theme.strong(),
     );
+    if let Some((words, trouble)) = tab.writing.last(cx) {
+        let words = format!(" {} ", fit_words(&words, width.saturating_sub(40)));
+        canvas.text_right(width.saturating_sub(2), 0, &words, if trouble { theme.trouble() } else { theme.normal() });
+    }
     let Some(cell) = tab.cells.get(tab.table, address) else { return };
     let words = tab.cells.words(tab.table, address, 4);
     if !tab.table.is_bits() {

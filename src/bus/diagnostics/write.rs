@@ -1,0 +1,95 @@
+//! A write without a plant file: read what the operator saw, write once, read back. Nothing is ever sent twice.
+
+use super::{Step, read, step};
+use crate::{
+    bus::pdu,
+    plant::{
+        command::{NotConfirmed, Outcome, Refusal},
+        diagnostics::RegisterWrite,
+        event::Fault,
+        number::to_u16,
+    },
+};
+
+/// Steps of a write.
+pub const STEPS: u32 = 3;
+
+/// Step `n` of a write, from 0.
+pub fn step_of(write: &RegisterWrite, n: u32) -> Step {
+    match n {
+        1 => step(message(write)),
+        _ => step(read(write.unit, write.table, write.address, to_u16(write.words.len()))),
+    }
+}
+
+/// Function 5 or 6 for one, 15 or 16 for more, or where the device has only those.
+fn message(write: &RegisterWrite) -> Vec<u8> {
+    let [high, low] = write.address.to_be_bytes();
+    let count = to_u16(write.words.len()).to_be_bytes();
+    let bits = write.table.is_bits();
+    match write.words.as_slice() {
+        [word] if !write.multiple => {
+            let word = if bits { if *word == 0 { 0 } else { 0xFF00 } } else { *word };
+            let [a, b] = word.to_be_bytes();
+            vec![write.unit, if bits { 5 } else { 6 }, high, low, a, b]
+        }
+        words => {
+            let data: Vec<u8> = match bits {
+                true => words.chunks(8).map(byte_of).collect(),
+                false => words.iter().flat_map(|word| word.to_be_bytes()).collect(),
+            };
+            let length = crate::plant::number::to_u8(data.len());
+            let head = [write.unit, if bits { 15 } else { 16 }, high, low, count[0], count[1], length];
+            head.into_iter().chain(data).collect()
+        }
+    }
+}
+
+/// Eight bits, the first in the lowest place (V1.1b3, 6.11).
+fn byte_of(bits: &[u16]) -> u8 {
+    bits.iter().rev().fold(0, |byte, bit| (byte << 1) | u8::from(*bit != 0))
+}
+
+/// Before the write: its end, if the device no longer holds what the operator saw, or does not say what it holds.
+pub fn after_first_read(write: &RegisterWrite, held: Result<Vec<u16>, Fault>) -> Option<Outcome> {
+    match held {
+        Ok(held) if held == write.expected => None,
+        Ok(held) => Some(Outcome::Refused(Refusal::ChangedTo(text(&held)))),
+        Err(Fault::Exception(code)) => Some(Outcome::Refused(Refusal::Exception(code))),
+        Err(fault) => Some(Outcome::Refused(Refusal::NotSent(fault))),
+    }
+}
+
+/// After the write: its end, if the device has refused it. An answer that did not come says nothing yet.
+pub fn after_write(answered: &Result<(), Fault>) -> Option<Outcome> {
+    match answered {
+        Err(Fault::Exception(code)) if code.is_refusal() => Some(Outcome::Refused(Refusal::Exception(*code))),
+        Ok(()) | Err(_) => None,
+    }
+}
+
+/// After the read-back.
+pub fn after_read_back(write: &RegisterWrite, answered: Result<(), Fault>, held: Result<Vec<u16>, Fault>) -> Outcome {
+    Outcome::NotConfirmed(match (held, answered) {
+        (Ok(held), _) if held == write.words => return Outcome::Verified,
+        (Ok(held), Ok(())) => NotConfirmed::Different(number(&held)),
+        (Ok(held), Err(_)) => NotConfirmed::NotApplied(number(&held)),
+        (Err(_), Err(fault)) => NotConfirmed::NotAnswered(fault),
+        (Err(fault), Ok(())) => NotConfirmed::NotRead(fault),
+    })
+}
+
+/// The values that a response to a read holds.
+pub fn words_of(request: &[u8], answer: &[u8]) -> Option<Vec<u16>> {
+    let (_, _, words) = pdu::values_read(request.get(1..)?, answer.get(1..)?)?;
+    Some(words)
+}
+
+/// Several words as one number, the first the most significant.
+fn number(words: &[u16]) -> f64 {
+    words.iter().fold(0.0, |number, word| number * 65_536.0 + f64::from(*word))
+}
+
+fn text(words: &[u16]) -> String {
+    words.iter().map(u16::to_string).collect::<Vec<_>>().join(" ")
+}
