@@ -85,7 +85,7 @@ fn of_command(kind: &CommandKind) -> Row {
         CommandKind::Configure(_) => row("configure", "---S--"),
         CommandKind::SaveSettings(_) => row("save settings", "---S--"),
         CommandKind::Test(_, diagnostic) => match diagnostic {
-            Diagnostic::Send(_) => row("test", "---S--"),
+            Diagnostic::Send(_) | Diagnostic::Write(_) => row("test", "---S--"),
             Diagnostic::Scan(Scan { serials, .. }) if !serials.is_empty() => row("test", "---S--"),
             Diagnostic::Scan(_)
             | Diagnostic::Loopback { .. }

@@ -160,6 +160,7 @@ impl Confirm {
             Intent::Command(CommandKind::Configure(_)) => t!("apply these settings"),
             Intent::Command(CommandKind::SaveSettings(_)) => t!("save"),
             Intent::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => t!("scan"),
+            Intent::Command(CommandKind::Test(_, Diagnostic::Write(_))) => t!("write and verify"),
             Intent::Command(CommandKind::Test(..)) => t!("send"),
             Intent::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => t!("stop"),
             Intent::Command(CommandKind::ReadSets) => t!("read"),
@@ -174,6 +175,11 @@ impl Confirm {
     /// What is sent to a line past all limits of the plant file comes behind an Enter: a second one must not send it.
     fn wants_y(&self) -> bool {
         matches!(&self.intent, Intent::Command(CommandKind::Test(..)))
+    }
+
+    /// The key that does it.
+    pub fn key(&self) -> &'static str {
+        if self.wants_y() { "y" } else { "⏎" }
     }
 
     /// What Esc does.
@@ -311,7 +317,7 @@ impl Confirm {
         let news = self.expected.as_ref().and_then(|expected| expected.news(cx)).map(|words| cx.theme.enter(&words));
         let notes = news.into_iter().chain(missing);
         rows.extend(notes.flat_map(|words| wrap(&words, room)).map(|line| (line, cx.theme.trouble())));
-        let yes = if self.wants_y() { "y".to_owned() } else { cx.theme.enter("⏎") };
+        let yes = cx.theme.enter(self.key());
         let keys = match self.is_refused(cx) {
             true => t!("Esc {escape}", escape = self.escape()),
             false => t!("{yes} {verb}   Esc {escape}", yes, verb = self.verb(), escape = self.escape()),

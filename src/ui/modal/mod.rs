@@ -209,7 +209,9 @@ impl Modal {
         let mut hints = match self {
             Modal::Help(_) => vec![Hint::of("↑↓", t!("scroll")), Hint::of(t!("Esc"), t!("close"))],
             Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![Hint::of(t!("Esc"), confirm.escape())],
-            Modal::Confirm(confirm) => vec![Hint::of("⏎", confirm.verb()), Hint::of(t!("Esc"), confirm.escape())],
+            Modal::Confirm(confirm) => {
+                vec![Hint::of(confirm.key(), confirm.verb()), Hint::of(t!("Esc"), confirm.escape())]
+            }
             Modal::Entry(_) => vec![Hint::of("⏎", t!("write and verify")), Hint::of(t!("Esc"), t!("cancel"))],
             Modal::Choice(_) => {
                 vec![Hint::of("↑↓", t!("select")), Hint::of("⏎", t!("next")), Hint::of(t!("Esc"), t!("cancel"))]

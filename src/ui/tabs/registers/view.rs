@@ -273,7 +273,7 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         &t!(" {modicon}   {table} {address} / 0x{hex} ", modicon, table, address, hex = format!("{address:04X}")),
         theme.strong(),
     );
-    if let Some((words, trouble)) = tab.writing.last(cx) {
+    if let Some((words, trouble)) = tab.writing.last() {
         let words = format!(" {} ", fit_words(&words, width.saturating_sub(40)));
         canvas.text_right(width.saturating_sub(2), 0, &words, if trouble { theme.trouble() } else { theme.normal() });
     }

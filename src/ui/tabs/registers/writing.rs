@@ -50,9 +50,10 @@ impl Writing {
     }
 
     /// The last write in words, and whether its reader should worry.
-    pub fn last(&self, cx: &ViewContext) -> Option<(String, bool)> {
+    pub fn last(&self) -> Option<(String, bool)> {
         let written = self.list.last()?;
-        Some((words(cx, written), outcome_words(&written.outcome).1))
+        let (outcome, trouble) = outcome_words(&written.outcome);
+        Some((format!("{outcome}: {}", change(&written.write)), trouble))
     }
 
     /// All of them, the latest first.
