@@ -38,5 +38,6 @@ pub mod admission;
 pub mod late_reply;
 pub mod diagnostics;
 pub mod live;
+pub mod recognise;
 pub mod line_stats;
 pub mod io;

@@ -148,6 +148,9 @@ pub struct DeviceDef {
     pub actions: Vec<ActionDef>,
     /// Its ramp/soak program, if it has one.
     pub program: Option<ProgramDef>,
+    /// By what it is recognised; a terminal at a station has no use for it.
+    #[serde(skip)]
+    pub signature: Vec<Probe>,
 }
 
 impl DeviceDef {
@@ -175,6 +178,7 @@ impl DeviceDef {
             faceplate: None,
             actions: Vec::new(),
             program: None,
+            signature: Vec::new(),
         }
     }
 }
@@ -258,6 +262,17 @@ pub struct ActionDef {
     pub stop: bool,
     /// It saves the settings in the device's own memory.
     pub saves: bool,
+}
+
+/// What a tag must hold in a device of this kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// The tag that is read.
+    pub tag: TagId,
+    /// Its raw number, before scaling, lies in one of these; both ends belong to them.
+    pub ranges: Vec<(f64, f64)>,
+    /// Instead: its word holds the same as 16 bits from this one on.
+    pub bits: Option<TagId>,
 }
 
 /// A group of pens of the trends tab.

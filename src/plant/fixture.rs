@@ -54,6 +54,7 @@ pub fn plant() -> PlantDef {
         faceplate: None,
         actions: Vec::new(),
         program: None,
+        signature: Vec::new(),
     };
     let alarm = |id: AlarmId, subject, condition, on_delay| AlarmDef {
         on_delay,

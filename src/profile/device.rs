@@ -1,20 +1,79 @@
 //! A device of the plant: its profile, its limits, the rows of its tags, its faceplate and its actions.
 
-use std::time::Duration;
+use std::{rc::Rc, time::Duration};
 
 use super::{
     diagnostic::{Problems, Span},
     names::{Names, Scope, Unique, check_number, held_number_of, number_of},
     reader::{At, Node, Raw, Written, text},
-    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile},
+    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, SignatureTable},
     simulate::simulate,
     tag::Defined,
     units,
 };
 use crate::plant::{
-    def::{ActionDef, Faceplate, Limits},
+    def::{ActionDef, Faceplate, Limits, Probe},
     tag::{Access, Point, Poll, TagDef},
 };
+
+/// The keys of a device profile that stand in the plant file itself; `None` where there is no map at all.
+pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Option<Rc<ProfileFile>> {
+    if table.tags.is_empty() {
+        let at = table.name.as_ref().map_or(table.at, |name| name.at);
+        problems
+            .add(at, "a device needs `profile`, or tags of its own")
+            .label("neither is here")
+            .help("write the register map below it as [[device.tag]], or profile = \"NAME\" (`sightglass profiles`)");
+        return None;
+    }
+    Some(Rc::new(ProfileFile {
+        at: table.at,
+        valid: table.valid,
+        vendor: table.vendor.clone(),
+        model: table.model.clone(),
+        revision: None,
+        status: None,
+        source: table.source.clone(),
+        notes: table.notes.clone(),
+        address_base: None,
+        scheme: table.scheme,
+        functions: table.functions.clone(),
+        // The limits of the device itself are read with it.
+        limits: None,
+        default: table.default.clone(),
+        tags: Vec::new(),
+        actions: table.actions.clone(),
+        faceplate: table.faceplate.clone(),
+        program: table.program.clone(),
+        signature: table.signature.clone(),
+    }))
+}
+
+/// A register map stands in one place: what belongs to a profile is refused beside the name of one.
+pub(super) fn check_inline_keys(table: &DeviceTable, problems: &mut Problems) {
+    let Some(profile) = &table.profile else { return };
+    for (key, at) in OF_PROFILE.into_iter().filter_map(|key| Some((key, table.span_of(key)?))) {
+        problems
+            .add(at, format!("`{key}` is written in the profile `{}`", profile.value))
+            .label("expected in a device without `profile` only")
+            .also(profile.at, "its profile");
+    }
+}
+
+/// Keys of a `[[device]]` that has no profile.
+const OF_PROFILE: [&str; 11] = [
+    "vendor",
+    "model",
+    "source",
+    "notes",
+    "scheme",
+    "functions",
+    "default",
+    "action",
+    "faceplate",
+    "program",
+    "signature",
+];
 
 /// One tag before it is defined: a plant file's keys lie on the profile's, which lie on the profile's defaults.
 pub(super) struct Row {
@@ -198,6 +257,37 @@ pub(super) fn faceplate(table: &FaceplateTable, scope: &Scope, problems: &mut Pr
     let sv = find(&table.sv).and_then(|_| scope.writable(&table.sv, problems));
     let tunes = table.tunes.iter().filter_map(|name| Some(scope.tag(name, problems)?.id)).collect();
     Some(Faceplate { pv: pv?, sv: sv?.id, sv_used, mv, run, mode, tune, tunes })
+}
+
+/// By what the device is recognised.
+pub(super) fn signature(table: &SignatureTable, scope: &Scope, problems: &mut Problems) -> Vec<Probe> {
+    let mut probes = Vec::new();
+    for At { value: probe, at } in &table.probes {
+        let Some(tag) = probe.tag.as_ref().and_then(|name| scope.tag(name, problems)) else { continue };
+        check_number(*at, tag, problems);
+        let bits = probe.bits.as_ref().and_then(|name| scope.tag(name, problems));
+        if let Some(bit) = bits.filter(|bit| !bit.point.table.is_bits() || tag.point.len() != 1) {
+            problems.add(*at, format!("{} and {} are no word and bit", tag.name, bit.name)).label("bits");
+        }
+        let is: Vec<f64> = probe.is.iter().map(|number| number.value as f64).collect();
+        let ranges = match (probe.range, &probe.bits, is.is_empty()) {
+            (Some(At { value: [low, high], at }), None, true) => {
+                if high < low {
+                    problems.add(at, format!("{low} to {high} is empty")).label("expected [least, greatest]");
+                }
+                vec![(low, high)]
+            }
+            (None, Some(_), true) => Vec::new(),
+            (None, None, false) => is.into_iter().map(|number| (number, number)).collect(),
+            _ => {
+                let problem = problems.add(*at, "a probe says what the raw number must be");
+                problem.label("expected one of `is`, `range` and `bits`");
+                continue;
+            }
+        };
+        probes.push(Probe { tag: tag.id, ranges, bits: bits.map(|bit| bit.id) });
+    }
+    probes
 }
 
 /// The actions of a device.

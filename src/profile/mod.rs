@@ -106,6 +106,14 @@ pub fn check(file: &Path, search: &Search) -> Result<Checked, Errors> {
         .map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
 }
 
+/// The device profiles that say by what their device is recognised, each as the only device of a plant of its name.
+/// One that has errors is left out: `check` reports them.
+pub fn recognisable(search: &Search) -> Vec<Arc<PlantDef>> {
+    let devices = list(search).into_iter().filter(|listed| listed.kind == Kind::Device);
+    let plants = devices.filter_map(|listed| check(Path::new(&listed.name), search).ok()).map(|checked| checked.plant);
+    plants.filter(|def| def.devices.iter().any(|device| !device.signature.is_empty())).collect()
+}
+
 /// A plant or device profile that could be loaded by its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Listed {

@@ -176,6 +176,8 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         def.actions = device::actions(&device.profile.actions, &scope, problems);
         let program = device.profile.program.as_ref().map(|program| &program.value);
         def.program = program.and_then(|table| program::program(table, &scope, problems));
+        let signature = device.profile.signature.as_ref().map(|signature| &signature.value);
+        def.signature = signature.map_or(Vec::new(), |table| device::signature(table, &scope, problems));
     }
     sets::mark(&devices, &mut tags, &written, problems);
     Some(Devices { devices, tags, names, classes })
@@ -213,7 +215,13 @@ fn known_devices<'a>(
         problems.add(file.at, "the plant has no device").label("expected a [[device]]");
     }
     for table in file.devices.iter().map(|table| &table.value) {
-        let profile = profile(&table.profile, library, &mut profiles, problems);
+        let profile = match &table.profile {
+            Some(_) => {
+                device::check_inline_keys(table, problems);
+                profile(&table.profile, library, &mut profiles, problems)
+            }
+            None => device::inline_profile(table, problems),
+        };
         match (&table.name, profile) {
             (Some(name), Some(profile)) => known.push(ResolvedDevice { name: &name.value, table, profile }),
             (Some(name), None) => names.unread.push(name.value.clone()),
@@ -239,8 +247,9 @@ fn define_device<'a>(
         title: text(&table.title),
         line: line_of(table, lines).unwrap_or(LineId(0)),
         unit: table.unit.value_or(1),
-        profile: text(&table.profile),
-        model: format!("{} {}", text(&profile.vendor), text(&profile.model)),
+        // A map of its own is that of this device alone.
+        profile: table.profile.as_ref().map_or_else(|| (*name).to_owned(), |profile| profile.value.clone()),
+        model: format!("{} {}", text(&profile.vendor), text(&profile.model)).trim().to_owned(),
         limits,
         functions: Vec::new(),
         gap,
@@ -248,6 +257,7 @@ fn define_device<'a>(
         faceplate: None,
         actions: Vec::new(),
         program: None,
+        signature: Vec::new(),
     };
     let context = DeviceContext {
         device: id,

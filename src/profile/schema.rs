@@ -7,8 +7,8 @@ use std::time::Duration;
 use jiff::civil::Time;
 
 pub(super) use self::device::{
-    ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Scheme, SimulateTable,
-    StepTable, TagTable,
+    ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Scheme, SignatureTable,
+    SimulateTable, StepTable, TagTable,
 };
 use super::{
     condition::AlarmTable,
@@ -68,7 +68,8 @@ toml_tables! {
     DeviceTable, "a device" {
         need "name" name: String,
         opt "title" title: String,
-        need "profile" profile: String,
+        /// Where its register map is; without it, the keys of a device profile stand here.
+        opt "profile" profile: String,
         need "line" line: String,
         need "unit" unit: u8,
         /// Period of tags with `poll = "fast"`.
@@ -78,6 +79,18 @@ toml_tables! {
         opt "limits" limits: Raw,
         /// More tags, or other keys for the tags of the profile.
         list "tag" tags: Raw,
+        // What follows belongs to a device without a profile.
+        opt "vendor" vendor: String,
+        opt "model" model: String,
+        opt "source" source: String,
+        opt "notes" notes: String,
+        opt "scheme" scheme: Scheme,
+        list "functions" functions: u8,
+        opt "default" default: Raw,
+        list "action" actions: ActionTable,
+        opt "faceplate" faceplate: FaceplateTable,
+        opt "program" program: ProgramTable,
+        opt "signature" signature: SignatureTable,
     }
 
     /// What holds for all alarms, `[alarms]`.

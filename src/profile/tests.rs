@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod alarms;
+mod inline;
 mod interlocks;
 mod messages;
 mod text_tags;

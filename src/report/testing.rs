@@ -64,6 +64,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             }),
             actions: Vec::new(),
             program: None,
+            signature: Vec::new(),
         }],
         tags: ["PV", "SV", "MV"].iter().enumerate().map(|(i, short)| tag(i as u16, short)).collect(),
         alarms: Vec::new(),

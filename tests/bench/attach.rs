@@ -264,6 +264,7 @@ fn plant(devices: u16, lines: u16) -> Arc<PlantDef> {
             faceplate: None,
             actions: Vec::new(),
             program: None,
+            signature: Vec::new(),
             ..device.clone()
         });
         for (address, tag) in tags_of(id.0).enumerate() {

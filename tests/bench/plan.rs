@@ -47,6 +47,7 @@ fn device(id: u16) -> DeviceDef {
         faceplate: None,
         actions: Vec::new(),
         program: None,
+        signature: Vec::new(),
     }
 }
 

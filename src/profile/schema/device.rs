@@ -38,6 +38,21 @@ toml_tables! {
         list "action" actions: ActionTable,
         opt "faceplate" faceplate: FaceplateTable,
         opt "program" program: ProgramTable,
+        opt "signature" signature: SignatureTable,
+    }
+
+    /// By what a device is recognised.
+    SignatureTable, "the signature" {
+        list "probe" probes: ProbeTable,
+    }
+
+    /// What the raw number of a tag must be.
+    ProbeTable, "a probe" {
+        need "tag" tag: String,
+        list "is" is: i64,
+        opt "range" range: [f64; 2],
+        /// The first of 16 coils or discrete inputs that the word holds once more.
+        opt "bits" bits: String,
     }
 
     /// What one request may hold.

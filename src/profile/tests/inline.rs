@@ -1,0 +1,78 @@
+//! A device whose register map stands in the plant file, and the signatures of profiles.
+
+use super::*;
+
+const OWN: &str = r#"title = "Bench"
+time_zone = "UTC"
+
+[[line]]
+name = "L1"
+mode = "tcp"
+host = "10.0.0.7"
+
+[[device]]
+name = "D1"
+vendor = "ACME"
+model = "M1"
+line = "L1"
+unit = 1
+limits = { read_registers_max = 20 }
+default = { table = "holding", type = "int16" }
+faceplate = { pv = "T", sv = "SV" }
+tag = [
+    { name = "T", address = 1002, scale = 0.1, unit = "°C" },
+    { name = "SV", address = 1003, access = "rw" },
+]
+"#;
+
+fn refused(from: &str, to: &str, expect: &[&str]) {
+    assert!(OWN.contains(from), "no `{from}`");
+    let errors = load(OWN.replacen(from, to, 1).as_bytes(), METER, PLC).expect_err("it is wrong").to_string();
+    for piece in expect {
+        assert!(errors.contains(piece), "no `{piece}` in\n{errors}");
+    }
+}
+
+#[test]
+fn tags_may_stand_in_the_plant_file_alone() {
+    let plant = load(OWN.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}"));
+    let device = &plant.devices[0];
+    assert_eq!((device.model.as_str(), device.limits.read_registers_max), ("ACME M1", 20));
+    assert_eq!(device.profile, "D1", "its map is its own");
+    assert!(device.faceplate.is_some());
+    let tag = plant.tag(plant.tag_named("D1.T").unwrap());
+    assert_eq!((tag.point.address, tag.point.kind, tag.scale, tag.unit.as_str()), (1002, DataType::I16, 0.1, "°C"));
+}
+
+#[test]
+fn wrong_inline_tags_name_file_and_line() {
+    refused("address = 1003", "address = 70000", &["small.toml:20:"]);
+    refused("unit = \"°C\"", "unit = \"C\"", &["small.toml:19:", "unknown unit `C`"]);
+    refused("sv = \"SV\"", "sv = \"S\"", &["small.toml:17:"]);
+    refused("model = \"M1\"", "modell = \"M1\"", &["small.toml:12:1", "unknown key `modell`", "model"]);
+    refused(
+        "vendor = \"ACME\"",
+        "profile = \"meter\"",
+        &["small.toml:12:", "`model` is written in the profile `meter`"],
+    );
+    let (without, _) = OWN.split_once("tag = [").unwrap();
+    let errors = load(without.as_bytes(), METER, PLC).expect_err("no tags").to_string();
+    assert!(errors.contains("needs `profile`, or tags of its own"), "{errors}");
+}
+
+#[test]
+fn a_probe_of_a_signature_says_what_its_tag_must_hold() {
+    let with = |probe: &str| OWN.to_owned() + &format!("signature = {{ probe = [{probe}] }}\n");
+    let plant = load(with("{ tag = \"T\", range = [-5, 9] }, { tag = \"SV\", is = [1, 3] }").as_bytes(), METER, PLC);
+    let probes = plant.map(|plant| plant.devices[0].signature.clone()).unwrap_or_else(|errors| panic!("{errors}"));
+    let ranges: Vec<_> = probes.into_iter().map(|probe| probe.ranges).collect();
+    assert_eq!(ranges, [vec![(-5.0, 9.0)], vec![(1.0, 1.0), (3.0, 3.0)]]);
+    for (probe, expect) in [
+        ("{ tag = \"T\" }", "expected one of `is`"),
+        ("{ tag = \"T\", range = [9, 1] }", "is empty"),
+        ("{ tag = \"TT\", is = [0] }", "small.toml:22:"),
+    ] {
+        let errors = load(with(probe).as_bytes(), METER, PLC).expect_err(probe).to_string();
+        assert!(errors.contains(expect), "no `{expect}` in\n{errors}");
+    }
+}
