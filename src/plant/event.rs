@@ -246,6 +246,13 @@ impl Fault {
 pub struct ExceptionCode(pub u8);
 
 impl ExceptionCode {
+    /// The device does not know the function.
+    pub const ILLEGAL_FUNCTION: ExceptionCode = ExceptionCode(1);
+    /// Nothing is at this address, or it cannot be written.
+    pub const ILLEGAL_ADDRESS: ExceptionCode = ExceptionCode(2);
+    /// The value or the count is out of range.
+    pub const ILLEGAL_VALUE: ExceptionCode = ExceptionCode(3);
+
     /// The gateway says that the device behind it is away; the device itself has said nothing.
     pub fn is_of_gateway(self) -> bool {
         matches!(self.0, 0x0A | 0x0B)

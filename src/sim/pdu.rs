@@ -9,30 +9,8 @@ use crate::{
         names,
         pdu::{self, Item, MEI_IDENTIFICATION},
     },
-    plant::{def::Limits, number::to_u8, tag::Table},
+    plant::{def::Limits, event::ExceptionCode, number::to_u8, tag::Table},
 };
-
-/// Why a device refuses (Modbus application protocol V1.1b3, 7).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refusal {
-    /// 01: it does not know the function.
-    Function,
-    /// 02: nothing is at this address, or it cannot be written.
-    Address,
-    /// 03: the value or the count is out of range.
-    Value,
-}
-
-impl Refusal {
-    /// The code on the wire.
-    pub fn code(self) -> u8 {
-        match self {
-            Refusal::Function => 1,
-            Refusal::Address => 2,
-            Refusal::Value => 3,
-        }
-    }
-}
 
 /// What a device has behind its addresses. A write of several is tried on a copy, so one bad value refuses the whole block.
 pub trait Registers: Clone {
@@ -46,19 +24,19 @@ pub trait Registers: Clone {
     }
 
     /// One coil or discrete input.
-    fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal>;
+    fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode>;
     /// Writes one coil.
-    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal>;
+    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode>;
     /// One holding or input register.
-    fn word(&self, table: Table, address: u16) -> Result<u16, Refusal>;
+    fn word(&self, table: Table, address: u16) -> Result<u16, ExceptionCode>;
     /// Writes one holding register.
-    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal>;
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode>;
     /// Whether it is too busy for this function now: then the request has no answer and no effect.
     fn holds_back(&self, _function: u8) -> bool {
         false
     }
     /// Writes holding registers that came in one request: all of them, on a copy that is thrown away if one is refused.
-    fn write_block(&mut self, address: u16, values: &[u16]) -> Result<(), Refusal> {
+    fn write_block(&mut self, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
         (address..=u16::MAX).zip(values).try_for_each(|(at, value)| self.write_word(at, *value))
     }
     /// Eight bits of the maker's choice, for function 07.
@@ -74,7 +52,7 @@ pub trait Registers: Clone {
 /// Answers a request. The PDU holds function and data, neither unit nor check; an empty one has no answer.
 pub fn serve<D: Registers>(device: &mut D, pdu: &[u8]) -> Option<Vec<u8>> {
     let function = *pdu.first()?;
-    Some(answer(device, pdu).unwrap_or_else(|refusal| exception(function, refusal.code())))
+    Some(answer(device, pdu).unwrap_or_else(|refusal| exception(function, refusal.0)))
 }
 
 /// The PDU of an exception.
@@ -95,12 +73,12 @@ fn most(function: u8) -> impl Iterator<Item = u16> {
 }
 
 /// A request of a wrong length is refused with 03, which the standard gives to "the implied length is incorrect".
-fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Refusal> {
+fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, ExceptionCode> {
     let function = pdu[0];
     if !device.functions().contains(&function) || matches!(pdu, [0x2B, other, ..] if *other != MEI_IDENTIFICATION) {
-        return Err(Refusal::Function);
+        return Err(ExceptionCode::ILLEGAL_FUNCTION);
     }
-    let (fields, data) = pdu::request_fields(pdu).ok_or(Refusal::Value)?;
+    let (fields, data) = pdu::request_fields(pdu).ok_or(ExceptionCode::ILLEGAL_VALUE)?;
     let limits = device.limits();
     match (function, &fields[..]) {
         (0x01 | 0x02, &[address, count]) => {
@@ -138,13 +116,13 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Refusal> 
         }
         (0x18, &[address]) => read_queue(device, function, address),
         (0x2B, &[_, code, object]) => identity::read(&device.identity(), to_u8(code), to_u8(object)),
-        _ => Err(Refusal::Value),
+        _ => Err(ExceptionCode::ILLEGAL_VALUE),
     }
 }
 
 type Span = std::ops::RangeInclusive<u16>;
 
-fn read_bits<D: Registers>(device: &D, function: u8, addresses: Span) -> Result<Vec<u8>, Refusal> {
+fn read_bits<D: Registers>(device: &D, function: u8, addresses: Span) -> Result<Vec<u8>, ExceptionCode> {
     let table = names::table(function);
     let bytes = addresses.len().div_ceil(8);
     let mut reply = vec![function, to_u8(bytes)];
@@ -155,16 +133,16 @@ fn read_bits<D: Registers>(device: &D, function: u8, addresses: Span) -> Result<
     Ok(reply)
 }
 
-fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) -> Result<Vec<u8>, Refusal> {
+fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) -> Result<Vec<u8>, ExceptionCode> {
     let table = names::table(function);
     let Limits { read_registers_max, alignment, .. } = device.limits();
     let mut reply = vec![function, to_u8(count.min(read_registers_max) * 2)];
     let addresses = span(function, 0, address, count, read_registers_max)?;
     if !address.is_multiple_of(alignment) {
-        return Err(Refusal::Address);
+        return Err(ExceptionCode::ILLEGAL_ADDRESS);
     }
     if !count.is_multiple_of(alignment) {
-        return Err(Refusal::Value);
+        return Err(ExceptionCode::ILLEGAL_VALUE);
     }
     for at in addresses {
         reply.extend_from_slice(&device.word(table, at)?.to_be_bytes());
@@ -172,9 +150,9 @@ fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) 
     Ok(reply)
 }
 
-fn write_bits<D: Registers>(device: &mut D, addresses: Span, packed: &[u8]) -> Result<(), Refusal> {
+fn write_bits<D: Registers>(device: &mut D, addresses: Span, packed: &[u8]) -> Result<(), ExceptionCode> {
     if packed.len() != addresses.len().div_ceil(8) {
-        return Err(Refusal::Value);
+        return Err(ExceptionCode::ILLEGAL_VALUE);
     }
     let mut trial = device.clone();
     for (place, at) in addresses.enumerate() {
@@ -185,12 +163,12 @@ fn write_bits<D: Registers>(device: &mut D, addresses: Span, packed: &[u8]) -> R
 }
 
 /// The registers of a write, which must be as many as its addresses.
-fn registers(addresses: Span, packed: &[u8]) -> Result<Vec<u16>, Refusal> {
+fn registers(addresses: Span, packed: &[u8]) -> Result<Vec<u16>, ExceptionCode> {
     let values: Vec<u16> = packed.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
-    (packed.len() == 2 * addresses.len()).then_some(values).ok_or(Refusal::Value)
+    (packed.len() == 2 * addresses.len()).then_some(values).ok_or(ExceptionCode::ILLEGAL_VALUE)
 }
 
-fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<(), Refusal> {
+fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
     let mut trial = device.clone();
     trial.write_block(address, values)?;
     *device = trial;
@@ -198,23 +176,23 @@ fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Re
 }
 
 /// The addresses of the `nth` block of a request: a wrong count is a wrong value, an end beyond 65535 a wrong address.
-fn span(function: u8, nth: usize, address: u16, count: u16, limit: u16) -> Result<Span, Refusal> {
+fn span(function: u8, nth: usize, address: u16, count: u16, limit: u16) -> Result<Span, ExceptionCode> {
     let most = most(function).nth(nth).unwrap_or(limit).min(limit);
     if count == 0 || count > most {
-        return Err(Refusal::Value);
+        return Err(ExceptionCode::ILLEGAL_VALUE);
     }
-    Ok(address..=address.checked_add(count - 1).ok_or(Refusal::Address)?)
+    Ok(address..=address.checked_add(count - 1).ok_or(ExceptionCode::ILLEGAL_ADDRESS)?)
 }
 
 /// A queue as the standard keeps it: its count at the address, its words behind; reading takes nothing out (V1.1b3, 6.18).
-fn read_queue<D: Registers>(device: &D, function: u8, address: u16) -> Result<Vec<u8>, Refusal> {
+fn read_queue<D: Registers>(device: &D, function: u8, address: u16) -> Result<Vec<u8>, ExceptionCode> {
     let count = device.word(Table::Holding, address)?;
     if count > QUEUE_MAX {
-        return Err(Refusal::Value);
+        return Err(ExceptionCode::ILLEGAL_VALUE);
     }
     let mut reply = vec![function, 0, to_u8(2 + 2 * count), 0, to_u8(count)];
     for place in 1..=count {
-        let at = address.checked_add(place).ok_or(Refusal::Address)?;
+        let at = address.checked_add(place).ok_or(ExceptionCode::ILLEGAL_ADDRESS)?;
         reply.extend_from_slice(&device.word(Table::Holding, at)?.to_be_bytes());
     }
     Ok(reply)
@@ -233,8 +211,8 @@ mod tests {
         words: [u16; 8],
     }
 
-    fn place(address: u16) -> Result<usize, Refusal> {
-        (100..108).contains(&address).then(|| usize::from(address) - 100).ok_or(Refusal::Address)
+    fn place(address: u16) -> Result<usize, ExceptionCode> {
+        (100..108).contains(&address).then(|| usize::from(address) - 100).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
     }
 
     impl Registers for Small {
@@ -245,19 +223,19 @@ mod tests {
             Limits { read_registers_max: 6, write_registers_max: 6, ..Limits::STANDARD }
         }
 
-        fn bit(&self, _: Table, address: u16) -> Result<bool, Refusal> {
+        fn bit(&self, _: Table, address: u16) -> Result<bool, ExceptionCode> {
             Ok(self.bits[place(address)?])
         }
-        fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+        fn write_bit(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode> {
             self.bits[place(address)?] = on;
             Ok(())
         }
-        fn word(&self, _: Table, address: u16) -> Result<u16, Refusal> {
+        fn word(&self, _: Table, address: u16) -> Result<u16, ExceptionCode> {
             Ok(self.words[place(address)?])
         }
-        fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+        fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode> {
             let place = place(address)?;
-            self.words[place] = if value < 1000 { value } else { return Err(Refusal::Value) };
+            self.words[place] = if value < 1000 { value } else { return Err(ExceptionCode::ILLEGAL_VALUE) };
             Ok(())
         }
     }

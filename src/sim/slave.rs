@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use super::pdu::{self, Refusal, Registers};
+use super::pdu::{self, Registers};
+use crate::plant::event::ExceptionCode;
 use crate::{bus, plant::number::to_u8};
 
 /// Events in the log (V1.1b3, 6.10); the oldest makes room.
@@ -79,7 +80,7 @@ impl<D: Registers> Unit for Slave<D> {
         }
         let reply = match function {
             0x08 | 0x0B | 0x0C if self.device.functions().contains(&function) => {
-                self.counters.serve(function, data).unwrap_or_else(|refusal| pdu::exception(function, refusal.code()))
+                self.counters.serve(function, data).unwrap_or_else(|refusal| pdu::exception(function, refusal.0))
             }
             _ => pdu::serve(&mut self.device, pdu)?,
         };
@@ -149,7 +150,7 @@ impl Counters {
         self.note(SENT | event);
     }
 
-    fn serve(&mut self, function: u8, data: &[u8]) -> Result<Vec<u8>, Refusal> {
+    fn serve(&mut self, function: u8, data: &[u8]) -> Result<Vec<u8>, ExceptionCode> {
         let ready = [0, 0];
         match (function, data) {
             (0x08, [high, low, data @ ..]) => self.diagnose(u16::from_be_bytes([*high, *low]), data),
@@ -159,21 +160,21 @@ impl Counters {
                 let length = to_u8(counts.len() + self.log.len());
                 Ok([function, length].into_iter().chain(counts).chain(self.log.iter().copied()).collect())
             }
-            _ => Err(Refusal::Value),
+            _ => Err(ExceptionCode::ILLEGAL_VALUE),
         }
     }
 
-    fn diagnose(&mut self, what: u16, data: &[u8]) -> Result<Vec<u8>, Refusal> {
+    fn diagnose(&mut self, what: u16, data: &[u8]) -> Result<Vec<u8>, ExceptionCode> {
         let reply = |data: &[u8]| Ok([&[0x08], &what.to_be_bytes()[..], data].concat());
         match what {
             0x00 => reply(data),
-            0x0A..=0x12 if data != [0, 0] => Err(Refusal::Value),
+            0x0A..=0x12 if data != [0, 0] => Err(ExceptionCode::ILLEGAL_VALUE),
             0x0A => {
                 (self.diagnostic, self.done) = ([0; 8], 0);
                 reply(data)
             }
             0x0B..=0x12 => reply(&self.diagnostic[usize::from(what - 0x0B)].to_be_bytes()),
-            _ => Err(Refusal::Function),
+            _ => Err(ExceptionCode::ILLEGAL_FUNCTION),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::{plant::tag::Table, sim::pdu::Refusal};
+use crate::plant::{event::ExceptionCode, tag::Table};
 
 /// Bits of one kind, sixteen to a word, lowest number in the lowest bit.
 #[derive(Debug, Clone)]
@@ -99,23 +99,23 @@ impl Memory {
     }
 
     /// One bit by its wire address.
-    pub fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal> {
+    pub fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode> {
         let (place, number) = find_bit(table, address)?;
         Ok(self.bank(place.kind).get(number))
     }
 
     /// Writes a coil by its wire address.
-    pub fn write_coil(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+    pub fn write_coil(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode> {
         let (place, number) = find_bit(Table::Coil, address)?;
         if !place.writable {
-            return Err(Refusal::Address);
+            return Err(ExceptionCode::ILLEGAL_ADDRESS);
         }
         self.bank_mut(place.kind).set(number, on);
         Ok(())
     }
 
     /// One word by its wire address.
-    pub fn word(&self, address: u16) -> Result<u16, Refusal> {
+    pub fn word(&self, address: u16) -> Result<u16, ExceptionCode> {
         match find_word(address)? {
             Word::Own { .. } => Ok(self.v[usize::from(address)]),
             Word::Bits { place, index } => Ok(self.bank(place.kind).0[index]),
@@ -123,11 +123,11 @@ impl Memory {
     }
 
     /// Writes a word by its wire address.
-    pub fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+    pub fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode> {
         match find_word(address)? {
             Word::Own { writable: true } => self.v[usize::from(address)] = value,
             Word::Bits { place, index } if place.writable => self.bank_mut(place.kind).0[index] = value,
-            Word::Own { .. } | Word::Bits { .. } => return Err(Refusal::Address),
+            Word::Own { .. } | Word::Bits { .. } => return Err(ExceptionCode::ILLEGAL_ADDRESS),
         }
         Ok(())
     }
@@ -156,19 +156,19 @@ enum Word {
     Bits { place: &'static Place, index: usize },
 }
 
-fn find_bit(table: Table, address: u16) -> Result<(&'static Place, u16), Refusal> {
+fn find_bit(table: Table, address: u16) -> Result<(&'static Place, u16), ExceptionCode> {
     let number = |place: &Place| address.checked_sub(place.first_bit).filter(|number| *number < place.words * 16);
     let mut places = PLACES.iter().filter(|place| place.table == table);
-    places.find_map(|place| number(place).map(|number| (place, number))).ok_or(Refusal::Address)
+    places.find_map(|place| number(place).map(|number| (place, number))).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
 }
 
-fn find_word(address: u16) -> Result<Word, Refusal> {
+fn find_word(address: u16) -> Result<Word, ExceptionCode> {
     if let Some((_, writable)) = AREAS.iter().find(|(range, _)| range.contains(&address)) {
         return Ok(Word::Own { writable: *writable });
     }
     let index = |place: &Place| address.checked_sub(place.first_word).filter(|index| *index < place.words);
     let found = PLACES.iter().find_map(|place| index(place).map(|index| (place, usize::from(index))));
-    found.map(|(place, index)| Word::Bits { place, index }).ok_or(Refusal::Address)
+    found.map(|(place, index)| Word::Bits { place, index }).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
 }
 
 #[cfg(test)]
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn words_can_be_written_where_users_own_them() {
-        let check = |address, expect: Result<bool, Refusal>| {
+        let check = |address, expect: Result<bool, ExceptionCode>| {
             let mut memory = Memory::new();
             let read = memory.word(address);
             assert_eq!(read.map(|_| memory.write_word(address, 1).is_ok()), expect, "V{address:o}");
@@ -208,18 +208,18 @@ mod tests {
         check(0o0, Ok(false));
         check(0o377, Ok(false));
         check(0o400, Ok(true));
-        check(0o700, Err(Refusal::Address));
+        check(0o700, Err(ExceptionCode::ILLEGAL_ADDRESS));
         check(0o2000, Ok(true));
         check(0o7577, Ok(true));
-        check(0o7655, Err(Refusal::Address));
+        check(0o7655, Err(ExceptionCode::ILLEGAL_ADDRESS));
         check(0o17777, Ok(true));
-        check(0o20000, Err(Refusal::Address));
+        check(0o20000, Err(ExceptionCode::ILLEGAL_ADDRESS));
         check(0o40400, Ok(false));
         check(0o40500, Ok(true));
         check(0o40537, Ok(true));
-        check(0o40540, Err(Refusal::Address));
+        check(0o40540, Err(ExceptionCode::ILLEGAL_ADDRESS));
         check(0o40677, Ok(true));
-        check(0o41257, Err(Refusal::Address));
+        check(0o41257, Err(ExceptionCode::ILLEGAL_ADDRESS));
     }
 
     #[test]
@@ -231,6 +231,6 @@ mod tests {
         assert_eq!([0, 1, 15].map(|relay| memory.bank(Kind::C).get(relay)), [true, false, true]);
         assert_eq!(memory.write_coil(2048 + 9, false), Ok(()));
         assert_eq!(memory.word(0o40500), Ok(0));
-        assert_eq!(memory.write_coil(5120, true), Err(Refusal::Address));
+        assert_eq!(memory.write_coil(5120, true), Err(ExceptionCode::ILLEGAL_ADDRESS));
     }
 }

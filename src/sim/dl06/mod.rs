@@ -8,8 +8,9 @@ use std::time::Duration;
 use memory::{Kind, Memory};
 use sequence::{Conditions, Sequence, Step};
 
-use super::pdu::{Identity, Refusal, Registers};
+use super::pdu::{Identity, Registers};
 use super::tank::{Actuators, Readings, control_level_cm};
+use crate::plant::event::ExceptionCode;
 use crate::plant::{def::Limits, number::to_u16, tag::Table};
 
 /// Time of one scan.
@@ -279,20 +280,20 @@ impl Registers for Dl06 {
         IDENTITY
     }
 
-    fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal> {
+    fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode> {
         self.memory.bit(table, address)
     }
 
-    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode> {
         self.memory.write_coil(address, on)
     }
 
     /// Functions 03 and 04 both read V memory.
-    fn word(&self, _: Table, address: u16) -> Result<u16, Refusal> {
+    fn word(&self, _: Table, address: u16) -> Result<u16, ExceptionCode> {
         self.memory.word(address)
     }
 
-    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode> {
         self.memory.write_word(address, value)
     }
 

@@ -7,13 +7,14 @@ use std::{
 
 use crate::{
     bus::codec,
+    plant::event::ExceptionCode,
     plant::{
         def::{DeviceDef, Limits, TagId},
         number::{to_u8, to_u32},
         scale,
         tag::{Access, Bound, Decimals, Table, TagDef},
     },
-    sim::pdu::{Refusal, Registers},
+    sim::pdu::Registers,
 };
 
 /// What a profile says of a device; never changes.
@@ -147,7 +148,7 @@ impl Model {
 
     /// Writes cells of a table from a request, or refuses: nothing there takes a write, a value is cut in two, is out of
     /// its bounds, is no state of its tag, or the device is locked.
-    fn take(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), Refusal> {
+    fn take(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
         let chart = self.chart.clone();
         let span = u32::from(address)..u32::from(address) + to_u32(values.len());
         let extent =
@@ -161,14 +162,14 @@ impl Model {
         let taken = |at: u32| touched.iter().any(|tag| extent(tag).contains(&at));
         let cut = |tag: &&TagDef| extent(tag).start < span.start || span.end < extent(tag).end;
         if !span.clone().all(taken) || touched.iter().any(cut) {
-            return Err(Refusal::Address);
+            return Err(ExceptionCode::ILLEGAL_ADDRESS);
         }
         let locked = |tag: &&TagDef| tag.write_unlock.is_some_and(|(key, value)| self.value(key) != Some(value));
         if touched.iter().any(locked) {
-            return Err(Refusal::Address);
+            return Err(ExceptionCode::ILLEGAL_ADDRESS);
         }
         self.cells[place(table)].extend((address..=u16::MAX).zip(values.iter().copied()));
-        if touched.iter().all(|tag| self.admits(tag)) { Ok(()) } else { Err(Refusal::Value) }
+        if touched.iter().all(|tag| self.admits(tag)) { Ok(()) } else { Err(ExceptionCode::ILLEGAL_VALUE) }
     }
 
     /// Whether a tag may hold what has just been written.
@@ -210,11 +211,11 @@ impl Registers for Model {
         self.chart.limits
     }
 
-    fn bit(&self, table: Table, address: u16) -> Result<bool, Refusal> {
-        self.cells[place(table)].get(&address).map(|bit| *bit != 0).ok_or(Refusal::Address)
+    fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode> {
+        self.cells[place(table)].get(&address).map(|bit| *bit != 0).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
     }
 
-    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), Refusal> {
+    fn write_bit(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode> {
         // A few devices write the bits that they call discrete inputs.
         let discrete =
             |tag: &TagDef| tag.writable() && tag.point.table == Table::Discrete && tag.point.address == address;
@@ -222,15 +223,15 @@ impl Registers for Model {
         self.take(table, address, &[u16::from(on)])
     }
 
-    fn word(&self, table: Table, address: u16) -> Result<u16, Refusal> {
-        self.cells[place(table)].get(&address).copied().ok_or(Refusal::Address)
+    fn word(&self, table: Table, address: u16) -> Result<u16, ExceptionCode> {
+        self.cells[place(table)].get(&address).copied().ok_or(ExceptionCode::ILLEGAL_ADDRESS)
     }
 
-    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode> {
         self.write_block(address, &[value])
     }
 
-    fn write_block(&mut self, address: u16, values: &[u16]) -> Result<(), Refusal> {
+    fn write_block(&mut self, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
         self.take(Table::Holding, address, values)
     }
 }

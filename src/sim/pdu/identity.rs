@@ -1,6 +1,6 @@
 //! What a device says of itself: report server id (11) and device identification (2B/0E).
 
-use super::Refusal;
+use crate::plant::event::ExceptionCode;
 use crate::{bus::pdu::MEI_IDENTIFICATION, plant::number::to_u8};
 
 /// Basic and regular objects, as a stream and one by one.
@@ -28,15 +28,15 @@ pub(super) fn report(identity: &Identity, running: bool) -> Vec<u8> {
 
 /// Answer to function 2B/0E. Codes 1 to 3 stream the basic, regular or all objects from one on (from the first if there
 /// is no such object; what goes beyond our conformity is answered as far as it goes), code 4 reads one.
-pub(super) fn read(identity: &Identity, code: u8, from: u8) -> Result<Vec<u8>, Refusal> {
+pub(super) fn read(identity: &Identity, code: u8, from: u8) -> Result<Vec<u8>, ExceptionCode> {
     let last = match code {
         1 => 0x02,
         2 | 3 => 0x7F,
         4 => {
-            let one = identity.objects.iter().find(|(id, _)| *id == from).ok_or(Refusal::Address)?;
+            let one = identity.objects.iter().find(|(id, _)| *id == from).ok_or(ExceptionCode::ILLEGAL_ADDRESS)?;
             return Ok(message(code, None, std::slice::from_ref(one)));
         }
-        _ => return Err(Refusal::Value),
+        _ => return Err(ExceptionCode::ILLEGAL_VALUE),
     };
     let count = identity.objects.iter().take_while(|(id, _)| *id <= last).count();
     let wanted = &identity.objects[..count];

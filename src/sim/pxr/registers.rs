@@ -5,8 +5,9 @@ use super::display::Display;
 use super::map::{self, Meaning, Row};
 use super::{NARROWEST_K, Pxr, SENSOR_C};
 use crate::{
+    plant::event::ExceptionCode,
     plant::{def::Limits, number::to_i16, tag::Table},
-    sim::pdu::{Refusal, Registers},
+    sim::pdu::Registers,
 };
 
 /// The functions are those that its manual and working drivers name, so it cannot be asked who it is.
@@ -19,16 +20,16 @@ impl Registers for Pxr {
         Limits { read_registers_max: 60, write_registers_max: 60, ..Limits::STANDARD }
     }
 
-    fn bit(&self, _: Table, _: u16) -> Result<bool, Refusal> {
-        Err(Refusal::Function)
+    fn bit(&self, _: Table, _: u16) -> Result<bool, ExceptionCode> {
+        Err(ExceptionCode::ILLEGAL_FUNCTION)
     }
 
-    fn write_bit(&mut self, _: u16, _: bool) -> Result<(), Refusal> {
-        Err(Refusal::Function)
+    fn write_bit(&mut self, _: u16, _: bool) -> Result<(), ExceptionCode> {
+        Err(ExceptionCode::ILLEGAL_FUNCTION)
     }
 
     /// Places between the known settings read as 0, as in the sibling series.
-    fn word(&self, table: Table, address: u16) -> Result<u16, Refusal> {
+    fn word(&self, table: Table, address: u16) -> Result<u16, ExceptionCode> {
         let (area, place) = area(address)?;
         let (raw, meaning) = match table {
             Table::Input => self.measurement(place)?,
@@ -38,14 +39,14 @@ impl Registers for Pxr {
         Ok(raw.cast_unsigned())
     }
 
-    fn write_word(&mut self, address: u16, value: u16) -> Result<(), Refusal> {
+    fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode> {
         let (area, place) = area(address)?;
-        let row = map::row(place).ok_or(Refusal::Address)?;
+        let row = map::row(place).ok_or(ExceptionCode::ILLEGAL_ADDRESS)?;
         let raw = value as i16;
         let value = if area == Area::Internal { self.to_display(raw, self.meaning(place)) } else { raw };
         let (min, max) = self.limits(place, row);
         if !(min..=max).contains(&value) {
-            return Err(Refusal::Value);
+            return Err(ExceptionCode::ILLEGAL_VALUE);
         }
         match place {
             map::FIX if value == 1 => self.begin_saving(),
@@ -84,7 +85,7 @@ impl Pxr {
     }
 
     /// The measurements 31001–31010 with their meanings, which decide the number in the internal area.
-    fn measurement(&self, place: usize) -> Result<(i16, Meaning), Refusal> {
+    fn measurement(&self, place: usize) -> Result<(i16, Meaning), ExceptionCode> {
         let display = self.display();
         let (pv, sv) = (display.temperature(self.pv_c), display.temperature(self.sv_c));
         Ok(match place {
@@ -98,7 +99,7 @@ impl Pxr {
             7 => (self.faults as i16, Meaning::Plain),
             8 => (self.program.position() as i16, Meaning::Plain),
             9 => (to_i16((self.heater_a * 10.0).round()), Meaning::Plain),
-            _ => return Err(Refusal::Address),
+            _ => return Err(ExceptionCode::ILLEGAL_ADDRESS),
         })
     }
 
@@ -145,7 +146,7 @@ impl Pxr {
     }
 
     /// Unit or decimals change: every temperature is rewritten, or nothing is if one would not fit into its word.
-    fn show_as(&mut self, to: Display) -> Result<(), Refusal> {
+    fn show_as(&mut self, to: Display) -> Result<(), ExceptionCode> {
         let from = self.display();
         let mut settings = self.settings;
         for place in map::rows().iter().flat_map(|row| row.places.clone()) {
@@ -157,7 +158,7 @@ impl Pxr {
             };
             // The range itself is the greatest number there is.
             if settings[place] == i16::MAX {
-                return Err(Refusal::Value);
+                return Err(ExceptionCode::ILLEGAL_VALUE);
             }
         }
         self.settings = settings;
@@ -189,11 +190,11 @@ enum Area {
     Engineering,
 }
 
-fn area(address: u16) -> Result<(Area, usize), Refusal> {
+fn area(address: u16) -> Result<(Area, usize), ExceptionCode> {
     match usize::from(address) {
         place @ 0..map::COUNT => Ok((Area::Internal, place)),
         place if (1000..1000 + map::COUNT).contains(&place) => Ok((Area::Engineering, place - 1000)),
-        _ => Err(Refusal::Address),
+        _ => Err(ExceptionCode::ILLEGAL_ADDRESS),
     }
 }
 
