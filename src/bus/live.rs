@@ -14,11 +14,6 @@ use crate::plant::{
     tag::Table,
 };
 
-/// Illegal data address: the unit does not have (all of) it.
-const NO_SUCH_ADDRESS: ExceptionCode = ExceptionCode(2);
-/// Illegal data value: for a read, more at once than the unit gives.
-const TOO_MANY: ExceptionCode = ExceptionCode(3);
-
 /// What the units of a line have refused to live reads.
 #[derive(Debug, Clone, Default)]
 pub struct KnownHoles {
@@ -76,7 +71,7 @@ impl LiveJob {
         }
         let unit = read.unit;
         let queue = read.spans.iter().flat_map(|span| known.requests(unit, *span)).collect();
-        let refused = Err(Fault::Exception(NO_SUCH_ADDRESS));
+        let refused = Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS));
         let holes = read.spans.iter().flat_map(|span| known.holes_in(unit, *span));
         let parts = holes.map(|span| LivePart { at, span, words: refused.clone() }).collect();
         LiveJob { unit, queue, reading: LiveReading { parts, ..LiveReading::default() } }
@@ -92,9 +87,12 @@ impl LiveJob {
         let Some(span) = self.queue.pop_front() else { return };
         self.reading.requests += 1;
         match outcome {
-            Err(Fault::Exception(code)) if matches!(code, NO_SUCH_ADDRESS | TOO_MANY) && 1 < span.count => {
+            // 02: it does not have all of them; 03: that is more at once than it gives.
+            Err(Fault::Exception(code))
+                if matches!(code, ExceptionCode::ILLEGAL_ADDRESS | ExceptionCode::ILLEGAL_VALUE) && 1 < span.count =>
+            {
                 let half = span.count / 2;
-                if code == TOO_MANY {
+                if code == ExceptionCode::ILLEGAL_VALUE {
                     known.most.insert((self.unit, span.table), half);
                 }
                 self.queue.push_front(AddressSpan {
@@ -105,7 +103,7 @@ impl LiveJob {
                 self.queue.push_front(AddressSpan { count: half, ..span });
             }
             words => {
-                if words == Err(Fault::Exception(NO_SUCH_ADDRESS)) {
+                if words == Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS)) {
                     known.holes.insert((self.unit, span.table, u32::from(span.address)));
                 }
                 // A unit that is silent would cost its timeout for every request.
@@ -140,8 +138,8 @@ mod tests {
         while let Some(span) = job.next() {
             let addresses: Vec<u16> = span.range().map(to_u16).collect();
             let outcome = match addresses.iter().all(|address| has(*address)) {
-                _ if most < span.count => Err(Fault::Exception(TOO_MANY)),
-                false => Err(Fault::Exception(NO_SUCH_ADDRESS)),
+                _ if most < span.count => Err(Fault::Exception(ExceptionCode::ILLEGAL_VALUE)),
+                false => Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS)),
                 true => Ok(addresses),
             };
             job.take(known, Timestamp::UNIX_EPOCH, outcome);
@@ -164,7 +162,8 @@ mod tests {
         assert_eq!(values(&first), expect);
         let second = serve(&mut known, &[(0, 125)], has, 125);
         assert_eq!((values(&second), second.requests), (expect, 2));
-        let holes = second.parts.iter().filter(|part| part.words == Err(Fault::Exception(NO_SUCH_ADDRESS)));
+        let holes =
+            second.parts.iter().filter(|part| part.words == Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS)));
         assert_eq!(holes.map(|part| part.span.address).collect::<Vec<_>>(), [40]);
         known.forget(1);
         assert_eq!(serve(&mut known, &[(0, 125)], |_| true, 125).requests, 1, "what it has now is seen");

@@ -8,8 +8,8 @@ pub use paced::PacedSlave;
 pub use tcp::TcpSlave;
 
 use sightglass::{
-    plant::{def::Limits, tag::Table},
-    sim::pdu::{self, Refusal, Registers},
+    plant::{def::Limits, event::ExceptionCode, tag::Table},
+    sim::pdu::{self, Registers},
 };
 
 /// Every register holds its address, odd coils are on; what is written is acknowledged and forgotten.
@@ -25,19 +25,19 @@ impl Registers for Numbers {
         Limits::STANDARD
     }
 
-    fn bit(&self, _: Table, address: u16) -> Result<bool, Refusal> {
+    fn bit(&self, _: Table, address: u16) -> Result<bool, ExceptionCode> {
         Ok(address % 2 == 1)
     }
 
-    fn write_bit(&mut self, _: u16, _: bool) -> Result<(), Refusal> {
+    fn write_bit(&mut self, _: u16, _: bool) -> Result<(), ExceptionCode> {
         Ok(())
     }
 
-    fn word(&self, _: Table, address: u16) -> Result<u16, Refusal> {
+    fn word(&self, _: Table, address: u16) -> Result<u16, ExceptionCode> {
         Ok(address)
     }
 
-    fn write_word(&mut self, _: u16, _: u16) -> Result<(), Refusal> {
+    fn write_word(&mut self, _: u16, _: u16) -> Result<(), ExceptionCode> {
         Ok(())
     }
 }
