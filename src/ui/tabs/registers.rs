@@ -6,18 +6,20 @@ mod cells;
 mod decode;
 mod keys;
 mod names;
+mod recognise;
 mod view;
 mod writing;
 
 #[cfg(test)]
 mod tests;
 
-use std::ops::Range;
+use std::{collections::BTreeMap, ops::Range};
 
 use self::{
     cells::Cells,
     keys::{Action, table},
     names::Names,
+    recognise::Recognition,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -62,6 +64,9 @@ pub struct Registers {
     paused: bool,
     cells: Cells,
     names: Names,
+    /// Names of the units that were shown before.
+    names_of: BTreeMap<u8, Names>,
+    recognition: Recognition,
     /// Number and steady time of the read on its way, and what it reads.
     on_way: Option<(u32, Timestamp, AddressSpan)>,
     number: u32,
@@ -100,6 +105,8 @@ impl TabView for Registers {
             paused: false,
             cells: Cells::default(),
             names: Names::default(),
+            names_of: BTreeMap::new(),
+            recognition: Recognition::default(),
             on_way: None,
             number: 0,
             relearn: false,
@@ -130,6 +137,7 @@ impl TabView for Registers {
             Action::Faster => self.change_period(-1),
             Action::Slower => self.change_period(1),
             Action::Relearn => self.relearn = true,
+            Action::Names => self.take_names(cx),
             Action::Write => return self.ask_write(),
             Action::Add(by) => return self.add(by),
             Action::Undo => return self.undo(cx),
@@ -161,17 +169,23 @@ impl TabView for Registers {
         let wanted = self
             .on_way
             .is_some_and(|(_, at, span)| span != self.span(cx) || (LOST_AFTER + self.period) < now.duration_since(at));
-        if self.paused || (self.on_way.is_some() && !wanted) {
-            return Vec::new();
+        let mut actions = self.recognise(cx);
+        if !self.paused && (self.on_way.is_none() || wanted) {
+            actions.extend(self.ask(cx, None));
         }
-        self.ask(cx, None)
+        actions
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.on_way.is_some_and(|(on_way, ..)| on_way == number)
+        self.on_way.is_some_and(|(on_way, ..)| on_way == number) || self.recognition.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        if self.recognition.awaits(number) {
+            let reading =
+                answer.ok().and_then(|answer| if let Answer::Registers(read) = answer { Some(read) } else { None });
+            return self.on_probed(cx, reading);
+        }
         if self.on_way.take_if(|(on_way, ..)| *on_way == number).is_none() {
             return Vec::new();
         }
@@ -191,7 +205,9 @@ impl TabView for Registers {
         if self.paused {
             return Vec::new();
         }
-        self.ask(cx, began.and_then(|at| at.checked_add(self.period).ok()))
+        let mut actions = self.recognise(cx);
+        actions.extend(self.ask(cx, began.and_then(|at| at.checked_add(self.period).ok())));
+        actions
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
@@ -204,8 +220,8 @@ impl TabView for Registers {
             }
             Asking::Unit => {
                 let wrong = || t!("found `{text}`, expected 1 to 247", text);
-                self.unit = text.parse().ok().filter(|unit| (1..=247).contains(unit)).ok_or_else(wrong)?;
-                (self.cells, self.last) = (Cells::default(), None);
+                let unit = text.parse().ok().filter(|unit| (1..=247).contains(unit)).ok_or_else(wrong)?;
+                self.show_unit(unit);
             }
             Asking::Enable => return self.enable_writing(text),
             Asking::Write => return self.write_typed(text),
@@ -225,6 +241,14 @@ impl TabView for Registers {
 }
 
 impl Registers {
+    /// Nothing that was read of one unit is shown of another, and each has names of its own.
+    fn show_unit(&mut self, unit: u8) {
+        let names = self.names_of.remove(&unit).unwrap_or_default();
+        self.names_of.insert(self.unit, std::mem::replace(&mut self.names, names));
+        (self.unit, self.reads) = (unit, 0);
+        (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
+    }
+
     /// The rows of the window.
     fn rows(&self, cx: &ViewContext) -> Range<u32> {
         let first = u32::from(self.first);

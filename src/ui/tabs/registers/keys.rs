@@ -27,6 +27,8 @@ pub enum Action {
     Slower,
     /// Asks again for what was refused.
     Relearn,
+    /// Names of the profile that the unit looks like.
+    Names,
     /// Asks for a value to write.
     Write,
     /// Adds to the selected register.
@@ -45,6 +47,12 @@ const KEYS: &[Key<Action>] = &[
         Action::Table(1),
     ),
     Key::new(code(KeyCode::Left), "", "previous table", Action::Table(-1)),
+    Key::new(
+        code(KeyCode::Enter),
+        "names",
+        "take names, units and scales of the device that it looks like",
+        Action::Names,
+    ),
     Key::new(char('j'), "go to", "go to an address: 1002, 0x3EA, 41003, input:1000", Action::GoTo),
     Key::new(char('/'), "find", "find a value in what was read", Action::Find),
     Key::new(char('o'), "order", "byte order: ABCD, CDAB, BADC, DCBA", Action::Order),

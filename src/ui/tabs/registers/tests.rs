@@ -1,5 +1,7 @@
 //! A terminal at a device without a plant file, and a scripted unit behind it.
 
+mod keep;
+
 use std::sync::Arc;
 
 use super::{names::Named, *};
@@ -25,6 +27,8 @@ use crate::{
 struct Bench {
     model: Model,
     asked: Vec<(QueryId, LiveRead)>,
+    /// What the signatures ask.
+    probed: Vec<(QueryId, LiveRead)>,
 }
 
 impl Bench {
@@ -36,7 +40,7 @@ impl Bench {
         let mut snapshot = Snapshot { at: now(), ..Snapshot::blank(Arc::new(def)) };
         snapshot.lines[0].state = LineState::Connected;
         let model = Model::new(Arc::new(snapshot), Theme::FULL, 1, session());
-        let mut bench = Bench { model, asked: Vec::new() };
+        let mut bench = Bench { model, asked: Vec::new(), probed: Vec::new() };
         bench.send(Msg::Resize(80, 24));
         bench
     }
@@ -52,26 +56,34 @@ impl Bench {
     }
 
     fn note(&mut self, effects: Vec<Effect>) {
-        self.asked.extend(effects.into_iter().filter_map(|effect| match effect {
+        let reads = effects.into_iter().filter_map(|effect| match effect {
             Effect::Query(id, Query::Registers(read)) => Some((id, read)),
             _ => None,
-        }));
+        });
+        let recognition = &self.model.tabs.registers.recognition;
+        let (probes, reads): (Vec<_>, Vec<_>) = reads.partition(|(id, _)| recognition.awaits(id.number));
+        self.probed.extend(probes);
+        self.asked.extend(reads);
     }
 
     /// The unit answers the last question after so many seconds: each register has its value, `None` does not exist.
     fn answer(&mut self, seconds: i64, value: impl Fn(u16) -> Option<u16>) -> LiveRead {
         let (id, read) = self.asked.pop().expect("a question");
         self.asked.clear();
+        self.respond(seconds, id, &read, |_, address| value(address));
+        read
+    }
+
+    fn respond(&mut self, seconds: i64, id: QueryId, read: &LiveRead, value: impl Fn(Table, u16) -> Option<u16>) {
         let at = now() + SignedDuration::from_secs(seconds);
         let part = |span: &AddressSpan, address: u32| LivePart {
             at,
             span: AddressSpan { address: to_u16(address), count: 1, ..*span },
-            words: value(to_u16(address)).map(|word| vec![word]).ok_or(Fault::Exception(ExceptionCode(2))),
+            words: value(span.table, to_u16(address)).map(|word| vec![word]).ok_or(Fault::Exception(ExceptionCode(2))),
         };
         let parts = read.spans.iter().flat_map(|span| span.range().map(|address| part(span, address))).collect();
         let reading = LiveReading { parts, reply: Some(Duration::from_micros(6_600)), requests: 2 };
         self.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
-        read
     }
 
     fn screen(&mut self, width: u16, height: u16) -> String {

@@ -267,15 +267,18 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let (modicon, table) = (tab.table.modicon(address), translate(tab.table.word()));
     let width = canvas.width();
     canvas.run(0, 0, width, '─', theme.dim());
-    canvas.text(
+    let x = canvas.text(
         2,
         0,
         &t!(" {modicon}   {table} {address} / 0x{hex} ", modicon, table, address, hex = format!("{address:04X}")),
         theme.strong(),
     );
+    let (recognised, right) = (tab.recognition.words(), width.saturating_sub(2));
     if let Some((words, trouble)) = tab.writing.last() {
         let words = format!(" {} ", fit_words(&words, width.saturating_sub(40)));
-        canvas.text_right(width.saturating_sub(2), 0, &words, if trouble { theme.trouble() } else { theme.normal() });
+        canvas.text_right(right, 0, &words, if trouble { theme.trouble() } else { theme.normal() });
+    } else if !recognised.is_empty() {
+        canvas.text_right(right, 0, &fit(&format!(" {recognised} "), right.saturating_sub(x + 1)), theme.strong());
     }
     let Some(cell) = tab.cells.get(tab.table, address) else { return };
     let words = tab.cells.words(tab.table, address, 4);
