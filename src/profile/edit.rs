@@ -96,6 +96,13 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
     Some(entries)
 }
 
+/// The keys of a line in a new file, those that are usual left out; nothing for a mode that has no keyword.
+pub(super) fn line_text(settings: &LineDef) -> String {
+    let entries = entries(settings).unwrap_or_default().into_iter();
+    let written = entries.filter(|entry| !entry.usual.as_ref().is_some_and(|usual| same(usual, &entry.value)));
+    written.map(|Entry { key, value, .. }| format!("{key} = {}\n", value.to_string().trim())).collect()
+}
+
 fn set(table: &mut dyn TableLike, settings: &LineDef) -> Result<(), String> {
     let entries = entries(settings).ok_or("a plant file has no keyword for this mode")?;
     let others: &[&str] = match settings.transport {

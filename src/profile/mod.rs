@@ -25,6 +25,7 @@ pub mod line;
 mod lint;
 pub(crate) mod names;
 mod mimic;
+pub(crate) mod new_plant;
 mod plant;
 mod program;
 pub(crate) mod reader;
@@ -80,6 +81,15 @@ fn load_warned(plant: &Path, search: &Search) -> Result<(Checked, Option<PlantFi
         .map(|(def, warnings)| (Checked { plant: Arc::new(def), warnings }, file))
 }
 
+/// Checks the text of a plant file that is not written yet, with the shipped device profiles.
+pub(crate) fn check_text(name: &str, text: &str) -> Result<Checked, Errors> {
+    let search = Search::shipped();
+    let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
+    let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
+    let text = plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() };
+    plant::build(name, &text, &library).map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
+}
+
 /// A plant that can be used, and what could be better in its file.
 #[derive(Debug)]
 pub struct Checked {
@@ -106,9 +116,9 @@ pub fn check(file: &Path, search: &Search) -> Result<Checked, Errors> {
         .map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
 }
 
-/// The device profiles that say by what their device is recognised, each as the only device of a plant of its name.
-/// One that has errors is left out: `check` reports them.
-pub fn recognisable(search: &Search) -> Vec<Arc<PlantDef>> {
+/// The shipped device profiles that say by what their device is recognised, each as the only device of a plant of its name.
+pub fn recognisable() -> Vec<Arc<PlantDef>> {
+    let search = &Search::shipped();
     let devices = list(search).into_iter().filter(|listed| listed.kind == Kind::Device);
     let plants = devices.filter_map(|listed| check(Path::new(&listed.name), search).ok()).map(|checked| checked.plant);
     plants.filter(|def| def.devices.iter().any(|device| !device.signature.is_empty())).collect()

@@ -30,7 +30,7 @@ use super::{
 use crate::{
     access::SessionRequest,
     history::{HistoryError, Query, io::QueryRequest},
-    profile::io::atomic::write_for_user,
+    profile::io::atomic::{write_for_user, write_new},
     station::{Request, Session},
 };
 use screen::{Screen, own};
@@ -208,7 +208,7 @@ impl Loop {
                 Effect::SessionRequest(id, request) => self.send_request(id, request),
                 Effect::Query(id, query) => self.ask(id, query),
                 Effect::Extension(message) => self.extension.iter().for_each(|port| (port.send)(message.clone())),
-                Effect::SaveReport { tab, path, bytes } => self.save(tab, path, bytes),
+                Effect::SaveReport { tab, path, bytes, new } => self.save(tab, path, bytes, new),
                 Effect::Bell => self.screen.ring()?,
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),
@@ -250,10 +250,10 @@ impl Loop {
         });
     }
 
-    fn save(&self, tab: Tab, path: PathBuf, bytes: Vec<u8>) {
+    fn save(&self, tab: Tab, path: PathBuf, bytes: Vec<u8>, new: bool) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         tokio::task::spawn_blocking(move || {
-            let saved = save(&path, &bytes).map_err(|error| format!("{}: {error}", path.display()));
+            let saved = save(&path, &bytes, new).map_err(|error| format!("{}: {error}", path.display()));
             let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
         });
     }
@@ -278,7 +278,11 @@ async fn next_state(port: &mut Option<ExtensionPort>) -> Arc<dyn Extension> {
 }
 
 /// A half-written report never has the name of a whole one.
-fn save(path: &Path, bytes: &[u8]) -> io::Result<PathBuf> {
-    write_for_user(path, bytes)?;
+fn save(path: &Path, bytes: &[u8], new: bool) -> io::Result<PathBuf> {
+    if new {
+        write_new(path, bytes)?
+    } else {
+        write_for_user(path, bytes)?
+    }
     std::path::absolute(path)
 }

@@ -71,6 +71,8 @@ pub enum Effect {
         path: PathBuf,
         /// What.
         bytes: Vec<u8>,
+        /// Never over a file that is there.
+        new: bool,
     },
     /// Ring the bell of the terminal once.
     Bell,

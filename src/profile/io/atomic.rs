@@ -51,6 +51,12 @@ pub fn write_for_user(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_atomic(path, bytes, 0o640)
 }
 
+/// A file that was not there before, whole or not at all; an error where one of its name is there.
+pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    fs::create_dir_all(folder(path))?;
+    write_placed(path, bytes, 0o640, |_, new| fs::hard_link(new, path)).map(drop)
+}
+
 /// Where a file is written before it takes the place of `path`. What killed processes have left there is removed.
 pub fn beside(path: &Path) -> PathBuf {
     let mut start = path.file_name().map(OsString::from).unwrap_or_default();

@@ -47,7 +47,7 @@ impl Outgoing {
     }
     /// Writes it.
     fn write(self) -> UiAction {
-        UiAction::Do(Effect::SaveReport { tab: self.tab, path: self.path, bytes: self.bytes })
+        UiAction::Do(Effect::SaveReport { tab: self.tab, path: self.path, bytes: self.bytes, new: false })
     }
 }
 

@@ -7,13 +7,14 @@ mod decode;
 mod keys;
 mod names;
 mod recognise;
+mod save;
 mod view;
 mod writing;
 
 #[cfg(test)]
 mod tests;
 
-use std::{collections::BTreeMap, ops::Range};
+use std::{collections::BTreeMap, ops::Range, path::PathBuf};
 
 use self::{
     cells::Cells,
@@ -87,6 +88,7 @@ enum Asking {
     Unit,
     Value,
     Enable,
+    Save,
     Write,
 }
 
@@ -138,6 +140,7 @@ impl TabView for Registers {
             Action::Slower => self.change_period(1),
             Action::Relearn => self.relearn = true,
             Action::Names => self.take_names(cx),
+            Action::Save => return self.ask_save(),
             Action::Write => return self.ask_write(),
             Action::Add(by) => return self.add(by),
             Action::Undo => return self.undo(cx),
@@ -223,6 +226,7 @@ impl TabView for Registers {
                 let unit = text.parse().ok().filter(|unit| (1..=247).contains(unit)).ok_or_else(wrong)?;
                 self.show_unit(unit);
             }
+            Asking::Save => return self.save(cx, text),
             Asking::Enable => return self.enable_writing(text),
             Asking::Write => return self.write_typed(text),
             Asking::Value => {
@@ -232,6 +236,10 @@ impl TabView for Registers {
             }
         }
         Ok(self.read_now(cx))
+    }
+
+    fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        vec![save::outcome(result)]
     }
 
     #[cfg(test)]

@@ -117,7 +117,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
     let saved: Vec<_> = saved
         .into_iter()
         .filter_map(|effect| match effect {
-            Effect::SaveReport { tab, path, bytes } => Some((tab, path, bytes)),
+            Effect::SaveReport { tab, path, bytes, .. } => Some((tab, path, bytes)),
             Effect::Command(..)
             | Effect::SessionRequest(..)
             | Effect::Query(..)

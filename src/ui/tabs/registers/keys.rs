@@ -29,6 +29,8 @@ pub enum Action {
     Relearn,
     /// Names of the profile that the unit looks like.
     Names,
+    /// Asks for the file to save a plant in.
+    Save,
     /// Asks for a value to write.
     Write,
     /// Adds to the selected register.
@@ -71,6 +73,12 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('D'), "", "write one less than it holds (asks first)", Action::Add(-1)).needs(Role::Supervisor),
     Key::new(char('u'), "", "undo the last verified write (asks first)", Action::Undo).needs(Role::Supervisor),
     Key::new(char('W'), "", "list what was written", Action::Writes),
+    Key::new(
+        char('S'),
+        "save",
+        "save what has a name as a plant file: sightglass FILE is then the same device",
+        Action::Save,
+    ),
     Key::new(char('U'), "unit", "read another unit", Action::Unit),
     Key::new(char('r'), "", "ask again for what the unit has refused", Action::Relearn),
 ];

@@ -12,7 +12,7 @@ use crate::{
         live::{AddressSpan, LiveRead, LiveReading},
         tag::{Decimals, TagDef},
     },
-    profile::{Search, recognisable},
+    profile::recognisable,
 };
 
 /// How far it is.
@@ -31,6 +31,14 @@ impl Recognition {
     /// Is this its read?
     pub fn awaits(&self, number: u32) -> bool {
         matches!(self, Recognition::Asking { on_way: Some((own, _)), .. } if *own == number)
+    }
+
+    /// The profile whose names were taken.
+    pub fn taken(&self) -> Option<&Arc<PlantDef>> {
+        match self {
+            Recognition::Done(Some((def, _, true))) => Some(def),
+            Recognition::Waiting | Recognition::Asking { .. } | Recognition::Done(_) => None,
+        }
     }
 
     /// What is known so far, in words.
@@ -59,7 +67,7 @@ impl Registers {
             return Vec::new();
         }
         if matches!(self.recognition, Recognition::Waiting) {
-            let known = recognisable(&Search::shipped());
+            let known = recognisable();
             self.recognition = Recognition::Asking { known, at: 0, on_way: None };
         }
         let now = cx.steady();

@@ -132,7 +132,7 @@ fn layout(width: u16) -> Columns {
 /// Where names stand, and their room: behind the other columns, else over the bits.
 fn name_column(at: &Columns, width: u16) -> (u16, u16) {
     let behind = width.saturating_sub(at.hint);
-    if 20 <= behind { (at.hint, behind) } else { (at.bits, 22) }
+    if 20 <= behind { (at.hint + 1, behind - 1) } else { (at.bits, 22) }
 }
 
 fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {

@@ -71,3 +71,63 @@ fn each_unit_has_names_of_its_own() {
     bench.keys("U1⏎");
     assert!(!bench.model.tabs.registers.names.is_empty());
 }
+
+impl Bench {
+    /// Saves: the text of the plant file, which loads.
+    fn saved(&mut self) -> (String, PlantDef) {
+        let mut effects = type_keys(&mut self.model, "S");
+        effects.extend(type_keys(&mut self.model, "⏎"));
+        let written = effects.into_iter().find_map(|effect| match effect {
+            Effect::SaveReport { path, bytes, new, .. } => Some((path, bytes, new)),
+            _ => None,
+        });
+        let (path, bytes, new) = written.unwrap_or_else(|| panic!("{}", self.screen(120, 40)));
+        assert_eq!((path.to_str(), new), (Some("bench.toml"), true), "never over an existing file");
+        let text = String::from_utf8(bytes).expect("a text");
+        let loaded = crate::profile::check_text("bench", &text).unwrap_or_else(|errors| panic!("{text}\n{errors}"));
+        (text, PlantDef::clone(&loaded.plant))
+    }
+}
+
+#[test]
+fn a_recognised_device_is_saved_with_its_profile() {
+    let mut bench = Bench::at_unit(pxr);
+    bench.keys("⏎");
+    let (text, def) = bench.saved();
+    let device = &def.devices[0];
+    assert_eq!((device.name.as_str(), device.profile.as_str(), device.unit), ("bench", "fuji_pxr", 1));
+    assert!(device.faceplate.is_some() && text.contains("kind = \"controller\""), "{text}");
+    assert_eq!(def.lines[0].transport, Transport::tcp("10.0.0.7", 502));
+    assert_eq!(def.shifts.len(), 2);
+    bench.send(Msg::Saved(Tab::Registers, Ok("/tmp/x.toml".into())));
+    assert!(bench.screen(80, 24).contains("saved /tmp/x.toml"));
+}
+
+#[test]
+fn registers_named_by_hand_are_saved_as_tags_of_the_plant_file() {
+    let mut bench = Bench::at_unit(|_, _| None);
+    let named = |address, kind, name: &str| Named::new(Table::Holding, address, kind, ByteOrder::Cdab, name);
+    let names = &mut bench.model.tabs.registers.names;
+    names.put(Named { scale: 0.1, decimals: 1, unit: "°C".into(), ..named(1002, DataType::I16, "SV tank \"1\"") });
+    names.put(Named { unit: "furlong".into(), ..named(1010, DataType::F32, "way") });
+    names.put(named(1011, DataType::U16, "inside the float"));
+    names.put(Named { labels: vec![(0, "off".into()), (1, "on".into())], ..named(1020, DataType::U16, "way") });
+    names.put(Named::new(Table::Coil, 7, DataType::Bool, ByteOrder::Abcd, "run"));
+    names.put(Named::new(Table::Input, 0, DataType::Text(8), ByteOrder::Abcd, "serial"));
+    let (text, def) = bench.saved();
+    let names: Vec<&str> = def.tags.iter().map(|tag| tag.name.as_str()).collect();
+    assert_eq!(names, ["bench.run", "bench.serial", "bench.SV_tank__1_", "bench.way", "bench.way_1020"], "{text}");
+    assert!(text.contains("# overlaps another one: { name = \"inside_the_float\""), "{text}");
+    let sv = &def.tags[2];
+    assert_eq!((sv.point.address, sv.scale, sv.unit.as_str()), (1002, 0.1, "°C"));
+    assert_eq!(sv.access, crate::plant::tag::Access::Read, "nothing is written before somebody says so");
+    assert_eq!(def.tags[3].label, "way in furlong");
+    assert_eq!(def.tags[4].label_of(1.0), Some("on"));
+}
+
+#[test]
+fn without_a_name_there_is_nothing_to_save() {
+    let mut bench = Bench::at_unit(|_, _| None);
+    bench.keys("S");
+    assert!(bench.screen(80, 24).contains("Nothing has a name yet"));
+}

@@ -1,0 +1,240 @@
+//! The text of a new plant file: what a technician has found on a line, commented, and checked by reading it again.
+
+use std::fmt::Write;
+
+use toml_edit::Value;
+
+use super::{edit, units};
+use crate::plant::{
+    def::LineDef,
+    tag::{ByteOrder, DataType, Decimals, TagDef},
+};
+
+/// Most values on the mimic, pens of the trend and tags of the report.
+const SHOWN_MAX: usize = 34;
+const PENS_MAX: usize = 4;
+const REPORTED_MAX: usize = 12;
+/// Values of a column of the mimic.
+const ROWS: usize = 17;
+
+/// What a new plant is made of.
+#[derive(Debug, Clone)]
+pub struct NewPlant {
+    /// What the screens show.
+    pub title: String,
+    /// IANA name.
+    pub time_zone: String,
+    /// Its lines.
+    pub lines: Vec<LineDef>,
+    /// Its devices.
+    pub devices: Vec<NewDevice>,
+    /// Name and start of each shift, `day` and `06:00`.
+    pub shifts: Vec<(String, String)>,
+}
+
+/// A device of a new plant.
+#[derive(Debug, Clone)]
+pub struct NewDevice {
+    /// `TIC-1`.
+    pub name: String,
+    /// Place of its line in [`NewPlant::lines`].
+    pub line: usize,
+    /// Unit address.
+    pub unit: u8,
+    /// Its profile, and the tags of it that are of interest; `None`: all it has are its own tags.
+    pub profile: Option<(String, Vec<TagDef>)>,
+    /// A controller: it has a faceplate.
+    pub controller: bool,
+    /// Tags that no profile has, by names of their own.
+    pub tags: Vec<TagDef>,
+}
+
+impl NewPlant {
+    /// The text, which loads without an error; else `Err` with the first errors, in words.
+    pub fn text(&self) -> Result<String, String> {
+        let mut out = String::new();
+        self.write(&mut out).map_err(|error| error.to_string())?;
+        super::check_text("plant", &out)
+            .map_err(|errors| errors.full_lines().take(3).collect::<Vec<_>>().join("\n"))?;
+        Ok(out)
+    }
+
+    fn write(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(
+            out,
+            "# Written by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
+        )?;
+        writeln!(out, "# `sightglass profiles` lists the device profiles, and README.md beside them every key.\n")?;
+        writeln!(out, "title = {}\ntime_zone = {}\n", quoted(&self.title), quoted(&self.time_zone))?;
+        for line in &self.lines {
+            writeln!(out, "[[line]]\nname = {}\n{}", quoted(&line.name), edit::line_text(line))?;
+        }
+        for device in &self.devices {
+            self.device(out, device)?;
+        }
+        self.alarms(out)?;
+        self.screens(out)?;
+        for (name, start) in &self.shifts {
+            writeln!(out, "[[shift]]\nname = {}\nstart = {}\n", quoted(name), quoted(start))?;
+        }
+        let tags: Vec<String> = self.shown().filter(|(_, tag)| is_number(tag)).map(|(name, _)| quoted(&name)).collect();
+        let tags = tags.get(..REPORTED_MAX).unwrap_or(&tags);
+        writeln!(out, "[report]\nfolder = \"reports\"\ntags = [{}]", tags.join(", "))
+    }
+
+    fn device(&self, out: &mut String, device: &NewDevice) -> std::fmt::Result {
+        let line = self.lines.get(device.line).map_or("", |line| line.name.as_str());
+        writeln!(out, "[[device]]\nname = {}", quoted(&device.name))?;
+        if let Some((profile, _)) = &device.profile {
+            writeln!(out, "profile = {}", quoted(profile))?;
+        }
+        writeln!(out, "line = {}\nunit = {}\nfast = \"1s\"\nslow = \"10s\"", quoted(line), device.unit)?;
+        let polled = device.profile.iter().flat_map(|(_, tags)| tags);
+        let polled: Vec<&TagDef> = polled.filter(|tag| tag.poll == crate::plant::tag::Poll::Never).collect();
+        if device.tags.is_empty() && polled.is_empty() {
+            return writeln!(out);
+        }
+        writeln!(
+            out,
+            "# value = raw · scale + offset. Read only: access = \"rw\" lets an operator write a tag.\ntag = ["
+        )?;
+        for tag in polled {
+            writeln!(out, "    {{ name = {}, poll = \"fast\" }},", quoted(&tag.short))?;
+        }
+        let (tags, left_out) = device.own_tags();
+        for tag in tags {
+            writeln!(out, "    {{ {} }},", tag_text(tag))?;
+        }
+        for tag in left_out {
+            writeln!(out, "    # overlaps another one: {{ {} }},", tag_text(tag))?;
+        }
+        writeln!(out, "]\n")
+    }
+
+    /// Alarms to begin with: every device and line has its own already; limits are for the plant's people to say.
+    fn alarms(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(
+            out,
+            "# A device that does not respond and a line that is not connected raise an alarm without a word here."
+        )?;
+        let Some((name, _)) = self.shown().find(|(_, tag)| is_number(tag) && !tag.point.table.is_bits()) else {
+            return writeln!(out);
+        };
+        writeln!(
+            out,
+            "# A limit, to be filled in and uncommented:\n# [[alarm]]\n# tag = {}\n# high = 80.0\n# deadband = 1.0\n\
+             # on_delay = \"5s\"\n# priority = \"high\"\n# message = \"too high\"\n# cause = \"\"\n# effect = \"\"\n\
+             # action = \"\"\n# response_time = \"10min\"\n",
+            quoted(&name)
+        )
+    }
+
+    fn screens(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(out, "[mimic]\nsize = [80, 18]\nitem = [")?;
+        let controllers: Vec<&NewDevice> = self.devices.iter().filter(|device| device.controller).take(2).collect();
+        let columns = if controllers.is_empty() { 2 } else { 1 };
+        let shown: Vec<(String, &TagDef)> = self.shown().filter(|(_, tag)| !tag.is_text()).collect();
+        for (n, (name, tag)) in shown.iter().take(SHOWN_MAX.min(columns * ROWS)).enumerate() {
+            let (x, y, label) = (1 + 40 * (n / ROWS), n % ROWS, quoted(&tag.short));
+            writeln!(
+                out,
+                "    {{ kind = \"value\", x = {x}, y = {y}, width = 38, label = {label}, tag = {} }},",
+                quoted(name)
+            )?;
+        }
+        for (n, device) in controllers.iter().enumerate() {
+            let (y, name) = (7 * n, quoted(&device.name));
+            writeln!(
+                out,
+                "    {{ kind = \"controller\", x = 50, y = {y}, width = 30, height = 6, device = {name} }},"
+            )?;
+        }
+        writeln!(out, "]\n")?;
+        let pens = shown.iter().filter(|(_, tag)| is_number(tag)).take(PENS_MAX);
+        let pens: Vec<String> = pens.map(|(name, _)| format!("    {{ tag = {} }},", quoted(name))).collect();
+        if pens.is_empty() {
+            return Ok(());
+        }
+        writeln!(out, "[[trend]]\nname = {}\npens = [\n{}\n]\n", quoted(&self.title), pens.join("\n"))
+    }
+
+    /// Every tag of interest with its full name.
+    fn shown(&self) -> impl Iterator<Item = (String, &TagDef)> {
+        self.devices.iter().flat_map(|device| {
+            let of_profile = device.profile.iter().flat_map(|(_, tags)| tags);
+            of_profile.chain(device.own_tags().0).map(|tag| (format!("{}.{}", device.name, tag.short), tag))
+        })
+    }
+}
+
+impl NewDevice {
+    /// Its own tags in the order of their addresses, and those that share a register with the one before.
+    fn own_tags(&self) -> (Vec<&TagDef>, Vec<&TagDef>) {
+        let mut tags: Vec<&TagDef> = self.tags.iter().collect();
+        tags.sort_by_key(|tag| (tag.point.table, tag.point.address));
+        let mut end = (None, 0);
+        tags.into_iter().partition(|tag| {
+            let (table, first) = (Some(tag.point.table), u32::from(tag.point.address));
+            let free = end.0 != table || end.1 <= first;
+            if free {
+                end = (table, first + u32::from(tag.point.len()));
+            }
+            free
+        })
+    }
+}
+
+fn is_number(tag: &TagDef) -> bool {
+    !tag.is_text() && tag.labels.is_empty()
+}
+
+/// The keys of a tag, those that are usual left out.
+fn tag_text(tag: &TagDef) -> String {
+    let point = tag.point;
+    let mut keys = vec![
+        format!("name = {}", quoted(&tag.short)),
+        format!("table = {}", quoted(point.table.word())),
+        format!("address = {}", point.address),
+    ];
+    if !point.table.is_bits() {
+        let kind = match point.kind {
+            DataType::Text(bytes) => format!("string({bytes})"),
+            kind => kind.name().to_owned(),
+        };
+        keys.push(format!("type = {}", quoted(&kind)));
+    }
+    if point.order != ByteOrder::Abcd {
+        keys.push(format!("order = {}", quoted(point.order.word())));
+    }
+    if !tag.is_text() {
+        let number = |key: &str, value: f64| format!("{key} = {}", Value::from(value).to_string().trim());
+        keys.extend((tag.scale != 1.0).then(|| number("scale", tag.scale)));
+        keys.extend((tag.offset != 0.0).then(|| number("offset", tag.offset)));
+        if let Decimals::Fixed(decimals) = tag.decimals {
+            keys.push(format!("decimals = {decimals}"));
+        }
+        // A unit that the list of units lacks stands in the words instead.
+        match units::known(&tag.unit) {
+            true => keys.extend((!tag.unit.is_empty()).then(|| format!("unit = {}", quoted(&tag.unit)))),
+            false => keys.push(format!("label = {}", quoted(&format!("{} in {}", tag.short, tag.unit)))),
+        }
+        if !tag.labels.is_empty() {
+            let labels = tag.labels.iter().map(|(number, word)| format!("{number} = {}", quoted(word)));
+            keys.push(format!("enum = {{ {} }}", labels.collect::<Vec<_>>().join(", ")));
+        }
+    }
+    keys.push("poll = \"fast\"".to_owned());
+    keys.join(", ")
+}
+
+/// A string of TOML.
+fn quoted(text: &str) -> String {
+    Value::from(text).to_string().trim().to_owned()
+}
+
+/// What a tag may be called: letters, digits and `- _ / # + .`, anything else becomes `_`.
+pub fn plain_name(text: &str) -> String {
+    let letter = |c: char| if c.is_alphanumeric() || "-_/#+.".contains(c) { c } else { '_' };
+    let name: String = text.trim().chars().map(letter).collect();
+    if name.is_empty() { "_".to_owned() } else { name }
+}

@@ -1,0 +1,118 @@
+//! Keeps what has a name as a plant file: the same device with mimic, alarms, history and reports.
+
+use std::path::PathBuf;
+
+use super::{Asking, Registers, names::Named};
+use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::{
+        def::LineDef,
+        tag::{Access, Decimals, Point, Poll, TagDef},
+    },
+    profile::new_plant::{NewDevice, NewPlant, plain_name},
+    ui::Effect,
+};
+
+/// Tags of a profile that are shown where it polls none by itself.
+const SHOWN_MAX: usize = 34;
+
+impl Registers {
+    /// Asks for the file, where there is something to keep.
+    pub(super) fn ask_save(&mut self) -> Vec<UiAction> {
+        if self.names.is_empty() {
+            let words =
+                t!("Nothing has a name yet: take those of the device with ⏎, or load a list from its manual with N.");
+            return vec![UiAction::Open(Modal::Notice(Notice::new(t!("save"), vec![words.to_owned()])))];
+        }
+        self.asking = Asking::Save;
+        let hint = t!("a new plant file; an existing file is never overwritten");
+        vec![UiAction::Open(Modal::Prompt(Prompt::new(t!("save as plant file"), hint, "bench.toml")))]
+    }
+
+    /// Writes the plant file, which was loaded before as a check.
+    pub(super) fn save(&self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        let mut path = PathBuf::from(text);
+        path.set_extension("toml");
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        if stem.is_empty() || text.is_empty() {
+            return Err(t!("expected the name of a file such as bench.toml").to_owned());
+        }
+        let plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
+        let bytes = plant.text()?.into_bytes();
+        Ok(vec![UiAction::Do(Effect::SaveReport { tab: Tab::Registers, path, bytes, new: true })])
+    }
+
+    fn new_plant(&self, cx: &ViewContext, stem: &str) -> Option<NewPlant> {
+        let def = cx.def();
+        let line = LineDef { name: "L1".to_owned(), ..def.lines.get(self.line.index())?.clone() };
+        let profile = self.recognition.taken();
+        let mut taken: Vec<String> = Vec::new();
+        let tags = self.names.iter().filter(|named| !profile.is_some_and(|profile| is_of(named, &profile.tags)));
+        let tags = tags.map(|named| {
+            let tag = tag_of(named, &taken);
+            taken.push(tag.short.clone());
+            tag
+        });
+        let device = NewDevice {
+            name: plain_name(stem).replace('.', "_"),
+            line: 0,
+            unit: self.unit,
+            controller: profile.is_some_and(|profile| profile.devices.iter().any(|device| device.faceplate.is_some())),
+            tags: tags.collect(),
+            profile: profile.map(|profile| (profile.name.clone(), of_interest(&profile.tags))),
+        };
+        let shifts = [("day", "06:00"), ("night", "18:00")].map(|(name, start)| (name.to_owned(), start.to_owned()));
+        Some(NewPlant {
+            title: def.title.clone(),
+            time_zone: def.time_zone.iana_name().unwrap_or("UTC").to_owned(),
+            lines: vec![line],
+            devices: vec![device],
+            shifts: shifts.to_vec(),
+        })
+    }
+}
+
+/// What became of the file.
+pub fn outcome(result: Result<PathBuf, String>) -> UiAction {
+    let words = match result {
+        Ok(path) => vec![
+            t!("saved {path}", path = path.display()),
+            t!(
+                "sightglass {file} is then the same device with mimic, alarms, history and reports.",
+                file = path.display()
+            ),
+        ],
+        Err(why) => vec![t!("nothing was saved").to_owned(), why],
+    };
+    UiAction::Open(Modal::Notice(Notice::new(t!("save"), words)))
+}
+
+/// Is it called so by the profile?
+fn is_of(named: &Named, tags: &[TagDef]) -> bool {
+    let same = |tag: &TagDef| (tag.point.table, tag.point.address) == (named.table, named.address);
+    tags.iter().any(|tag| same(tag) && tag.short == named.name)
+}
+
+/// What a profile reads often; where it reads nothing by itself, the first that can be read.
+pub fn of_interest(tags: &[TagDef]) -> Vec<TagDef> {
+    let readable = || tags.iter().filter(|tag| tag.access != Access::Write && tag.point.field.is_none());
+    let often = |tag: &&TagDef| matches!(tag.poll, Poll::Every(period) if period <= Duration::from_secs(1));
+    let fast: Vec<TagDef> = readable().filter(often).cloned().collect();
+    if fast.is_empty() { readable().take(SHOWN_MAX).cloned().collect() } else { fast }
+}
+
+/// A tag of its own with a name that no other has.
+fn tag_of(named: &Named, taken: &[String]) -> TagDef {
+    let plain = plain_name(&named.name);
+    let short = if taken.contains(&plain) { format!("{plain}_{}", named.address) } else { plain };
+    let point = Point { table: named.table, address: named.address, kind: named.kind, order: named.order, field: None };
+    TagDef {
+        short: short.clone(),
+        scale: named.scale,
+        offset: named.offset,
+        decimals: Decimals::Fixed(named.decimals),
+        unit: named.unit.clone(),
+        labels: named.labels.clone(),
+        ..TagDef::new(TagId(0), DeviceId(0), &short, point)
+    }
+}
