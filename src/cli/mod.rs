@@ -14,6 +14,7 @@ mod export;
 mod decode;
 mod init;
 mod log;
+mod menu;
 mod open;
 mod own_files;
 mod paths;
@@ -191,18 +192,44 @@ pub fn main() -> ExitCode {
         say_error(&message);
         return ExitCode::from(2);
     }
-    let args = Args::try_parse().unwrap_or_else(|error| {
+    let result = menu::completed(std::env::args_os().collect()).and_then(|words| carry_out(parse(words)));
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            match &error {
+                CliError::Profile(errors) => say_problems(errors),
+                _ => say_error(&error.to_string()),
+            }
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn parse(words: Vec<std::ffi::OsString>) -> Args {
+    Args::try_parse_from(words).unwrap_or_else(|error| {
         if !error.use_stderr() {
             error.exit();
         }
         // What was typed, or comes out of a script, stands in it.
         let _ = write!(std::io::stderr(), "{}", visible(&error.to_string()));
         std::process::exit(error.exit_code())
-    });
-    let result = match args.command {
+    })
+}
+
+/// Does what the arguments say.
+fn carry_out(args: Args) -> Result<(), CliError> {
+    match args.command {
         None => match args.plant {
             Some(plant) => run::with_terminal(&plant, &args.station).map_err(|error| mistyped(&plant, error)),
-            None => attach::main(attach::Args { plant: None }),
+            None => match attach::main(attach::Args { plant: None }) {
+                Err(error @ CliError::NotRunning(_)) => match menu::without_station()? {
+                    Some(words) => carry_out(parse(
+                        std::iter::once("sightglass".into()).chain(words.into_iter().map(Into::into)).collect(),
+                    )),
+                    None => Err(error),
+                },
+                result => result,
+            },
         },
         Some(Command::Demo(args)) => demo::main(args),
         Some(Command::Open(args)) => open::main(args),
@@ -228,16 +255,6 @@ pub fn main() -> ExitCode {
         Some(Command::Probe(args)) => tools::probe::main(args),
         Some(Command::Loopback(args)) => tools::loopback::main(args),
         Some(Command::Send(args)) => tools::send::main(args),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            match &error {
-                CliError::Profile(errors) => say_problems(errors),
-                _ => say_error(&error.to_string()),
-            }
-            ExitCode::from(error.exit_code())
-        }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{
-    CliError, in_runtime, log, paths, say,
+    CliError, in_runtime, log, menu, paths, say,
     tools::{self, PortArgs},
 };
 use crate::{
@@ -56,6 +56,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let _log = log::start(None, None)?;
     in_runtime(async {
         let (line, unit) = find(line, &args).await?;
+        menu::remember(&place(&line, unit));
         let def = Arc::new(bench(line, unit));
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let station = station::start_transient(def, Clock::real(), connectors, Box::new(|_| {}));
@@ -64,6 +65,20 @@ pub fn main(args: Args) -> Result<(), CliError> {
         station.stop().await;
         Ok(result?)
     })
+}
+
+/// The arguments that open this device again at once.
+fn place(line: &LineDef, unit: u8) -> String {
+    let mode = match (&line.transport, line.transport.framing()) {
+        (Transport::Serial { .. }, Framing::Ascii) => " --mode ascii",
+        (Transport::Tcp { .. }, Framing::Rtu) => " --mode rtu-over-tcp",
+        (Transport::Serial { .. } | Transport::Tcp { .. }, _) => "",
+    };
+    let serial = line.transport.serial().map_or(String::new(), |serial| {
+        let stop = if serial.stop_bits == 2 { " --stop 2" } else { "" };
+        format!(" --baud {} --parity {}{stop}", serial.baud, serial.parity.word())
+    });
+    format!("{} --unit {unit}{mode}{serial}", port_of(line))
 }
 
 /// A plant that is one device on one line, of which nothing is known.

@@ -15,6 +15,17 @@ pub fn list() -> Vec<String> {
     stable.iter().cloned().chain(others.filter(|path| is_real(path))).collect()
 }
 
+/// `, driver ch341` for a port whose driver is known, else nothing.
+pub fn driver_words(path: &str) -> String {
+    let device = fs::canonicalize(path).ok();
+    let name = device.as_deref().and_then(Path::file_name);
+    let driver =
+        name.and_then(|name| fs::canonicalize(Path::new("/sys/class/tty").join(name).join("device/driver")).ok());
+    let words =
+        driver.as_deref().and_then(Path::file_name).map(|driver| format!(", driver {}", driver.to_string_lossy()));
+    words.unwrap_or_default()
+}
+
 /// Linux makes /dev/ttyS0 to ttyS31 whether they exist or not; those that do have a driver.
 fn is_real(path: &str) -> bool {
     let name = path.trim_start_matches("/dev/");
