@@ -99,6 +99,11 @@ impl Job {
         matches!(&self.run.diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty())
     }
 
+    /// All steps that need no answer of an earlier one.
+    pub fn planned_steps(&self) -> Vec<Step> {
+        (0..self.planned).map(|n| planned_step(&self.run.diagnostic, n)).collect()
+    }
+
     /// The next step; `None` when it is done or was stopped.
     pub fn next(&self) -> Option<&Step> {
         self.step.as_ref().filter(|_| self.run.state == DiagnosticState::Running)

@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use super::{PortArgs, baud, parity, run};
 use crate::{
+    bus::io::testing,
     cli::{CliError, say},
     plant::{
-        def::Serial,
+        def::{Framing, Serial},
         diagnostics::{Diagnostic, Finding, Scan},
         number::to_u32,
     },
@@ -43,7 +44,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     // Time for request and answer on the wire of the slowest setting is added by the link.
     let scan = Scan { first, last, serials, timeout: line.timeout.min(Duration::from_secs(60)) };
     let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
-    let most = line.timeout * to_u32(requests);
+    // Where a gateway takes one request at a time it can be longer.
+    let at_once = if line.transport.framing() == Framing::Mbap { testing::SCAN_CONNECTIONS } else { 1 };
+    let most = line.timeout * to_u32(requests.div_ceil(at_once));
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if no unit answers", line.transport));
     let run = run(&line, Diagnostic::Scan(scan), |finding| match finding {

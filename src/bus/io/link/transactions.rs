@@ -188,6 +188,11 @@ impl Link {
         self.transactions.has_room(unit)
     }
 
+    /// Requests whose time was over, and whose answers may still come.
+    pub fn late_awaited(&self) -> usize {
+        self.transactions.given_up.iter().filter(|(_, unit)| unit.is_some()).count()
+    }
+
     /// Is there no room for any other request?
     pub fn is_full(&self) -> bool {
         self.transactions.limit() <= self.transactions.under_way.len()
