@@ -52,7 +52,7 @@ pub fn completed(args: Vec<OsString>) -> Result<Vec<OsString>, CliError> {
     }
 }
 
-/// Asks what to do where no station runs; `None` where nobody can be asked.
+/// Asks what to do where no station runs; `None` without a terminal to ask on.
 pub fn without_station() -> Result<Option<Vec<String>>, CliError> {
     if !is_asked() {
         return Ok(None);
