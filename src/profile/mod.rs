@@ -49,6 +49,7 @@ use std::{
 };
 
 pub(crate) use self::io::scenario;
+pub(crate) use self::units::unit_of;
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},

@@ -7,6 +7,12 @@ pub(super) fn known(unit: &str) -> bool {
     KNOWN.contains(&unit)
 }
 
+/// The unit that a word of a manual means, in the spelling that a tag may have.
+pub fn unit_of(word: &str) -> Option<&'static str> {
+    let other = || OTHER_SPELLINGS.iter().find(|(other, _)| other.eq_ignore_ascii_case(word)).map(|(_, unit)| *unit);
+    KNOWN.iter().find(|unit| **unit == word).copied().or_else(other)
+}
+
 /// The unit if it is known; else its problem, with the unit that was meant.
 pub(super) fn check(unit: &At<String>, problems: &mut Problems) -> String {
     let written = unit.value.as_str();

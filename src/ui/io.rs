@@ -209,6 +209,7 @@ impl Loop {
                 Effect::Query(id, query) => self.ask(id, query),
                 Effect::Extension(message) => self.extension.iter().for_each(|port| (port.send)(message.clone())),
                 Effect::SaveReport { tab, path, bytes, new } => self.save(tab, path, bytes, new),
+                Effect::Load { tab, path } => self.load(tab, path),
                 Effect::Bell => self.screen.ring()?,
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),
@@ -258,6 +259,14 @@ impl Loop {
         });
     }
 
+    fn load(&self, tab: Tab, path: PathBuf) {
+        let (outbox, plants) = (self.outbox.clone(), self.model.plants);
+        tokio::task::spawn_blocking(move || {
+            let loaded = load(&path).map_err(|error| format!("{}: {error}", path.display()));
+            let _ = outbox.blocking_send((plants, Msg::Loaded(tab, loaded)));
+        });
+    }
+
     fn draw(&mut self) -> Result<(), UiError> {
         self.redraw_at = None;
         self.screen.draw(|frame| view(&self.model, frame))?;
@@ -276,6 +285,19 @@ async fn next_state(port: &mut Option<ExtensionPort>) -> Arc<dyn Extension> {
     }
     std::future::pending().await
 }
+
+/// A text of the user; one of another encoding is read as well as it can be.
+fn load(path: &Path) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    io::Read::read_to_end(&mut io::Read::take(std::fs::File::open(path)?, LOAD_MAX + 1), &mut bytes)?;
+    if LOAD_MAX < bytes.len() as u64 {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "more than 4 MiB"));
+    }
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Most bytes of a file that is loaded.
+const LOAD_MAX: u64 = 4 << 20;
 
 /// A half-written report never has the name of a whole one.
 fn save(path: &Path, bytes: &[u8], new: bool) -> io::Result<PathBuf> {

@@ -230,6 +230,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_answer(cx, id.number, answer)),
         Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
+        Msg::Loaded(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_loaded(cx, result)),
         Msg::Undelivered(id, why) => {
             model.note_undelivered(id, why.into());
             Vec::new()

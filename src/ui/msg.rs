@@ -41,6 +41,8 @@ pub enum Msg {
     Answer(QueryId, Result<Answer, HistoryError>),
     /// A file of this tab was written, or why not.
     Saved(Tab, Result<PathBuf, String>),
+    /// The text of a file that this tab wanted, or why not.
+    Loaded(Tab, Result<String, String>),
     /// The station did not take this command: its queue is full, or it has gone.
     Undelivered(CommandId, &'static str),
     /// A frame was drawn: what it showed may be meant by the next key.
@@ -73,6 +75,13 @@ pub enum Effect {
         bytes: Vec<u8>,
         /// Never over a file that is there.
         new: bool,
+    },
+    /// Read a file of the user; answered by [`Msg::Loaded`].
+    Load {
+        /// The tab that wants it.
+        tab: Tab,
+        /// Where, relative to the working folder.
+        path: PathBuf,
     },
     /// Ring the bell of the terminal once.
     Bell,

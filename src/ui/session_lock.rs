@@ -169,7 +169,9 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             UiAction::Command(_)
             | UiAction::SendCommand(..)
             | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
-            | UiAction::Do(Effect::SaveReport { .. } | Effect::Extension(_)) => held = held.or(Some(None)),
+            | UiAction::Do(Effect::SaveReport { .. } | Effect::Load { .. } | Effect::Extension(_)) => {
+                held = held.or(Some(None))
+            }
             UiAction::Open(_)
             | UiAction::Leave
             | UiAction::Show(_)

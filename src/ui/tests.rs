@@ -73,6 +73,7 @@ pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
         Effect::Query(..)
         | Effect::Extension(_)
         | Effect::SaveReport { .. }
+        | Effect::Load { .. }
         | Effect::Bell
         | Effect::Redraw
         | Effect::Quit => None,

@@ -114,6 +114,11 @@ pub trait TabView {
         Ok(Vec::new())
     }
 
+    /// The text of a file that the tab wanted, or why not.
+    fn on_loaded(&mut self, _cx: &ViewContext, _result: Result<String, String>) -> Vec<UiAction> {
+        Vec::new()
+    }
+
     /// A file of the tab was written, or why not.
     fn on_saved(&mut self, _cx: &ViewContext, _result: Result<PathBuf, String>) -> Vec<UiAction> {
         Vec::new()

@@ -5,6 +5,7 @@
 mod cells;
 mod decode;
 mod keys;
+mod list;
 mod names;
 mod recognise;
 mod save;
@@ -29,7 +30,10 @@ use crate::{
         number::to_u32,
         tag::{ByteOrder, Table},
     },
-    ui::keys::{find, hints},
+    ui::{
+        Effect,
+        keys::{find, hints},
+    },
 };
 
 /// Periods to choose from.
@@ -68,6 +72,8 @@ pub struct Registers {
     /// Names of the units that were shown before.
     names_of: BTreeMap<u8, Names>,
     recognition: Recognition,
+    /// What came of a pasted list.
+    said: Option<UiAction>,
     /// Number and steady time of the read on its way, and what it reads.
     on_way: Option<(u32, Timestamp, AddressSpan)>,
     number: u32,
@@ -89,6 +95,7 @@ enum Asking {
     Value,
     Enable,
     Save,
+    List,
     Write,
 }
 
@@ -109,6 +116,7 @@ impl TabView for Registers {
             names: Names::default(),
             names_of: BTreeMap::new(),
             recognition: Recognition::default(),
+            said: None,
             on_way: None,
             number: 0,
             relearn: false,
@@ -141,6 +149,11 @@ impl TabView for Registers {
             Action::Relearn => self.relearn = true,
             Action::Names => self.take_names(cx),
             Action::Save => return self.ask_save(),
+            Action::Load => {
+                let hint =
+                    t!("a file: CSV, or columns with address, name, type, scale, unit. Or paste the list into the tab");
+                return self.ask_text(Asking::List, t!("load a register list"), hint);
+            }
             Action::Write => return self.ask_write(),
             Action::Add(by) => return self.add(by),
             Action::Undo => return self.undo(cx),
@@ -173,6 +186,7 @@ impl TabView for Registers {
             .on_way
             .is_some_and(|(_, at, span)| span != self.span(cx) || (LOST_AFTER + self.period) < now.duration_since(at));
         let mut actions = self.recognise(cx);
+        actions.extend(self.said.take());
         if !self.paused && (self.on_way.is_none() || wanted) {
             actions.extend(self.ask(cx, None));
         }
@@ -227,6 +241,9 @@ impl TabView for Registers {
                 self.show_unit(unit);
             }
             Asking::Save => return self.save(cx, text),
+            Asking::List => {
+                return Ok(vec![UiAction::Do(Effect::Load { tab: Tab::Registers, path: PathBuf::from(text) })]);
+            }
             Asking::Enable => return self.enable_writing(text),
             Asking::Write => return self.write_typed(text),
             Asking::Value => {
@@ -236,6 +253,19 @@ impl TabView for Registers {
             }
         }
         Ok(self.read_now(cx))
+    }
+
+    fn on_loaded(&mut self, cx: &ViewContext, result: Result<String, String>) -> Vec<UiAction> {
+        let said = match result {
+            Ok(text) => self.take_list(&text),
+            Err(why) => UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![why]))),
+        };
+        std::iter::once(said).chain(self.read_now(cx)).collect()
+    }
+
+    /// A list that was copied; what came of it is said with the next snapshot.
+    fn on_paste(&mut self, text: &str) {
+        self.said = Some(self.take_list(text));
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {

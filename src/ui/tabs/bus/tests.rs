@@ -122,6 +122,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
             | Effect::SessionRequest(..)
             | Effect::Query(..)
             | Effect::Extension(_)
+            | Effect::Load { .. }
             | Effect::Bell
             | Effect::Redraw
             | Effect::Quit => None,

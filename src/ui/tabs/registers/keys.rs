@@ -29,6 +29,8 @@ pub enum Action {
     Relearn,
     /// Names of the profile that the unit looks like.
     Names,
+    /// Asks for the file of a register list.
+    Load,
     /// Asks for the file to save a plant in.
     Save,
     /// Asks for a value to write.
@@ -73,6 +75,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('D'), "", "write one less than it holds (asks first)", Action::Add(-1)).needs(Role::Supervisor),
     Key::new(char('u'), "", "undo the last verified write (asks first)", Action::Undo).needs(Role::Supervisor),
     Key::new(char('W'), "", "list what was written", Action::Writes),
+    Key::new(char('N'), "", "load a register list from a manual: CSV or columns; or paste it here", Action::Load),
     Key::new(
         char('S'),
         "save",

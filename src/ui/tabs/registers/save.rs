@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Asking, Registers, names::Named};
+use super::{Asking, Base, Registers, list, names::Named};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -15,6 +15,8 @@ use crate::{
 
 /// Tags of a profile that are shown where it polls none by itself.
 const SHOWN_MAX: usize = 34;
+/// Lines of a list that are said not to be read.
+const PROBLEMS_MAX: usize = 10;
 
 impl Registers {
     /// Asks for the file, where there is something to keep.
@@ -69,6 +71,30 @@ impl Registers {
             devices: vec![device],
             shifts: shifts.to_vec(),
         })
+    }
+}
+
+impl Registers {
+    /// Gives the names of a register list, in place of those that were there; says what could not be read, by line.
+    pub(super) fn take_list(&mut self, text: &str) -> UiAction {
+        let list = list::parse(text, self.table, u16::from(self.base == Base::One));
+        let mut words = vec![t!("{count} names read", count = list.named.len())];
+        if let Some(first) = list.named.first() {
+            let (name, place) = (&first.name, first.table.modicon(first.address));
+            words.push(t!(
+                "The first is {name} at {place}. Wrong? Change table or base (b), load it again.",
+                name,
+                place
+            ));
+            (self.table, self.first, self.selected) = (first.table, first.address, first.address);
+        }
+        let more = list.problems.len().saturating_sub(PROBLEMS_MAX);
+        words.extend(list.problems.into_iter().take(PROBLEMS_MAX));
+        if more != 0 {
+            words.push(t!("and {more} more lines that could not be read", more));
+        }
+        list.named.into_iter().for_each(|named| self.names.put(named));
+        UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), words)))
     }
 }
 

@@ -51,6 +51,7 @@ impl Stand {
                 | Effect::Command(..)
                 | Effect::SessionRequest(..)
                 | Effect::Extension(_)
+                | Effect::Load { .. }
                 | Effect::Bell
                 | Effect::Redraw
                 | Effect::Quit => {}

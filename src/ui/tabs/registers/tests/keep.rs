@@ -131,3 +131,26 @@ fn without_a_name_there_is_nothing_to_save() {
     bench.keys("S");
     assert!(bench.screen(80, 24).contains("Nothing has a name yet"));
 }
+
+#[test]
+fn a_list_from_a_manual_gives_names() {
+    let mut bench = Bench::at_unit(device_of_a_manual);
+    bench.keys("Nlist.csv⏎");
+    let list = "address;name;type;scale;unit\n41003;SV;int16;0.1;°C\nsee page 9\n";
+    bench.send(Msg::Loaded(Tab::Registers, Ok(list.to_owned())));
+    let shown = bench.screen(80, 24);
+    assert!(shown.contains("1 names read") && shown.contains("line 3: no address"), "{shown}");
+    bench.keys("⎋");
+    bench.answer(1, |address| device_of_a_manual(Table::Holding, address));
+    assert!(bench.screen(80, 24).contains("SV  70.0 °C"), "{}", bench.screen(80, 24));
+    bench.send(Msg::Paste("40005  speed  uint16  rpm\n".to_owned()));
+    bench.send(Msg::Tick { silent: Duration::ZERO });
+    assert!(bench.screen(80, 24).contains("The first is speed at 40005"), "{}", bench.screen(80, 24));
+    bench.keys("⎋");
+    bench.send(Msg::Loaded(Tab::Registers, Err("list.csv: it is not there".to_owned())));
+    assert!(bench.screen(80, 24).contains("it is not there"));
+}
+
+fn device_of_a_manual(table: Table, address: u16) -> Option<u16> {
+    (table == Table::Holding && address < 1_100).then(|| if address == 1002 { 700 } else { address })
+}
