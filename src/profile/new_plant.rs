@@ -65,7 +65,12 @@ impl NewPlant {
             "# Written by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
         )?;
         writeln!(out, "# `sightglass profiles` lists the device profiles, and README.md beside them every key.\n")?;
-        writeln!(out, "title = {}\ntime_zone = {}\n", quoted(&self.title), quoted(&self.time_zone))?;
+        writeln!(out, "title = {}", quoted(&self.title))?;
+        writeln!(
+            out,
+            "# Local time of shifts and reports, such as Asia/Bangkok.\ntime_zone = {}\n",
+            quoted(&self.time_zone)
+        )?;
         for line in &self.lines {
             writeln!(out, "[[line]]\nname = {}\n{}", quoted(&line.name), edit::line_text(line))?;
         }

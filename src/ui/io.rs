@@ -32,6 +32,7 @@ use crate::{
     history::{HistoryError, Query, io::QueryRequest},
     profile::io::atomic::{write_for_user, write_new},
     station::{Request, Session},
+    t,
 };
 use screen::{Screen, own};
 
@@ -254,7 +255,11 @@ impl Loop {
     fn save(&self, tab: Tab, path: PathBuf, bytes: Vec<u8>, new: bool) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         tokio::task::spawn_blocking(move || {
-            let saved = save(&path, &bytes, new).map_err(|error| format!("{}: {error}", path.display()));
+            let why = |error: io::Error| match error.kind() {
+                io::ErrorKind::AlreadyExists => t!("a file of this name is there already").to_owned(),
+                _ => error.to_string(),
+            };
+            let saved = save(&path, &bytes, new).map_err(|error| format!("{}: {}", path.display(), why(error)));
             let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
         });
     }
