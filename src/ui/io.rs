@@ -1,5 +1,6 @@
 //! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become commands, queries and frames.
 
+mod append;
 mod screen;
 #[cfg(test)]
 mod tests;
@@ -105,9 +106,21 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     }
     let screen = Screen::raise()?;
     let heard_at = Instant::now();
-    Loop { session, model, screen, extension, outbox, asked: Vec::new(), redraw_at: None, drawn_at: None, heard_at }
-        .run(inbox)
-        .await
+    let appender = append::Appender::new(outbox.clone());
+    Loop {
+        session,
+        model,
+        screen,
+        extension,
+        outbox,
+        appender,
+        asked: Vec::new(),
+        redraw_at: None,
+        drawn_at: None,
+        heard_at,
+    }
+    .run(inbox)
+    .await
 }
 
 struct Loop {
@@ -119,6 +132,8 @@ struct Loop {
     outbox: mpsc::Sender<(u32, Msg)>,
     /// Queries on their way, and what waits for their answers.
     asked: Vec<(QueryId, AbortHandle)>,
+    /// Writes logs.
+    appender: append::Appender,
     /// When the next frame is due; `None` while the screen is up to date.
     redraw_at: Option<Instant>,
     drawn_at: Option<Instant>,
@@ -211,6 +226,7 @@ impl Loop {
                 Effect::Extension(message) => self.extension.iter().for_each(|port| (port.send)(message.clone())),
                 Effect::SaveReport { tab, path, bytes, new } => self.save(tab, path, bytes, new),
                 Effect::Load { tab, path } => self.load(tab, path),
+                Effect::Append { tab, path, bytes, new } => self.appender.append(tab, path, bytes, new),
                 Effect::Bell => self.screen.ring()?,
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),

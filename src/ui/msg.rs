@@ -83,6 +83,17 @@ pub enum Effect {
         /// Where, relative to the working folder.
         path: PathBuf,
     },
+    /// Write bytes behind those of a file, in the order of these effects; only a failure is answered, by [`Msg::Saved`].
+    Append {
+        /// The tab that wants it.
+        tab: Tab,
+        /// Where, relative to the working folder.
+        path: PathBuf,
+        /// What.
+        bytes: Vec<u8>,
+        /// The file begins with them: it must not be there yet.
+        new: bool,
+    },
     /// Ring the bell of the terminal once.
     Bell,
     /// Forget what the terminal shows and draw everything.

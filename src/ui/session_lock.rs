@@ -169,9 +169,12 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             UiAction::Command(_)
             | UiAction::SendCommand(..)
             | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
-            | UiAction::Do(Effect::SaveReport { .. } | Effect::Load { .. } | Effect::Extension(_)) => {
-                held = held.or(Some(None))
-            }
+            | UiAction::Do(
+                Effect::SaveReport { .. }
+                | Effect::Append { new: true, .. }
+                | Effect::Load { .. }
+                | Effect::Extension(_),
+            ) => held = held.or(Some(None)),
             UiAction::Open(_)
             | UiAction::Leave
             | UiAction::Show(_)

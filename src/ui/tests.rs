@@ -74,6 +74,7 @@ pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
         | Effect::Extension(_)
         | Effect::SaveReport { .. }
         | Effect::Load { .. }
+        | Effect::Append { .. }
         | Effect::Bell
         | Effect::Redraw
         | Effect::Quit => None,

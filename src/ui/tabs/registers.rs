@@ -10,6 +10,7 @@ mod names;
 mod recognise;
 mod save;
 mod view;
+mod watch;
 mod writing;
 
 #[cfg(test)]
@@ -83,6 +84,7 @@ pub struct Registers {
     reads: u64,
     trouble: Option<String>,
     writing: writing::Writing,
+    watch: watch::WatchList,
     /// What the open prompt asks for.
     asking: Asking,
 }
@@ -94,6 +96,7 @@ enum Asking {
     Unit,
     Value,
     Enable,
+    Name,
     Save,
     List,
     Write,
@@ -124,6 +127,7 @@ impl TabView for Registers {
             reads: 0,
             trouble: None,
             writing: writing::Writing::default(),
+            watch: watch::WatchList::default(),
             asking: Asking::Address,
         }
     }
@@ -147,6 +151,14 @@ impl TabView for Registers {
             Action::Faster => self.change_period(-1),
             Action::Slower => self.change_period(1),
             Action::Relearn => self.relearn = true,
+            Action::Watch => {
+                let refused = self.toggle_watch();
+                if !refused.is_empty() {
+                    return refused;
+                }
+            }
+            Action::Name => return self.ask_name(),
+            Action::Log => return self.toggle_log(cx),
             Action::Names => self.take_names(cx),
             Action::Save => return self.ask_save(),
             Action::Load => {
@@ -217,12 +229,13 @@ impl TabView for Registers {
         self.trouble = None;
         self.reads += 1;
         self.cells.take(&reading);
+        let mut actions = self.watch_reading(&reading);
         let began = reading.parts.first().map(|part| part.at);
         self.last = Some(reading);
         if self.paused {
-            return Vec::new();
+            return actions;
         }
-        let mut actions = self.recognise(cx);
+        actions.extend(self.recognise(cx));
         actions.extend(self.ask(cx, began.and_then(|at| at.checked_add(self.period).ok())));
         actions
     }
@@ -244,6 +257,7 @@ impl TabView for Registers {
             Asking::List => {
                 return Ok(vec![UiAction::Do(Effect::Load { tab: Tab::Registers, path: PathBuf::from(text) })]);
             }
+            Asking::Name => self.name_typed(text)?,
             Asking::Enable => return self.enable_writing(text),
             Asking::Write => return self.write_typed(text),
             Asking::Value => {
@@ -269,7 +283,10 @@ impl TabView for Registers {
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        vec![save::outcome(result)]
+        match &result {
+            Err(why) if self.watch.on_lost(why) => Vec::new(),
+            Ok(_) | Err(_) => vec![save::outcome(result)],
+        }
     }
 
     #[cfg(test)]
@@ -285,12 +302,13 @@ impl Registers {
         self.names_of.insert(self.unit, std::mem::replace(&mut self.names, names));
         (self.unit, self.reads) = (unit, 0);
         (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
+        self.watch.clear();
     }
 
     /// The rows of the window.
     fn rows(&self, cx: &ViewContext) -> Range<u32> {
         let first = u32::from(self.first);
-        first..(first + to_u32(view::rows(cx.area.height))).min(0x1_0000)
+        first..(first + to_u32(view::rows(self, cx.area.height))).min(0x1_0000)
     }
 
     /// What is read: the window, and what its last row may need.
@@ -301,13 +319,13 @@ impl Registers {
     }
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
-        let room = view::rows(cx.area.height);
+        let room = view::rows(self, cx.area.height);
         self.selected = to_u16(motion.to(usize::from(self.selected), 0x1_0000, room));
         self.keep_in_sight(cx);
     }
 
     fn keep_in_sight(&mut self, cx: &ViewContext) {
-        let room = to_u16(view::rows(cx.area.height)).max(1);
+        let room = to_u16(view::rows(self, cx.area.height)).max(1);
         let last_first = u16::MAX - (room - 1);
         self.first = self.first.clamp(self.selected.saturating_sub(room - 1), self.selected).min(last_first);
     }
@@ -338,7 +356,8 @@ impl Registers {
         }
         let span = self.span(cx);
         let relearn = std::mem::take(&mut self.relearn);
-        let read = LiveRead { line: self.line, unit: self.unit, spans: vec![span], not_before, relearn };
+        let spans = std::iter::once(span).chain(self.watched_spans(span)).collect();
+        let read = LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn };
         self.number = self.number.wrapping_add(1);
         self.on_way = Some((self.number, cx.steady(), span));
         vec![UiAction::query(Tab::Registers, self.number, Query::Registers(read))]

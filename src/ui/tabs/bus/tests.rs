@@ -123,6 +123,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
             | Effect::Query(..)
             | Effect::Extension(_)
             | Effect::Load { .. }
+            | Effect::Append { .. }
             | Effect::Bell
             | Effect::Redraw
             | Effect::Quit => None,

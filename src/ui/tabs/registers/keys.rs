@@ -33,6 +33,12 @@ pub enum Action {
     Load,
     /// Asks for the file to save a plant in.
     Save,
+    /// Watches the selected register, or no longer.
+    Watch,
+    /// Asks for its name and type.
+    Name,
+    /// Begins or ends a log of what is watched.
+    Log,
     /// Asks for a value to write.
     Write,
     /// Adds to the selected register.
@@ -64,6 +70,9 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char(' '), "pause", "pause or resume reading", Action::Pause),
     Key::new(char('+'), "", "read more often", Action::Faster),
     Key::new(char('-'), "", "read less often", Action::Slower),
+    Key::new(char('p'), "watch", "watch the selected register, or no longer", Action::Watch),
+    Key::new(char('e'), "name", "name, type, scale and unit of the selected register", Action::Name),
+    Key::new(char('L'), "log", "begin or end a log of what is watched, as CSV: a row for every read", Action::Log),
     Key::new(
         char('w'),
         "write",

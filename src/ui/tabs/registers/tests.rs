@@ -1,6 +1,7 @@
 //! A terminal at a device without a plant file, and a scripted unit behind it.
 
 mod keep;
+mod watch;
 
 use std::sync::Arc;
 
@@ -29,6 +30,8 @@ struct Bench {
     asked: Vec<(QueryId, LiveRead)>,
     /// What the signatures ask.
     probed: Vec<(QueryId, LiveRead)>,
+    /// Rows of a log.
+    rows: Vec<String>,
 }
 
 impl Bench {
@@ -40,7 +43,7 @@ impl Bench {
         let mut snapshot = Snapshot { at: now(), ..Snapshot::blank(Arc::new(def)) };
         snapshot.lines[0].state = LineState::Connected;
         let model = Model::new(Arc::new(snapshot), Theme::FULL, 1, session());
-        let mut bench = Bench { model, asked: Vec::new(), probed: Vec::new() };
+        let mut bench = Bench { model, asked: Vec::new(), probed: Vec::new(), rows: Vec::new() };
         bench.send(Msg::Resize(80, 24));
         bench
     }
@@ -56,6 +59,11 @@ impl Bench {
     }
 
     fn note(&mut self, effects: Vec<Effect>) {
+        let rows = effects.iter().filter_map(|effect| match effect {
+            Effect::Append { bytes, .. } => Some(String::from_utf8_lossy(bytes).trim_end().to_owned()),
+            _ => None,
+        });
+        self.rows.extend(rows);
         let reads = effects.into_iter().filter_map(|effect| match effect {
             Effect::Query(id, Query::Registers(read)) => Some((id, read)),
             _ => None,

@@ -1,6 +1,6 @@
 //! How the registers are drawn: a row each, and the selected one below in every meaning.
 
-use super::{Base, Registers, cells::Cell, decode};
+use super::{Base, Registers, cells::Cell, decode, watch};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -21,10 +21,15 @@ const DETAIL_FROM: u16 = 14;
 /// A change is marked for so long.
 const FRESH: SignedDuration = SignedDuration::from_secs(3);
 
+/// Rows of the watch list: at most half of what the registers would have.
+fn watched(tab: &Registers, height: u16) -> u16 {
+    tab.watch.height().min(height.saturating_sub(HEAD + DETAIL) / 2)
+}
+
 /// Registers on a screen of so many rows.
-pub fn rows(height: u16) -> usize {
-    let detail = if DETAIL_FROM <= height { DETAIL } else { 0 };
-    usize::from(height.saturating_sub(HEAD + detail)).max(1)
+pub fn rows(tab: &Registers, height: u16) -> usize {
+    let below = if DETAIL_FROM <= height { DETAIL + watched(tab, height) } else { 0 };
+    usize::from(height.saturating_sub(HEAD + below)).max(1)
 }
 
 /// What words may mean as numbers, in this byte order.
@@ -38,7 +43,7 @@ pub fn meanings(words: &[u16], order: ByteOrder) -> Vec<f64> {
 pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     heading(tab, cx, canvas);
     let height = canvas.height();
-    let room = rows(height);
+    let room = rows(tab, height);
     columns(tab, cx, canvas);
     for (y, address) in tab.rows(cx).map(to_u16).enumerate() {
         row(tab, cx, canvas, HEAD + to_u16(y), address);
@@ -46,6 +51,7 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     if DETAIL_FROM <= height {
         let (width, y) = (canvas.width(), HEAD + to_u16(room));
         detail(tab, cx, &mut canvas.part(0, y, width, DETAIL));
+        watch::view(tab, cx, &mut canvas.part(0, y + DETAIL, width, watched(tab, height)));
     }
 }
 

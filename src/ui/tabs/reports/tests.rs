@@ -52,6 +52,7 @@ impl Stand {
                 | Effect::SessionRequest(..)
                 | Effect::Extension(_)
                 | Effect::Load { .. }
+                | Effect::Append { .. }
                 | Effect::Bell
                 | Effect::Redraw
                 | Effect::Quit => {}

@@ -1,0 +1,59 @@
+//! The watch list and its log.
+
+use super::*;
+
+#[test]
+fn what_is_watched_is_read_wherever_the_window_is() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("eSV int16 0.1 °C⏎");
+    bench.keys("pj0⏎");
+    let spans = bench.asked.last().map(|(_, read)| read.spans.clone()).expect("a question");
+    assert_eq!((spans[0].address, spans[1].address, spans[1].count), (0, 1002, 1));
+    bench.answer(1, device);
+    bench.answer(2, |address| if address == 1002 { Some(720) } else { device(address) });
+    let shown = bench.screen(120, 40);
+    let row = shown.lines().find(|row| row.contains("SV")).expect("the list is on the screen");
+    for part in ["72.0 °C", "least 70", "greatest 72", "mean 71"] {
+        assert!(row.contains(part), "{part} in {row}");
+    }
+    bench.keys("j1002⏎p");
+    assert!(!bench.screen(120, 40).contains("watch ──"), "p takes it off again");
+}
+
+#[test]
+fn a_log_has_a_row_for_every_read_and_no_old_value() {
+    let mut bench = Bench::new();
+    bench.keys("L");
+    assert!(bench.screen(80, 24).contains("Nothing is watched"));
+    bench.keys("⎋j1002⏎");
+    bench.answer(0, device);
+    bench.keys("eSV int16 0.1 °C⏎p");
+    bench.keys("L");
+    bench.answer(1, device);
+    bench.answer(2, |address| if address == 1002 { Some(701) } else { device(address) });
+    let (id, read) = bench.asked.pop().expect("a question");
+    let at = now() + SignedDuration::from_secs(3);
+    let parts = read.spans.iter().map(|span| LivePart { at, span: *span, words: Err(Fault::Timeout) }).collect();
+    let reading = LiveReading { parts, reply: None, requests: 1 };
+    bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
+    assert!(bench.screen(120, 40).contains("3 rows"));
+    bench.keys("p");
+    assert!(bench.screen(120, 40).contains("cannot change while it is logged"));
+    bench.keys("⎋L");
+    bench.answer(4, device);
+    let values: Vec<_> = bench.rows.iter().map(|row| row.split_once(',').unwrap_or_default().1).collect();
+    assert_eq!(values, ["SV [°C]", "70.0", "70.1", ""], "no row before, none after, none invented");
+    assert!(bench.rows[1].starts_with("20") && bench.rows[1].contains('T'), "{:?}", bench.rows);
+}
+
+#[test]
+fn a_log_that_cannot_be_written_ends_and_says_why() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("pL");
+    bench.send(Msg::Saved(Tab::Registers, Err("x.csv: no space left".to_owned())));
+    assert!(bench.screen(120, 40).contains("LOG ENDED: x.csv: no space left"));
+}

@@ -1,0 +1,304 @@
+//! The watch list: registers that are read wherever the window is, with what they have held, and their log as CSV.
+
+use std::{collections::VecDeque, path::PathBuf};
+
+use super::{Asking, Registers, decode, names::Named};
+use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::{
+        live::{AddressSpan, LiveReading},
+        number::to_u32,
+        tag::{ByteOrder, DataType, Table},
+    },
+    ui::{Effect, widgets::spark},
+};
+
+/// Registers on the list: as many as a read has room for beside the window.
+const WATCHED_MAX: usize = 32;
+/// Values of each that are remembered.
+const VALUES_MAX: usize = 600;
+
+/// One register of the list; what it is called stands in the names.
+#[derive(Debug, Clone, PartialEq)]
+struct Watched {
+    at: (Table, u16),
+    /// The last values, oldest first; `None` where the read brought none.
+    values: VecDeque<Option<f64>>,
+    good: u32,
+    sum: f64,
+    least: f64,
+    greatest: f64,
+}
+
+/// A log under way.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Log {
+    path: PathBuf,
+    rows: u64,
+}
+
+/// The list.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct WatchList {
+    items: Vec<Watched>,
+    log: Option<Log>,
+    /// Why the last log ended by itself.
+    lost: Option<String>,
+}
+
+impl WatchList {
+    /// Rows on the screen, the rule above them included.
+    pub fn height(&self) -> u16 {
+        if self.items.is_empty() { 0 } else { to_u16(self.items.len()).saturating_add(1) }
+    }
+
+    /// Another unit is shown: its registers are others.
+    pub fn clear(&mut self) {
+        *self = WatchList::default();
+    }
+
+    /// A write to the log failed: what it would have held is missing from there on.
+    pub fn on_lost(&mut self, why: &str) -> bool {
+        let logged = self.log.take().is_some();
+        if logged {
+            self.lost = Some(why.to_owned());
+        }
+        logged
+    }
+}
+
+impl Watched {
+    fn new(at: (Table, u16)) -> Watched {
+        let (least, greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        Watched { at, values: VecDeque::new(), good: 0, sum: 0.0, least, greatest }
+    }
+
+    fn push(&mut self, value: Option<f64>) {
+        if self.values.len() == VALUES_MAX {
+            self.values.pop_front();
+        }
+        self.values.push_back(value);
+        if let Some(value) = value {
+            (self.good, self.sum) = (self.good.saturating_add(1), self.sum + value);
+            (self.least, self.greatest) = (self.least.min(value), self.greatest.max(value));
+        }
+    }
+}
+
+impl Registers {
+    /// Puts the selected register on the list, or takes it off.
+    pub(super) fn toggle_watch(&mut self) -> Vec<UiAction> {
+        if self.watch.log.is_some() {
+            return notice(t!("The list cannot change while it is logged: L ends the log.").to_owned());
+        }
+        let at = (self.table, self.selected);
+        if let Some(index) = self.watch.items.iter().position(|item| item.at == at) {
+            self.watch.items.remove(index);
+            return Vec::new();
+        }
+        if self.watch.items.len() == WATCHED_MAX {
+            return notice(t!("The list is full: {most} registers.", most = WATCHED_MAX));
+        }
+        if self.names.get(self.table, self.selected).is_none() {
+            self.names.put(self.unnamed());
+        }
+        self.watch.items.push(Watched::new(at));
+        Vec::new()
+    }
+
+    /// The selected register by its number: a float where it looks like one.
+    fn unnamed(&self) -> Named {
+        let words = self.cells.words(self.table, self.selected, 2);
+        let float = decode::likely_float(&words).filter(|_| !self.table.is_bits());
+        let (kind, order) = match float {
+            Some(order) => (DataType::F32, order),
+            None if self.table.is_bits() => (DataType::Bool, ByteOrder::Abcd),
+            None => (DataType::U16, self.order),
+        };
+        let decimals = if kind == DataType::F32 { 3 } else { 0 };
+        let name = self.table.modicon(self.selected);
+        Named { decimals, ..Named::new(self.table, self.selected, kind, order, &name) }
+    }
+
+    /// Asks for name and type of the selected register.
+    pub(super) fn ask_name(&mut self) -> Vec<UiAction> {
+        let text = self.names.get(self.table, self.selected).map_or(String::new(), |named| {
+            let Named { name, kind, order, scale, unit, .. } = named;
+            format!("{name} {} {} {scale} {unit}", kind.name(), order.word())
+        });
+        let hint = t!("NAME [TYPE] [ORDER] [SCALE] [UNIT]: SV int16 0.1 °C, or energy float32 CDAB kWh");
+        self.asking = Asking::Name;
+        vec![UiAction::Open(Modal::Prompt(Prompt::new(t!("name of the register"), hint, text.trim_end())))]
+    }
+
+    /// Takes a name; an empty text takes it away.
+    pub(super) fn name_typed(&mut self, text: &str) -> Result<(), String> {
+        let at = (self.table, self.selected);
+        if text.is_empty() {
+            self.names.remove(self.table, self.selected);
+            self.watch.items.retain(|item| item.at != at);
+            return Ok(());
+        }
+        let named = named(text, self.unnamed())?;
+        self.names.put(named);
+        // Values of another type are no values of this one.
+        self.watch.items.iter_mut().filter(|item| item.at == at).for_each(|item| *item = Watched::new(at));
+        Ok(())
+    }
+
+    /// What the list reads beside the window.
+    pub(super) fn watched_spans(&self, window: AddressSpan) -> impl Iterator<Item = AddressSpan> {
+        let span = |item: &Watched| {
+            let (table, address) = item.at;
+            let count = self.names.get(table, address).map_or(1, Named::len);
+            AddressSpan { table, address, count: count.min(u16::MAX - address).max(1) }
+        };
+        let inside = move |span: &AddressSpan| {
+            let (all, own) = (window.range(), span.range());
+            span.table == window.table && all.start <= own.start && own.end <= all.end
+        };
+        self.watch.items.iter().map(span).filter(move |span| !inside(span))
+    }
+
+    /// Takes the values of a read, and writes their row.
+    pub(super) fn watch_reading(&mut self, reading: &LiveReading) -> Vec<UiAction> {
+        let times = || reading.parts.iter().map(|part| part.at);
+        let (Some(began), Some(at)) = (times().min(), times().max()) else { return Vec::new() };
+        let (mut values, mut cells) = (Vec::new(), Vec::new());
+        for item in &self.watch.items {
+            let (table, address) = item.at;
+            let named = self.names.get(table, address);
+            let words = self.cells.words(table, address, named.map_or(1, Named::len));
+            // What an earlier read has brought is no value of this one.
+            let is_new = self.cells.get(table, address).is_some_and(|cell| began <= cell.at);
+            let value = named.filter(|_| is_new).and_then(|named| named.value(&words));
+            let decimals = named.map_or(0, |named| usize::from(named.decimals));
+            cells.push(value.map_or(String::new(), |value| format!("{value:.decimals$}")));
+            values.push(value);
+        }
+        self.watch.items.iter_mut().zip(values).for_each(|(item, value)| item.push(value));
+        let Some(log) = &mut self.watch.log else { return Vec::new() };
+        log.rows += 1;
+        let row = csv_row(std::iter::once(format!("{at:.3}")).chain(cells));
+        vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path: log.path.clone(), bytes: row, new: false })]
+    }
+
+    /// Begins a log of the list, or ends it.
+    pub(super) fn toggle_log(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if self.watch.log.take().is_some() {
+            return Vec::new();
+        }
+        if self.watch.items.is_empty() {
+            return notice(t!("Nothing is watched yet: p puts the selected register on the list.").to_owned());
+        }
+        let path = PathBuf::from(draw::local(cx, cx.now, "registers-%Y%m%d-%H%M%S.csv"));
+        let head = |item: &Watched| match self.names.get(item.at.0, item.at.1) {
+            Some(named) if !named.unit.is_empty() => format!("{} [{}]", named.name, named.unit),
+            Some(named) => named.name.clone(),
+            None => item.at.0.modicon(item.at.1),
+        };
+        let bytes = csv_row(std::iter::once("time_utc".to_owned()).chain(self.watch.items.iter().map(head)));
+        (self.watch.log, self.watch.lost) = (Some(Log { path: path.clone(), rows: 0 }), None);
+        vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path, bytes, new: true })]
+    }
+}
+
+/// One row; an empty cell is a value that was not read.
+fn csv_row(cells: impl Iterator<Item = String>) -> Vec<u8> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    // Memory takes every row.
+    let _ = writer.write_record(cells);
+    writer.into_inner().unwrap_or_default()
+}
+
+/// `NAME [TYPE] [ORDER] [SCALE] [UNIT]`, each known by its form.
+fn named(text: &str, plain: Named) -> Result<Named, String> {
+    let mut words = text.split_whitespace();
+    let name = words.next().ok_or_else(|| t!("expected a name").to_owned())?.to_owned();
+    let mut named = Named { name, unit: String::new(), ..plain };
+    for word in words {
+        let kind = DataType::NUMBERS.into_iter().find(|kind| kind.name() == word);
+        let order = ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(word));
+        match (kind, order, word.parse::<f64>()) {
+            (Some(kind), ..) if named.table.is_bits() && kind != DataType::Bool => {
+                return Err(t!("{word}: a bit holds 0 or 1", word));
+            }
+            (Some(kind), ..) => {
+                let decimals = if matches!(kind, DataType::F32 | DataType::F64) { 3 } else { 0 };
+                (named.kind, named.decimals) = (kind, decimals);
+            }
+            (_, Some(order), _) => named.order = order,
+            (.., Ok(scale)) if scale.is_finite() && scale != 0.0 => {
+                let digits = word.split_once('.').map_or(0, |(_, digits)| digits.trim_end_matches('0').len());
+                let decimals = crate::plant::number::to_u8(digits.min(6)).max(named.decimals);
+                (named.scale, named.decimals) = (scale, decimals);
+            }
+            (.., Ok(_)) => return Err(t!("found `{word}`, expected a scale other than 0", word)),
+            (None, None, Err(_)) if named.unit.is_empty() => named.unit = word.to_owned(),
+            (None, None, Err(_)) => return Err(t!("found `{word}`, expected one unit at the end", word)),
+        }
+    }
+    Ok(named)
+}
+
+fn notice(words: String) -> Vec<UiAction> {
+    vec![UiAction::Open(Modal::Notice(Notice::new(t!("watch list"), vec![words])))]
+}
+
+/// Draws the list: name, value, least, greatest and mean, and the last values.
+pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let width = canvas.width();
+    canvas.run(0, 0, width, '─', theme.dim());
+    canvas.text(2, 0, t!(" watch "), theme.strong());
+    if let Some(log) = &tab.watch.log {
+        let words = t!(" logging {path}, {rows} rows ", path = log.path.display(), rows = log.rows);
+        canvas.text_right(width.saturating_sub(2), 0, &words, theme.strong());
+    } else if let Some(why) = &tab.watch.lost {
+        let words = fit_words(&t!(" LOG ENDED: {why} ", why), width.saturating_sub(14));
+        canvas.text_right(width.saturating_sub(2), 0, &words, theme.trouble());
+    }
+    for (y, item) in tab.watch.items.iter().enumerate().map(|(n, item)| (to_u16(n) + 1, item)) {
+        let (table, address) = item.at;
+        let Some(named) = tab.names.get(table, address) else { continue };
+        let words = tab.cells.words(table, address, named.len());
+        let good = item.values.back().is_some_and(Option::is_some);
+        let text = named.text(&words).filter(|_| good).unwrap_or_else(|| "----".to_owned());
+        canvas.text(1, y, &pad(&fit(&named.name, 16), 16), theme.normal());
+        canvas.text_right(34, y, &text, if good { theme.strong() } else { theme.trouble() });
+        if item.good == 0 {
+            continue;
+        }
+        let short = |value: f64| decode::short((value * 1e6).round() / 1e6, 9);
+        let (least, greatest) = (short(item.least), short(item.greatest));
+        let mean = short(item.sum / f64::from(item.good));
+        let words = t!("least {least}  greatest {greatest}  mean {mean}", least, greatest, mean);
+        let x = canvas.text(36, y, &words, theme.dim()) + 2;
+        let room = usize::from(width.saturating_sub(x + 1)).min(60);
+        let recent: Vec<Option<f64>> =
+            item.values.iter().rev().take(room).rev().map(|value| value.map(|value| value - item.least)).collect();
+        if 4 <= room && 0 < to_u32(recent.len()) {
+            let range = (item.greatest - item.least).max(f64::MIN_POSITIVE);
+            canvas.text(x, y, &spark::bars(&recent, range, theme.glyphs), theme.normal());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_has_its_parts_in_any_order_and_wrong_ones_are_refused() {
+        let plain = Named::new(Table::Holding, 5, DataType::U16, ByteOrder::Abcd, "40006");
+        let parse = |text: &str| named(text, plain.clone());
+        let sv = parse("SV int16 0.1 °C").expect("a name");
+        assert_eq!((sv.kind, sv.scale, sv.decimals, sv.unit.as_str()), (DataType::I16, 0.1, 1, "°C"));
+        let energy = parse("energy CDAB float32 kWh").expect("a name");
+        assert_eq!((energy.kind, energy.order, energy.unit.as_str()), (DataType::F32, ByteOrder::Cdab, "kWh"));
+        assert_eq!(parse("run").map(|named| named.kind), Ok(DataType::U16));
+        assert!(parse("SV 0").is_err() && parse("SV a b").is_err());
+        let bit = Named { table: Table::Coil, kind: DataType::Bool, ..plain.clone() };
+        assert!(named("run float32", bit).is_err());
+    }
+}
