@@ -269,10 +269,11 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         if item.good == 0 {
             continue;
         }
-        let short = |value: f64| decode::short((value * 1e6).round() / 1e6, 9);
-        let (least, greatest) = (short(item.least), short(item.greatest));
-        let mean = short(item.sum / f64::from(item.good));
-        let words = t!("least {least}  greatest {greatest}  mean {mean}", least, greatest, mean);
+        let decimals = usize::from(named.decimals);
+        let text = |value: f64| format!("{value:.decimals$}");
+        let (least, greatest) = (text(item.least), text(item.greatest));
+        let mean = text(item.sum / f64::from(item.good));
+        let words = t!("{least} to {greatest}, mean {mean}", least, greatest, mean);
         let x = canvas.text(36, y, &words, theme.dim()) + 2;
         let room = usize::from(width.saturating_sub(x + 1)).min(60);
         let recent: Vec<Option<f64>> =
