@@ -152,5 +152,5 @@ fn a_list_from_a_manual_gives_names() {
 }
 
 fn device_of_a_manual(table: Table, address: u16) -> Option<u16> {
-    (table == Table::Holding && address < 1_100).then(|| if address == 1002 { 700 } else { address })
+    (table == Table::Holding && address < 1_100).then_some(if address == 1002 { 700 } else { address })
 }
