@@ -212,6 +212,20 @@ fn a_write_is_sent_once_and_read_back() {
         Err(Fault::Timeout)
     };
     assert_eq!(written(&held, late), (Outcome::Verified, 1), "what it holds counts, not what it said");
+    let same = RegisterWrite {
+        unit: 1,
+        table: Table::Holding,
+        address: 5,
+        words: vec![7],
+        expected: vec![7],
+        multiple: false,
+    };
+    let done = run(Diagnostic::Write(same), |request| match request[1] {
+        3 => Ok(vec![1, 3, 2, 0, 7]),
+        _ => Err(Fault::Timeout),
+    });
+    let unknown = Finding::Written(Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)));
+    assert!(done.findings.contains(&unknown), "the same value as before proves nothing: {:?}", done.findings);
 }
 
 #[test]

@@ -71,6 +71,8 @@ pub fn after_write(answered: &Result<(), Fault>) -> Option<Outcome> {
 /// After the read-back.
 pub fn after_read_back(write: &RegisterWrite, answered: Result<(), Fault>, held: Result<Vec<u16>, Fault>) -> Outcome {
     Outcome::NotConfirmed(match (held, answered) {
+        // What it held before proves nothing of a write that was not answered.
+        (Ok(held), Err(fault)) if held == write.words && held == write.expected => NotConfirmed::NotAnswered(fault),
         (Ok(held), _) if held == write.words => return Outcome::Verified,
         (Ok(held), Ok(())) => NotConfirmed::Different(number(&held)),
         (Ok(held), Err(_)) => NotConfirmed::NotApplied(number(&held)),

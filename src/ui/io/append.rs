@@ -1,11 +1,13 @@
 //! Writes logs: one thread, so that rows stay in order and a hung disk holds up neither keys nor screen.
 
 use std::{
+    collections::HashSet,
     fs::OpenOptions,
     io::{self, Write},
     path::{Path, PathBuf},
     sync::mpsc::{Receiver, SyncSender, sync_channel},
     thread,
+    time::Duration,
 };
 
 use tokio::sync::mpsc;
@@ -22,16 +24,21 @@ struct Row {
     new: bool,
 }
 
+/// At the end the rows on their way are waited for so long: a hung disk holds up no one.
+const END_MAX: Duration = Duration::from_secs(2);
+
 /// The way to the thread, which begins with the first row.
 pub struct Appender {
     rows: Option<SyncSender<Row>>,
+    /// Closed when the thread has written its last row.
+    ended: Option<Receiver<()>>,
     outbox: mpsc::Sender<(u32, Msg)>,
 }
 
 impl Appender {
     /// Failures go to the outbox.
     pub fn new(outbox: mpsc::Sender<(u32, Msg)>) -> Appender {
-        Appender { rows: None, outbox }
+        Appender { rows: None, ended: None, outbox }
     }
 
     /// Writes a row behind the others of its file.
@@ -39,7 +46,12 @@ impl Appender {
         let outbox = self.outbox.clone();
         let rows = self.rows.get_or_insert_with(|| {
             let (rows, queue) = sync_channel(ROWS_MAX);
-            thread::spawn(move || write_rows(&queue, &outbox));
+            let (end, ended) = sync_channel(1);
+            thread::spawn(move || {
+                write_rows(&queue, &outbox);
+                drop(end);
+            });
+            self.ended = Some(ended);
             rows
         });
         if rows.try_send(Row { tab, path, bytes, new }).is_err() {
@@ -49,9 +61,23 @@ impl Appender {
     }
 }
 
+impl Drop for Appender {
+    fn drop(&mut self) {
+        drop(self.rows.take());
+        // The thread says nothing; it only lets go.
+        let _ = self.ended.take().map(|ended| ended.recv_timeout(END_MAX));
+    }
+}
+
 fn write_rows(queue: &Receiver<Row>, outbox: &mpsc::Sender<(u32, Msg)>) {
+    // A file that failed gets no more rows: it would be another's, or have a gap.
+    let mut failed: HashSet<PathBuf> = HashSet::new();
     for Row { tab, path, bytes, new } in queue {
+        if failed.contains(&path) {
+            continue;
+        }
         if let Err(error) = write(&path, &bytes, new) {
+            failed.insert(path.clone());
             let why = format!("{}: {error}", path.display());
             // A terminal that has left needs no answer.
             let _ = outbox.blocking_send((0, Msg::Saved(tab, Err(why))));

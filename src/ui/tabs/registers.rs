@@ -249,6 +249,9 @@ impl TabView for Registers {
                 (self.table, self.selected) = (table, address);
                 self.first = address;
             }
+            Asking::Unit if self.watch.is_logging() => {
+                return Err(t!("another unit has other registers: end the log first, with L").to_owned());
+            }
             Asking::Unit => {
                 let wrong = || t!("found `{text}`, expected 1 to 247", text);
                 let unit = text.parse().ok().filter(|unit| (1..=247).contains(unit)).ok_or_else(wrong)?;

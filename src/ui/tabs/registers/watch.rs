@@ -7,7 +7,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         live::{AddressSpan, LiveReading},
-        number::to_u32,
+        number::{to_f32, to_u32},
         tag::{ByteOrder, DataType, Table},
     },
     ui::{Effect, widgets::spark},
@@ -50,6 +50,11 @@ impl WatchList {
     /// Rows on the screen, the rule above them included.
     pub fn height(&self) -> u16 {
         if self.items.is_empty() { 0 } else { to_u16(self.items.len()).saturating_add(1) }
+    }
+
+    /// Is a log under way?
+    pub fn is_logging(&self) -> bool {
+        self.log.is_some()
     }
 
     /// Another unit is shown: its registers are others.
@@ -133,6 +138,9 @@ impl Registers {
 
     /// Takes a name; an empty text takes it away.
     pub(super) fn name_typed(&mut self, text: &str) -> Result<(), String> {
+        if self.watch.log.is_some() {
+            return Err(t!("names cannot change while they are logged: L ends the log").to_owned());
+        }
         let at = (self.table, self.selected);
         if text.is_empty() {
             self.names.remove(self.table, self.selected);
@@ -162,18 +170,12 @@ impl Registers {
 
     /// Takes the values of a read, and writes their row.
     pub(super) fn watch_reading(&mut self, reading: &LiveReading) -> Vec<UiAction> {
-        let times = || reading.parts.iter().map(|part| part.at);
-        let (Some(began), Some(at)) = (times().min(), times().max()) else { return Vec::new() };
+        let Some(at) = reading.parts.iter().map(|part| part.at).max() else { return Vec::new() };
         let (mut values, mut cells) = (Vec::new(), Vec::new());
-        for item in &self.watch.items {
-            let (table, address) = item.at;
+        for (table, address) in self.watch.items.iter().map(|item| item.at) {
             let named = self.names.get(table, address);
-            let words = self.cells.words(table, address, named.map_or(1, Named::len));
-            // What an earlier read has brought is no value of this one.
-            let is_new = self.cells.get(table, address).is_some_and(|cell| began <= cell.at);
-            let value = named.filter(|_| is_new).and_then(|named| named.value(&words));
-            let decimals = named.map_or(0, |named| usize::from(named.decimals));
-            cells.push(value.map_or(String::new(), |value| format!("{value:.decimals$}")));
+            let value = named.and_then(|named| named.value(&words_in(reading, table, address, named.len())?));
+            cells.push(named.zip(value).map_or(String::new(), |(named, value)| exact(named, value)));
             values.push(value);
         }
         self.watch.items.iter_mut().zip(values).for_each(|(item, value)| item.push(value));
@@ -200,6 +202,25 @@ impl Registers {
         let bytes = csv_row(std::iter::once("time_utc".to_owned()).chain(self.watch.items.iter().map(head)));
         (self.watch.log, self.watch.lost) = (Some(Log { path: path.clone(), rows: 0 }), None);
         vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path, bytes, new: true })]
+    }
+}
+
+/// The words of a value, if one response of the read holds them all: two halves of different moments are no value.
+fn words_in(reading: &LiveReading, table: Table, address: u16, len: u16) -> Option<Vec<u16>> {
+    let wanted = AddressSpan { table, address, count: len }.range();
+    let holds =
+        |span: AddressSpan| span.table == table && span.range().start <= wanted.start && wanted.end <= span.range().end;
+    let part = reading.parts.iter().find(|part| part.words.is_ok() && holds(part.span))?;
+    let start = usize::from(address - part.span.address);
+    part.words.as_ref().ok()?.get(start..start + usize::from(len)).map(<[u16]>::to_vec)
+}
+
+/// A value for the log: a plain float with all its digits, others with the decimals of their scale.
+fn exact(named: &Named, value: f64) -> String {
+    match named.kind {
+        DataType::F32 if named.scale == 1.0 => to_f32(value).to_string(),
+        DataType::F64 if named.scale == 1.0 => value.to_string(),
+        _ => format!("{value:.*}", usize::from(named.decimals)),
     }
 }
 
