@@ -1,5 +1,6 @@
 //! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
+mod scan;
 mod write;
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
@@ -10,15 +11,12 @@ use super::{names, pdu};
 use crate::plant::{
     command::CommandId,
     def::Serial,
-    diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, RegisterWrite, Scan},
+    diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, RegisterWrite},
     event::Fault,
-    number::{to_u8, to_u16, to_u32},
+    number::{to_u16, to_u32},
     tag::Table,
     traffic::Exchange,
 };
-
-/// Most units of a scan with the same settings of which only corrupt bytes may come.
-const CORRUPT_UNITS_MAX: usize = 3;
 
 /// What is to be sent next.
 #[derive(Debug, Clone, PartialEq)]
@@ -226,43 +224,6 @@ impl Job {
         }
     }
 
-    fn add_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
-        let Ask::Message(request) = &step.ask else { return };
-        let words = match answer {
-            // A broadcast has no response.
-            Ok(answer) if answer.is_empty() => return,
-            Ok(answer) => match answer.get(3..5) {
-                Some([high, low]) => format!("register 0 = {}", u16::from_be_bytes([*high, *low])),
-                _ => "answers".into(),
-            },
-            Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => fault.to_string(),
-            // Corrupt bytes are a trace too: a unit may be there with another parity or baud rate.
-            Err(fault) if fault.is_corrupt() => return self.corrupt_units.push((request[0], step.serial, fault)),
-            Err(_) => return,
-        };
-        self.found(Finding::Unit { unit: request[0], serial: step.serial, words });
-    }
-
-    /// A few corrupt responses may be units; more of them with the same settings come from another sender.
-    fn conclude_corrupt_units(&mut self) {
-        let corrupt_units = std::mem::take(&mut self.corrupt_units);
-        for same in corrupt_units.chunk_by(|one, other| one.1 == other.1) {
-            let (_, serial, fault) = same[0];
-            if same.len() <= CORRUPT_UNITS_MAX {
-                let unit = |(unit, serial, fault): &(u8, Option<Serial>, Fault)| Finding::Unit {
-                    unit: *unit,
-                    serial: *serial,
-                    words: format!("something is there: {fault}"),
-                };
-                same.iter().for_each(|trace| self.found(unit(trace)));
-                continue;
-            }
-            let at = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
-            let what = format!("{} addresses{at}: something else talks on this line", same.len());
-            self.found(Finding::Failed { what, fault });
-        }
-    }
-
     fn conclude(&mut self) {
         self.conclude_corrupt_units();
         let summary = match &self.run.diagnostic {
@@ -307,13 +268,8 @@ fn steps_in(diagnostic: &Diagnostic) -> u32 {
         Diagnostic::Loopback { count, .. } => 1 + u32::from(*count),
         Diagnostic::Identify { .. } => 2,
         Diagnostic::Write(_) => write::STEPS,
-        Diagnostic::Scan(scan) => units_of(scan) * to_u32(scan.serials.len().max(1)),
+        Diagnostic::Scan(scan) => scan::steps_in(scan),
     }
-}
-
-/// Units that a scan asks with each setting.
-fn units_of(scan: &Scan) -> u32 {
-    (u32::from(scan.last) + 1).saturating_sub(u32::from(scan.first))
 }
 
 /// Step `n` of a diagnostic, from 0.
@@ -332,14 +288,7 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
         Diagnostic::Identify { unit } => step(vec![*unit, 0x2B, 0x0E, 0x02, 3]),
         Diagnostic::Write(write) => write::step_of(write, n),
         Diagnostic::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
-        Diagnostic::Scan(scan) => {
-            let units = units_of(scan).max(1);
-            Step {
-                serial: scan.serials.get((n / units) as usize).copied(),
-                timeout: Some(scan.timeout),
-                ask: Ask::Message(read(to_u8(u32::from(scan.first) + n % units), Table::Holding, 0, 1)),
-            }
-        }
+        Diagnostic::Scan(scan) => scan::step_of(scan, n),
     }
 }
 

@@ -151,8 +151,10 @@ async fn first_answer(
 
 fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
     run.findings.iter().find_map(|finding| match finding {
-        Finding::Unit { unit, serial, words } => Some((*unit, *serial, words.clone())),
-        Finding::Exchange(_)
+        Finding::Unit { unit, serial, words, certain: true } => Some((*unit, *serial, words.clone())),
+        // Corrupt bytes at one of the settings fit nothing.
+        Finding::Unit { certain: false, .. }
+        | Finding::Exchange(_)
         | Finding::Bytes { .. }
         | Finding::Object { .. }
         | Finding::Values { .. }
@@ -179,4 +181,26 @@ fn with_serial(line: LineDef, wanted: Serial) -> LineDef {
         *serial = wanted;
     }
     line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::command::CommandId;
+
+    #[test]
+    fn corrupt_bytes_at_a_setting_are_no_answer() {
+        let job = crate::bus::diagnostics::Job::new(
+            CommandId::default(),
+            "cli".into(),
+            Diagnostic::Identify { unit: 1 },
+            jiff::Timestamp::UNIX_EPOCH,
+        );
+        let found = |certain| {
+            let words = "register 0 = 77".to_owned();
+            let findings = vec![Finding::Unit { unit: 3, serial: None, words, certain }];
+            answer(&DiagnosticRun { findings, ..job.run().clone() }).map(|(unit, ..)| unit)
+        };
+        assert_eq!((found(true), found(false)), (Some(3), None));
+    }
 }

@@ -240,6 +240,8 @@ pub enum Finding {
         serial: Option<Serial>,
         /// What it answered: `register 0 = 123`, `exception 02, illegal data address`.
         words: String,
+        /// A whole frame came; else only corrupt bytes, which may be a unit with other settings.
+        certain: bool,
     },
     /// Part of a device's identification.
     Object {

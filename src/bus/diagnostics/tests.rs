@@ -1,6 +1,7 @@
 //! Diagnostics against a device that is a function from request to response.
 
 use super::*;
+use crate::plant::diagnostics::Scan;
 use crate::plant::{
     command::{NotConfirmed, Outcome, Refusal},
     def::Framing,

@@ -144,28 +144,16 @@ pub fn run(
     diagnostic: Diagnostic,
     describe: impl Fn(&Finding) -> Vec<String>,
 ) -> Result<DiagnosticRun, CliError> {
-    let job = Job::new(CommandId { terminal: 0, number: 0 }, Arc::from("cli"), diagnostic, Timestamp::now());
-    let shown = std::io::stderr().is_terminal();
     let mut printed = 0;
-    let run = runtime()?.block_on(async {
-        let work = testing::run(line, job, |run: &DiagnosticRun| {
-            run.findings[printed..].iter().flat_map(&describe).for_each(|text| say(&text));
-            printed = run.findings.len();
-            if shown && 1 < run.total {
-                show_progress(&format!("{} of {}  {}", run.done, run.total, run.now));
-            }
-            true
-        });
-        tokio::select! {
-            run = work => Some(run),
-            _ = tokio::signal::ctrl_c() => None,
-        }
-    });
-    if shown {
-        show_progress("");
-    }
-    let Some(run) = run else { return Err(CliError::Failed("stopped".into())) };
-    run.findings[printed.min(run.findings.len())..].iter().flat_map(&describe).for_each(|text| say(&text));
+    let mut print = |run: &DiagnosticRun| {
+        run.findings.iter().skip(printed).flat_map(&describe).for_each(|text| say(&text));
+        printed = run.findings.len();
+    };
+    let run = runtime()?.block_on(search(line, diagnostic, |run| {
+        print(run);
+        false
+    }))?;
+    print(&run);
     match &run.state {
         DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
         DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => Ok(run),
@@ -176,15 +164,16 @@ pub fn run(
 pub async fn search(
     line: &LineDef,
     diagnostic: Diagnostic,
-    found: impl Fn(&DiagnosticRun) -> bool,
+    mut found: impl FnMut(&DiagnosticRun) -> bool,
 ) -> Result<DiagnosticRun, CliError> {
     let job = Job::new(CommandId::default(), Arc::from("cli"), diagnostic, Timestamp::now());
     let shown = std::io::stderr().is_terminal();
     let work = testing::run(line, job, |run: &DiagnosticRun| {
-        if shown {
-            show_progress(&run.now);
+        let found = found(run);
+        if shown && 1 < run.total {
+            show_progress(&format!("{} of {}  {}", run.done, run.total, run.now));
         }
-        !found(run)
+        !found
     });
     let run = tokio::select! {
         run = work => Ok(run),

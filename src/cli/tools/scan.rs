@@ -50,7 +50,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if no unit answers", line.transport));
     let run = run(&line, Diagnostic::Scan(scan), |finding| match finding {
-        Finding::Unit { unit, serial, words } => {
+        Finding::Unit { unit, serial, words, .. } => {
             let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
             vec![format!("unit {unit:3}{settings}: {words}")]
         }

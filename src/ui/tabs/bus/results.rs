@@ -43,7 +43,7 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
                 });
             }
             Finding::Exchange(exchange) => rows.extend(exchange_rows(cx, exchange, room)),
-            Finding::Unit { unit, serial, words } => {
+            Finding::Unit { unit, serial, words, .. } => {
                 let serial = serial.map_or(String::new(), |serial| t!(" at {serial}", serial));
                 rows.push(plain(t!("● unit {unit}{serial}: {words}", unit, serial, words), theme.strong()));
             }
