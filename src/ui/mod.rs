@@ -229,6 +229,10 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             Vec::new()
         }
         Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_answer(cx, id.number, answer)),
+        Msg::LogFailed(tab, why) => {
+            model.tabs.of_mut(tab).on_log_failed(&why);
+            Vec::new()
+        }
         Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
         Msg::Loaded(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_loaded(cx, result)),
         Msg::Undelivered(id, why) => {

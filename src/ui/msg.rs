@@ -41,6 +41,8 @@ pub enum Msg {
     Answer(QueryId, Result<Answer, HistoryError>),
     /// A file of this tab was written, or why not.
     Saved(Tab, Result<PathBuf, String>),
+    /// A log of this tab could not be written, and why.
+    LogFailed(Tab, String),
     /// The text of a file that this tab wanted, or why not.
     Loaded(Tab, Result<String, String>),
     /// The station did not take this command: its queue is full, or it has gone.
@@ -83,7 +85,8 @@ pub enum Effect {
         /// Where, relative to the working folder.
         path: PathBuf,
     },
-    /// Write bytes behind those of a file, in the order of these effects; only a failure is answered, by [`Msg::Saved`].
+    /// Write bytes behind those of a file, in the order of these effects; only a failure is answered, by
+    /// [`Msg::LogFailed`].
     Append {
         /// The tab that wants it.
         tab: Tab,

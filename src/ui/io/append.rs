@@ -56,7 +56,7 @@ impl Appender {
         });
         if rows.try_send(Row { tab, path, bytes, new }).is_err() {
             let why = "the disk does not keep up: rows are lost".to_owned();
-            let _ = self.outbox.try_send((0, Msg::Saved(tab, Err(why))));
+            let _ = self.outbox.try_send((0, Msg::LogFailed(tab, why)));
         }
     }
 }
@@ -80,7 +80,7 @@ fn write_rows(queue: &Receiver<Row>, outbox: &mpsc::Sender<(u32, Msg)>) {
             failed.insert(path.clone());
             let why = format!("{}: {error}", path.display());
             // A terminal that has left needs no answer.
-            let _ = outbox.blocking_send((0, Msg::Saved(tab, Err(why))));
+            let _ = outbox.blocking_send((0, Msg::LogFailed(tab, why)));
         }
     }
 }
@@ -109,7 +109,7 @@ mod tests {
         // It must not begin a log over this one: its answer comes behind all rows.
         appender.append(Tab::Registers, path.clone(), b"head\n".to_vec(), true);
         let answer = inbox.blocking_recv();
-        assert!(matches!(answer, Some((_, Msg::Saved(Tab::Registers, Err(_))))), "{answer:?}");
+        assert!(matches!(answer, Some((_, Msg::LogFailed(Tab::Registers, _)))), "{answer:?}");
         let text = std::fs::read_to_string(&path).expect("the log");
         let expected: String = std::iter::once("head\n".into()).chain((0..500).map(|n| format!("{n}\n"))).collect();
         assert_eq!(text, expected);

@@ -119,6 +119,9 @@ pub trait TabView {
         Vec::new()
     }
 
+    /// A log of the tab could not be written.
+    fn on_log_failed(&mut self, _why: &str) {}
+
     /// A file of the tab was written, or why not.
     fn on_saved(&mut self, _cx: &ViewContext, _result: Result<PathBuf, String>) -> Vec<UiAction> {
         Vec::new()

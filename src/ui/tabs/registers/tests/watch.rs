@@ -36,7 +36,7 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
     let (id, read) = bench.asked.pop().expect("a question");
     let at = now() + SignedDuration::from_secs(3);
     let parts = read.spans.iter().map(|span| LivePart { at, span: *span, words: Err(Fault::Timeout) }).collect();
-    let reading = LiveReading { parts, reply: None, requests: 1 };
+    let reading = LiveReading { parts, requests: 1, ..LiveReading::default() };
     bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
     assert!(bench.screen(120, 40).contains("3 rows"));
     bench.keys("p");
@@ -54,6 +54,10 @@ fn a_log_that_cannot_be_written_ends_and_says_why() {
     bench.keys("j1002⏎");
     bench.answer(0, device);
     bench.keys("pL");
-    bench.send(Msg::Saved(Tab::Registers, Err("x.csv: no space left".to_owned())));
+    bench.send(Msg::Saved(Tab::Registers, Err("bench.toml: exists".to_owned())));
+    assert!(bench.screen(120, 40).contains("nothing was saved"), "another file than the log");
+    bench.keys("⎋");
+    assert!(bench.screen(120, 40).contains("logging"), "the log goes on");
+    bench.send(Msg::LogFailed(Tab::Registers, "x.csv: no space left".to_owned()));
     assert!(bench.screen(120, 40).contains("LOG ENDED: x.csv: no space left"));
 }
