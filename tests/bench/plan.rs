@@ -32,23 +32,8 @@ impl Dice {
 }
 
 fn device(id: u16) -> DeviceDef {
-    DeviceDef {
-        id: DeviceId(id),
-        name: format!("D-{id}"),
-        title: String::new(),
-        line: LineId(0),
-        unit: id as u8 + 1,
-        profile: String::new(),
-        model: String::new(),
-        limits: Limits { gap_registers_max: 16, ..Limits::STANDARD },
-        functions: Vec::new(),
-        gap: Duration::ZERO,
-        write_gap: Duration::ZERO,
-        faceplate: None,
-        actions: Vec::new(),
-        program: None,
-        signature: Vec::new(),
-    }
+    let limits = Limits { gap_registers_max: 16, ..Limits::STANDARD };
+    DeviceDef { unit: id as u8 + 1, limits, ..DeviceDef::new(DeviceId(id), &format!("D-{id}"), LineId(0)) }
 }
 
 /// Tags of mixed types in runs of one to eight, with gaps of up to `gap` registers between the runs.

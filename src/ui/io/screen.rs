@@ -52,6 +52,8 @@ impl Screen {
         let raised = crossterm::execute!(
             io::stdout(),
             terminal::EnterAlternateScreen,
+            // A console without an alternate screen keeps what was there.
+            terminal::Clear(terminal::ClearType::All),
             cursor::Hide,
             event::EnableBracketedPaste
         );
