@@ -64,8 +64,9 @@ pub struct LiveJob {
 }
 
 impl LiveJob {
-    /// Ready for its first request; what is known to be refused is in the reading already.
-    pub fn new(read: &LiveRead, known: &mut KnownHoles, at: Timestamp) -> LiveJob {
+    /// Ready for its first request, `at` in UTC and `began` by the line's clock; what is known to be refused is in the
+    /// reading already.
+    pub fn new(read: &LiveRead, known: &mut KnownHoles, at: Timestamp, began: Timestamp) -> LiveJob {
         if read.relearn {
             known.forget(read.unit);
         }
@@ -74,7 +75,7 @@ impl LiveJob {
         let refused = Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS));
         let holes = read.spans.iter().flat_map(|span| known.holes_in(unit, *span));
         let parts = holes.map(|span| LivePart { at, span, words: refused.clone() }).collect();
-        LiveJob { unit, queue, reading: LiveReading { parts, ..LiveReading::default() } }
+        LiveJob { unit, queue, reading: LiveReading { began, parts, ..LiveReading::default() } }
     }
 
     /// The next request; `None` when it is done.
@@ -134,7 +135,7 @@ mod tests {
             |(address, count): &(u16, u16)| AddressSpan { table: Table::Holding, address: *address, count: *count };
         let spans = spans.iter().map(span).collect();
         let read = LiveRead { line: LineId(0), unit: 1, spans, not_before: None, relearn: false };
-        let mut job = LiveJob::new(&read, known, Timestamp::UNIX_EPOCH);
+        let mut job = LiveJob::new(&read, known, Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
         while let Some(span) = job.next() {
             let addresses: Vec<u16> = span.range().map(to_u16).collect();
             let outcome = match addresses.iter().all(|address| has(*address)) {
@@ -183,7 +184,7 @@ mod tests {
         let spans = vec![span(0), span(100), span(65_526)];
         let read = LiveRead { line: LineId(0), unit: 1, spans, not_before: None, relearn: false };
         let mut known = KnownHoles::default();
-        let mut job = LiveJob::new(&read, &mut known, Timestamp::UNIX_EPOCH);
+        let mut job = LiveJob::new(&read, &mut known, Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
         job.take(&mut known, Timestamp::UNIX_EPOCH, Err(Fault::Timeout));
         assert_eq!(job.next(), None);
         let reading = job.finish(None);

@@ -40,7 +40,7 @@ pub struct LiveRead {
     pub unit: u8,
     /// What, in the order in which it is to be read.
     pub spans: Vec<AddressSpan>,
-    /// The line waits until then; `None`: as soon as it has time.
+    /// The line waits until then, by its clock as in [`LiveReading::began`]; `None`: as soon as it has time.
     pub not_before: Option<Timestamp>,
     /// Ask again for what the unit has refused before.
     pub relearn: bool,
@@ -64,6 +64,8 @@ impl LiveRead {
 /// What a live read has found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LiveReading {
+    /// When its first request was made, by the line's clock, which no setting of a clock moves.
+    pub began: Timestamp,
     /// Each part that was asked, in the order in which it was read.
     pub parts: Vec<LivePart>,
     /// From the last byte sent to the first byte received, of the last request that was answered.
@@ -75,7 +77,7 @@ pub struct LiveReading {
 /// Part of a live read: what one request brought, or what is known of addresses that were not asked again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LivePart {
-    /// When its response was complete, or its request failed.
+    /// When its response was complete, or its request failed, in UTC.
     pub at: Timestamp,
     /// Where.
     pub span: AddressSpan,

@@ -49,7 +49,7 @@ impl LiveReads {
             && let Some(first) = first
         {
             let request = self.waiting.remove(first);
-            self.job = Some((LiveJob::new(&request.read, &mut self.known, now), request));
+            self.job = Some((LiveJob::new(&request.read, &mut self.known, clock.to_utc(now), now), request));
         }
         self.job.is_some()
     }

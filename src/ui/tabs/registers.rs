@@ -81,6 +81,8 @@ pub struct Registers {
     number: u32,
     relearn: bool,
     last: Option<LiveReading>,
+    /// How long the last read took, with its way to this terminal.
+    took: SignedDuration,
     /// Reads answered, and requests that they took.
     reads: u64,
     trouble: Option<String>,
@@ -125,6 +127,7 @@ impl TabView for Registers {
             number: 0,
             relearn: false,
             last: None,
+            took: SignedDuration::ZERO,
             reads: 0,
             trouble: None,
             writing: writing::Writing::default(),
@@ -231,13 +234,14 @@ impl TabView for Registers {
         self.reads += 1;
         self.cells.take(&reading);
         let mut actions = self.watch_reading(&reading);
-        let began = reading.parts.first().map(|part| part.at);
+        let began = reading.began;
+        self.took = cx.steady().duration_since(began);
         self.last = Some(reading);
         if self.paused {
             return actions;
         }
         actions.extend(self.recognise(cx));
-        actions.extend(self.ask(cx, began.and_then(|at| at.checked_add(self.period).ok())));
+        actions.extend(self.ask(cx, began.checked_add(self.period).ok()));
         actions
     }
 
@@ -287,10 +291,11 @@ impl TabView for Registers {
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        match &result {
-            Err(why) if self.watch.on_lost(why) => Vec::new(),
-            Ok(_) | Err(_) => vec![save::outcome(result)],
-        }
+        vec![save::outcome(result)]
+    }
+
+    fn on_log_failed(&mut self, why: &str) {
+        self.watch.on_lost(why);
     }
 
     #[cfg(test)]

@@ -45,7 +45,7 @@ impl Task<'_> {
                     return Ok(());
                 }
             };
-            job.take(&mut self.live.known, self.clock.now(), words);
+            job.take(&mut self.live.known, self.clock.utc(), words);
         }
         if job.next().is_none()
             && let Some((job, request)) = self.live.job.take()

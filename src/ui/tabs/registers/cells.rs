@@ -51,6 +51,13 @@ impl Cells {
         range.map_while(word).collect()
     }
 
+    /// The words of a value from one response, good or not any more; two halves of different moments are no value.
+    pub fn held(&self, table: Table, address: u16, count: u16) -> Option<Vec<u16>> {
+        let at = self.get(table, address)?.at;
+        let word = |address: u32| self.get(table, u16::try_from(address).ok()?).filter(|cell| cell.at == at)?.word;
+        AddressSpan { table, address, count }.range().map(word).collect()
+    }
+
     /// Everything good, in the order of tables and addresses.
     pub fn good(&self) -> impl Iterator<Item = (Table, u16)> {
         let good = self.0.iter().filter(|(_, cell)| cell.fault.is_none() && cell.word.is_some());

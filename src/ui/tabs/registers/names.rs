@@ -31,7 +31,6 @@ pub struct Named {
     pub labels: Vec<(i64, String)>,
 }
 
-#[allow(dead_code, reason = "what gives names comes next")]
 impl Named {
     /// An unscaled number without unit.
     pub fn new(table: Table, address: u16, kind: DataType, order: ByteOrder, name: &str) -> Named {
@@ -82,7 +81,6 @@ impl Named {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Names(BTreeMap<(Table, u16), Named>);
 
-#[allow(dead_code, reason = "what gives names comes next")]
 impl Names {
     /// What begins at an address.
     pub fn get(&self, table: Table, address: u16) -> Option<&Named> {

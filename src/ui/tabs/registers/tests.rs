@@ -53,6 +53,14 @@ impl Bench {
         self.note(effects);
     }
 
+    /// The line is in this state, so many seconds later.
+    fn snapshot(&mut self, seconds: i64, state: LineState) {
+        let mut snapshot = Snapshot::clone(&self.model.snapshot);
+        snapshot.at = now() + SignedDuration::from_secs(seconds);
+        snapshot.lines[0].state = state;
+        self.send(Msg::Snapshot(Arc::new(snapshot)));
+    }
+
     fn keys(&mut self, keys: &str) {
         let effects = type_keys(&mut self.model, keys);
         self.note(effects);
@@ -90,7 +98,7 @@ impl Bench {
             words: value(span.table, to_u16(address)).map(|word| vec![word]).ok_or(Fault::Exception(ExceptionCode(2))),
         };
         let parts = read.spans.iter().flat_map(|span| span.range().map(|address| part(span, address))).collect();
-        let reading = LiveReading { parts, reply: Some(Duration::from_micros(6_600)), requests: 2 };
+        let reading = LiveReading { began: at, parts, reply: Some(Duration::from_micros(6_600)), requests: 2 };
         self.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
     }
 
@@ -175,7 +183,7 @@ fn a_change_is_marked_and_a_failed_read_is_not_shown_as_good() {
     let (id, read) = bench.asked.pop().expect("a question");
     let words = Err(Fault::Timeout);
     let part = LivePart { at: now() + SignedDuration::from_secs(5), span: read.spans[0], words };
-    let reading = LiveReading { parts: vec![part], reply: None, requests: 1 };
+    let reading = LiveReading { parts: vec![part], requests: 1, ..LiveReading::default() };
     bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
     let shown = bench.screen(80, 24);
     let row = shown.lines().find(|row| row.contains("41003 /")).expect("the row is on the screen");
@@ -270,4 +278,47 @@ fn what_is_not_known_is_not_written_over() {
     bench.answer(0, |address| Some(address).filter(|address| *address == 1002));
     bench.keys("w1 2⏎");
     assert!(bench.screen(80, 24).contains("what all of them hold"), "{}", bench.screen(80, 24));
+}
+
+#[test]
+fn what_was_read_before_the_line_was_lost_is_marked_as_old() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("p");
+    bench.answer(1, device);
+    let row = |bench: &mut Bench| {
+        let shown = bench.screen(120, 40);
+        let rows = shown.lines().filter(|row| row.contains("41003")).map(str::to_owned).collect::<Vec<_>>();
+        (rows[0].clone(), rows[rows.len() - 1].clone())
+    };
+    assert!(!row(&mut bench).0.contains("02BC?"), "good while it is read");
+    bench.snapshot(2, LineState::Waiting { why: "refused".to_owned(), retry_at: now() });
+    let (grid, watched) = row(&mut bench);
+    assert!(grid.contains("02BC?") && watched.contains("700?"), "{grid}\n{watched}");
+    bench.snapshot(60, LineState::Connected);
+    assert!(row(&mut bench).0.contains("02BC?"), "nothing was read for a minute");
+    bench.answer(60, device);
+    let (grid, watched) = row(&mut bench);
+    assert!(!grid.contains('?') && !watched.contains('?'), "{grid}\n{watched}");
+}
+
+#[test]
+fn a_system_clock_that_was_set_does_not_stop_reading() {
+    let mut bench = Bench::new();
+    let (id, read) = bench.asked.pop().expect("a question");
+    let at = now() - SignedDuration::from_hours(1);
+    let part = LivePart { at, span: read.spans[0], words: Err(Fault::Timeout) };
+    let reading = LiveReading { began: now(), parts: vec![part], requests: 1, ..LiveReading::default() };
+    bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
+    let next = now() + SignedDuration::from_secs(1);
+    assert_eq!(bench.asked.last().map(|(_, read)| read.not_before), Some(Some(next)));
+}
+
+#[test]
+fn a_bench_has_no_alarms_that_could_not_be_evaluated() {
+    let mut bench = Bench::new();
+    bench.snapshot(2, LineState::Connecting);
+    let shown = bench.screen(80, 24);
+    assert!(shown.contains("no plant file") && !shown.contains("not evaluated"), "{shown}");
 }

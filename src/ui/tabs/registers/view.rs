@@ -1,6 +1,6 @@
 //! How the registers are drawn: a row each, and the selected one below in every meaning.
 
-use super::{Base, Registers, cells::Cell, decode, watch};
+use super::{Base, Registers, cells::Cell, decode, names::Named, watch};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -202,7 +202,7 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
         canvas.text(17, y, &why, theme.dim());
         return;
     };
-    let old = cell.fault.is_some();
+    let old = is_old(tab, cx, cell);
     let style = match (old, fresh) {
         (true, _) => theme.trouble(),
         (false, true) => theme.strong(),
@@ -224,7 +224,7 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
     canvas.text(at.age, y, &fit(&words, 6), style);
     let words = tab.cells.words(tab.table, address, 4);
     if let Some(named) = tab.names.get(tab.table, address) {
-        let value = named.text(&words).unwrap_or_else(|| "----".to_owned());
+        let (value, _) = named_text(tab, cx, named);
         let (x, room) = name_column(&at, canvas.width());
         canvas.text(x, y, &pad(&format!("{}  {value}", named.name), room), style);
     } else if let Some(order) = decode::likely_float(words.get(..2).unwrap_or(&words))
@@ -262,6 +262,22 @@ fn bits(word: u16) -> String {
     [word >> 12, word >> 8 & 15, word >> 4 & 15, word & 15].map(|four| format!("{four:04b}")).join(" ")
 }
 
+/// Does the unit perhaps hold something else by now? Nothing came, or for too long.
+fn is_old(tab: &Registers, cx: &ViewContext, cell: &Cell) -> bool {
+    let line = cx.snapshot.lines.get(tab.line.index());
+    let connected = line.is_some_and(|line| line.state == LineState::Connected);
+    let limit = tab.period.max(tab.took) * 3 + SignedDuration::from_secs(2);
+    !connected || cell.fault.is_some() || limit < cx.now.duration_since(cell.at)
+}
+
+/// A named value, and whether it is good: `70.0 °C`, `70.0 °C?` for an old one, `----` for none.
+pub fn named_text(tab: &Registers, cx: &ViewContext, named: &Named) -> (String, bool) {
+    let words = tab.cells.held(named.table, named.address, named.len());
+    let Some(text) = words.and_then(|words| named.text(&words)) else { return ("----".to_owned(), false) };
+    let mut cells = (0..named.len()).filter_map(|n| tab.cells.get(named.table, named.address.checked_add(n)?));
+    if cells.any(|cell| is_old(tab, cx, cell)) { (format!("{text}?"), false) } else { (text, true) }
+}
+
 fn is_fresh(cx: &ViewContext, cell: &Cell) -> bool {
     cell.changed.is_some_and(|changed| cx.now.duration_since(changed) <= FRESH)
 }
@@ -287,6 +303,8 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         canvas.text_right(right, 0, &fit(&format!(" {recognised} "), right.saturating_sub(x + 1)), theme.strong());
     }
     let Some(cell) = tab.cells.get(tab.table, address) else { return };
+    let old = is_old(tab, cx, cell);
+    let normal = if old { theme.trouble() } else { theme.normal() };
     let words = tab.cells.words(tab.table, address, 4);
     if !tab.table.is_bits() {
         let number = |kind, order| {
@@ -299,7 +317,7 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
             double = number(DataType::F64, tab.order),
             text = decode::text(&words)
         );
-        canvas.text(1, 1, &fit(&plain, width.saturating_sub(2)), theme.normal());
+        canvas.text(1, 1, &fit(&plain, width.saturating_sub(2)), normal);
         // All four where two stand beside each other, else the usual one and the chosen one.
         let other = if tab.order == ByteOrder::Abcd { ByteOrder::Cdab } else { tab.order };
         let orders = if 108 <= width { ByteOrder::ALL.to_vec() } else { vec![ByteOrder::Abcd, other] };
@@ -307,19 +325,24 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
             let float = decode::float(order, &words, 12).unwrap_or_else(|| "–".to_owned());
             let (unsigned, signed) = (number(DataType::U32, order), number(DataType::I32, order));
             let text = format!("{}  {unsigned:>11} {signed:>12} {float:>13}", order.word());
-            let style = if order == tab.order { theme.normal() } else { theme.dim() };
+            let style = if order == tab.order { normal } else { theme.dim() };
             canvas.text(1 + 60 * (to_u16(n) / 2), 2 + to_u16(n) % 2, &text, style);
         }
     }
-    seen(cx, cell, canvas);
+    seen(cx, cell, old, canvas);
 }
 
 /// `700 now   3 values in 0:42   least 690   greatest 702   mean 697.2  ▁▂▃`.
-fn seen(cx: &ViewContext, cell: &Cell, canvas: &mut Canvas) {
+fn seen(cx: &ViewContext, cell: &Cell, old: bool, canvas: &mut Canvas) {
     let theme = cx.theme;
-    if let Some(fault) = cell.fault {
-        let why = fit_words(&fault.to_string(), canvas.width().saturating_sub(2));
-        canvas.text(1, 4, &why, theme.trouble());
+    if old {
+        let why = cell.fault.map_or(t!("not read any more").to_owned(), |fault| fault.to_string());
+        let read = if cell.word.is_some() {
+            t!(", last read {age} ago", age = text::age(elapsed(cell.at, cx.now)))
+        } else {
+            String::new()
+        };
+        canvas.text(1, 4, &fit_words(&(why + &read), canvas.width().saturating_sub(2)), theme.trouble());
         return;
     }
     let values: Vec<f64> = cell.seen.iter().map(|(_, word)| f64::from(*word)).collect();

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, path::PathBuf};
 
-use super::{Asking, Registers, decode, names::Named};
+use super::{Asking, Registers, decode, names::Named, view::named_text};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -63,12 +63,10 @@ impl WatchList {
     }
 
     /// A write to the log failed: what it would have held is missing from there on.
-    pub fn on_lost(&mut self, why: &str) -> bool {
-        let logged = self.log.take().is_some();
-        if logged {
+    pub fn on_lost(&mut self, why: &str) {
+        if self.log.take().is_some() {
             self.lost = Some(why.to_owned());
         }
-        logged
     }
 }
 
@@ -159,7 +157,8 @@ impl Registers {
         let span = |item: &Watched| {
             let (table, address) = item.at;
             let count = self.names.get(table, address).map_or(1, Named::len);
-            AddressSpan { table, address, count: count.min(u16::MAX - address).max(1) }
+            let room = 0x1_0000 - u32::from(address);
+            AddressSpan { table, address, count: to_u16(u32::from(count).min(room)) }
         };
         let inside = move |span: &AddressSpan| {
             let (all, own) = (window.range(), span.range());
@@ -282,9 +281,7 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     for (y, item) in tab.watch.items.iter().enumerate().map(|(n, item)| (to_u16(n) + 1, item)) {
         let (table, address) = item.at;
         let Some(named) = tab.names.get(table, address) else { continue };
-        let words = tab.cells.words(table, address, named.len());
-        let good = item.values.back().is_some_and(Option::is_some);
-        let text = named.text(&words).filter(|_| good).unwrap_or_else(|| "----".to_owned());
+        let (text, good) = named_text(tab, cx, named);
         canvas.text(1, y, &pad(&fit(&named.name, 16), 16), theme.normal());
         canvas.text_right(34, y, &text, if good { theme.strong() } else { theme.trouble() });
         if item.good == 0 {

@@ -120,7 +120,7 @@ fn registers_named_by_hand_are_saved_as_tags_of_the_plant_file() {
     assert!(text.contains("# overlaps another one: { name = \"inside_the_float\""), "{text}");
     let sv = &def.tags[2];
     assert_eq!((sv.point.address, sv.scale, sv.unit.as_str()), (1002, 0.1, "°C"));
-    assert_eq!(sv.access, crate::plant::tag::Access::Read, "nothing is written before somebody says so");
+    assert_eq!(sv.access, crate::plant::tag::Access::Read, "read only until the plant file says otherwise");
     assert_eq!(def.tags[3].label, "way in furlong");
     assert_eq!(def.tags[4].label_of(1.0), Some("on"));
 }
