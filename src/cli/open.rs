@@ -52,6 +52,7 @@ pub struct Args {
 /// Finds settings and unit, and shows the registers.
 pub fn main(args: Args) -> Result<(), CliError> {
     let line = args.port.line()?;
+    args.unit.map_or(Ok(()), |unit| tools::check_unit(&line, unit))?;
     ui::io::require_terminal()?;
     let _log = log::start(None, None)?;
     in_runtime(async {
@@ -119,7 +120,7 @@ async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError> {
         return Ok((line, unit));
     }
     for range in USUAL_UNITS {
-        if line.transport.framing() != Framing::Mbap && !(1..=247).contains(&range.0) {
+        if !line.transport.units().contains(&range.0) {
             continue;
         }
         if let Some((unit, _, words)) = first_answer(&line, range, Vec::new()).await? {

@@ -100,6 +100,11 @@ impl Transport {
         }
     }
 
+    /// Units that answer here: 0 is the broadcast of a serial line and has no response, on TCP it is a unit like others.
+    pub fn units(&self) -> std::ops::RangeInclusive<u8> {
+        if self.framing() == Framing::Mbap { 0..=255 } else { 1..=247 }
+    }
+
     /// The serial parameters, if it is a serial port.
     pub fn serial(&self) -> Option<Serial> {
         match self {

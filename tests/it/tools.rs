@@ -128,6 +128,15 @@ fn a_unit_that_answers_wrongly_is_not_called_silent() {
 }
 
 #[test]
+fn a_unit_that_cannot_answer_is_refused_before_a_port_is_opened() {
+    for unit in ["0", "248"] {
+        let (ended, said) = run(&["open", "/dev/no-such-port", "--unit", unit]);
+        let words = format!("--unit: found {unit}, expected 1 to 247");
+        assert!(ended == Some(2) && said.contains(&words), "{ended:?} {said}");
+    }
+}
+
+#[test]
 fn a_mistyped_command_gets_a_suggestion() {
     for (typed, meant) in [("demoo", "demo"), ("atach", "attach"), ("staus", "status")] {
         let (code, said) = run(&[typed]);

@@ -62,15 +62,22 @@ pub struct UnitArgs {
 }
 
 impl UnitArgs {
-    /// The line, and a unit on it that can answer: on a serial line 0 is the broadcast address, which has no response.
+    /// The line, and a unit on it that can answer.
     fn line_and_unit(&self) -> Result<(LineDef, u8), CliError> {
         let line = self.port.line()?;
-        let (least, most) = if line.transport.framing() == Framing::Mbap { (0, 255) } else { (1, 247) };
-        if (least..=most).contains(&self.unit) {
-            return Ok((line, self.unit));
-        }
-        Err(CliError::Usage(format!("--unit: found {}, expected {least} to {most}", self.unit)))
+        check_unit(&line, self.unit)?;
+        Ok((line, self.unit))
     }
+}
+
+/// Refuses a unit that cannot answer on this line.
+pub(super) fn check_unit(line: &LineDef, unit: u8) -> Result<(), CliError> {
+    let units = line.transport.units();
+    if units.contains(&unit) {
+        return Ok(());
+    }
+    let (least, most) = units.into_inner();
+    Err(CliError::Usage(format!("--unit: found {unit}, expected {least} to {most}")))
 }
 
 impl PortArgs {

@@ -17,7 +17,11 @@ mod writing;
 #[cfg(test)]
 mod tests;
 
-use std::{collections::BTreeMap, ops::Range, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    ops::{Range, RangeInclusive},
+    path::PathBuf,
+};
 
 use self::{
     cells::Cells,
@@ -178,7 +182,10 @@ impl TabView for Registers {
                 let hint = t!("1002, 0x3EA, 41003, or input:1000");
                 return self.ask_text(Asking::Address, t!("go to address"), hint);
             }
-            Action::Unit => return self.ask_text(Asking::Unit, t!("unit address"), t!("1 to 247")),
+            Action::Unit => {
+                let (least, most) = self.units(cx).into_inner();
+                return self.ask_text(Asking::Unit, t!("unit address"), &t!("{least} to {most}", least, most));
+            }
             Action::Find => {
                 let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
                 return self.ask_text(Asking::Value, t!("find a value in what was read"), hint);
@@ -257,8 +264,10 @@ impl TabView for Registers {
                 return Err(t!("another unit has other registers: end the log first, with L").to_owned());
             }
             Asking::Unit => {
-                let wrong = || t!("found `{text}`, expected 1 to 247", text);
-                let unit = text.parse().ok().filter(|unit| (1..=247).contains(unit)).ok_or_else(wrong)?;
+                let units = self.units(cx);
+                let (least, most) = (units.start(), units.end());
+                let wrong = || t!("found `{text}`, expected {least} to {most}", text, least, most);
+                let unit = text.parse().ok().filter(|unit| units.contains(unit)).ok_or_else(wrong)?;
                 self.show_unit(unit);
             }
             Asking::Save => return self.save(cx, text),
@@ -312,6 +321,11 @@ impl Registers {
         (self.unit, self.reads) = (unit, 0);
         (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
         self.watch.clear();
+    }
+
+    /// Units that can answer on the line.
+    fn units(&self, cx: &ViewContext) -> RangeInclusive<u8> {
+        cx.def().lines.get(self.line.index()).map_or(0..=255, |line| line.transport.units())
     }
 
     /// The rows of the window.

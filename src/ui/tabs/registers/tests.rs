@@ -212,6 +212,17 @@ fn addresses_are_taken_in_every_form_and_wrong_ones_refused() {
 }
 
 #[test]
+fn units_are_those_that_can_answer_on_the_line() {
+    let mut bench = Bench::new();
+    bench.keys("U0⏎");
+    assert_eq!((bench.model.tabs.registers.unit, &bench.model.modal), (0, &None), "0 is a unit on TCP");
+    let rtu = Transport::rtu("/dev/ttyUSB0", crate::plant::def::Serial::USUAL);
+    assert_eq!((rtu.units(), Transport::tcp("plc", 502).units()), (1..=247, 0..=255));
+    bench.keys("U256⏎");
+    assert!(bench.screen(80, 24).contains("found `256`, expected 0 to 255"));
+}
+
+#[test]
 fn a_value_is_found_raw_scaled_and_as_a_float() {
     let mut bench = Bench::new();
     bench.keys("j1000⏎");
