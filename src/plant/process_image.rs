@@ -270,6 +270,16 @@ enum FaultEffect {
     Gone(Cause),
 }
 
+impl Sample {
+    /// What is left of it when a request for it has failed.
+    pub(crate) fn after(self, fault: Fault, at: Timestamp) -> Sample {
+        match effect_of(fault) {
+            FaultEffect::Uncertain(cause) => Sample { at, ..self }.uncertain(cause),
+            FaultEffect::Gone(cause) => Sample::bad(cause, at),
+        }
+    }
+}
+
 /// What a fault means for the values that were asked for.
 fn effect_of(fault: Fault) -> FaultEffect {
     match fault.kind() {

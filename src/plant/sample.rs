@@ -64,6 +64,15 @@ impl fmt::Display for Quality {
 }
 
 impl Quality {
+    /// As files have it, in whatever language the screen is: `good`, `uncertain: stale`, `bad: response timeout`.
+    pub fn word(self) -> String {
+        match self {
+            Quality::Good => "good".to_owned(),
+            Quality::Uncertain(cause) => format!("uncertain: {}", cause.word()),
+            Quality::Bad(cause) => format!("bad: {}", cause.word()),
+        }
+    }
+
     /// `true` only for [`Quality::Good`].
     pub fn is_good(self) -> bool {
         self == Quality::Good

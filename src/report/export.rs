@@ -34,13 +34,7 @@ pub fn export_csv(
     columns: &[Column],
     dialect: CsvDialect,
 ) -> Vec<u8> {
-    let head = |column: &Column| {
-        let value = match column.unit.is_empty() {
-            true => text(&column.tag),
-            false => text(&format!("{} {}", column.tag, column.unit)),
-        };
-        [value, text(&format!("{} quality", column.tag))]
-    };
+    let head = |column: &Column| heading(&column.tag, &column.unit);
     let cells = |column: &Column, row: usize| {
         let stood = column.values.get(row).copied().flatten();
         let good = stood.filter(|stood| stood.quality.is_good()).and_then(|stood| stood.value);
@@ -55,6 +49,15 @@ pub fn export_csv(
     });
     csv::write(std::iter::once(header).chain(rows), dialect)
 }
+
+/// The headings of the two columns of a tag.
+pub(super) fn heading(tag: &str, unit: &str) -> [String; 2] {
+    let value = if unit.is_empty() { text(tag) } else { text(&format!("{tag} {unit}")) };
+    [value, text(&format!("{tag}{QUALITY}"))]
+}
+
+/// What makes a heading that of a quality.
+pub(super) const QUALITY: &str = " quality";
 
 #[cfg(test)]
 mod tests {

@@ -9,6 +9,7 @@ mod csv;
 pub(crate) mod shift_csv;
 mod record_csv;
 pub(crate) mod export;
+pub(crate) mod value_log;
 pub(crate) mod text;
 #[cfg(test)]
 pub(crate) mod testing;

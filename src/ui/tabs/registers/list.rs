@@ -94,15 +94,11 @@ fn cells(line: &str) -> Vec<String> {
 }
 
 fn quoted_cells(line: &str, separator: char) -> Vec<String> {
-    let (mut cells, mut quoted) = (vec![String::new()], false);
-    for c in line.chars() {
-        match c {
-            '"' => quoted = !quoted,
-            c if c == separator && !quoted => cells.push(String::new()),
-            c => cells.iter_mut().last().into_iter().for_each(|cell| cell.push(c)),
-        }
-    }
-    cells.iter().map(|cell| cell.trim().to_owned()).collect()
+    let mut reader = csv::ReaderBuilder::new();
+    let reader = reader.has_headers(false).delimiter(u8::try_from(separator).unwrap_or(b',')).trim(csv::Trim::All);
+    let record = reader.from_reader(line.as_bytes()).into_records().next();
+    // A line of text in memory is a record.
+    record.and_then(Result::ok).map_or(Vec::new(), |cells| cells.iter().map(str::to_owned).collect())
 }
 
 /// The columns of a heading: at least an address and one more, and no number.
@@ -335,6 +331,11 @@ mod tests {
             "line 7: 8: `ten` is not a scale",
         ];
         assert_eq!(problems, expect);
+    }
+
+    #[test]
+    fn a_quoted_cell_keeps_its_separators_and_quotes() {
+        assert_eq!(quoted_cells("5,\"a, \"\"b\"\"\",10\" pipe,", ','), ["5", "a, \"b\"", "10\" pipe", ""]);
     }
 
     #[test]

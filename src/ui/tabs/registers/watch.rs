@@ -6,24 +6,27 @@ use super::{Asking, Registers, decode, names::Named, view::named_text};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        event::Fault,
         live::{AddressSpan, LiveReading},
         number::{to_f32, to_u32},
+        sample::{Cause, Sample},
         tag::{ByteOrder, DataType, Table},
     },
+    report::value_log,
     ui::{Effect, widgets::spark},
 };
 
 /// Registers on the list: as many as a read has room for beside the window.
 const WATCHED_MAX: usize = 32;
-/// Values of each that are remembered.
-const VALUES_MAX: usize = 600;
+/// Values of each that are remembered: ten hours at one a second.
+const SAMPLES_MAX: usize = 36_000;
 
 /// One register of the list; what it is called stands in the names.
 #[derive(Debug, Clone, PartialEq)]
 struct Watched {
     at: (Table, u16),
-    /// The last values, oldest first; `None` where the read brought none.
-    values: VecDeque<Option<f64>>,
+    /// What each read has brought, oldest first.
+    samples: VecDeque<Sample>,
     good: u32,
     sum: f64,
     least: f64,
@@ -73,15 +76,15 @@ impl WatchList {
 impl Watched {
     fn new(at: (Table, u16)) -> Watched {
         let (least, greatest) = (f64::INFINITY, f64::NEG_INFINITY);
-        Watched { at, values: VecDeque::new(), good: 0, sum: 0.0, least, greatest }
+        Watched { at, samples: VecDeque::new(), good: 0, sum: 0.0, least, greatest }
     }
 
-    fn push(&mut self, value: Option<f64>) {
-        if self.values.len() == VALUES_MAX {
-            self.values.pop_front();
+    fn push(&mut self, sample: Sample) {
+        if self.samples.len() == SAMPLES_MAX {
+            self.samples.pop_front();
         }
-        self.values.push_back(value);
-        if let Some(value) = value {
+        self.samples.push_back(sample);
+        if let Some(value) = sample.good_value() {
             (self.good, self.sum) = (self.good.saturating_add(1), self.sum + value);
             (self.least, self.greatest) = (self.least.min(value), self.greatest.max(value));
         }
@@ -170,18 +173,18 @@ impl Registers {
     /// Takes the values of a read, and writes their row.
     pub(super) fn watch_reading(&mut self, reading: &LiveReading) -> Vec<UiAction> {
         let Some(at) = reading.parts.iter().map(|part| part.at).max() else { return Vec::new() };
-        let (mut values, mut cells) = (Vec::new(), Vec::new());
-        for (table, address) in self.watch.items.iter().map(|item| item.at) {
-            let named = self.names.get(table, address);
-            let value = named.and_then(|named| named.value(&words_in(reading, table, address, named.len())?));
-            cells.push(named.zip(value).map_or(String::new(), |(named, value)| exact(named, value)));
-            values.push(value);
+        let mut cells = Vec::new();
+        for item in &mut self.watch.items {
+            let Some(named) = self.names.get(item.at.0, item.at.1) else { continue };
+            let before = item.samples.back().copied().unwrap_or(Sample::bad(Cause::NotRead, at));
+            let sample = sample(reading, named, Sample { at, ..before });
+            item.push(sample);
+            cells.push((sample.good_value().map_or(String::new(), |value| exact(named, value)), sample.quality));
         }
-        self.watch.items.iter_mut().zip(values).for_each(|(item, value)| item.push(value));
         let Some(log) = &mut self.watch.log else { return Vec::new() };
         log.rows += 1;
-        let row = csv_row(std::iter::once(format!("{at:.3}")).chain(cells));
-        vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path: log.path.clone(), bytes: row, new: false })]
+        let bytes = value_log::row(at, cells.into_iter());
+        vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path: log.path.clone(), bytes, new: false })]
     }
 
     /// Begins a log of the list, or ends it.
@@ -193,25 +196,32 @@ impl Registers {
             return notice(t!("Nothing is watched yet: p puts the selected register on the list.").to_owned());
         }
         let path = PathBuf::from(draw::local(cx, cx.now, "registers-%Y%m%d-%H%M%S.csv"));
-        let head = |item: &Watched| match self.names.get(item.at.0, item.at.1) {
-            Some(named) if !named.unit.is_empty() => format!("{} [{}]", named.name, named.unit),
-            Some(named) => named.name.clone(),
-            None => item.at.0.modicon(item.at.1),
-        };
-        let bytes = csv_row(std::iter::once("time_utc".to_owned()).chain(self.watch.items.iter().map(head)));
+        let columns = self.watch.items.iter().filter_map(|item| self.names.get(item.at.0, item.at.1));
+        let bytes = value_log::heading(columns.map(|named| (named.name.as_str(), named.unit.as_str())));
         (self.watch.log, self.watch.lost) = (Some(Log { path: path.clone(), rows: 0 }), None);
         vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path, bytes, new: true })]
     }
 }
 
-/// The words of a value, if one response of the read holds them all: two halves of different moments are no value.
-fn words_in(reading: &LiveReading, table: Table, address: u16, len: u16) -> Option<Vec<u16>> {
-    let wanted = AddressSpan { table, address, count: len }.range();
-    let holds =
-        |span: AddressSpan| span.table == table && span.range().start <= wanted.start && wanted.end <= span.range().end;
-    let part = reading.parts.iter().find(|part| part.words.is_ok() && holds(part.span))?;
-    let start = usize::from(address - part.span.address);
-    part.words.as_ref().ok()?.get(start..start + usize::from(len)).map(<[u16]>::to_vec)
+/// What a read has brought of a value: two halves of different moments are no value. Of `before` is left what the fault
+/// leaves of it; what was not read at all is stale.
+fn sample(reading: &LiveReading, named: &Named, before: Sample) -> Sample {
+    let wanted = AddressSpan { table: named.table, address: named.address, count: named.len() }.range();
+    let of_it = || reading.parts.iter().filter(|part| part.span.table == named.table);
+    let all = of_it().find_map(|part| {
+        let own = part.span.range();
+        let words = part.words.as_ref().ok().filter(|_| own.start <= wanted.start && wanted.end <= own.end)?;
+        words.get(usize::from(named.address - part.span.address)..)
+    });
+    let touches = |span: AddressSpan| span.range().start < wanted.end && wanted.start < span.range().end;
+    match all.map(|words| named.value(words).filter(|value| value.is_finite())) {
+        Some(Some(value)) => Sample::good(value, before.at),
+        Some(None) => before.after(Fault::NotANumber, before.at),
+        None => match of_it().filter(|part| touches(part.span)).find_map(|part| part.words.as_ref().err()) {
+            Some(fault) => before.after(*fault, before.at),
+            None => before.uncertain(Cause::Stale),
+        },
+    }
 }
 
 /// A value for the log: a plain float with all its digits, others with the decimals of their scale.
@@ -221,14 +231,6 @@ fn exact(named: &Named, value: f64) -> String {
         DataType::F64 if named.scale == 1.0 => value.to_string(),
         _ => format!("{value:.*}", usize::from(named.decimals)),
     }
-}
-
-/// One row; an empty cell is a value that was not read.
-fn csv_row(cells: impl Iterator<Item = String>) -> Vec<u8> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    // Memory takes every row.
-    let _ = writer.write_record(cells);
-    writer.into_inner().unwrap_or_default()
 }
 
 /// `NAME [TYPE] [ORDER] [SCALE] [UNIT]`, each known by its form.
@@ -294,8 +296,9 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         let words = t!("{least} to {greatest}, mean {mean}", least, greatest, mean);
         let x = canvas.text(36, y, &words, theme.dim()) + 2;
         let room = usize::from(width.saturating_sub(x + 1)).min(60);
+        let recent = item.samples.iter().rev().take(room).rev();
         let recent: Vec<Option<f64>> =
-            item.values.iter().rev().take(room).rev().map(|value| value.map(|value| value - item.least)).collect();
+            recent.map(|sample| sample.good_value().map(|value| value - item.least)).collect();
         if 4 <= room && 0 < to_u32(recent.len()) {
             let range = (item.greatest - item.least).max(f64::MIN_POSITIVE);
             canvas.text(x, y, &spark::bars(&recent, range, theme.glyphs), theme.normal());

@@ -44,7 +44,8 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
     bench.keys("⎋L");
     bench.answer(4, device);
     let values: Vec<_> = bench.rows.iter().map(|row| row.split_once(',').unwrap_or_default().1).collect();
-    assert_eq!(values, ["SV [°C]", "70.0", "70.1", ""], "no row before, none after, none invented");
+    let expect = ["SV °C,SV quality", "70.0,good", "70.1,good", ",uncertain: response timeout"];
+    assert_eq!(values, expect, "no row before, none after, none invented");
     assert!(bench.rows[1].starts_with("20") && bench.rows[1].contains('T'), "{:?}", bench.rows);
 }
 
