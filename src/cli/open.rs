@@ -1,6 +1,6 @@
 //! `sightglass open PORT`: the registers of any device, live, without a plant file.
 
-use std::{sync::Arc, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use super::{
     CliError, in_runtime, log, menu, paths, say,
@@ -13,6 +13,7 @@ use crate::{
         def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Parity, Serial, Transport},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
     },
+    profile::{self, OwnProfiles, Search},
     station::io as station,
     ui,
 };
@@ -62,10 +63,21 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
         let station = station::start_transient(def, Clock::real(), connectors, Box::new(|_| {}));
         let session = station.session(&paths::operator());
-        let result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Bench)).await;
+        let options =
+            ui::io::Options { profiles: own_profiles(Path::new("")), ..ui::io::Options::new(ui::Leaving::Bench) };
+        let result = ui::io::run(session, options).await;
         station.stop().await;
         Ok(result?)
     })
+}
+
+/// The user's device profiles, for a plant file in this folder; says which have errors.
+pub fn own_profiles(folder: &Path) -> OwnProfiles {
+    let profiles = profile::own_profiles(&Search::usual(), &folder.join("plant.toml"));
+    for file in profiles.broken() {
+        say(&format!("{file} has errors and takes no part: `sightglass check {file}` says which"));
+    }
+    profiles
 }
 
 /// The arguments that open this device again at once.

@@ -74,6 +74,31 @@ pub struct LiveReading {
     pub requests: u32,
 }
 
+/// Replies without which nothing is said of the timeout.
+const REPLIES_MIN: u64 = 20;
+
+/// What the replies so far say of the timeout of their line.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ReplyTimes {
+    /// Replies seen.
+    pub count: u64,
+    /// The slowest of them.
+    pub slowest: Duration,
+}
+
+impl ReplyTimes {
+    /// Counts a reply.
+    pub fn see(&mut self, reply: Duration) {
+        (self.count, self.slowest) = (self.count + 1, self.slowest.max(reply));
+    }
+
+    /// A timeout with a margin: three times the slowest reply in steps of 50 ms, at least 100 ms; `None` after too few.
+    pub fn timeout(self) -> Option<Duration> {
+        let steps = (self.slowest * 3).as_millis().div_ceil(50).clamp(2, 200);
+        (REPLIES_MIN <= self.count).then(|| Duration::from_millis(50) * u32::try_from(steps).unwrap_or(200))
+    }
+}
+
 /// Part of a live read: what one request brought, or what is known of addresses that were not asked again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LivePart {
@@ -145,6 +170,15 @@ pub fn of_modicon(text: &str) -> Option<(Table, u16)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_timeout_leaves_the_slowest_reply_a_margin() {
+        let after = |count, slowest| ReplyTimes { count, slowest: Duration::from_millis(slowest) }.timeout();
+        assert_eq!(after(19, 12), None, "too few");
+        assert_eq!(after(20, 12), Some(Duration::from_millis(100)));
+        assert_eq!(after(20, 130), Some(Duration::from_millis(400)));
+        assert_eq!(after(20, 60_000), Some(Duration::from_secs(10)));
+    }
 
     #[test]
     fn a_span_is_read_by_wire_address_or_modicon_number() {

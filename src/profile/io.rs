@@ -4,6 +4,7 @@ pub mod atomic;
 mod save;
 
 use std::{
+    collections::BTreeMap,
     fs::File,
     io::Read,
     path::{Path, PathBuf},
@@ -48,8 +49,8 @@ impl Search {
         Search { folders }
     }
     /// The same, with the plant file's own folder in front.
-    pub(super) fn beside(&self, plant: &Found) -> Search {
-        let own = plant.path.as_deref().and_then(Path::parent);
+    pub(super) fn beside(&self, plant: &Path) -> Search {
+        let own = plant.parent();
         // A folder `plants` has its devices in the folder `devices` next to it.
         let sibling = own.filter(|own| own.ends_with("plants")).and_then(Path::parent);
         let front = own.into_iter().chain(sibling).map(Path::to_path_buf);
@@ -64,7 +65,7 @@ pub(super) struct Found {
     /// Its text.
     pub text: Text,
     /// Where it lies; `None` for a shipped one.
-    path: Option<PathBuf>,
+    pub path: Option<PathBuf>,
 }
 
 impl Found {
@@ -145,6 +146,19 @@ pub(super) fn device_file(argument: &Path, search: &Search) -> Option<(String, T
     let is_plant = has("[[line]]") || has("[[device]]") || has("time_zone");
     let is_device = !is_plant && (has("[[tag]]") || has("tag =") || has("vendor") || has("[link]"));
     is_device.then(|| (stem, Text { file: argument.display().to_string(), bytes }))
+}
+
+/// The device profiles on disk by name, each from the first folder that has it; what cannot be read is left out.
+pub(super) fn own_devices(search: &Search) -> BTreeMap<String, Text> {
+    let folders = search.folders.iter().flat_map(|folder| [folder.join("devices"), folder.clone()]);
+    let entries = folders.filter_map(|folder| {
+        // The empty path is the folder that the program was started in.
+        let folder = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder };
+        folder.read_dir().ok()
+    });
+    let names = entries.flatten().flatten().filter_map(|entry| stem(&entry.path()));
+    let files = names.filter_map(|name| Some((path_of("devices", &name, search)?, name)));
+    files.filter_map(|(path, name)| Some((name, device_file(&path, search)?.1))).collect()
 }
 
 /// The names of all plants, device profiles and scenarios, with where each comes from.

@@ -27,6 +27,7 @@ pub(crate) mod names;
 mod mimic;
 pub(crate) mod new_plant;
 mod plant;
+mod own;
 mod program;
 pub(crate) mod reader;
 pub(crate) mod renamed;
@@ -53,6 +54,7 @@ pub(crate) use self::units::unit_of;
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},
+    own::OwnProfiles,
     set_file::{read_set, text_of_set},
 };
 pub use crate::plant::line_check::BAUDS;
@@ -75,20 +77,11 @@ pub fn load_with_file(plant: &Path, search: &Search) -> Result<(Arc<PlantDef>, O
 fn load_warned(plant: &Path, search: &Search) -> Result<(Checked, Option<PlantFile>), Errors> {
     let found = io::plant(plant, search)?;
     let file = found.file();
-    let search = search.beside(&found);
+    let search = found.path.as_deref().map_or_else(|| search.clone(), |path| search.beside(path));
     let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
     let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
     plant::build(&found.name, &found.text, &library)
         .map(|(def, warnings)| (Checked { plant: Arc::new(def), warnings }, file))
-}
-
-/// Checks the text of a plant file that is not written yet, with the shipped device profiles.
-pub(crate) fn check_text(name: &str, text: &str) -> Result<Checked, Errors> {
-    let search = Search::shipped();
-    let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
-    let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
-    let text = plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() };
-    plant::build(name, &text, &library).map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
 }
 
 /// A plant that can be used, and what could be better in its file.
@@ -106,6 +99,10 @@ pub fn check(file: &Path, search: &Search) -> Result<Checked, Errors> {
     let Some((stem, text)) = io::device_file(file, search) else {
         return load_warned(file, search).map(|(checked, _)| checked);
     };
+    check_device(&stem, text)
+}
+
+fn check_device(stem: &str, text: plant::Text) -> Result<Checked, Errors> {
     let around = format!(
         "title = \"{stem}\"\ntime_zone = \"UTC\"\n[[line]]\nname = \"L1\"\nmode = \"rtu\"\nport = \"/dev/ttyUSB0\"\nbaud = 9600\nparity = \"N\"\n\
          [[device]]\nname = \"D-1\"\nprofile = \"{stem}\"\nline = \"L1\"\nunit = 1\n"
@@ -113,16 +110,23 @@ pub fn check(file: &Path, search: &Search) -> Result<Checked, Errors> {
     let plant = plant::Text { file: format!("a plant around {}", text.file), bytes: around.into_bytes() };
     let (file, bytes) = (text.file, text.bytes);
     let find = |_: &str| Ok(Some(plant::Text { file: file.clone(), bytes: bytes.clone() }));
-    plant::build(&stem, &plant, &plant::Library { find: &find, names: vec![stem.clone()] })
+    plant::build(stem, &plant, &plant::Library { find: &find, names: vec![stem.to_owned()] })
         .map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
 }
 
-/// The shipped device profiles that say by what their device is recognised, each as the only device of a plant of its name.
-pub fn recognisable() -> Vec<Arc<PlantDef>> {
-    let search = &Search::shipped();
-    let devices = list(search).into_iter().filter(|listed| listed.kind == Kind::Device);
-    let plants = devices.filter_map(|listed| check(Path::new(&listed.name), search).ok()).map(|checked| checked.plant);
-    plants.filter(|def| def.devices.iter().any(|device| !device.signature.is_empty())).collect()
+/// The device profiles of the configuration folders and beside a plant file: those that the plant file can name.
+pub fn own_profiles(search: &Search, plant: &Path) -> OwnProfiles {
+    OwnProfiles { texts: io::own_devices(&search.beside(plant)) }
+}
+
+/// The text of a device profile of the program.
+fn shipped_device(name: &str) -> Option<plant::Text> {
+    io::device(name, &Search::shipped()).ok().flatten()
+}
+
+/// The names of all device profiles of the program.
+fn shipped_devices() -> impl Iterator<Item = String> {
+    io::list(&Search::shipped()).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name)
 }
 
 /// A plant or device profile that could be loaded by its name.

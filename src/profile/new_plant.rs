@@ -4,9 +4,10 @@ use std::fmt::Write;
 
 use toml_edit::Value;
 
-use super::{edit, units};
+use super::{OwnProfiles, edit, units};
 use crate::plant::{
     def::LineDef,
+    live::ReplyTimes,
     tag::{ByteOrder, DataType, Decimals, TagDef},
 };
 
@@ -24,8 +25,8 @@ pub struct NewPlant {
     pub title: String,
     /// IANA name.
     pub time_zone: String,
-    /// Its lines.
-    pub lines: Vec<LineDef>,
+    /// Its lines, with what their replies say of the timeout.
+    pub lines: Vec<(LineDef, ReplyTimes)>,
     /// Its devices.
     pub devices: Vec<NewDevice>,
     /// Name and start of each shift, `day` and `06:00`.
@@ -51,11 +52,10 @@ pub struct NewDevice {
 
 impl NewPlant {
     /// The text, which loads without an error; else `Err` with the first errors, in words.
-    pub fn text(&self) -> Result<String, String> {
+    pub fn text(&self, profiles: &OwnProfiles) -> Result<String, String> {
         let mut out = String::new();
         self.write(&mut out).map_err(|error| error.to_string())?;
-        super::check_text("plant", &out)
-            .map_err(|errors| errors.full_lines().take(3).collect::<Vec<_>>().join("\n"))?;
+        profiles.check("plant", &out).map_err(|errors| errors.full_lines().take(3).collect::<Vec<_>>().join("\n"))?;
         Ok(out)
     }
 
@@ -71,8 +71,22 @@ impl NewPlant {
             "# Local time of shifts and reports, such as Asia/Bangkok.\ntime_zone = {}\n",
             quoted(&self.time_zone)
         )?;
-        for line in &self.lines {
-            writeln!(out, "[[line]]\nname = {}\n{}", quoted(&line.name), edit::line_text(line))?;
+        for (line, replies) in &self.lines {
+            let learned = replies.timeout().map(|timeout| LineDef { timeout, ..line.clone() });
+            if learned.is_some() {
+                let slowest = replies.slowest.as_secs_f64() * 1e3;
+                writeln!(
+                    out,
+                    "# The slowest of {} replies took {slowest:.1} ms; timeout_ms leaves a margin.",
+                    replies.count
+                )?;
+            }
+            writeln!(
+                out,
+                "[[line]]\nname = {}\n{}",
+                quoted(&line.name),
+                edit::line_text(learned.as_ref().unwrap_or(line))
+            )?;
         }
         for device in &self.devices {
             self.device(out, device)?;
@@ -88,7 +102,7 @@ impl NewPlant {
     }
 
     fn device(&self, out: &mut String, device: &NewDevice) -> std::fmt::Result {
-        let line = self.lines.get(device.line).map_or("", |line| line.name.as_str());
+        let line = self.lines.get(device.line).map_or("", |(line, _)| line.name.as_str());
         writeln!(out, "[[device]]\nname = {}", quoted(&device.name))?;
         if let Some((profile, _)) = &device.profile {
             writeln!(out, "profile = {}", quoted(profile))?;

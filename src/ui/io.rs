@@ -31,7 +31,10 @@ use super::{
 use crate::{
     access::SessionRequest,
     history::{HistoryError, Query, io::QueryRequest},
-    profile::io::atomic::{write_for_user, write_new},
+    profile::{
+        OwnProfiles,
+        io::atomic::{write_for_user, write_new},
+    },
     station::{Request, Session},
     t,
 };
@@ -54,6 +57,8 @@ pub struct Options {
     pub leaving: Leaving,
     /// What the embedding command adds.
     pub extension: Option<ExtensionPort>,
+    /// The user's own device profiles, which are recognised too.
+    pub profiles: OwnProfiles,
 }
 
 /// The embedding command's end of an [`Extension`].
@@ -67,7 +72,8 @@ pub struct ExtensionPort {
 impl Options {
     /// Looks chosen by the environment.
     pub fn new(leaving: Leaving) -> Options {
-        Options { theme: Theme::detect(|name| std::env::var(name).ok()), leaving, extension: None }
+        let theme = Theme::detect(|name| std::env::var(name).ok());
+        Options { theme, leaving, extension: None, profiles: OwnProfiles::default() }
     }
 }
 
@@ -100,6 +106,7 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let status = session.status.borrow_and_update().clone();
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
     model.leaving = options.leaving;
+    model.tabs.registers.profiles = options.profiles;
     let mut extension = options.extension;
     if let Some(port) = &mut extension {
         model.extension = port.states.next().await;

@@ -4,7 +4,7 @@
 use super::*;
 use crate::{
     plant::{id::LineId, tag::Table},
-    profile::{Search, recognisable},
+    profile::{OwnProfiles, Search},
     sim::simulator::Simulator,
 };
 
@@ -29,14 +29,14 @@ fn recognised(plant: &PlantDef, unit: u8) -> Option<(String, Fit)> {
     let mut simulator = Simulator::of(plant).unwrap();
     simulator.advance(std::time::Duration::from_secs(5));
     let simulator = std::cell::RefCell::new(simulator);
-    let known = recognisable();
+    let known = OwnProfiles::default().recognisable();
     let found = best(&known, &|span| read(&mut simulator.borrow_mut(), unit, span));
     found.map(|(def, fit)| (def.name.clone(), fit))
 }
 
 #[test]
 fn every_simulated_device_is_recognised_as_itself() {
-    let known = recognisable();
+    let known = OwnProfiles::default().recognisable();
     assert!(7 <= known.len(), "{}", known.len());
     for def in &known {
         let found = recognised(def, 1);
@@ -55,7 +55,7 @@ fn the_devices_of_the_tank_are_recognised() {
 
 #[test]
 fn slaves_of_no_kind_are_not_recognised() {
-    let known = recognisable();
+    let known = OwnProfiles::default().recognisable();
     let check = |what: &str, word: &dyn Fn(Table, u16) -> Option<u16>| {
         let words = |span: AddressSpan| -> Vec<u16> {
             span.range().map_while(|address| word(span.table, to_u16(address))).collect()
@@ -84,7 +84,7 @@ fn slaves_of_no_kind_are_not_recognised() {
 
 #[test]
 fn decimals_and_unit_are_those_that_the_device_says() {
-    let known = recognisable();
+    let known = OwnProfiles::default().recognisable();
     let pxr = known.iter().find(|def| def.name == "fuji_pxr").unwrap();
     let sv = pxr.tags.iter().find(|tag| tag.short == "SV").unwrap();
     let device = |decimals: u16, unit: u16| {

@@ -55,7 +55,7 @@ fn on_the_pty() {
             }
         });
         let session = Session { snapshots, status, requests, terminal: 1 };
-        run(session, Options { theme: Theme::FULL, leaving: Leaving::Station, extension: None })
+        run(session, Options { theme: Theme::FULL, ..Options::new(Leaving::Station) })
             .await
             .expect("left by its operator or a signal");
     });

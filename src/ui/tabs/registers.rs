@@ -10,6 +10,7 @@ mod list;
 mod names;
 mod recognise;
 mod save;
+mod unit;
 mod view;
 mod watch;
 mod writing;
@@ -17,11 +18,7 @@ mod writing;
 #[cfg(test)]
 mod tests;
 
-use std::{
-    collections::BTreeMap,
-    ops::{Range, RangeInclusive},
-    path::PathBuf,
-};
+use std::{collections::BTreeMap, ops::Range, path::PathBuf};
 
 use self::{
     cells::Cells,
@@ -32,10 +29,11 @@ use self::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        live::{AddressSpan, LiveRead, LiveReading, TABLES},
+        live::{AddressSpan, LiveRead, LiveReading, ReplyTimes, TABLES},
         number::to_u32,
         tag::{ByteOrder, Table},
     },
+    profile::OwnProfiles,
     ui::{
         Effect,
         keys::{find, hints},
@@ -78,6 +76,8 @@ pub struct Registers {
     /// Names of the units that were shown before.
     names_of: BTreeMap<u8, Names>,
     recognition: Recognition,
+    /// Of the user.
+    pub profiles: OwnProfiles,
     /// What came of a pasted list.
     said: Option<UiAction>,
     /// Number and steady time of the read on its way, and what it reads.
@@ -85,6 +85,7 @@ pub struct Registers {
     number: u32,
     relearn: bool,
     last: Option<LiveReading>,
+    replies: ReplyTimes,
     /// How long the last read took, with its way to this terminal.
     took: SignedDuration,
     /// Reads answered, and requests that they took.
@@ -126,11 +127,13 @@ impl TabView for Registers {
             names: Names::default(),
             names_of: BTreeMap::new(),
             recognition: Recognition::default(),
+            profiles: OwnProfiles::default(),
             said: None,
             on_way: None,
             number: 0,
             relearn: false,
             last: None,
+            replies: ReplyTimes::default(),
             took: SignedDuration::ZERO,
             reads: 0,
             trouble: None,
@@ -182,10 +185,7 @@ impl TabView for Registers {
                 let hint = t!("1002, 0x3EA, 41003, or input:1000");
                 return self.ask_text(Asking::Address, t!("go to address"), hint);
             }
-            Action::Unit => {
-                let (least, most) = self.units(cx).into_inner();
-                return self.ask_text(Asking::Unit, t!("unit address"), &t!("{least} to {most}", least, most));
-            }
+            Action::Unit => return self.ask_unit(cx),
             Action::Find => {
                 let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
                 return self.ask_text(Asking::Value, t!("find a value in what was read"), hint);
@@ -239,6 +239,7 @@ impl TabView for Registers {
         };
         self.trouble = None;
         self.reads += 1;
+        reading.reply.into_iter().for_each(|reply| self.replies.see(reply));
         self.cells.take(&reading);
         let mut actions = self.watch_reading(&reading);
         let began = reading.began;
@@ -260,16 +261,7 @@ impl TabView for Registers {
                 (self.table, self.selected) = (table, address);
                 self.first = address;
             }
-            Asking::Unit if self.watch.is_logging() => {
-                return Err(t!("another unit has other registers: end the log first, with L").to_owned());
-            }
-            Asking::Unit => {
-                let units = self.units(cx);
-                let (least, most) = (units.start(), units.end());
-                let wrong = || t!("found `{text}`, expected {least} to {most}", text, least, most);
-                let unit = text.parse().ok().filter(|unit| units.contains(unit)).ok_or_else(wrong)?;
-                self.show_unit(unit);
-            }
+            Asking::Unit => self.unit_typed(cx, text)?,
             Asking::Save => return self.save(cx, text),
             Asking::List => {
                 return Ok(vec![UiAction::Do(Effect::Load { tab: Tab::Registers, path: PathBuf::from(text) })]);
@@ -314,20 +306,6 @@ impl TabView for Registers {
 }
 
 impl Registers {
-    /// Nothing that was read of one unit is shown of another, and each has names of its own.
-    fn show_unit(&mut self, unit: u8) {
-        let names = self.names_of.remove(&unit).unwrap_or_default();
-        self.names_of.insert(self.unit, std::mem::replace(&mut self.names, names));
-        (self.unit, self.reads) = (unit, 0);
-        (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
-        self.watch.clear();
-    }
-
-    /// Units that can answer on the line.
-    fn units(&self, cx: &ViewContext) -> RangeInclusive<u8> {
-        cx.def().lines.get(self.line.index()).map_or(0..=255, |line| line.transport.units())
-    }
-
     /// The rows of the window.
     fn rows(&self, cx: &ViewContext) -> Range<u32> {
         let first = u32::from(self.first);

@@ -12,7 +12,6 @@ use crate::{
         live::{AddressSpan, LiveRead, LiveReading},
         tag::{Decimals, TagDef},
     },
-    profile::recognisable,
 };
 
 /// How far it is.
@@ -67,7 +66,7 @@ impl Registers {
             return Vec::new();
         }
         if matches!(self.recognition, Recognition::Waiting) {
-            let known = recognisable();
+            let known = self.profiles.recognisable();
             self.recognition = Recognition::Asking { known, at: 0, on_way: None };
         }
         let now = cx.steady();

@@ -40,7 +40,7 @@ impl Registers {
             return Err(t!("expected the name of a file such as bench.toml").to_owned());
         }
         let plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
-        let bytes = plant.text()?.into_bytes();
+        let bytes = plant.text(&self.profiles)?.into_bytes();
         Ok(vec![UiAction::Do(Effect::SaveReport { tab: Tab::Registers, path, bytes, new: true })])
     }
 
@@ -67,7 +67,7 @@ impl Registers {
         Some(NewPlant {
             title: def.title.clone(),
             time_zone: def.time_zone.iana_name().unwrap_or("UTC").to_owned(),
-            lines: vec![line],
+            lines: vec![(line, self.replies)],
             devices: vec![device],
             shifts: shifts.to_vec(),
         })

@@ -113,7 +113,11 @@ fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
         requests = last.requests,
         reads = tab.reads
     );
-    (words, true)
+    let timeout = cx.def().lines.get(tab.line.index()).map(|line| line.timeout);
+    match tab.replies.timeout().filter(|learned| timeout.is_some_and(|timeout| *learned < timeout)) {
+        Some(learned) => (words + &t!("   timeout {ms} ms is enough", ms = learned.as_millis()), true),
+        None => (words, true),
+    }
 }
 
 /// Where each column begins; the widest screens have all of them.

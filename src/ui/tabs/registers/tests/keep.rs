@@ -84,7 +84,9 @@ impl Bench {
         let (path, bytes, new) = written.unwrap_or_else(|| panic!("{}", self.screen(120, 40)));
         assert_eq!((path.to_str(), new), (Some("bench.toml"), true), "never over an existing file");
         let text = String::from_utf8(bytes).expect("a text");
-        let loaded = crate::profile::check_text("bench", &text).unwrap_or_else(|errors| panic!("{text}\n{errors}"));
+        let loaded = crate::profile::OwnProfiles::default()
+            .check("bench", &text)
+            .unwrap_or_else(|errors| panic!("{text}\n{errors}"));
         (text, PlantDef::clone(&loaded.plant))
     }
 }
@@ -153,4 +155,19 @@ fn a_list_from_a_manual_gives_names() {
 
 fn device_of_a_manual(table: Table, address: u16) -> Option<u16> {
     (table == Table::Holding && address < 1_100).then_some(if address == 1002 { 700 } else { address })
+}
+
+#[test]
+fn the_timeout_that_the_replies_suggest_is_saved() {
+    let mut bench = Bench::at_unit(pxr);
+    bench.keys("⏎");
+    bench.answer(1, |address| pxr(Table::Input, address));
+    assert!(!bench.saved().0.contains("timeout_ms"), "too few replies to say");
+    let slow = std::time::Duration::from_millis(40);
+    (0..20).for_each(|_| bench.model.tabs.registers.replies.see(slow));
+    let (text, def) = bench.saved();
+    assert_eq!(def.lines[0].timeout, slow * 3 + std::time::Duration::from_millis(30), "{text}");
+    assert!(text.contains(" replies took 40.0 ms; timeout_ms leaves a margin"), "{text}");
+    let shown = bench.screen(120, 40);
+    assert!(shown.contains("timeout 150 ms is enough"), "{shown}");
 }

@@ -1,0 +1,83 @@
+//! The device profiles of the user, read once, for what may not read files itself: recognition and a new plant file.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use super::{Checked, Errors, check_device, plant, shipped_device, shipped_devices};
+use crate::plant::PlantDef;
+
+/// Their texts by name; a profile of the program that has the same name gives way.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OwnProfiles {
+    pub(super) texts: BTreeMap<String, plant::Text>,
+}
+
+impl OwnProfiles {
+    /// Files with errors: their devices are not recognised.
+    pub fn broken(&self) -> Vec<&str> {
+        let is_broken = |(name, text): &(&String, &plant::Text)| check_device(name, (*text).clone()).is_err();
+        self.texts.iter().filter(is_broken).map(|(_, text)| text.file.as_str()).collect()
+    }
+
+    /// The profiles that say by what their device is recognised, each as the only device of a plant of its name.
+    pub fn recognisable(&self) -> Vec<Arc<PlantDef>> {
+        let texts = self.names().into_iter().filter_map(|name| Some((self.find(&name)?, name)));
+        let plants = texts.filter_map(|(text, name)| check_device(&name, text).ok()).map(|checked| checked.plant);
+        plants.filter(|def| def.devices.iter().any(|device| !device.signature.is_empty())).collect()
+    }
+
+    /// Checks the text of a plant file that is not written yet.
+    pub fn check(&self, name: &str, text: &str) -> Result<Checked, Errors> {
+        let library = plant::Library { find: &|name| Ok(self.find(name)), names: self.names() };
+        let text = plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() };
+        plant::build(name, &text, &library).map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
+    }
+
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = shipped_devices().chain(self.texts.keys().cloned()).collect();
+        names.sort();
+        names.dedup();
+        names
+    }
+
+    fn find(&self, name: &str) -> Option<plant::Text> {
+        self.texts.get(name).cloned().or_else(|| shipped_device(name))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::profile::{Search, own_profiles, text_of};
+
+    #[test]
+    fn profiles_beside_the_plant_and_of_the_user_are_recognised() {
+        let root = tempfile::tempdir().unwrap();
+        let (here, user) = (root.path().join("here"), root.path().join("user"));
+        std::fs::create_dir_all(user.join("devices")).unwrap();
+        std::fs::create_dir(&here).unwrap();
+        let fuji = text_of("fuji_pxr", &Search::shipped()).unwrap();
+        let put = |path: &Path, text: &str| std::fs::write(path, text).unwrap();
+        put(&user.join("devices/mine.toml"), &fuji.replace("model = \"PXR\"", "model = \"USER\""));
+        put(&here.join("mine.toml"), &fuji.replace("model = \"PXR\"", "model = \"HERE\""));
+        let (head, rest) = fuji.split_once("[signature]").unwrap();
+        let silent = format!("{head}{}", rest.split_once("]\n\n").unwrap().1);
+        put(&here.join("silent.toml"), &silent.replace("model = \"PXR\"", "model = \"SILENT\""));
+        put(&here.join("broken.toml"), &fuji.replace("address_base = 0", "address_base = 7"));
+        put(&here.join("plant.toml"), "title = \"P\"\ntime_zone = \"UTC\"\n[[line]]\n");
+        let own = own_profiles(&Search::folders(vec![user.clone()]), &here.join("plant.toml"));
+        let models = |own: &OwnProfiles| -> Vec<String> {
+            own.recognisable().iter().map(|def| def.devices[0].model.clone()).collect()
+        };
+        let shipped = models(&OwnProfiles::default());
+        let added: Vec<String> = models(&own).into_iter().filter(|model| !shipped.contains(model)).collect();
+        assert_eq!(added, ["FUJI HERE"], "the one beside the plant file wins; without a signature none is recognised");
+        assert_eq!(own.broken(), [here.join("broken.toml").display().to_string()]);
+        let plant = "title = \"P\"\ntime_zone = \"UTC\"\n[[line]]\nname = \"L1\"\nmode = \"tcp\"\nhost = \"plc\"\n\
+                     [[device]]\nname = \"D-1\"\nprofile = \"silent\"\nline = \"L1\"\nunit = 1\n";
+        assert!(own.check("p", plant).is_ok());
+        assert!(OwnProfiles::default().check("p", plant).is_err());
+    }
+}

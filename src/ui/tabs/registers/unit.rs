@@ -1,0 +1,39 @@
+//! The unit whose registers are shown.
+
+use std::ops::RangeInclusive;
+
+use super::{Asking, Recognition, Registers, cells::Cells};
+use crate::ui::tabs::prelude::*;
+
+impl Registers {
+    pub(super) fn ask_unit(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let (least, most) = self.units(cx).into_inner();
+        self.ask_text(Asking::Unit, t!("unit address"), &t!("{least} to {most}", least, most))
+    }
+
+    pub(super) fn unit_typed(&mut self, cx: &ViewContext, text: &str) -> Result<(), String> {
+        if self.watch.is_logging() {
+            return Err(t!("another unit has other registers: end the log first, with L").to_owned());
+        }
+        let units = self.units(cx);
+        let (least, most) = (units.start(), units.end());
+        let wrong = || t!("found `{text}`, expected {least} to {most}", text, least, most);
+        let unit = text.parse().ok().filter(|unit| units.contains(unit)).ok_or_else(wrong)?;
+        self.show_unit(unit);
+        Ok(())
+    }
+
+    /// Nothing that was read of one unit is shown of another, and each has names of its own.
+    fn show_unit(&mut self, unit: u8) {
+        let names = self.names_of.remove(&unit).unwrap_or_default();
+        self.names_of.insert(self.unit, std::mem::replace(&mut self.names, names));
+        (self.unit, self.reads) = (unit, 0);
+        (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
+        self.watch.clear();
+    }
+
+    /// Units that can answer on the line.
+    fn units(&self, cx: &ViewContext) -> RangeInclusive<u8> {
+        cx.def().lines.get(self.line.index()).map_or(0..=255, |line| line.transport.units())
+    }
+}
