@@ -13,12 +13,13 @@ mod save;
 mod unit;
 mod view;
 mod watch;
+mod window;
 mod writing;
 
 #[cfg(test)]
 mod tests;
 
-use std::{collections::BTreeMap, ops::Range, path::PathBuf};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use self::{
     cells::Cells,
@@ -30,7 +31,6 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         live::{AddressSpan, LiveRead, LiveReading, ReplyTimes, TABLES},
-        number::to_u32,
         tag::{ByteOrder, Table},
     },
     profile::OwnProfiles,
@@ -40,13 +40,8 @@ use crate::{
     },
 };
 
-/// Periods to choose from.
-const PERIODS_MS: [i64; 8] = [200, 500, 1_000, 2_000, 5_000, 10_000, 30_000, 60_000];
 /// An answer that is not there after so long is asked for again: the line has dropped it.
 const LOST_AFTER: SignedDuration = SignedDuration::from_secs(15);
-/// Words behind the window that are read with it: the last row may be the first word of a 64-bit value.
-const BEHIND: u32 = 3;
-
 /// How an address is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Base {
@@ -121,7 +116,7 @@ impl TabView for Registers {
             selected: 0,
             order: ByteOrder::Abcd,
             base: Base::Modicon,
-            period: SignedDuration::from_millis(PERIODS_MS[2]),
+            period: SignedDuration::from_secs(1),
             paused: false,
             cells: Cells::default(),
             names: Names::default(),
@@ -149,6 +144,12 @@ impl TabView for Registers {
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        if self.watch.has_graph() {
+            return match find(&keys::log(), event) {
+                Some(_) => self.toggle_log(cx),
+                None => self.graph_key(cx, event),
+            };
+        }
         let Some(action) = find(&table(), event) else { return Vec::new() };
         match action {
             Action::Move(motion) => self.scroll(cx, motion),
@@ -164,6 +165,12 @@ impl TabView for Registers {
             Action::Relearn => self.relearn = true,
             Action::Watch => {
                 let refused = self.toggle_watch();
+                if !refused.is_empty() {
+                    return refused;
+                }
+            }
+            Action::Graph => {
+                let refused = self.open_graph(cx);
                 if !refused.is_empty() {
                     return refused;
                 }
@@ -195,15 +202,27 @@ impl TabView for Registers {
     }
 
     fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
+        if self.watch.has_graph() {
+            let back = Hint::new("Esc", t!("back"), t!("back to the registers"));
+            return hints(&watch::graph::keys()).into_iter().chain(hints(&keys::log())).chain([back]).collect();
+        }
         hints(&table())
     }
 
+    fn back(&mut self, _cx: &ViewContext) -> bool {
+        self.watch.close_graph()
+    }
+
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        if self.watch.has_graph() {
+            return watch::graph::view(self, cx, frame, area);
+        }
         view::view(self, cx, &mut Canvas::new(frame.buffer_mut(), area));
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.writing.follow(cx, self.line);
+        self.follow_graph(cx);
         let now = cx.steady();
         let wanted = self
             .on_way
@@ -301,42 +320,13 @@ impl TabView for Registers {
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        vec![("registers", crate::ui::keys::chords_of(&table()))]
+        let graph = crate::ui::keys::chords_of(&watch::graph::keys()).into_iter();
+        let graph = graph.chain(crate::ui::keys::chords_of(&keys::log())).collect();
+        vec![("registers", crate::ui::keys::chords_of(&table())), ("graph", graph)]
     }
 }
 
 impl Registers {
-    /// The rows of the window.
-    fn rows(&self, cx: &ViewContext) -> Range<u32> {
-        let first = u32::from(self.first);
-        first..(first + to_u32(view::rows(self, cx.area.height))).min(0x1_0000)
-    }
-
-    /// What is read: the window, and what its last row may need.
-    fn span(&self, cx: &ViewContext) -> AddressSpan {
-        let rows = self.rows(cx);
-        let count = to_u16((rows.end + BEHIND).min(0x1_0000) - rows.start);
-        AddressSpan { table: self.table, address: self.first, count }
-    }
-
-    fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
-        let room = view::rows(self, cx.area.height);
-        self.selected = to_u16(motion.to(usize::from(self.selected), 0x1_0000, room));
-        self.keep_in_sight(cx);
-    }
-
-    fn keep_in_sight(&mut self, cx: &ViewContext) {
-        let room = to_u16(view::rows(self, cx.area.height)).max(1);
-        let last_first = u16::MAX - (room - 1);
-        self.first = self.first.clamp(self.selected.saturating_sub(room - 1), self.selected).min(last_first);
-    }
-
-    fn change_period(&mut self, by: isize) {
-        let at = PERIODS_MS.iter().position(|ms| SignedDuration::from_millis(*ms) == self.period).unwrap_or(0);
-        let at = at.saturating_add_signed(by).min(PERIODS_MS.len() - 1);
-        self.period = SignedDuration::from_millis(PERIODS_MS[at]);
-    }
-
     fn ask_text(&mut self, asking: Asking, title: &str, hint: &str) -> Vec<UiAction> {
         self.asking = asking;
         vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, "")))]

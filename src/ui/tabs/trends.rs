@@ -159,6 +159,13 @@ impl Trends {
                 (self.accumulate, self.since, self.end) = (!self.accumulate, None, None);
                 self.moved();
             }
+            (None, Action::Hold) => {
+                self.end = if self.end.is_some() { None } else { Some(cx.now) };
+                if std::mem::take(&mut self.accumulate) {
+                    self.window = nearest(self.span(cx).width());
+                }
+                self.moved();
+            }
             (None, Action::Rate) => self.rate = (self.rate + 1) % RATES.len(),
             (None, Action::Cursor) => self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) },
             (None, Action::Live) => {
@@ -286,8 +293,13 @@ impl Trends {
         self.values = Some((first_now, row));
     }
 
+    /// Lets the window hold so much time, as far as a window can.
+    pub fn fit(&mut self, span: SignedDuration) {
+        self.window = nearest(span);
+    }
+
     /// Shows the curve of a tag: in the group of the plant that has it, or alone.
-    fn open_tag(&mut self, cx: &ViewContext, tag: TagId) {
+    pub fn open_tag(&mut self, cx: &ViewContext, tag: TagId) {
         let groups = &cx.def().trends;
         let place = |group: &TrendGroup| group.pens.iter().take(8).position(|pen| pen.tag == tag);
         let found = groups.iter().enumerate().find_map(|(n, group)| Some((n, place(group)?)));

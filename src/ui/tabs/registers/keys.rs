@@ -33,6 +33,8 @@ pub enum Action {
     Load,
     /// Asks for the file to save a plant in.
     Save,
+    /// Shows what is watched as curves.
+    Graph,
     /// Watches the selected register, or no longer.
     Watch,
     /// Asks for its name and type.
@@ -71,6 +73,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('+'), "", "read more often", Action::Faster),
     Key::new(char('-'), "", "read less often", Action::Slower),
     Key::new(char('p'), "watch", "watch the selected register, or no longer", Action::Watch),
+    Key::new(char('g'), "graph", "graph of what is watched, full screen", Action::Graph),
     Key::new(char('e'), "name", "name, type, scale and unit of the selected register", Action::Name),
     Key::new(char('L'), "log", "begin or end a log of what is watched, as CSV: a row for every read", Action::Log),
     Key::new(
@@ -98,4 +101,9 @@ const KEYS: &[Key<Action>] = &[
 /// All keys.
 pub(super) fn table() -> Vec<Key<Action>> {
     [&motions!("", Action::Move), KEYS].concat()
+}
+
+/// The key of the log, which the graph has too.
+pub(super) fn log() -> Vec<Key<Action>> {
+    KEYS.iter().copied().filter(|key| key.action == Action::Log).collect()
 }

@@ -131,14 +131,24 @@ pub fn of_interest(tags: &[TagDef]) -> Vec<TagDef> {
 fn tag_of(named: &Named, taken: &[String]) -> TagDef {
     let plain = plain_name(&named.name);
     let short = if taken.contains(&plain) { format!("{plain}_{}", named.address) } else { plain };
+    tag(named, &short)
+}
+
+/// What is named, as a tag that is called so.
+pub fn tag(named: &Named, name: &str) -> TagDef {
     let point = Point { table: named.table, address: named.address, kind: named.kind, order: named.order, field: None };
     TagDef {
-        short: short.clone(),
+        short: name.to_owned(),
         scale: named.scale,
         offset: named.offset,
         decimals: Decimals::Fixed(named.decimals),
         unit: named.unit.clone(),
         labels: named.labels.clone(),
-        ..TagDef::new(TagId(0), DeviceId(0), &short, point)
+        ..TagDef::new(TagId(0), DeviceId(0), name, point)
     }
+}
+
+/// The decimals of a tag that [`tag`] has made.
+pub fn decimals(tag: &TagDef) -> u8 {
+    if let Decimals::Fixed(decimals) = tag.decimals { decimals } else { 0 }
 }

@@ -81,7 +81,7 @@ fn heading(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
 }
 
 /// `unit 1   every 1 s   6.6 ms, 2 requests   214 reads`, or what is wrong; and whether all is well.
-fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
+pub fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
     let unit = tab.unit;
     let line = cx.snapshot.lines.get(tab.line.index());
     let waiting = match line.map(|line| &line.state) {
@@ -268,10 +268,15 @@ fn bits(word: u16) -> String {
 
 /// Does the unit perhaps hold something else by now? Nothing came, or for too long.
 fn is_old(tab: &Registers, cx: &ViewContext, cell: &Cell) -> bool {
+    cell.fault.is_some() || is_past(tab, cx, cell.at)
+}
+
+/// Is a moment so long ago that what was read then may be something else by now?
+pub fn is_past(tab: &Registers, cx: &ViewContext, at: Timestamp) -> bool {
     let line = cx.snapshot.lines.get(tab.line.index());
     let connected = line.is_some_and(|line| line.state == LineState::Connected);
     let limit = tab.period.max(tab.took) * 3 + SignedDuration::from_secs(2);
-    !connected || cell.fault.is_some() || limit < cx.now.duration_since(cell.at)
+    !connected || limit < cx.now.duration_since(at)
 }
 
 /// A named value, and whether it is good: `70.0 °C`, `70.0 °C?` for an old one, `----` for none.

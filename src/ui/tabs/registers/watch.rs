@@ -1,5 +1,7 @@
 //! The watch list: registers that are read wherever the window is, with what they have held, and their log as CSV.
 
+pub(super) mod graph;
+
 use std::{collections::VecDeque, path::PathBuf};
 
 use super::{Asking, Registers, decode, names::Named, view::named_text};
@@ -41,12 +43,13 @@ struct Log {
 }
 
 /// The list.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Default)]
 pub struct WatchList {
     items: Vec<Watched>,
     log: Option<Log>,
     /// Why the last log ended by itself.
     lost: Option<String>,
+    graph: Option<graph::Graph>,
 }
 
 impl WatchList {
@@ -58,6 +61,12 @@ impl WatchList {
     /// Is a log under way?
     pub fn is_logging(&self) -> bool {
         self.log.is_some()
+    }
+
+    /// How the log stands.
+    fn log_words(&self) -> Option<String> {
+        let log = self.log.as_ref()?;
+        Some(t!("logging {path}, {rows} rows", path = log.path.display(), rows = log.rows))
     }
 
     /// Another unit is shown: its registers are others.
@@ -273,9 +282,8 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let width = canvas.width();
     canvas.run(0, 0, width, '─', theme.dim());
     canvas.text(2, 0, t!(" watch "), theme.strong());
-    if let Some(log) = &tab.watch.log {
-        let words = t!(" logging {path}, {rows} rows ", path = log.path.display(), rows = log.rows);
-        canvas.text_right(width.saturating_sub(2), 0, &words, theme.strong());
+    if let Some(words) = tab.watch.log_words() {
+        canvas.text_right(width.saturating_sub(2), 0, &format!(" {words} "), theme.strong());
     } else if let Some(why) = &tab.watch.lost {
         let words = fit_words(&t!(" LOG ENDED: {why} ", why), width.saturating_sub(14));
         canvas.text_right(width.saturating_sub(2), 0, &words, theme.trouble());

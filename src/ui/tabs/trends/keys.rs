@@ -23,6 +23,8 @@ pub enum Action {
     Rate,
     /// Cursor on or off.
     Cursor,
+    /// The picture stands still, or is live again.
+    Hold,
     /// Back to the present.
     Live,
     /// Curves, or the list of all values.
@@ -40,6 +42,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Up), "", "select the pen above", Action::Move(Motion::Rows(-1))),
     Key::new(code(KeyCode::Down), "", "select the pen below", Action::Move(Motion::Rows(1))),
     Key::new(char('l'), "live", "back to the present", Action::Live),
+    Key::new(char('p'), "pause", "hold the picture, or back to the present", Action::Hold),
     Key::new(char('+'), "zoom", "shorter window", Action::Zoom(-1)),
     Key::new(char('='), "", "shorter window", Action::Zoom(-1)),
     Key::new(char('-'), "", "longer window", Action::Zoom(1)),

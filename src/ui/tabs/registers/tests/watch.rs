@@ -62,3 +62,52 @@ fn a_log_that_cannot_be_written_ends_and_says_why() {
     bench.send(Msg::LogFailed(Tab::Registers, "x.csv: no space left".to_owned()));
     assert!(bench.screen(120, 40).contains("LOG ENDED: x.csv: no space left"));
 }
+
+#[test]
+fn the_graph_shows_what_was_read_and_where_nothing_was() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("eSV int16 0.1 °C⏎pj1005⏎");
+    bench.answer(1, device);
+    bench.keys("eP int16 %⏎p");
+    let rising = |seconds: i64| {
+        move |address: u16| match address {
+            1002 => Some(700 + to_u16(usize::try_from(seconds).unwrap_or(0)) * 2),
+            1005 if (40..60).contains(&seconds) => None,
+            _ => device(address),
+        }
+    };
+    for seconds in 2..100 {
+        bench.answer(seconds, rising(seconds));
+    }
+    bench.keys("g");
+    bench.snapshot(100, LineState::Connected);
+    for (width, height) in [(80, 24), (120, 40)] {
+        insta::assert_snapshot!(format!("graph_{width}x{height}"), bench.screen(width, height));
+    }
+    let asked = bench.asked.len();
+    bench.keys("c←←←←←←←←");
+    assert_eq!(bench.asked.len(), asked, "its keys read nothing");
+    assert!(bench.screen(80, 24).contains("at 07:0"), "{}", bench.screen(80, 24));
+    bench.keys("clp");
+    assert!(bench.screen(80, 24).contains("past"), "p holds the picture");
+    bench.keys("p");
+    bench.snapshot(130, LineState::Connected);
+    let shown = bench.screen(80, 24);
+    assert!(shown.contains("89.8?") && shown.contains("live"), "nothing was read for 30 s: {shown}");
+    bench.keys("⎋");
+    assert!(bench.screen(80, 24).contains("watch ──"), "Esc leads back");
+}
+
+#[test]
+fn without_a_list_the_graph_is_of_the_selected_register() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("g");
+    bench.answer(1, device);
+    bench.snapshot(1, LineState::Connected);
+    let shown = bench.screen(80, 24);
+    assert!(shown.contains("41003") && shown.contains("700"), "{shown}");
+}

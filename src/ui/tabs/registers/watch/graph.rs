@@ -1,0 +1,203 @@
+//! The watched values as curves, full screen: the tab of the trends, over what was read here instead of the history.
+
+use std::{collections::VecDeque, sync::Arc};
+
+use super::{Registers, WatchList, Watched};
+use crate::ui::tabs::{
+    prelude::*,
+    registers::{
+        save,
+        view::{is_past, state},
+    },
+    trends,
+};
+use crate::{
+    history::{
+        Series,
+        series::{Curve, Span},
+    },
+    plant::{
+        PlantDef,
+        def::{Pen, TrendGroup},
+        number::to_u16,
+        sample::{Cause, Sample},
+        tag::TagDef,
+    },
+    report::step_series::HOLD_MAX,
+    ui::{Effect, keys::find},
+};
+
+/// Pens of a group.
+const PENS: usize = 8;
+/// The window is at least so wide at first.
+const WINDOW_MIN: SignedDuration = SignedDuration::from_mins(2);
+/// What one key or snapshot makes the trends ask at most.
+const QUERIES_MAX: usize = 16;
+
+/// The trends, and the watched values as tags.
+#[derive(Debug)]
+pub(super) struct Graph {
+    trends: trends::Trends,
+    snapshot: Snapshot,
+}
+
+impl Graph {
+    /// Of the values of a list, the first of them selected.
+    fn new(cx: &ViewContext, title: &str, tags: Vec<TagDef>) -> Graph {
+        let ids: Vec<TagId> = tags.iter().map(|tag| tag.id).collect();
+        let group = |pens: &[TagId]| TrendGroup {
+            name: title.to_owned(),
+            pens: pens.iter().map(|tag| Pen { tag: *tag, scale: None }).collect(),
+        };
+        let trends = ids.chunks(PENS).map(group).collect();
+        let def = PlantDef { time_zone: cx.def().time_zone.clone(), tags, trends, ..PlantDef::default() };
+        let mut snapshot = Snapshot::blank(Arc::new(def));
+        snapshot.decimals = snapshot.def.tags.iter().map(save::decimals).collect();
+        Graph { trends: TabView::new(&snapshot), snapshot }
+    }
+
+    /// What the trends may read.
+    fn context<'a>(snapshot: &'a Snapshot, cx: &ViewContext<'a>) -> ViewContext<'a> {
+        ViewContext { snapshot, ..*cx }
+    }
+
+    /// Lets the trends act, and answers what they ask.
+    fn act(
+        &mut self,
+        cx: &ViewContext,
+        items: &[Watched],
+        act: impl FnOnce(&mut trends::Trends, &ViewContext) -> Vec<UiAction>,
+    ) {
+        let Graph { trends, snapshot } = self;
+        let cx = Graph::context(snapshot, cx);
+        let mut actions = act(trends, &cx);
+        for _ in 0..QUERIES_MAX {
+            let Some(action) = actions.pop() else { break };
+            // They ask for nothing but curves, and the alarms beside them.
+            if let UiAction::Do(Effect::Query(id, query)) = action {
+                actions.extend(trends.on_answer(&cx, id.number, answer(items, query, cx.now)));
+            }
+        }
+    }
+}
+
+/// What the history would say.
+fn answer(items: &[Watched], query: Query, now: Timestamp) -> Result<Answer, HistoryError> {
+    let Query::Series { tags, from, to, buckets } = query else { return Ok(Answer::Journal(Vec::new())) };
+    let known = tags.into_iter().filter_map(|tag| Some((tag, items.get(tag.index())?)));
+    let span = Span { from, to, until: now };
+    Ok(Answer::Series(known.map(|(tag, item)| series(&item.samples, tag, span, buckets)).collect()))
+}
+
+fn series(samples: &VecDeque<Sample>, tag: TagId, span: Span, buckets: usize) -> Series {
+    let mut curve = Curve::new(tag, span, buckets);
+    let before = span.from.checked_sub(HOLD_MAX).unwrap_or(span.from);
+    let first = samples.partition_point(|sample| sample.at < before);
+    samples.range(first..).take_while(|sample| sample.at < span.to).for_each(|sample| curve.next(*sample));
+    curve.end()
+}
+
+impl WatchList {
+    /// Is the graph shown?
+    pub fn has_graph(&self) -> bool {
+        self.graph.is_some()
+    }
+
+    /// Back to the registers.
+    pub fn close_graph(&mut self) -> bool {
+        self.graph.take().is_some()
+    }
+
+    /// When the first of the values that are remembered was read.
+    fn since(&self) -> Option<Timestamp> {
+        self.items.iter().filter_map(|item| item.samples.front()).map(|sample| sample.at).min()
+    }
+}
+
+impl Watched {
+    /// As it stands: a value that is not good has the time of the read that brought it.
+    fn shown(&self) -> Option<Sample> {
+        let last = *self.samples.back()?;
+        let read = self.samples.iter().rev().find(|sample| sample.quality.is_good());
+        Some(Sample { at: read.filter(|_| last.value.is_some()).map_or(last.at, |read| read.at), ..last })
+    }
+}
+
+impl Registers {
+    /// Shows what is watched; where nothing is, the selected register.
+    pub(in crate::ui::tabs::registers) fn open_graph(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if self.watch.items.is_empty() {
+            let refused = self.toggle_watch();
+            if !refused.is_empty() {
+                return refused;
+            }
+        }
+        let named = self.watch.items.iter().filter_map(|item| self.names.get(item.at.0, item.at.1));
+        let tag = |(n, named)| TagDef { id: TagId(to_u16(n)), ..save::tag(named, &named.name) };
+        let mut graph = Graph::new(cx, t!("watched"), named.enumerate().map(tag).collect());
+        let selected = self.watch.items.iter().position(|item| item.at == (self.table, self.selected)).unwrap_or(0);
+        let past = self.watch.since().map_or(SignedDuration::ZERO, |since| cx.now.duration_since(since));
+        graph.act(cx, &self.watch.items, |trends, cx| {
+            trends.fit(past.max(WINDOW_MIN));
+            trends.open_tag(cx, TagId(to_u16(selected)));
+            Vec::new()
+        });
+        self.watch.graph = Some(graph);
+        self.follow_graph(cx);
+        Vec::new()
+    }
+
+    /// Gives the graph what was read; values that may be others by now end there.
+    pub(in crate::ui::tabs::registers) fn follow_graph(&mut self, cx: &ViewContext) {
+        let period = self.period;
+        let old: Vec<bool> = self.watch.items.iter().map(|item| self.is_stale(cx, item)).collect();
+        let WatchList { graph, items, .. } = &mut self.watch;
+        for (item, _) in items.iter_mut().zip(old).filter(|(_, old)| *old) {
+            if let Some(last) = item.samples.back().filter(|last| last.quality.is_good()) {
+                let at = last.at.checked_add(period).unwrap_or(cx.now).min(cx.now);
+                item.push(Sample { at, ..*last }.uncertain(Cause::Stale));
+            }
+        }
+        let Some(graph) = graph else { return };
+        (graph.snapshot.at, graph.snapshot.stepped) = (cx.now, cx.snapshot.stepped);
+        for (shown, item) in graph.snapshot.samples.iter_mut().zip(items.iter()) {
+            *shown = item.shown().unwrap_or(*shown);
+        }
+        graph.act(cx, items, |trends, cx| trends.on_snapshot(cx));
+    }
+
+    fn is_stale(&self, cx: &ViewContext, item: &Watched) -> bool {
+        item.samples.back().is_some_and(|last| is_past(self, cx, last.at))
+    }
+
+    /// A key of the trends.
+    pub(in crate::ui::tabs::registers) fn graph_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        let WatchList { graph, items, .. } = &mut self.watch;
+        if let (Some(graph), Some(_)) = (graph, find(&keys(), event)) {
+            graph.act(cx, items, |trends, cx| trends.on_key(cx, event));
+        }
+        Vec::new()
+    }
+}
+
+/// The keys of the trends, but for those that ask the plant.
+pub fn keys() -> Vec<Key<trends::Action>> {
+    trends::KEYS.iter().copied().filter(|key| key.action != trends::Action::Why).collect()
+}
+
+/// Draws it; where it has room, what is wrong with reading, or the log.
+pub fn view(tab: &Registers, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+    let Some(graph) = &tab.watch.graph else { return };
+    graph.trends.view(&Graph::context(&graph.snapshot, cx), frame, area);
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let (words, style) = match state(tab, cx) {
+        _ if tab.paused => (t!("reading is paused").to_owned(), cx.theme.trouble()),
+        (why, false) => (why, cx.theme.trouble()),
+        (_, true) => (tab.watch.log_words().unwrap_or_default(), cx.theme.strong()),
+    };
+    let end = canvas.width().saturating_sub(1);
+    let words = fit_words(&words, end / 2);
+    if canvas.is_blank(end.saturating_sub(width(&words) + 1), 0, width(&words) + 1) {
+        canvas.text_right(end, 0, &words, style);
+    }
+}

@@ -1,0 +1,47 @@
+//! Which registers are on the screen and read, and how often.
+
+use std::ops::Range;
+
+use super::{Registers, view};
+use crate::{
+    plant::{live::AddressSpan, number::to_u32},
+    ui::tabs::prelude::*,
+};
+
+/// Periods to choose from.
+const PERIODS_MS: [i64; 8] = [200, 500, 1_000, 2_000, 5_000, 10_000, 30_000, 60_000];
+/// Words behind the window that are read with it: the last row may be the first word of a 64-bit value.
+const BEHIND: u32 = 3;
+
+impl Registers {
+    /// The rows of the window.
+    pub(super) fn rows(&self, cx: &ViewContext) -> Range<u32> {
+        let first = u32::from(self.first);
+        first..(first + to_u32(view::rows(self, cx.area.height))).min(0x1_0000)
+    }
+
+    /// What is read: the window, and what its last row may need.
+    pub(super) fn span(&self, cx: &ViewContext) -> AddressSpan {
+        let rows = self.rows(cx);
+        let count = to_u16((rows.end + BEHIND).min(0x1_0000) - rows.start);
+        AddressSpan { table: self.table, address: self.first, count }
+    }
+
+    pub(super) fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
+        let room = view::rows(self, cx.area.height);
+        self.selected = to_u16(motion.to(usize::from(self.selected), 0x1_0000, room));
+        self.keep_in_sight(cx);
+    }
+
+    pub(super) fn keep_in_sight(&mut self, cx: &ViewContext) {
+        let room = to_u16(view::rows(self, cx.area.height)).max(1);
+        let last_first = u16::MAX - (room - 1);
+        self.first = self.first.clamp(self.selected.saturating_sub(room - 1), self.selected).min(last_first);
+    }
+
+    pub(super) fn change_period(&mut self, by: isize) {
+        let at = PERIODS_MS.iter().position(|ms| SignedDuration::from_millis(*ms) == self.period).unwrap_or(0);
+        let at = at.saturating_add_signed(by).min(PERIODS_MS.len() - 1);
+        self.period = SignedDuration::from_millis(PERIODS_MS[at]);
+    }
+}
