@@ -70,6 +70,8 @@ pub struct Trends {
     raised: Answered<Vec<AlarmRecord>>,
     /// Queries asked so far.
     asked: u32,
+    /// Values without a unit have a scale each: nothing says that they are alike.
+    apart: bool,
 }
 
 type Figures = (Option<(f64, f64, f64)>, f64);
@@ -293,9 +295,9 @@ impl Trends {
         self.values = Some((first_now, row));
     }
 
-    /// Lets the window hold so much time, as far as a window can.
-    pub fn fit(&mut self, span: SignedDuration) {
-        self.window = nearest(span);
+    /// Trends of values of which no plant file says what they are, in a window of so much time, as far as one can be.
+    pub fn of_registers(snapshot: &Snapshot, span: SignedDuration) -> Trends {
+        Trends { window: nearest(span), apart: true, ..TabView::new(snapshot) }
     }
 
     /// Shows the curve of a tag: in the group of the plant that has it, or alone.

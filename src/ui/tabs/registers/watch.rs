@@ -63,10 +63,13 @@ impl WatchList {
         self.log.is_some()
     }
 
-    /// How the log stands.
-    fn log_words(&self) -> Option<String> {
-        let log = self.log.as_ref()?;
-        Some(t!("logging {path}, {rows} rows", path = log.path.display(), rows = log.rows))
+    /// How the log stands, at length and in short, and whether all is well.
+    fn log_words(&self) -> Option<([String; 2], bool)> {
+        if let Some(why) = &self.lost {
+            return Some(([t!("LOG ENDED: {why}", why), t!("LOG ENDED").to_owned()], false));
+        }
+        let Log { path, rows } = self.log.as_ref()?;
+        Some(([t!("logging {path}, {rows} rows", path = path.display(), rows), t!("{rows} rows", rows)], true))
     }
 
     /// Another unit is shown: its registers are others.
@@ -282,11 +285,9 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let width = canvas.width();
     canvas.run(0, 0, width, '─', theme.dim());
     canvas.text(2, 0, t!(" watch "), theme.strong());
-    if let Some(words) = tab.watch.log_words() {
-        canvas.text_right(width.saturating_sub(2), 0, &format!(" {words} "), theme.strong());
-    } else if let Some(why) = &tab.watch.lost {
-        let words = fit_words(&t!(" LOG ENDED: {why} ", why), width.saturating_sub(14));
-        canvas.text_right(width.saturating_sub(2), 0, &words, theme.trouble());
+    if let Some(([words, _], well)) = tab.watch.log_words() {
+        let words = format!(" {} ", fit_words(&words, width.saturating_sub(16)));
+        canvas.text_right(width.saturating_sub(2), 0, &words, if well { theme.strong() } else { theme.trouble() });
     }
     for (y, item) in tab.watch.items.iter().enumerate().map(|(n, item)| (to_u16(n) + 1, item)) {
         let (table, address) = item.at;

@@ -112,7 +112,7 @@ fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
     let curve = |(n, pen): (usize, Pen)| Curve {
         trace: trends.traces.get(&pen.tag).unwrap_or(&NO_TRACE),
         pen: n,
-        unit: cx.snapshot.unit(pen.tag),
+        unit: axis(trends, cx, pen.tag),
         fixed: pen.scale,
         resolution: resolution(cx, pen.tag),
         dashed: is_set_value(cx, pen.tag),
@@ -308,6 +308,12 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
 /// The last hour of a tag.
 fn hour(trends: &Trends, tag: TagId) -> Option<&Series> {
     trends.hours.value.iter().flatten().find(|series| series.tag == tag)
+}
+
+/// What the axis of a tag is called: curves with one name share it.
+fn axis<'a>(trends: &Trends, cx: &ViewContext<'a>, tag: TagId) -> &'a str {
+    let unit = cx.snapshot.unit(tag);
+    if trends.apart && unit.is_empty() { &cx.def().tag(tag).name } else { unit }
 }
 
 /// The last digit of a tag: 0.1 for one decimal.

@@ -111,3 +111,18 @@ fn without_a_list_the_graph_is_of_the_selected_register() {
     let shown = bench.screen(80, 24);
     assert!(shown.contains("41003") && shown.contains("700"), "{shown}");
 }
+
+#[test]
+fn values_without_a_unit_do_not_share_an_axis() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("pj1006⏎");
+    bench.answer(1, device);
+    bench.keys("pg");
+    bench.answer(2, |address| if address == 1006 { Some(7) } else { device(address) });
+    bench.snapshot(2, LineState::Connected);
+    let shown = bench.screen(80, 24);
+    let axes = shown.lines().nth(5).unwrap_or_default();
+    assert!(axes.contains("41003") && axes.contains("41007"), "{shown}");
+}

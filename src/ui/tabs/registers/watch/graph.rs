@@ -43,7 +43,7 @@ pub(super) struct Graph {
 
 impl Graph {
     /// Of the values of a list, the first of them selected.
-    fn new(cx: &ViewContext, title: &str, tags: Vec<TagDef>) -> Graph {
+    fn new(cx: &ViewContext, title: &str, tags: Vec<TagDef>, span: SignedDuration) -> Graph {
         let ids: Vec<TagId> = tags.iter().map(|tag| tag.id).collect();
         let group = |pens: &[TagId]| TrendGroup {
             name: title.to_owned(),
@@ -53,7 +53,7 @@ impl Graph {
         let def = PlantDef { time_zone: cx.def().time_zone.clone(), tags, trends, ..PlantDef::default() };
         let mut snapshot = Snapshot::blank(Arc::new(def));
         snapshot.decimals = snapshot.def.tags.iter().map(save::decimals).collect();
-        Graph { trends: TabView::new(&snapshot), snapshot }
+        Graph { trends: trends::Trends::of_registers(&snapshot, span), snapshot }
     }
 
     /// What the trends may read.
@@ -134,11 +134,10 @@ impl Registers {
         }
         let named = self.watch.items.iter().filter_map(|item| self.names.get(item.at.0, item.at.1));
         let tag = |(n, named)| TagDef { id: TagId(to_u16(n)), ..save::tag(named, &named.name) };
-        let mut graph = Graph::new(cx, t!("watched"), named.enumerate().map(tag).collect());
-        let selected = self.watch.items.iter().position(|item| item.at == (self.table, self.selected)).unwrap_or(0);
         let past = self.watch.since().map_or(SignedDuration::ZERO, |since| cx.now.duration_since(since));
+        let mut graph = Graph::new(cx, t!("watched"), named.enumerate().map(tag).collect(), past.max(WINDOW_MIN));
+        let selected = self.watch.items.iter().position(|item| item.at == (self.table, self.selected)).unwrap_or(0);
         graph.act(cx, &self.watch.items, |trends, cx| {
-            trends.fit(past.max(WINDOW_MIN));
             trends.open_tag(cx, TagId(to_u16(selected)));
             Vec::new()
         });
@@ -190,14 +189,16 @@ pub fn view(tab: &Registers, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let Some(graph) = &tab.watch.graph else { return };
     graph.trends.view(&Graph::context(&graph.snapshot, cx), frame, area);
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
-    let (words, style) = match state(tab, cx) {
-        _ if tab.paused => (t!("reading is paused").to_owned(), cx.theme.trouble()),
-        (why, false) => (why, cx.theme.trouble()),
-        (_, true) => (tab.watch.log_words().unwrap_or_default(), cx.theme.strong()),
+    let (words, style) = match (state(tab, cx), tab.watch.log_words()) {
+        _ if tab.paused => (vec![t!("reading is paused").to_owned()], cx.theme.trouble()),
+        ((why, false), _) => (vec![why], cx.theme.trouble()),
+        (_, Some((words, true))) => (words.to_vec(), cx.theme.strong()),
+        (_, Some((words, false))) => (words.to_vec(), cx.theme.trouble()),
+        ((_, true), None) => return,
     };
     let end = canvas.width().saturating_sub(1);
-    let words = fit_words(&words, end / 2);
-    if canvas.is_blank(end.saturating_sub(width(&words) + 1), 0, width(&words) + 1) {
-        canvas.text_right(end, 0, &words, style);
+    let fits = |words: &&String| canvas.is_blank(end.saturating_sub(width(words) + 2), 0, width(words) + 2);
+    if let Some(words) = words.iter().find(fits) {
+        canvas.text_right(end, 0, words, style);
     }
 }
