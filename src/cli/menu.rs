@@ -16,7 +16,7 @@ const OPENED_MAX: usize = 9;
 
 /// Something to choose.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Choice {
+pub struct Choice {
     /// What is shown.
     words: String,
     /// The arguments that it stands for.
@@ -78,7 +78,8 @@ pub fn remember(place: &str) {
     let _ = atomic::write_for_user(&path, (all.join("\n") + "\n").as_bytes());
 }
 
-fn is_asked() -> bool {
+/// Can something be asked?
+pub fn is_asked() -> bool {
     io::stdin().is_terminal() && io::stdout().is_terminal()
 }
 
@@ -92,7 +93,7 @@ fn opened(path: &Path) -> Vec<String> {
 }
 
 /// Devices opened before, and the serial ports of this machine.
-fn devices() -> Vec<Choice> {
+pub fn devices() -> Vec<Choice> {
     let before = opened(&opened_file());
     let again = before.iter().map(|place| Choice::open(format!("{place}, opened before"), place));
     let ports = ports::list();
@@ -112,11 +113,16 @@ fn plants(folder: &Path) -> Vec<Choice> {
     names.iter().map(|name| Choice::new(format!("the plant {name}"), &[name])).collect()
 }
 
-/// Shows the choices until one is taken; an empty line leaves.
-fn ask(question: &str, choices: &[Choice]) -> Result<Vec<String>, CliError> {
+/// Lists choices by number.
+pub fn show(choices: &[Choice]) {
     for (n, choice) in choices.iter().enumerate() {
         say(&format!("  {:2}  {}", n + 1, choice.words));
     }
+}
+
+/// Shows the choices until one is taken; an empty line leaves.
+fn ask(question: &str, choices: &[Choice]) -> Result<Vec<String>, CliError> {
+    show(choices);
     loop {
         let _ = write!(io::stdout(), "{question}: ");
         let _ = io::stdout().flush();
@@ -133,7 +139,7 @@ fn ask(question: &str, choices: &[Choice]) -> Result<Vec<String>, CliError> {
 }
 
 /// What an answer means: a number of the list, or a port or address.
-fn chosen(answer: &str, choices: &[Choice]) -> Result<Vec<String>, String> {
+pub fn chosen(answer: &str, choices: &[Choice]) -> Result<Vec<String>, String> {
     if let Ok(number) = answer.parse::<usize>() {
         let choice = number.checked_sub(1).and_then(|n| choices.get(n));
         let wrong = || format!("found {number}, expected 1 to {}", choices.len());

@@ -15,10 +15,12 @@ mod decode;
 mod init;
 mod log;
 mod menu;
+mod new;
 mod open;
 mod own_files;
 mod paths;
 mod profiles;
+mod prompt;
 mod report;
 mod run;
 mod sim;
@@ -69,6 +71,8 @@ enum Command {
     Demo(demo::Args),
     /// Show the registers of any device, live: a port, or HOST[:TCPPORT]; no plant file, no login
     Open(open::Args),
+    /// Write a plant file by answering questions: lines, units, recognised devices, tags, alarms, shifts
+    New(new::Args),
     /// Run the station without a terminal: poll, evaluate alarms, record the history
     Run(run::Args),
     /// Open a terminal at a running station; leaving it stops nothing
@@ -233,6 +237,7 @@ fn carry_out(args: Args) -> Result<(), CliError> {
         },
         Some(Command::Demo(args)) => demo::main(args),
         Some(Command::Open(args)) => open::main(args),
+        Some(Command::New(args)) => new::main(&args),
         Some(Command::Run(args)) => run::main(args),
         Some(Command::Attach(args)) => attach::main(args),
         Some(Command::Status(args)) => status::main(args),

@@ -59,9 +59,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let (line, unit) = find(line, &args).await?;
         menu::remember(&place(&line, unit));
-        let def = Arc::new(bench(line, unit));
-        let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
-        let station = station::start_transient(def, Clock::real(), connectors, Box::new(|_| {}));
+        let station = bench_station(line, unit);
         let session = station.session(&paths::operator());
         let options =
             ui::io::Options { profiles: own_profiles(Path::new("")), ..ui::io::Options::new(ui::Leaving::Bench) };
@@ -94,6 +92,20 @@ fn place(line: &LineDef, unit: u8) -> String {
     format!("{} --unit {unit}{mode}{serial}", port_of(line))
 }
 
+impl Args {
+    /// The line that they describe.
+    pub fn line(&self) -> Result<LineDef, CliError> {
+        self.port.line()
+    }
+}
+
+/// A station without history over one line of which nothing is known.
+pub fn bench_station(line: LineDef, unit: u8) -> station::Station {
+    let def = Arc::new(bench(line, unit));
+    let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+    station::start_transient(def, Clock::real(), connectors, Box::new(|_| {}))
+}
+
 /// A plant that is one device on one line, of which nothing is known.
 fn bench(line: LineDef, unit: u8) -> PlantDef {
     let place = match &line.transport {
@@ -105,7 +117,7 @@ fn bench(line: LineDef, unit: u8) -> PlantDef {
 }
 
 /// The settings and the unit that answer; what is given is taken as it is.
-async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError> {
+pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError> {
     if let Some(serial) = line.transport.serial() {
         let unit = args.unit.unwrap_or(1);
         if args.port.is_exact() {

@@ -1,20 +1,23 @@
 //! The text of a new plant file: what a technician has found on a line, commented, and checked by reading it again.
 
-use std::fmt::Write;
+use std::{fmt::Write, time::Duration};
 
 use toml_edit::Value;
 
 use super::{OwnProfiles, edit, units};
 use crate::plant::{
-    def::LineDef,
+    PlantDef,
+    def::{LineDef, TagId},
     live::ReplyTimes,
-    tag::{ByteOrder, DataType, Decimals, TagDef},
+    tag::{Access, Bound, ByteOrder, DataType, Decimals, Poll, TagDef},
 };
 
 /// Most values on the mimic, pens of the trend and tags of the report.
 const SHOWN_MAX: usize = 34;
 const PENS_MAX: usize = 4;
 const REPORTED_MAX: usize = 12;
+/// Tags that are of interest where a profile reads none often.
+const INTEREST_MAX: usize = 34;
 /// Values of a column of the mimic.
 const ROWS: usize = 17;
 
@@ -29,8 +32,27 @@ pub struct NewPlant {
     pub lines: Vec<(LineDef, ReplyTimes)>,
     /// Its devices.
     pub devices: Vec<NewDevice>,
+    /// Its alarms, beside those that every device and line has.
+    pub alarms: Vec<NewAlarm>,
     /// Name and start of each shift, `day` and `06:00`.
     pub shifts: Vec<(String, String)>,
+}
+
+/// An alarm of a new plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewAlarm {
+    /// Full name of its tag, `TIC-1.PV`.
+    pub tag: String,
+    /// `high` or `low`.
+    pub condition: &'static str,
+    /// In the unit of the tag.
+    pub limit: f64,
+    /// How far the value must come back.
+    pub deadband: f64,
+    /// Its name on the screens.
+    pub message: String,
+    /// Where the limit comes from.
+    pub reason: &'static str,
 }
 
 /// A device of a new plant.
@@ -44,6 +66,8 @@ pub struct NewDevice {
     pub unit: u8,
     /// Its profile, and the tags of it that are of interest; `None`: all it has are its own tags.
     pub profile: Option<(String, Vec<TagDef>)>,
+    /// Tags of the profile that are never read.
+    pub unpolled: Vec<String>,
     /// A controller: it has a faceplate.
     pub controller: bool,
     /// Tags that no profile has, by names of their own.
@@ -109,8 +133,8 @@ impl NewPlant {
         }
         writeln!(out, "line = {}\nunit = {}\nfast = \"1s\"\nslow = \"10s\"", quoted(line), device.unit)?;
         let polled = device.profile.iter().flat_map(|(_, tags)| tags);
-        let polled: Vec<&TagDef> = polled.filter(|tag| tag.poll == crate::plant::tag::Poll::Never).collect();
-        if device.tags.is_empty() && polled.is_empty() {
+        let polled: Vec<&TagDef> = polled.filter(|tag| tag.poll == Poll::Never).collect();
+        if device.tags.is_empty() && polled.is_empty() && device.unpolled.is_empty() {
             return writeln!(out);
         }
         writeln!(
@@ -119,6 +143,9 @@ impl NewPlant {
         )?;
         for tag in polled {
             writeln!(out, "    {{ name = {}, poll = \"fast\" }},", quoted(&tag.short))?;
+        }
+        for name in &device.unpolled {
+            writeln!(out, "    {{ name = {}, poll = \"never\" }},", quoted(name))?;
         }
         let (tags, left_out) = device.own_tags();
         for tag in tags {
@@ -136,6 +163,19 @@ impl NewPlant {
             out,
             "# A device that does not respond and a line that is not connected raise an alarm without a word here."
         )?;
+        for NewAlarm { tag, condition, limit, deadband, message, reason } in &self.alarms {
+            let [limit, deadband] = [limit, deadband].map(|value| Value::from(*value).to_string().trim().to_owned());
+            writeln!(
+                out,
+                "# {reason}: is it the one of this plant?\n[[alarm]]\ntag = {}\n{condition} = {limit}\n\
+                 deadband = {deadband}\non_delay = \"5s\"\npriority = \"high\"\nmessage = {}\n",
+                quoted(tag),
+                quoted(message)
+            )?;
+        }
+        if !self.alarms.is_empty() {
+            return Ok(());
+        }
         let Some((name, _)) = self.shown().find(|(_, tag)| is_number(tag) && !tag.point.table.is_bits()) else {
             return writeln!(out);
         };
@@ -201,6 +241,73 @@ impl NewDevice {
             free
         })
     }
+}
+
+/// What a profile reads often; where it reads nothing by itself, the first that can be read.
+pub fn of_interest(tags: &[TagDef]) -> Vec<TagDef> {
+    let readable = || tags.iter().filter(|tag| tag.access != Access::Write && tag.point.field.is_none());
+    let fast: Vec<TagDef> = readable().filter(|tag| is_fast(tag)).cloned().collect();
+    if fast.is_empty() { readable().take(INTEREST_MAX).cloned().collect() } else { fast }
+}
+
+/// Is it read every second? Then it is measured, and no setting.
+fn is_fast(tag: &TagDef) -> bool {
+    matches!(tag.poll, Poll::Every(period) if period <= Duration::from_secs(1))
+}
+
+/// Tags of a profile that are not kept and not needed by those that are: never read.
+pub fn left_out(def: &PlantDef, kept: &[TagDef]) -> Vec<String> {
+    let plates = def.devices.iter().filter_map(|device| device.faceplate.as_ref());
+    let operated = plates.flat_map(|plate| {
+        let some = [plate.sv_used, plate.mv, plate.run, plate.mode, plate.tune].into_iter().flatten();
+        [plate.pv, plate.sv].into_iter().chain(some).chain(plate.tunes.iter().copied()).collect::<Vec<_>>()
+    });
+    let mut wanted: Vec<TagId> = kept.iter().map(|tag| tag.id).chain(operated).collect();
+    let mut next = 0;
+    while let Some(id) = wanted.get(next).copied() {
+        let needs: Vec<TagId> = def.tag(id).needs().filter(|need| !wanted.contains(need)).collect();
+        wanted.extend(needs);
+        next += 1;
+    }
+    let rest = def.tags.iter().filter(|tag| tag.poll != Poll::Never && !wanted.contains(&tag.id));
+    rest.map(|tag| tag.short.clone()).collect()
+}
+
+/// Alarms that a profile suggests for these of its tags: a fault word that is not 0, and the ends of a measured range.
+pub fn suggested_alarms(device: &str, tags: &[TagDef]) -> Vec<NewAlarm> {
+    let faults = tags.iter().filter_map(|tag| tag.quality_from.map(|(fault, _)| fault));
+    let faults: Vec<TagId> = faults.collect();
+    let alarm = |tag: &TagDef, condition, limit, deadband, reason| {
+        let words = if tag.label.is_empty() { &tag.short } else { &tag.label };
+        let message = if condition == "fault" { words.clone() } else { format!("{words} {condition}") };
+        let condition = if condition == "low" { "low" } else { "high" };
+        NewAlarm { tag: format!("{device}.{}", tag.short), condition, limit, deadband, message, reason }
+    };
+    tags.iter()
+        .filter(|tag| tag.access == Access::Read && tag.labels.is_empty() && !tag.is_text())
+        .flat_map(|tag| {
+            let fault =
+                faults.contains(&tag.id).then(|| alarm(tag, "fault", 0.5, 0.25, "The word is 0 while all is well"));
+            // An output cannot leave 0 to 100 %.
+            let limits = match (tag.min, tag.max) {
+                (Some(Bound::Fixed(min)), Some(Bound::Fixed(max)))
+                    if is_fast(tag) && !tag.unit.is_empty() && tag.unit != "%" =>
+                {
+                    let reason = "The end of the range that the profile gives";
+                    let deadband = (max - min) / 100.0;
+                    let low = (min != 0.0).then(|| alarm(tag, "low", min, deadband, reason));
+                    [Some(alarm(tag, "high", max, deadband, reason)), low]
+                }
+                _ => [None, None],
+            };
+            fault.into_iter().chain(limits.into_iter().flatten()).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// Two shifts of twelve hours.
+pub fn usual_shifts() -> Vec<(String, String)> {
+    [("day", "06:00"), ("night", "18:00")].map(|(name, start)| (name.to_owned(), start.to_owned())).to_vec()
 }
 
 fn is_number(tag: &TagDef) -> bool {

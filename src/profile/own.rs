@@ -20,9 +20,13 @@ impl OwnProfiles {
 
     /// The profiles that say by what their device is recognised, each as the only device of a plant of its name.
     pub fn recognisable(&self) -> Vec<Arc<PlantDef>> {
-        let texts = self.names().into_iter().filter_map(|name| Some((self.find(&name)?, name)));
-        let plants = texts.filter_map(|(text, name)| check_device(&name, text).ok()).map(|checked| checked.plant);
+        let plants = self.names().into_iter().filter_map(|name| self.device(&name));
         plants.filter(|def| def.devices.iter().any(|device| !device.signature.is_empty())).collect()
+    }
+
+    /// The device of a profile as the only one of a plant; `None` for a profile that there is not, or with errors.
+    pub fn device(&self, name: &str) -> Option<Arc<PlantDef>> {
+        check_device(name, self.find(name)?).ok().map(|checked| checked.plant)
     }
 
     /// Checks the text of a plant file that is not written yet.

@@ -1,6 +1,9 @@
 //! The program as a person sees it, in a pseudo-terminal.
 
-use crate::pty::Terminal;
+use crate::{
+    pty::Terminal,
+    support::{folder, simulated_tank},
+};
 
 #[test]
 fn every_tab_opens_and_q_asks_before_leaving() {
@@ -20,6 +23,50 @@ fn every_tab_opens_and_q_asks_before_leaving() {
     terminal.keys("\r");
     assert_eq!(terminal.end(), 0);
     terminal.assert_restored();
+}
+
+#[test]
+fn a_new_plant_is_made_of_what_answers() {
+    let (_sim, port) = simulated_tank();
+    let folder = folder();
+    let file = folder.path().join("works.toml");
+    let path = file.to_str().unwrap();
+    let mut terminal = Terminal::start(160, 60, &["new", path]);
+    let enter = |question: &str, answer: &str| (question.to_owned(), format!("{answer}\r"));
+    for (question, keys) in [
+        enter("title [Plant]", "Works"),
+        enter("time zone", "Nowhere/Atlantis"),
+        enter("expected an IANA name", "Asia/Bangkok"),
+        enter("line 1:", &port),
+        enter("units to look for", "1-3"),
+        enter("which of them [all]", ""),
+        enter("unit 1: looks like FUJI PXR", ""),
+        enter("name [TIC-1]", ""),
+        enter("tags to keep [all]", "PV SV 8"),
+        enter("unit 2: looks like KOYO DL06", ""),
+        enter("name [D-1]", "PLC-1"),
+        enter("42 VY0", ""),
+        enter("line 2:", ""),
+        enter("TIC-1.FAULT high 0.5: fault of sensor or controller", ""),
+        enter("shifts, or none", ""),
+        enter("write the plant file", ""),
+    ] {
+        terminal.wait_for(&question);
+        terminal.keys(&keys);
+    }
+    terminal.wait_for("saved");
+    assert_eq!(terminal.end(), 0);
+    let text = std::fs::read_to_string(&file).unwrap();
+    let def = sightglass::profile::load(&file, &sightglass::profile::Search::shipped()).unwrap();
+    let names: Vec<&str> = def.devices.iter().map(|device| device.name.as_str()).collect();
+    assert_eq!((def.title.as_str(), names, def.shifts.len()), ("Works", vec!["TIC-1", "PLC-1"], 2));
+    for part in ["# The word is 0 while all is well", "{ name = \"CT\", poll = \"never\" }", "replies took"] {
+        assert!(text.contains(part), "no `{part}` in {text}");
+    }
+    let mut again = Terminal::start(160, 24, &["new", path]);
+    again.wait_for("is never overwritten");
+    assert_eq!(again.end(), 2);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), text);
 }
 
 #[test]

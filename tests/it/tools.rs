@@ -137,6 +137,12 @@ fn a_unit_that_cannot_answer_is_refused_before_a_port_is_opened() {
 }
 
 #[test]
+fn a_new_plant_is_not_asked_for_without_a_terminal() {
+    let (code, said) = run(&["new"]);
+    assert!(code == Some(2) && said.contains("asks questions: run it in a terminal"), "{code:?} {said}");
+}
+
+#[test]
 fn a_mistyped_command_gets_a_suggestion() {
     for (typed, meant) in [("demoo", "demo"), ("atach", "attach"), ("staus", "status")] {
         let (code, said) = run(&[typed]);

@@ -49,7 +49,15 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let most = line.timeout * to_u32(requests.div_ceil(at_once));
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if no unit answers", line.transport));
-    let run = run(&line, Diagnostic::Scan(scan), |finding| match finding {
+    let run = run(&line, Diagnostic::Scan(scan), describe)?;
+
+    let found = run.findings.iter().any(|finding| matches!(finding, Finding::Unit { .. }));
+    if found { Ok(()) } else { Err(CliError::Failed("no unit was found".into())) }
+}
+
+/// What a scan has found, in words.
+pub fn describe(finding: &Finding) -> Vec<String> {
+    match finding {
         Finding::Unit { unit, serial, words, .. } => {
             let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
             vec![format!("unit {unit:3}{settings}: {words}")]
@@ -61,9 +69,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         | Finding::Bytes { .. }
         | Finding::Object { .. }
         | Finding::Values { .. } => Vec::new(),
-    })?;
-    let found = run.findings.iter().any(|finding| matches!(finding, Finding::Unit { .. }));
-    if found { Ok(()) } else { Err(CliError::Failed("no unit was found".into())) }
+    }
 }
 
 /// Every combination that is asked for; none: only the settings of the port.
@@ -97,7 +103,7 @@ fn serials(args: &Args, usual: Serial) -> Result<Vec<Serial>, CliError> {
 }
 
 /// `1-247` or `17`.
-fn units(text: &str) -> Result<(u8, u8), String> {
+pub fn units(text: &str) -> Result<(u8, u8), String> {
     let wrong = || format!("found `{text}`, expected a unit such as 17 or a range such as 1-32, 1 to 255");
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let number = |word: &str| word.trim().parse::<u8>().map_err(|_| wrong());

@@ -7,14 +7,12 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         def::LineDef,
-        tag::{Access, Decimals, Point, Poll, TagDef},
+        tag::{Decimals, Point, TagDef},
     },
-    profile::new_plant::{NewDevice, NewPlant, plain_name},
+    profile::new_plant::{NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
     ui::Effect,
 };
 
-/// Tags of a profile that are shown where it polls none by itself.
-const SHOWN_MAX: usize = 34;
 /// Lines of a list that are said not to be read.
 const PROBLEMS_MAX: usize = 10;
 
@@ -61,15 +59,16 @@ impl Registers {
             unit: self.unit,
             controller: profile.is_some_and(|profile| profile.devices.iter().any(|device| device.faceplate.is_some())),
             tags: tags.collect(),
+            unpolled: Vec::new(),
             profile: profile.map(|profile| (profile.name.clone(), of_interest(&profile.tags))),
         };
-        let shifts = [("day", "06:00"), ("night", "18:00")].map(|(name, start)| (name.to_owned(), start.to_owned()));
         Some(NewPlant {
             title: def.title.clone(),
             time_zone: def.time_zone.iana_name().unwrap_or("UTC").to_owned(),
             lines: vec![(line, self.replies)],
             devices: vec![device],
-            shifts: shifts.to_vec(),
+            alarms: Vec::new(),
+            shifts: usual_shifts(),
         })
     }
 }
@@ -117,14 +116,6 @@ pub fn outcome(result: Result<PathBuf, String>) -> UiAction {
 fn is_of(named: &Named, tags: &[TagDef]) -> bool {
     let same = |tag: &TagDef| (tag.point.table, tag.point.address) == (named.table, named.address);
     tags.iter().any(|tag| same(tag) && tag.short == named.name)
-}
-
-/// What a profile reads often; where it reads nothing by itself, the first that can be read.
-pub fn of_interest(tags: &[TagDef]) -> Vec<TagDef> {
-    let readable = || tags.iter().filter(|tag| tag.access != Access::Write && tag.point.field.is_none());
-    let often = |tag: &&TagDef| matches!(tag.poll, Poll::Every(period) if period <= Duration::from_secs(1));
-    let fast: Vec<TagDef> = readable().filter(often).cloned().collect();
-    if fast.is_empty() { readable().take(SHOWN_MAX).cloned().collect() } else { fast }
 }
 
 /// A tag of its own with a name that no other has.
