@@ -17,6 +17,7 @@ mod log;
 mod menu;
 mod new;
 mod open;
+mod open_log;
 mod own_files;
 mod paths;
 mod profiles;

@@ -3,7 +3,9 @@
 use std::{path::Path, sync::Arc, time::Duration};
 
 use super::{
-    CliError, in_runtime, log, menu, paths, say,
+    CliError, in_runtime, log, menu,
+    open_log::WatchArgs,
+    paths, say,
     tools::{self, PortArgs},
 };
 use crate::{
@@ -48,12 +50,15 @@ pub struct Args {
     /// Unit address [default: the first usual one that answers]
     #[arg(long, short, value_parser = clap::value_parser!(u8))]
     unit: Option<u8>,
+    #[command(flatten)]
+    watched: WatchArgs,
 }
 
 /// Finds settings and unit, and shows the registers.
 pub fn main(args: Args) -> Result<(), CliError> {
     let line = args.port.line()?;
     args.unit.map_or(Ok(()), |unit| tools::check_unit(&line, unit))?;
+    let start = args.watched.start()?;
     ui::io::require_terminal()?;
     let _log = log::start(None, None)?;
     in_runtime(async {
@@ -61,10 +66,14 @@ pub fn main(args: Args) -> Result<(), CliError> {
         menu::remember(&place(&line, unit));
         let station = bench_station(line, unit);
         let session = station.session(&paths::operator());
-        let options =
-            ui::io::Options { profiles: own_profiles(Path::new("")), ..ui::io::Options::new(ui::Leaving::Bench) };
+        let options = ui::io::Options {
+            start,
+            profiles: own_profiles(Path::new("")),
+            ..ui::io::Options::new(ui::Leaving::Bench)
+        };
         let result = ui::io::run(session, options).await;
         station.stop().await;
+        args.watched.say_written();
         Ok(result?)
     })
 }

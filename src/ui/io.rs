@@ -24,7 +24,7 @@ use tokio::{
 use super::{
     Effect, Leaving, Model, Msg, QueryId,
     extension::{Extension, ExtensionMessage},
-    tabs::Tab,
+    tabs::{Tab, registers::Start},
     theme::Theme,
     update, view,
 };
@@ -57,6 +57,8 @@ pub struct Options {
     pub leaving: Leaving,
     /// What the embedding command adds.
     pub extension: Option<ExtensionPort>,
+    /// What the registers of a bench begin with.
+    pub start: Start,
     /// The user's own device profiles, which are recognised too.
     pub profiles: OwnProfiles,
 }
@@ -73,7 +75,7 @@ impl Options {
     /// Looks chosen by the environment.
     pub fn new(leaving: Leaving) -> Options {
         let theme = Theme::detect(|name| std::env::var(name).ok());
-        Options { theme, leaving, extension: None, profiles: OwnProfiles::default() }
+        Options { theme, leaving, extension: None, start: Start::default(), profiles: OwnProfiles::default() }
     }
 }
 
@@ -126,7 +128,7 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
         drawn_at: None,
         heard_at,
     }
-    .run(inbox)
+    .run(inbox, options.start)
     .await
 }
 
@@ -149,7 +151,7 @@ struct Loop {
 }
 
 impl Loop {
-    async fn run(mut self, mut inbox: mpsc::Receiver<(u32, Msg)>) -> Result<(), UiError> {
+    async fn run(mut self, mut inbox: mpsc::Receiver<(u32, Msg)>, start: Start) -> Result<(), UiError> {
         let mut events = EventStream::new();
         let mut hangup = signal(SignalKind::hangup())?;
         let mut terminate = signal(SignalKind::terminate())?;
@@ -158,6 +160,9 @@ impl Loop {
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let (width, height) = self.screen.size();
         self.handle(Msg::Resize(width, height), Duration::ZERO)?;
+        if start != Start::default() {
+            self.handle(Msg::Begin(start), Duration::ZERO)?;
+        }
         loop {
             let due = self.redraw_at.unwrap_or_else(|| Instant::now() + FRAME);
             let leave = tokio::select! {

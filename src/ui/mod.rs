@@ -221,6 +221,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             }
             with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))
         }
+        Msg::Begin(start) => with_tabs(model, |tabs, cx| tabs.registers.begin(cx, start)),
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
         Msg::SessionStatus(session) => session_lock::on_session_status(model, session),
         Msg::RequestDone(id, answer) => session_lock::on_request_done(model, id, answer),
@@ -391,5 +392,5 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     if silent >= SILENCE {
         model.doubt();
     }
-    with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))
+    with_tabs(model, |tabs, cx| tabs.on_tick(cx))
 }

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use super::{
     extension::{Extension, ExtensionMessage},
     modal::Modal,
-    tabs::Tab,
+    tabs::{Tab, registers::Start},
 };
 use crate::{
     access::{Credentials, Durability, SessionRequest, SessionStatus},
@@ -23,6 +23,8 @@ use crate::{
 /// What happens to a terminal.
 #[derive(Debug)]
 pub enum Msg {
+    /// The tab of the registers begins: once, before anything else.
+    Begin(Start),
     /// A key.
     Key(KeyEvent),
     /// Pasted text: never acts as keys.

@@ -19,6 +19,7 @@
 //! | `tampering` | the audit log changed by hand: what `sightglass audit verify` says |
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
 //! | `tools` | the tools for a line against peers that echo, chatter and lie |
+//! | `logs` | logs of registers by `sightglass open`: killed, ended, shown again |
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file; commands made before a reload |
 //! | `durability` | killed, unplugged, locked, damaged |
@@ -39,6 +40,7 @@ mod endings;
 mod guarded;
 mod hostile;
 mod kills;
+mod logs;
 mod masters;
 mod outstanding;
 mod peers;

@@ -250,6 +250,12 @@ impl Tabs {
     pub fn shown_mut(&mut self) -> &mut dyn TabView {
         self.of_mut(self.shown)
     }
+    /// Time passes: the shown tab asks for what is due; a log goes on wherever its operator looks.
+    pub fn on_tick(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let logging = self.shown != Tab::Registers && self.registers.is_logging();
+        let logged = if logging { self.registers.on_snapshot(cx) } else { Vec::new() };
+        logged.into_iter().chain(self.shown_mut().on_snapshot(cx)).collect()
+    }
     /// Does the tab that asked still wait for the answer?
     pub fn awaits(&self, id: QueryId) -> bool {
         self.of(id.tab).awaits(id.number)

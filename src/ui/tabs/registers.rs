@@ -21,6 +21,7 @@ mod tests;
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+pub use self::watch::start::{Start, parse_all as parse_watched};
 use self::{
     cells::Cells,
     keys::{Action, table},

@@ -1,6 +1,7 @@
 //! The watch list: registers that are read wherever the window is, with what they have held, and their log as CSV.
 
 pub(super) mod graph;
+pub(super) mod start;
 
 use std::{collections::VecDeque, path::PathBuf};
 
@@ -207,7 +208,11 @@ impl Registers {
         if self.watch.items.is_empty() {
             return notice(t!("Nothing is watched yet: p puts the selected register on the list.").to_owned());
         }
-        let path = PathBuf::from(draw::local(cx, cx.now, "registers-%Y%m%d-%H%M%S.csv"));
+        self.begin_log(PathBuf::from(draw::local(cx, cx.now, "registers-%Y%m%d-%H%M%S.csv")))
+    }
+
+    /// Begins a log of the list in a new file.
+    fn begin_log(&mut self, path: PathBuf) -> Vec<UiAction> {
         let columns = self.watch.items.iter().filter_map(|item| self.names.get(item.at.0, item.at.1));
         let bytes = value_log::heading(columns.map(|named| (named.name.as_str(), named.unit.as_str())));
         (self.watch.log, self.watch.lost) = (Some(Log { path: path.clone(), rows: 0 }), None);

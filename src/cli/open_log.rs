@@ -1,0 +1,62 @@
+//! What `sightglass open` watches and logs from the start.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use jiff::SignedDuration;
+
+use super::{CliError, say, span};
+use crate::ui::tabs::registers::{Start, parse_watched};
+
+/// What is watched and logged.
+#[derive(Debug, clap::Args)]
+pub struct WatchArgs {
+    /// Watch a register from the start: NAME=ADDRESS[:COUNT] [TYPE] [ORDER] [SCALE] [UNIT], such as
+    /// 'SV=41003 int16 0.1 °C'; again for more
+    #[arg(long, value_name = "REGISTER")]
+    watch: Vec<String>,
+    /// Log what is watched to a new CSV file, a row for each read
+    #[arg(long, value_name = "FILE", requires = "watch")]
+    log: Option<PathBuf>,
+    /// Time between two reads [default: 1s]
+    #[arg(long, value_name = "TIME", value_parser = period)]
+    every: Option<SignedDuration>,
+}
+
+impl WatchArgs {
+    /// What the registers begin with.
+    pub fn start(&self) -> Result<Start, CliError> {
+        let watch = parse_watched(&self.watch).map_err(|why| CliError::Usage(format!("--watch: {why}")))?;
+        if let Some(log) = self.log.as_ref().filter(|log| log.exists()) {
+            let why = "a file of this name is there already, and stays as it is";
+            return Err(CliError::Usage(format!("--log: {}: {why}", log.display())));
+        }
+        Ok(Start { watch, log: self.log.clone(), every: self.every })
+    }
+
+    /// Says what the file of the log holds when all is over.
+    pub fn say_written(&self) {
+        self.log.iter().for_each(|log| say(&written(log)));
+    }
+}
+
+/// What the file of a log holds when all is over.
+fn written(log: &Path) -> String {
+    match fs::read(log) {
+        Ok(bytes) => {
+            let rows = bytes.iter().filter(|byte| **byte == b'\n').count().saturating_sub(1);
+            format!("{}: {rows} rows written", log.display())
+        }
+        Err(error) => format!("{}: nothing was written: {error}", log.display()),
+    }
+}
+
+/// A time that the registers can be read at.
+fn period(text: &str) -> Result<SignedDuration, String> {
+    let (least, most) = (SignedDuration::from_millis(200), SignedDuration::from_secs(60));
+    let period = span(text).ok().and_then(|span| SignedDuration::try_from(span).ok());
+    let wrong = || format!("found `{text}`, expected 200ms to 60s");
+    period.filter(|period| (least..=most).contains(period)).ok_or_else(wrong)
+}
