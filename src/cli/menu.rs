@@ -9,7 +9,11 @@ use std::{
 };
 
 use super::{CliError, paths, say};
-use crate::{bus::io::ports, plant::def::Transport, profile::io::atomic};
+use crate::{
+    bus::io::{network::Network, ports},
+    plant::def::Transport,
+    profile::io::atomic,
+};
 
 /// Devices that are remembered.
 const OPENED_MAX: usize = 9;
@@ -40,7 +44,8 @@ pub fn completed(args: Vec<OsString>) -> Result<Vec<OsString>, CliError> {
     let words: Vec<Option<&str>> = args.iter().map(|word| word.to_str()).collect();
     match words.as_slice() {
         [_, Some("open")] if is_asked() => {
-            let chosen = ask("which device? a number, or HOST[:TCPPORT] or /dev/…", &devices())?;
+            let choices: Vec<Choice> = devices().into_iter().chain(networks()).collect();
+            let chosen = ask("which device? a number, HOST[:TCPPORT], /dev/… or a network 10.0.0.0/24", &choices)?;
             Ok(args.into_iter().take(1).chain(chosen.into_iter().map(OsString::from)).collect())
         }
         [program, Some(word), ..] if program.is_some() && is_port(word) && !Path::new(word).is_file() => {
@@ -60,6 +65,7 @@ pub fn without_station() -> Result<Option<Vec<String>>, CliError> {
     let mut choices = vec![Choice::new("the demonstration: a simulated plant", &["demo"])];
     choices.extend(plants(Path::new(".")));
     choices.extend(devices());
+    choices.extend(networks());
     say("no station runs here");
     ask("what shall be shown? a number, HOST[:TCPPORT] or /dev/…", &choices).map(Some)
 }
@@ -99,6 +105,14 @@ pub fn devices() -> Vec<Choice> {
     let ports = ports::list();
     let new = ports.iter().filter(|port| !before.iter().any(|place| place.split_whitespace().next() == Some(port)));
     again.chain(new.map(|port| Choice::open(format!("{port}{}", ports::driver_words(port)), port))).collect()
+}
+
+/// The networks of this machine, to be scanned after a question.
+fn networks() -> impl Iterator<Item = Choice> {
+    Network::neighbours().into_iter().map(|network| {
+        let network = network.to_string();
+        Choice::new(format!("look for devices in the network {network}; asks first"), &["scan", &network])
+    })
 }
 
 /// The plant files of a folder.
@@ -145,6 +159,9 @@ pub fn chosen(answer: &str, choices: &[Choice]) -> Result<Vec<String>, String> {
         let wrong = || format!("found {number}, expected 1 to {}", choices.len());
         return choice.map(|choice| choice.args.clone()).ok_or_else(wrong);
     }
+    if answer.split(':').next().is_some_and(|network| network.parse::<Network>().is_ok()) {
+        return Ok(Choice::new("", &["scan", answer]).args);
+    }
     let place = answer.strip_prefix("open ").unwrap_or(answer);
     let word = place.split_whitespace().next().unwrap_or_default();
     let plain = word.chars().all(|letter| letter.is_ascii_alphanumeric() || "-._:[]/".contains(letter));
@@ -189,6 +206,10 @@ mod tests {
         assert_eq!(chosen("1", &choices), Ok(vec!["demo".to_owned()]));
         assert_eq!(chosen("2", &choices).map(|args| args.join(" ")), Ok("open plc --unit 7".to_owned()));
         assert_eq!(chosen("plc:1502", &choices).map(|args| args.join(" ")), Ok("open plc:1502".to_owned()));
+        assert_eq!(
+            chosen("10.0.0.0/24:1502", &choices).map(|args| args.join(" ")),
+            Ok("scan 10.0.0.0/24:1502".to_owned())
+        );
         assert_eq!(chosen("3", &choices), Err("found 3, expected 1 to 2".to_owned()));
         assert!(chosen("what?", &choices).is_err());
     }

@@ -7,7 +7,6 @@ use std::{
     time::Duration,
 };
 
-use clap::Parser;
 use jiff::{civil::Time, tz::TimeZone};
 
 use super::{
@@ -48,13 +47,6 @@ pub struct Args {
     /// The plant file to write; an existing file is never overwritten
     #[arg(value_name = "FILE", default_value = "plant.toml")]
     file: PathBuf,
-}
-
-/// A line as it is typed.
-#[derive(Debug, Parser)]
-struct LineArgs {
-    #[command(flatten)]
-    open: open::Args,
 }
 
 /// What was found at a unit.
@@ -129,17 +121,13 @@ async fn next_line(count: usize) -> Result<Option<LineDef>, CliError> {
         menu::show(&choices);
     }
     let usual = if count == 0 && !choices.is_empty() { "1" } else { END };
-    let question =
-        format!("line {}: a number, HOST[:TCPPORT] or /dev/…, or with options: /dev/ttyUSB0 --baud 19200", count + 1);
+    let question = format!("line {}: number, HOST[:TCPPORT] or /dev/… --baud 19200", count + 1);
     loop {
         let parsed = ask_until(&question, usual, |answer| match answer {
             END => Ok(None),
-            _ => {
-                let parsed = LineArgs::try_parse_from(menu::chosen(answer, &choices)?);
-                parsed.map(Some).map_err(|error| error.to_string())
-            }
+            _ => open::Args::of(menu::chosen(answer, &choices)?).map(Some),
         });
-        let Some(LineArgs { open: args }) = parsed.await? else { return Ok(None) };
+        let Some(args) = parsed.await? else { return Ok(None) };
         let found = match args.line() {
             // Units are looked for later; only a serial line has settings to find.
             Ok(line) if line.transport.serial().is_none() => return Ok(Some(line)),

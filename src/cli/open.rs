@@ -2,6 +2,8 @@
 
 use std::{path::Path, sync::Arc, time::Duration};
 
+use clap::Parser;
+
 use super::{
     CliError, in_runtime, log, menu,
     open_log::WatchArgs,
@@ -101,7 +103,19 @@ fn place(line: &LineDef, unit: u8) -> String {
     format!("{} --unit {unit}{mode}{serial}", port_of(line))
 }
 
+/// `open` and its arguments.
+#[derive(Debug, clap::Parser)]
+struct Words {
+    #[command(flatten)]
+    args: Args,
+}
+
 impl Args {
+    /// The arguments that these words mean, the first of them `open`; `Err` says what is wrong with them.
+    pub fn of(words: Vec<String>) -> Result<Args, String> {
+        Words::try_parse_from(words).map(|words| words.args).map_err(|error| error.to_string())
+    }
+
     /// The line that they describe.
     pub fn line(&self) -> Result<LineDef, CliError> {
         self.port.line()

@@ -137,6 +137,23 @@ fn a_unit_that_cannot_answer_is_refused_before_a_port_is_opened() {
 }
 
 #[test]
+fn a_network_is_scanned_only_after_a_yes() {
+    let device = TcpListener::bind((Ipv4Addr::new(127, 0, 0, 5), 0)).unwrap();
+    let port = device.local_addr().unwrap().port();
+    let Ok(closed) = TcpListener::bind((Ipv4Addr::new(127, 0, 0, 9), port)) else { return };
+    serve(device, answers(|request| vec![request[0], request[1], 0, 0, 0, 5, request[6], 3, 2, 0, 7]));
+    serve(closed, drop);
+    let network = format!("127.0.0.0/24:{port}");
+    let (code, said) = run(&["scan", &network]);
+    assert!(code == Some(2) && said.contains("connects to every host") && said.contains("--yes"), "{code:?} {said}");
+    let (code, said) = run(&["scan", &network, "--yes", "--timeout", "300"]);
+    assert!(code == Some(0) && said.contains("1  127.0.0.5  unit 1: register 0 = 7"), "{code:?} {said}");
+    assert!(said.contains("-  127.0.0.9  accepts connections") && !said.contains("127.0.0.6"), "{said}");
+    let (code, said) = run(&["scan", "10.0.0.0/16", "--yes"]);
+    assert!(code == Some(2) && said.contains("at most 256 addresses"), "{code:?} {said}");
+}
+
+#[test]
 fn a_new_plant_is_not_asked_for_without_a_terminal() {
     let (code, said) = run(&["new"]);
     assert!(code == Some(2) && said.contains("asks questions: run it in a terminal"), "{code:?} {said}");

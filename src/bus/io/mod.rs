@@ -3,6 +3,7 @@
 pub mod clock;
 pub mod uart;
 pub mod ports;
+pub mod network;
 pub mod transport;
 pub mod pause;
 pub mod wire;

@@ -71,7 +71,8 @@ async fn scan_at_once(line: &LineDef, steps: &[Step], progress: &mut impl FnMut(
     results
 }
 
-async fn open(line: &LineDef) -> Option<Link> {
+/// A link of its own to a line that is not polled; `None` if it cannot be opened.
+pub async fn open(line: &LineDef) -> Option<Link> {
     let opened = Connector::Real(line.transport.clone()).open().await.ok()?;
     Some(Link::new(opened, line, Clock::real(), Memory::new(line, Clock::real())))
 }

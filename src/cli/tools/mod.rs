@@ -1,6 +1,7 @@
 //! Tools for a line without a plant: which port, which settings, and the output of findings.
 
 pub mod loopback;
+mod network;
 pub mod probe;
 pub mod send;
 pub mod scan;
@@ -10,7 +11,12 @@ use std::{io::IsTerminal, sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use crate::{
-    bus::{diagnostics::Job, dissect, frame::hex, io::testing},
+    bus::{
+        diagnostics::Job,
+        dissect,
+        frame::hex,
+        io::{network::Network, testing},
+    },
     plant::{
         command::CommandId,
         def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
@@ -81,8 +87,27 @@ pub(super) fn check_unit(line: &LineDef, unit: u8) -> Result<(), CliError> {
 }
 
 impl PortArgs {
+    /// The network that is meant, and the arguments with one of its hosts instead; `None` for a port.
+    pub fn network(&self) -> Option<Result<(Network, PortArgs), String>> {
+        let (text, tcp_port) = self.port.split_once(':').map_or((self.port.as_str(), ""), |(text, port)| (text, port));
+        if self.port.starts_with('/') || !text.contains('/') {
+            return None;
+        }
+        let colon = if tcp_port.is_empty() { "" } else { ":" };
+        let with_host = |network: Network| {
+            let host = network.hosts().first().map(ToString::to_string).unwrap_or_default();
+            (network, PortArgs { port: format!("{host}{colon}{tcp_port}"), ..self.clone() })
+        };
+        Some(text.parse().map(with_host))
+    }
+
     /// The line that the arguments describe.
     pub fn line(&self) -> Result<LineDef, CliError> {
+        if let Some(network) = self.network() {
+            network.map_err(CliError::Usage)?;
+            let words = format!("port: found a network; `sightglass scan {}` looks for its devices", self.port);
+            return Err(CliError::Usage(words));
+        }
         let is_path = self.port.starts_with('/');
         let mode = self.mode.as_deref().unwrap_or(if is_path { "rtu" } else { "tcp" });
         let (serial_mode, framing) = match mode {
@@ -174,10 +199,9 @@ pub async fn search(
     mut found: impl FnMut(&DiagnosticRun) -> bool,
 ) -> Result<DiagnosticRun, CliError> {
     let job = Job::new(CommandId::default(), Arc::from("cli"), diagnostic, Timestamp::now());
-    let shown = std::io::stderr().is_terminal();
     let work = testing::run(line, job, |run: &DiagnosticRun| {
         let found = found(run);
-        if shown && 1 < run.total {
+        if 1 < run.total {
             show_progress(&format!("{} of {}  {}", run.done, run.total, run.now));
         }
         !found
@@ -186,15 +210,16 @@ pub async fn search(
         run = work => Ok(run),
         _ = tokio::signal::ctrl_c() => Err(CliError::Failed("stopped".into())),
     };
-    if shown {
-        show_progress("");
-    }
+    show_progress("");
     run
 }
 
-/// Replaces the line of progress.
+/// Replaces the line of progress, on a terminal.
 fn show_progress(text: &str) {
     use std::io::Write;
+    if !std::io::stderr().is_terminal() {
+        return;
+    }
     let _ = write!(std::io::stderr(), "\r\x1b[K{text}");
 }
 
@@ -274,6 +299,8 @@ mod tests {
             ("plc --mode rtu", "expected a path such as /dev/ttyUSB0"),
             ("plc:99999", "found `plc:99999`, expected HOST or HOST:TCPPORT with a TCP port"),
             ("[::1]x", "or [IPV6]:TCPPORT"),
+            ("10.0.0.0/24", "found a network; `sightglass scan 10.0.0.0/24`"),
+            ("10.0.0.0/8", "at most 256 addresses"),
             ("/dev/ttyUSB0 --baud 9601", "found 9601, expected one of 300"),
             ("/dev/ttyUSB0 --data 7", "found 7, expected 8"),
             ("/dev/ttyUSB0 --parity X", "[possible values: N, E, O]"),

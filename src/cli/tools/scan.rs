@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{PortArgs, baud, parity, run};
+use super::{PortArgs, baud, network, parity, run};
 use crate::{
     bus::io::testing,
     cli::{CliError, say},
@@ -28,10 +28,17 @@ pub struct Args {
     /// Try these parities too: a list of N, E, O with commas, or `all`
     #[arg(long, value_name = "LIST")]
     parities: Option<String>,
+    /// Scan a network (10.0.0.0/24 in place of HOST) without asking first, and open nothing
+    #[arg(long)]
+    yes: bool,
 }
 
 /// One request to every unit; who answers, even with a refusal, is there.
 pub fn main(args: Args) -> Result<(), CliError> {
+    if let Some(network) = args.port.network() {
+        let (network, port) = network.map_err(CliError::Usage)?;
+        return network::main(network, &port.line()?, args.yes);
+    }
     let line = args.port.line()?;
     let serials = match line.transport.serial() {
         Some(serial) => serials(&args, serial)?,

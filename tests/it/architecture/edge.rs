@@ -99,6 +99,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("src/cli/source.rs", &["channels", "clock"]),
     ("src/cli/systemd_unit.rs", &["process"]),
     ("src/cli/tools/mod.rs", &["tasks", "files", "terminal", "clock", "process"]),
+    ("src/cli/tools/network.rs", &["tasks", "process", "network"]),
     ("src/station/audit_queue.rs", &["channels", "clock"]),
     ("src/station/blocking_jobs.rs", &["tasks"]),
     ("src/station/past.rs", &["channels"]),
