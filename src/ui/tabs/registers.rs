@@ -5,6 +5,7 @@
 mod cells;
 mod decode;
 mod find;
+mod import;
 mod keys;
 mod list;
 mod names;

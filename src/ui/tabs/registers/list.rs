@@ -196,12 +196,17 @@ impl Row {
             Some(word) => kind_of(&word).ok_or_else(|| t!("{written}: `{word}` is not a known type", written, word))?,
         };
         let scale = self.scale.unwrap_or(1.0);
-        let fraction = format!("{scale}").split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
-        let float = matches!(kind, DataType::F32 | DataType::F64);
-        let decimals = u8::try_from(if float { fraction.max(2) } else { fraction }).unwrap_or(0);
+        let decimals = decimals_of(scale, kind);
         let unit = unit_of(&self.unit).map_or(self.unit, str::to_owned);
         Ok(Named { scale, decimals, unit, ..Named::new(table, address, kind, self.order, &self.name) })
     }
+}
+
+/// Decimals that show what a scale leaves of a raw number.
+pub fn decimals_of(scale: f64, kind: DataType) -> u8 {
+    let fraction = format!("{scale}").split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
+    let float = matches!(kind, DataType::F32 | DataType::F64);
+    u8::try_from(if float { fraction.max(2) } else { fraction }).unwrap_or(0)
 }
 
 fn plain(text: &str) -> bool {
@@ -209,7 +214,7 @@ fn plain(text: &str) -> bool {
 }
 
 /// `41003`, `0x3EA`, `03EAH`, `1002`; of `41003-41004` the first.
-fn address_of(text: &str, table: Table, first: u16) -> Option<(Table, u16)> {
+pub fn address_of(text: &str, table: Table, first: u16) -> Option<(Table, u16)> {
     let text = text.split(['-', '–', '…']).next()?.trim();
     let hex = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
     let hex =
@@ -250,12 +255,12 @@ fn table_of(text: &str) -> Option<Table> {
     }
 }
 
-fn order_of(text: &str) -> Option<ByteOrder> {
+pub fn order_of(text: &str) -> Option<ByteOrder> {
     ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(text))
 }
 
 /// The type that a manual means by a word.
-fn kind_of(text: &str) -> Option<DataType> {
+pub fn kind_of(text: &str) -> Option<DataType> {
     let word: String = text.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
     let text_bytes =
         ["string", "char", "ascii"].iter().find_map(|prefix| word.strip_prefix(prefix)?.parse::<u8>().ok());

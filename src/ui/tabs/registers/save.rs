@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Asking, Base, Registers, list, names::Named};
+use super::{Asking, Base, Registers, import, list, names::Named};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -76,7 +76,8 @@ impl Registers {
 impl Registers {
     /// Gives the names of a register list, in place of those that were there; says what could not be read, by line.
     pub(super) fn take_list(&mut self, text: &str) -> UiAction {
-        let list = list::parse(text, self.table, u16::from(self.base == Base::One));
+        let first = u16::from(self.base == Base::One);
+        let list = import::parse(text, self.table, first).unwrap_or_else(|| list::parse(text, self.table, first));
         let mut words = vec![t!("{count} names read", count = list.named.len())];
         if let Some(first) = list.named.first() {
             let (name, place) = (&first.name, first.table.modicon(first.address));
