@@ -6,7 +6,7 @@ use clap::Parser;
 
 use super::{
     CliError, in_runtime, log, menu,
-    open_log::WatchArgs,
+    open_log::{self, WatchArgs},
     paths, say,
     tools::{self, PortArgs},
 };
@@ -19,7 +19,7 @@ use crate::{
     },
     profile::{self, OwnProfiles, Search},
     station::io as station,
-    ui,
+    ui::{self, tabs::registers::Start},
 };
 
 /// The usual baud rates and parities, the most frequent first.
@@ -58,6 +58,9 @@ pub struct Args {
 
 /// Finds settings and unit, and shows the registers.
 pub fn main(args: Args) -> Result<(), CliError> {
+    if let Some(path) = args.port.log() {
+        return show_log(open_log::read(path)?);
+    }
     let line = args.port.line()?;
     args.unit.map_or(Ok(()), |unit| tools::check_unit(&line, unit))?;
     let start = args.watched.start()?;
@@ -76,6 +79,22 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let result = ui::io::run(session, options).await;
         station.stop().await;
         args.watched.say_written();
+        Ok(result?)
+    })
+}
+
+/// Shows a log, without a line.
+fn show_log(start: Start) -> Result<(), CliError> {
+    ui::io::require_terminal()?;
+    let _log = log::start(None, None)?;
+    in_runtime(async {
+        let title = start.shown.as_ref().map(|(file, _)| file.clone()).unwrap_or_default();
+        let def = Arc::new(PlantDef { name: "log".into(), title, ..PlantDef::default() });
+        let station = station::start_transient(def, Clock::real(), Vec::new(), Box::new(|_| {}));
+        let session = station.session(&paths::operator());
+        let options = ui::io::Options { start, ..ui::io::Options::new(ui::Leaving::Log) };
+        let result = ui::io::run(session, options).await;
+        station.stop().await;
         Ok(result?)
     })
 }

@@ -8,7 +8,13 @@ use std::{
 use jiff::SignedDuration;
 
 use super::{CliError, say, span};
-use crate::ui::tabs::registers::{Start, parse_watched};
+use crate::{
+    report::value_log::reader,
+    ui::tabs::registers::{Start, parse_watched},
+};
+
+/// The largest log that is read: days of values.
+const LOG_MAX: u64 = 256 << 20;
 
 /// What is watched and logged.
 #[derive(Debug, clap::Args)]
@@ -33,13 +39,30 @@ impl WatchArgs {
             let why = "a file of this name is there already, and stays as it is";
             return Err(CliError::Usage(format!("--log: {}: {why}", log.display())));
         }
-        Ok(Start { watch, log: self.log.clone(), every: self.every })
+        Ok(Start { watch, log: self.log.clone(), every: self.every, shown: None })
     }
 
     /// Says what the file of the log holds when all is over.
     pub fn say_written(&self) {
         self.log.iter().for_each(|log| say(&written(log)));
     }
+}
+
+/// Reads a log to show.
+pub fn read(path: &Path) -> Result<Start, CliError> {
+    let failed = |why: String| CliError::Failed(format!("{}: {why}", path.display()));
+    let size = fs::metadata(path).map_err(|error| failed(error.to_string()))?.len();
+    if LOG_MAX < size {
+        return Err(failed(format!("found {} MiB, expected a log of at most {} MiB", size >> 20, LOG_MAX >> 20)));
+    }
+    let bytes = fs::read(path).map_err(|error| failed(error.to_string()))?;
+    let log = reader::parse(&bytes).map_err(failed)?;
+    if log.rows == 0 {
+        let problems = log.problems.into_iter().next().unwrap_or_else(|| "it has no rows".to_owned());
+        return Err(failed(problems));
+    }
+    let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    Ok(Start { shown: Some((file, log)), ..Start::default() })
 }
 
 /// What the file of a log holds when all is over.

@@ -86,9 +86,9 @@ impl Default for PlantDef {
 }
 
 impl PlantDef {
-    /// Is it only a device on a line, without a plant file that says what its registers mean?
+    /// Is it only a device on a line, or a log of one, without a plant file that says what its registers mean?
     pub fn is_bench(&self) -> bool {
-        self.tags.is_empty() && !self.devices.is_empty()
+        self.tags.is_empty()
     }
 
     /// The line of an id. Ids come from this very definition, so they are always there.

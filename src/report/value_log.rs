@@ -1,6 +1,8 @@
 //! Values as they are read, as CSV: a row for each read, two columns a register, its value and its quality, in the words
 //! of [`export`].
 
+pub(crate) mod reader;
+
 use jiff::Timestamp;
 
 use super::{

@@ -201,6 +201,15 @@ fn assemble(
             stopped,
         )));
     }
+    if def.lines.is_empty() {
+        // A plant ends with its last line; one without any when it is stopped.
+        let (events, mut stopped) = (events.clone(), stopped.clone());
+        tasks.push(tokio::spawn(async move {
+            // A station that is gone has stopped.
+            let _ = stopped.wait_for(|stop| *stop).await;
+            drop(events);
+        }));
+    }
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));

@@ -51,14 +51,17 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
     effects
 }
 
-/// Shows a tab; it asks at once for what it needs.
+/// Shows a tab; it asks at once for what it needs, and says what it has to say.
 pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
     let effects = asked.into_iter().filter_map(|action| match action {
         UiAction::Do(effect) => Some(effect),
-        UiAction::Open(_)
-        | UiAction::Leave
+        UiAction::Open(modal) => {
+            model.modal = Some(modal);
+            None
+        }
+        UiAction::Leave
         | UiAction::Show(_)
         | UiAction::ShowDevice(_)
         | UiAction::ShowParameter(_)

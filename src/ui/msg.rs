@@ -153,6 +153,8 @@ pub enum Leaving {
     Demo,
     /// Reading a device without a plant file.
     Bench,
+    /// Looking at a log.
+    Log,
     /// Nothing else: the terminal is attached.
     Terminal,
 }

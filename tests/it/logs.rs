@@ -60,6 +60,35 @@ fn rows_of_a_log_outlive_a_killed_program() {
 }
 
 #[test]
+fn a_log_is_shown_again_and_a_damaged_line_is_named() {
+    let folder = folder();
+    let log = folder.path().join("bench.csv");
+    let row = |n: usize| format!("2026-11-23T14:00:{n:02}.000Z,{}.5,good\r\n", 60 + n);
+    let rows: String = (0..40).map(row).collect();
+    let text = format!("time_utc,SV °C,SV quality\r\n{}", rows.replace("79.5", "7x.5"));
+    std::fs::write(&log, &text).unwrap();
+    let mut terminal = Terminal::start(120, 40, &["open", log.to_str().unwrap()]);
+    terminal.wait_for("bench.csv: line 21, SV: found `7x.5`");
+    terminal.keys("\x1b");
+    terminal.wait_gone("found `7x.5`");
+    for shown in ["40 rows, DAMAGED: 1", "end of the log", "99.5 °C", "60.5"] {
+        terminal.wait_for(shown);
+    }
+    // Its keys neither write to it nor leave it.
+    terminal.keys("Lc");
+    terminal.wait_for("at 14:00:");
+    terminal.keys("q");
+    terminal.wait_for("The log stays as it is");
+    terminal.keys("\r");
+    assert_eq!(terminal.end(), 0);
+    assert_eq!(std::fs::read_to_string(&log).unwrap(), text);
+
+    let output = sightglass().args(["open", "none.csv"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && said.contains("none.csv: No such file"), "{said}");
+}
+
+#[test]
 fn a_log_says_in_the_end_how_many_rows_it_has() {
     let folder = folder();
     let log = folder.path().join("bench.csv");

@@ -6,7 +6,7 @@ pub mod probe;
 pub mod send;
 pub mod scan;
 
-use std::{io::IsTerminal, sync::Arc, time::Duration};
+use std::{io::IsTerminal, path::Path, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
@@ -139,6 +139,13 @@ impl PortArgs {
         }
         let parity = self.parity.as_deref().map_or(Parity::None, parity);
         Ok(Serial { baud: baud(self.baud.unwrap_or(Serial::USUAL.baud))?, data_bits, parity, stop_bits: self.stop })
+    }
+
+    /// The log of registers that is named instead of a port.
+    pub(super) fn log(&self) -> Option<&Path> {
+        let path = Path::new(&self.port);
+        let is_log = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+        (is_log || path.is_file()).then_some(path)
     }
 
     /// Are baud rate and parity both given?

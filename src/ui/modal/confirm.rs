@@ -65,7 +65,8 @@ impl Confirm {
         let ends = match leaving {
             Leaving::Station => t!("Polling and alarms stop too: the station runs in this terminal."),
             Leaving::Demo => t!("The demonstration ends: its simulated plant, polling and alarms stop."),
-            Leaving::Bench => t!("The device stays as it is; nothing is recorded."),
+            Leaving::Bench => t!("The device stays as it is. Reading ends, and a log of it."),
+            Leaving::Log => t!("The log stays as it is."),
             Leaving::Terminal => t!("Only this terminal closes. Polling and alarms continue."),
         };
         Confirm::new(Intent::Quit, t!("quit"), vec![t!("Quit?").to_owned(), ends.to_owned()])

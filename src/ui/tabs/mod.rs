@@ -210,6 +210,7 @@ impl Tab {
         Tab::ALL
             .into_iter()
             .filter(|tab| tab.is_of_bench() || !cx.def().is_bench())
+            .filter(|tab| *tab != Tab::Bus || !cx.def().lines.is_empty())
             .filter(|tab| tab.is_offered(cx))
             .collect()
     }

@@ -148,8 +148,8 @@ impl TabView for Registers {
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         if self.watch.has_graph() {
             return match find(&keys::log(), event) {
-                Some(_) => self.toggle_log(cx),
-                None => self.graph_key(cx, event),
+                Some(_) if !self.watch.is_shown_log() => self.toggle_log(cx),
+                Some(_) | None => self.graph_key(cx, event),
             };
         }
         let Some(action) = find(&table(), event) else { return Vec::new() };
@@ -204,6 +204,9 @@ impl TabView for Registers {
     }
 
     fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
+        if self.watch.is_shown_log() {
+            return hints(&watch::graph::keys());
+        }
         if self.watch.has_graph() {
             let back = Hint::new("Esc", t!("back"), t!("back to the registers"));
             return hints(&watch::graph::keys()).into_iter().chain(hints(&keys::log())).chain([back]).collect();
@@ -230,7 +233,8 @@ impl TabView for Registers {
             .on_way
             .is_some_and(|(_, at, span)| span != self.span(cx) || (LOST_AFTER + self.period) < now.duration_since(at));
         let mut actions = self.recognise(cx);
-        actions.extend(self.said.take());
+        // A window closes when a session begins.
+        actions.extend(self.said.take_if(|_| cx.session.who.is_some()));
         if !self.paused && (self.on_way.is_none() || wanted) {
             actions.extend(self.ask(cx, None));
         }

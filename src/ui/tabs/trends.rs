@@ -72,6 +72,8 @@ pub struct Trends {
     asked: u32,
     /// Values without a unit have a scale each: nothing says that they are alike.
     apart: bool,
+    /// Nothing comes any more: what is shown is a log.
+    ended: bool,
 }
 
 type Figures = (Option<(f64, f64, f64)>, f64);
@@ -295,9 +297,10 @@ impl Trends {
         self.values = Some((first_now, row));
     }
 
-    /// Trends of values of which no plant file says what they are, in a window of so much time, as far as one can be.
-    pub fn of_registers(snapshot: &Snapshot, span: SignedDuration) -> Trends {
-        Trends { window: nearest(span), apart: true, ..TabView::new(snapshot) }
+    /// Trends of values of which no plant file says what they are, in a window of so much time, as far as one can be;
+    /// `ended` where they are those of a log.
+    pub fn of_registers(snapshot: &Snapshot, span: SignedDuration, ended: bool) -> Trends {
+        Trends { window: nearest(span), apart: true, ended, ..TabView::new(snapshot) }
     }
 
     /// Shows the curve of a tag: in the group of the plant that has it, or alone.

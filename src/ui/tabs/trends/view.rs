@@ -85,11 +85,12 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     x = canvas.text(x + 3, 0, &window, theme.normal());
     let (time, style) = match trends.end {
         Some(_) => (t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.now, zone)), theme.focus()),
+        None if trends.ended => (t!("end of the log").to_owned(), theme.normal()),
         None if theme.glyphs == Glyphs::Braille => (t!("live ●").to_owned(), theme.normal()),
         None => (t!("live *").to_owned(), theme.normal()),
     };
     x = canvas.text(x + 3, 0, &time, style);
-    if trends.end.is_none() && !brief {
+    if trends.end.is_none() && !brief && !trends.ended {
         let rate = t!("update {rate_text}", rate_text = rate_text(RATES[trends.rate]));
         x = canvas.text(x + 3, 0, &rate, theme.normal());
     }
@@ -174,7 +175,8 @@ fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Opt
         return;
     }
     let cursor = trends.cursor(cx);
-    let now = cursor.map_or(t!("now").to_owned(), |at| t!("at {clock}", clock = clock(at, &cx.def().time_zone)));
+    let now = if trends.ended { t!("last") } else { t!("now") };
+    let now = cursor.map_or(now.to_owned(), |at| t!("at {clock}", clock = clock(at, &cx.def().time_zone)));
     canvas.text(4, 0, t!("pen"), dim);
     for (end, text) in [
         (columns.value, now.as_str()),

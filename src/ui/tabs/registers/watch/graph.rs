@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use super::{Registers, WatchList, Watched};
+use super::{Named, Registers, WatchList, Watched};
 use crate::ui::tabs::{
     prelude::*,
     registers::{
@@ -21,16 +21,21 @@ use crate::{
         def::{Pen, TrendGroup},
         number::to_u16,
         sample::{Cause, Sample},
-        tag::TagDef,
+        tag::{ByteOrder, DataType, Table, TagDef},
     },
-    report::step_series::HOLD_MAX,
+    report::{
+        step_series::HOLD_MAX,
+        value_log::reader::{LoggedValue, ValueLog},
+    },
     ui::{Effect, keys::find},
 };
 
 /// Pens of a group.
 const PENS: usize = 8;
-/// The window is at least so wide at first.
+/// The window of what goes on is at least so wide at first.
 const WINDOW_MIN: SignedDuration = SignedDuration::from_mins(2);
+/// Damaged lines that are named.
+const PROBLEMS_MAX: usize = 10;
 /// What one key or snapshot makes the trends ask at most.
 const QUERIES_MAX: usize = 16;
 
@@ -39,11 +44,19 @@ const QUERIES_MAX: usize = 16;
 pub(super) struct Graph {
     trends: trends::Trends,
     snapshot: Snapshot,
+    /// It shows a log: its end, and how much was read of it.
+    log: Option<(Timestamp, String)>,
 }
 
 impl Graph {
     /// Of the values of a list, the first of them selected.
-    fn new(cx: &ViewContext, title: &str, tags: Vec<TagDef>, span: SignedDuration) -> Graph {
+    fn new(
+        cx: &ViewContext,
+        title: &str,
+        tags: Vec<TagDef>,
+        span: SignedDuration,
+        log: Option<(Timestamp, String)>,
+    ) -> Graph {
         let ids: Vec<TagId> = tags.iter().map(|tag| tag.id).collect();
         let group = |pens: &[TagId]| TrendGroup {
             name: title.to_owned(),
@@ -53,12 +66,12 @@ impl Graph {
         let def = PlantDef { time_zone: cx.def().time_zone.clone(), tags, trends, ..PlantDef::default() };
         let mut snapshot = Snapshot::blank(Arc::new(def));
         snapshot.decimals = snapshot.def.tags.iter().map(save::decimals).collect();
-        Graph { trends: trends::Trends::of_registers(&snapshot, span), snapshot }
+        Graph { trends: trends::Trends::of_registers(&snapshot, span, log.is_some()), snapshot, log }
     }
 
     /// What the trends may read.
     fn context<'a>(snapshot: &'a Snapshot, cx: &ViewContext<'a>) -> ViewContext<'a> {
-        ViewContext { snapshot, ..*cx }
+        ViewContext { snapshot, now: snapshot.at, ..*cx }
     }
 
     /// Lets the trends act, and answers what they ask.
@@ -68,7 +81,7 @@ impl Graph {
         items: &[Watched],
         act: impl FnOnce(&mut trends::Trends, &ViewContext) -> Vec<UiAction>,
     ) {
-        let Graph { trends, snapshot } = self;
+        let Graph { trends, snapshot, log: _ } = self;
         let cx = Graph::context(snapshot, cx);
         let mut actions = act(trends, &cx);
         for _ in 0..QUERIES_MAX {
@@ -103,9 +116,14 @@ impl WatchList {
         self.graph.is_some()
     }
 
+    /// Is it the graph of a log? There is nothing else then.
+    pub fn is_shown_log(&self) -> bool {
+        self.graph.as_ref().is_some_and(|graph| graph.log.is_some())
+    }
+
     /// Back to the registers.
     pub fn close_graph(&mut self) -> bool {
-        self.graph.take().is_some()
+        !self.is_shown_log() && self.graph.take().is_some()
     }
 
     /// When the first of the values that are remembered was read.
@@ -124,6 +142,31 @@ impl Watched {
 }
 
 impl Registers {
+    /// Shows a log, and says what is damaged in it.
+    pub(super) fn show_log(&mut self, cx: &ViewContext, file: &str, log: ValueLog) {
+        let ValueLog { columns, end, rows, problems, damaged } = log;
+        for (n, column) in columns.into_iter().enumerate() {
+            let LoggedValue { name, unit, decimals, samples } = column;
+            let named = Named::new(Table::Holding, to_u16(n), DataType::F64, ByteOrder::Abcd, &name);
+            self.names.put(Named { unit, decimals, ..named });
+            self.watch.items.push(Watched { samples: samples.into(), ..Watched::new((Table::Holding, to_u16(n))) });
+        }
+        let words = match damaged {
+            0 => t!("{rows} rows", rows),
+            _ => t!("{rows} rows, DAMAGED: {damaged}", rows, damaged),
+        };
+        self.show_graph(cx, file, Some((end, words)));
+        if damaged == 0 {
+            return;
+        }
+        let more = damaged.saturating_sub(PROBLEMS_MAX);
+        let mut words: Vec<String> = problems.iter().take(PROBLEMS_MAX).map(|why| format!("{file}: {why}")).collect();
+        if more != 0 {
+            words.push(t!("and {more} more", more));
+        }
+        self.said = Some(UiAction::Open(Modal::Notice(Notice::new(t!("damaged: all the rest is shown"), words))));
+    }
+
     /// Shows what is watched; where nothing is, the selected register.
     pub(in crate::ui::tabs::registers) fn open_graph(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if self.watch.items.is_empty() {
@@ -132,10 +175,16 @@ impl Registers {
                 return refused;
             }
         }
+        self.show_graph(cx, t!("watched"), None);
+        Vec::new()
+    }
+
+    fn show_graph(&mut self, cx: &ViewContext, title: &str, log: Option<(Timestamp, String)>) {
+        let (now, least) = log.as_ref().map_or((cx.now, WINDOW_MIN), |(end, _)| (*end, SignedDuration::ZERO));
         let named = self.watch.items.iter().filter_map(|item| self.names.get(item.at.0, item.at.1));
         let tag = |(n, named)| TagDef { id: TagId(to_u16(n)), ..save::tag(named, &named.name) };
-        let past = self.watch.since().map_or(SignedDuration::ZERO, |since| cx.now.duration_since(since));
-        let mut graph = Graph::new(cx, t!("watched"), named.enumerate().map(tag).collect(), past.max(WINDOW_MIN));
+        let past = self.watch.since().map_or(SignedDuration::ZERO, |since| now.duration_since(since));
+        let mut graph = Graph::new(cx, title, named.enumerate().map(tag).collect(), past.max(least), log);
         let selected = self.watch.items.iter().position(|item| item.at == (self.table, self.selected)).unwrap_or(0);
         graph.act(cx, &self.watch.items, |trends, cx| {
             trends.open_tag(cx, TagId(to_u16(selected)));
@@ -143,7 +192,6 @@ impl Registers {
         });
         self.watch.graph = Some(graph);
         self.follow_graph(cx);
-        Vec::new()
     }
 
     /// Gives the graph what was read; values that may be others by now end there.
@@ -151,14 +199,15 @@ impl Registers {
         let period = self.period;
         let old: Vec<bool> = self.watch.items.iter().map(|item| self.is_stale(cx, item)).collect();
         let WatchList { graph, items, .. } = &mut self.watch;
-        for (item, _) in items.iter_mut().zip(old).filter(|(_, old)| *old) {
+        let end = graph.as_ref().and_then(|graph| graph.log.as_ref()).map(|(end, _)| *end);
+        for (item, _) in items.iter_mut().zip(old).filter(|(_, old)| *old && end.is_none()) {
             if let Some(last) = item.samples.back().filter(|last| last.quality.is_good()) {
                 let at = last.at.checked_add(period).unwrap_or(cx.now).min(cx.now);
                 item.push(Sample { at, ..*last }.uncertain(Cause::Stale));
             }
         }
         let Some(graph) = graph else { return };
-        (graph.snapshot.at, graph.snapshot.stepped) = (cx.now, cx.snapshot.stepped);
+        (graph.snapshot.at, graph.snapshot.stepped) = (end.unwrap_or(cx.now), cx.snapshot.stepped);
         for (shown, item) in graph.snapshot.samples.iter_mut().zip(items.iter()) {
             *shown = item.shown().unwrap_or(*shown);
         }
@@ -189,7 +238,9 @@ pub fn view(tab: &Registers, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let Some(graph) = &tab.watch.graph else { return };
     graph.trends.view(&Graph::context(&graph.snapshot, cx), frame, area);
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let shown = graph.log.as_ref().map(|(_, words)| words.clone());
     let (words, style) = match (state(tab, cx), tab.watch.log_words()) {
+        _ if shown.is_some() => (shown.into_iter().collect(), cx.theme.normal()),
         _ if tab.paused => (vec![t!("reading is paused").to_owned()], cx.theme.trouble()),
         ((why, false), _) => (vec![why], cx.theme.trouble()),
         (_, Some((words, true))) => (words.to_vec(), cx.theme.strong()),

@@ -8,6 +8,7 @@ use crate::{
         live::AddressSpan,
         tag::{ByteOrder, DataType},
     },
+    report::value_log::reader::ValueLog,
     t,
     ui::tabs::prelude::*,
 };
@@ -21,6 +22,8 @@ pub struct Start {
     pub log: Option<PathBuf>,
     /// Time between two reads.
     pub every: Option<SignedDuration>,
+    /// A log to look at instead of a device, and what it is called.
+    pub shown: Option<(String, ValueLog)>,
 }
 
 /// Reads `NAME=ADDRESS[:COUNT] [TYPE] [ORDER] [SCALE] [UNIT]`, with blanks or commas between: `SV=41003 int16 0.1 °C`.
@@ -75,7 +78,11 @@ impl Registers {
 
     /// Watches and logs from the first read on.
     pub fn begin(&mut self, cx: &ViewContext, start: Start) -> Vec<UiAction> {
-        let Start { watch, log, every } = start;
+        let Start { watch, log, every, shown } = start;
+        if let Some((file, shown)) = shown {
+            self.show_log(cx, &file, shown);
+            return Vec::new();
+        }
         self.period = every.unwrap_or(self.period);
         if let Some(first) = watch.first() {
             (self.table, self.first, self.selected) = (first.table, first.address, first.address);
