@@ -355,8 +355,8 @@ async fn save(plant: &NewPlant, profiles: &OwnProfiles, path: &Path) -> Result<(
     .await?;
     let path = path.display();
     let (lines, devices, alarms) = (plant.lines.len(), plant.devices.len(), plant.alarms.len());
-    say(&format!("saved {path}: lines {lines}, devices {devices}, alarms {alarms} beside those that each has already"));
-    say(&format!("`sightglass {path}` shows the plant; `sightglass check {path}` its read plan after a change"));
+    say(&format!("saved {path}: lines {lines}, devices {devices}, alarms {alarms}"));
+    say(&format!("`sightglass {path}` shows the plant, `sightglass check {path}` its read plan"));
     Ok(())
 }
 

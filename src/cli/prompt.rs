@@ -9,9 +9,11 @@ use crate::plant::visible::visible;
 pub async fn ask(question: &str, usual: &str) -> Result<String, CliError> {
     let _ = write!(io::stdout(), "{} [{}]: ", visible(question), visible(usual));
     let _ = io::stdout().flush();
-    let read = tokio::task::spawn_blocking(|| {
+    // A thread of its own, which nothing waits for when the program is left.
+    let (sender, read) = tokio::sync::oneshot::channel();
+    std::thread::spawn(move || {
         let mut line = String::new();
-        io::stdin().lock().read_line(&mut line).map(|read| (read, line))
+        let _ = sender.send(io::stdin().lock().read_line(&mut line).map(|read| (read, line)));
     });
     let stopped = || CliError::Failed("stopped; nothing was written".to_owned());
     let (read, line) = tokio::select! {

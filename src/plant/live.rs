@@ -92,9 +92,9 @@ impl ReplyTimes {
         (self.count, self.slowest) = (self.count + 1, self.slowest.max(reply));
     }
 
-    /// A timeout with a margin: three times the slowest reply in steps of 50 ms, at least 100 ms; `None` after too few.
+    /// A timeout with a margin: three times the slowest reply in steps of 50 ms, at least 200 ms; `None` after too few.
     pub fn timeout(self) -> Option<Duration> {
-        let steps = (self.slowest * 3).as_millis().div_ceil(50).clamp(2, 200);
+        let steps = (self.slowest * 3).as_millis().div_ceil(50).clamp(4, 200);
         (REPLIES_MIN <= self.count).then(|| Duration::from_millis(50) * u32::try_from(steps).unwrap_or(200))
     }
 }
@@ -175,7 +175,7 @@ mod tests {
     fn a_timeout_leaves_the_slowest_reply_a_margin() {
         let after = |count, slowest| ReplyTimes { count, slowest: Duration::from_millis(slowest) }.timeout();
         assert_eq!(after(19, 12), None, "too few");
-        assert_eq!(after(20, 12), Some(Duration::from_millis(100)));
+        assert_eq!(after(20, 12), Some(Duration::from_millis(200)));
         assert_eq!(after(20, 130), Some(Duration::from_millis(400)));
         assert_eq!(after(20, 60_000), Some(Duration::from_secs(10)));
     }

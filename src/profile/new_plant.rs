@@ -53,6 +53,8 @@ pub struct NewAlarm {
     pub message: String,
     /// Where the limit comes from.
     pub reason: &'static str,
+    /// What may have happened, as far as the profile says; empty if it does not.
+    pub cause: String,
 }
 
 /// A device of a new plant.
@@ -163,14 +165,16 @@ impl NewPlant {
             out,
             "# A device that does not respond and a line that is not connected raise an alarm without a word here."
         )?;
-        for NewAlarm { tag, condition, limit, deadband, message, reason } in &self.alarms {
+        for NewAlarm { tag, condition, limit, deadband, message, reason, cause } in &self.alarms {
             let [limit, deadband] = [limit, deadband].map(|value| Value::from(*value).to_string().trim().to_owned());
             writeln!(
                 out,
                 "# {reason}: is it the one of this plant?\n[[alarm]]\ntag = {}\n{condition} = {limit}\n\
-                 deadband = {deadband}\non_delay = \"5s\"\npriority = \"high\"\nmessage = {}\n",
+                 deadband = {deadband}\non_delay = \"5s\"\npriority = \"high\"\nmessage = {}\ncause = {}\n\
+                 # effect = \"\"\n# action = \"\"\n# response_time = \"10min\"\n",
                 quoted(tag),
-                quoted(message)
+                quoted(message),
+                quoted(cause)
             )?;
         }
         if !self.alarms.is_empty() {
@@ -281,7 +285,8 @@ pub fn suggested_alarms(device: &str, tags: &[TagDef]) -> Vec<NewAlarm> {
         let words = if tag.label.is_empty() { &tag.short } else { &tag.label };
         let message = if condition == "fault" { words.clone() } else { format!("{words} {condition}") };
         let condition = if condition == "low" { "low" } else { "high" };
-        NewAlarm { tag: format!("{device}.{}", tag.short), condition, limit, deadband, message, reason }
+        let cause = tag.bit_labels.iter().map(|(_, label)| label.as_str()).collect::<Vec<_>>().join(", or ");
+        NewAlarm { tag: format!("{device}.{}", tag.short), condition, limit, deadband, message, reason, cause }
     };
     tags.iter()
         .filter(|tag| tag.access == Access::Read && tag.labels.is_empty() && !tag.is_text())

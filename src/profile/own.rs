@@ -12,6 +12,18 @@ pub struct OwnProfiles {
 }
 
 impl OwnProfiles {
+    /// One that lies in the folder that the program was started in.
+    #[cfg(test)]
+    pub fn of_text(name: &str, text: &str) -> OwnProfiles {
+        let text = plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() };
+        OwnProfiles { texts: BTreeMap::from([(name.to_owned(), text)]) }
+    }
+
+    /// The file of a profile that only plant files beside it can name.
+    pub fn beside(&self, name: &str) -> Option<&str> {
+        self.texts.get(name).map(|text| text.file.as_str()).filter(|file| !file.starts_with('/'))
+    }
+
     /// Files with errors: their devices are not recognised.
     pub fn broken(&self) -> Vec<&str> {
         let is_broken = |(name, text): &(&String, &plant::Text)| check_device(name, (*text).clone()).is_err();

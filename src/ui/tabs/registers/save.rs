@@ -1,11 +1,12 @@
 //! Keeps what has a name as a plant file: the same device with mimic, alarms, history and reports.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use super::{Asking, Base, Registers, import, list, names::Named};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        PlantDef,
         def::LineDef,
         tag::{Decimals, Point, TagDef},
     },
@@ -36,6 +37,11 @@ impl Registers {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         if stem.is_empty() || text.is_empty() {
             return Err(t!("expected the name of a file such as bench.toml").to_owned());
+        }
+        let here = path.parent().is_none_or(|folder| folder.as_os_str().is_empty());
+        let beside = |def: &Arc<PlantDef>| self.profiles.beside(&def.name);
+        if let Some(profile) = self.recognition.taken().and_then(beside).filter(|_| !here) {
+            return Err(t!("{profile} would not be found from there: save the plant file beside it", profile));
         }
         let plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
         let bytes = plant.text(&self.profiles)?.into_bytes();

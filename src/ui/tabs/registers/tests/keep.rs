@@ -163,11 +163,21 @@ fn the_timeout_that_the_replies_suggest_is_saved() {
     bench.keys("⏎");
     bench.answer(1, |address| pxr(Table::Input, address));
     assert!(!bench.saved().0.contains("timeout_ms"), "too few replies to say");
-    let slow = std::time::Duration::from_millis(40);
+    let slow = std::time::Duration::from_millis(80);
     (0..20).for_each(|_| bench.model.tabs.registers.replies.see(slow));
     let (text, def) = bench.saved();
-    assert_eq!(def.lines[0].timeout, slow * 3 + std::time::Duration::from_millis(30), "{text}");
-    assert!(text.contains(" replies took 40.0 ms; timeout_ms leaves a margin"), "{text}");
+    assert_eq!(def.lines[0].timeout, std::time::Duration::from_millis(250), "{text}");
+    assert!(text.contains(" replies took 80.0 ms; timeout_ms leaves a margin"), "{text}");
     let shown = bench.screen(120, 40);
-    assert!(shown.contains("timeout 150 ms is enough"), "{shown}");
+    assert!(shown.contains("timeout 250 ms is enough"), "{shown}");
+}
+
+#[test]
+fn a_profile_beside_the_plant_file_is_not_lost_in_another_folder() {
+    let fuji = crate::profile::text_of("fuji_pxr", &crate::profile::Search::shipped()).expect("it is shipped");
+    let mut bench = Bench::at_unit(pxr);
+    bench.keys("⏎");
+    bench.model.tabs.registers.profiles = crate::profile::OwnProfiles::of_text("fuji_pxr", &fuji);
+    bench.keys(&format!("S{}/tmp/other/bench⏎", "\u{8}".repeat(10)));
+    assert!(bench.screen(120, 40).contains("fuji_pxr.toml would not be found from there"), "{}", bench.screen(120, 40));
 }
