@@ -173,7 +173,7 @@ fn the_timeout_that_the_replies_suggest_is_saved() {
 }
 
 #[test]
-fn a_profile_beside_the_plant_file_is_not_lost_in_another_folder() {
+fn a_plant_file_stays_beside_the_profile_that_it_names() {
     let fuji = crate::profile::text_of("fuji_pxr", &crate::profile::Search::shipped()).expect("it is shipped");
     let mut bench = Bench::at_unit(pxr);
     bench.keys("⏎");
