@@ -38,7 +38,7 @@ impl Choice {
     }
 }
 
-/// The arguments of this process with what was left out: a bare port or address means `open`, and `open` alone asks which
+/// The arguments of this process with what was left out: a bare port, address or log means `open`, and `open` alone asks which
 /// port.
 pub fn completed(args: Vec<OsString>) -> Result<Vec<OsString>, CliError> {
     let words: Vec<Option<&str>> = args.iter().map(|word| word.to_str()).collect();
@@ -48,7 +48,7 @@ pub fn completed(args: Vec<OsString>) -> Result<Vec<OsString>, CliError> {
             let chosen = ask("which device? a number, HOST[:TCPPORT], /dev/… or a network 10.0.0.0/24", &choices)?;
             Ok(args.into_iter().take(1).chain(chosen.into_iter().map(OsString::from)).collect())
         }
-        [program, Some(word), ..] if program.is_some() && is_port(word) && !Path::new(word).is_file() => {
+        [Some(_), Some(word), ..] if is_log(word) || (is_port(word) && !Path::new(word).is_file()) => {
             let mut args = args;
             args.insert(1, "open".into());
             Ok(args)
@@ -171,6 +171,11 @@ pub fn chosen(answer: &str, choices: &[Choice]) -> Result<Vec<String>, String> {
     Ok(Choice::open(String::new(), place).args)
 }
 
+/// Is it the file of a log?
+pub fn is_log(word: &str) -> bool {
+    Path::new(word).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
+}
+
 /// Is it a port or an address, and no name of a plant?
 fn is_port(word: &str) -> bool {
     let has_tcp_port = || matches!(Transport::host_and_port(word), Some((host, Some(_))) if !host.is_empty());
@@ -196,6 +201,7 @@ mod tests {
         let words = |text: &str| text.split(' ').map(OsString::from).collect::<Vec<_>>();
         let completed = |text: &str| completed(words(text)).expect("nothing is asked");
         assert_eq!(completed("sightglass 10.0.0.7 --unit 5"), words("sightglass open 10.0.0.7 --unit 5"));
+        assert_eq!(completed("sightglass bench.csv"), words("sightglass open bench.csv"));
         assert_eq!(completed("sightglass demo"), words("sightglass demo"));
         assert_eq!(completed("sightglass"), words("sightglass"));
     }

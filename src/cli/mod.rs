@@ -70,7 +70,7 @@ struct Args {
 enum Command {
     /// Run a simulated plant on a real pseudo-terminal line, with station and terminal in one process
     Demo(demo::Args),
-    /// Show the registers of any device, live: a port, or HOST[:TCPPORT]; no plant file, no login
+    /// Show the registers of any device, live: a port, or HOST[:TCPPORT]; or a log of them: FILE.csv
     Open(open::Args),
     /// Write a plant file by answering questions: lines, units, recognised devices, tags, alarms, shifts
     New(new::Args),

@@ -14,10 +14,12 @@ use crate::plant::{def::CsvDialect, sample::Quality};
 /// The heading of the times, which are in UTC.
 const TIME: &str = "time_utc";
 
-/// The first row, of names and units.
+/// The first row, of names and units. A spreadsheet needs the byte order mark to read `°C`; plain names go without.
 pub fn heading<'a>(columns: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<u8> {
     let columns = columns.flat_map(|(name, unit)| export::heading(name, unit));
-    line(std::iter::once(plain(TIME)).chain(columns))
+    let cells: Vec<String> = std::iter::once(plain(TIME)).chain(columns).collect();
+    let bom = !cells.iter().all(|cell| cell.is_ascii());
+    csv::write(std::iter::once(cells), CsvDialect { bom, ..CsvDialect::default() })
 }
 
 /// The row of a read: of each register its value as text, which stands there only if it is good, and its quality.

@@ -47,7 +47,7 @@ fn rows_of_a_log_outlive_a_killed_program() {
     terminal.end();
     let text = std::fs::read_to_string(&log).unwrap();
     let mut rows = text.lines();
-    assert_eq!(rows.next(), Some("time_utc,SV °C,SV quality"));
+    assert_eq!(rows.next(), Some("\u{feff}time_utc,SV °C,SV quality"));
     let rows: Vec<&str> = rows.collect();
     // The last one shown may still have been on its way to the disk.
     assert!(rows.len() >= 3 && rows.iter().all(|row| row.ends_with("Z,70.0,good")), "{text}");
@@ -101,5 +101,5 @@ fn a_log_says_in_the_end_how_many_rows_it_has() {
     terminal.wait_for("rows written");
     assert_eq!(terminal.end(), 0);
     let text = std::fs::read_to_string(&log).unwrap();
-    assert!(text.starts_with("time_utc,T1 °C,T1 quality,T2 °C,T2 quality\r\n"), "{text}");
+    assert!(text.starts_with("\u{feff}time_utc,T1 °C,T1 quality,T2 °C,T2 quality\r\n"), "{text}");
 }

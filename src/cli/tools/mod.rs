@@ -26,7 +26,7 @@ use crate::{
     profile::BAUDS,
 };
 
-use super::{CliError, runtime, say};
+use super::{CliError, menu, runtime, say};
 
 /// The port that a diagnostic works on.
 #[derive(Debug, Clone, clap::Args)]
@@ -144,8 +144,7 @@ impl PortArgs {
     /// The log of registers that is named instead of a port.
     pub(super) fn log(&self) -> Option<&Path> {
         let path = Path::new(&self.port);
-        let is_log = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-        (is_log || path.is_file()).then_some(path)
+        (menu::is_log(&self.port) || path.is_file()).then_some(path)
     }
 
     /// Are baud rate and parity both given?

@@ -46,6 +46,7 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
     let values: Vec<_> = bench.rows.iter().map(|row| row.split_once(',').unwrap_or_default().1).collect();
     let expect = ["SV °C,SV quality", "70.0,good", "70.1,good", ",uncertain: response timeout"];
     assert_eq!(values, expect, "no row before, none after, none invented");
+    assert!(bench.rows[0].starts_with("\u{feff}time_utc,"), "a spreadsheet reads °C");
     assert!(bench.rows[1].starts_with("20") && bench.rows[1].contains('T'), "{:?}", bench.rows);
 }
 
