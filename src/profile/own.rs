@@ -50,7 +50,8 @@ impl OwnProfiles {
 
     fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = shipped_devices().chain(self.texts.keys().cloned()).collect();
-        names.sort();
+        // Of two that fit as well the last is taken: the user's own.
+        names.sort_by_cached_key(|name| (self.texts.contains_key(name), name.clone()));
         names.dedup();
         names
     }
@@ -90,6 +91,7 @@ mod tests {
         let shipped = models(&OwnProfiles::default());
         let added: Vec<String> = models(&own).into_iter().filter(|model| !shipped.contains(model)).collect();
         assert_eq!(added, ["FUJI HERE"], "the one beside the plant file wins; without a signature none is recognised");
+        assert_eq!(own.recognisable().last().map(|def| def.name.as_str()), Some("mine"), "of two that fit, the own");
         assert_eq!(own.broken(), [here.join("broken.toml").display().to_string()]);
         let plant = "title = \"P\"\ntime_zone = \"UTC\"\n[[line]]\nname = \"L1\"\nmode = \"tcp\"\nhost = \"plc\"\n\
                      [[device]]\nname = \"D-1\"\nprofile = \"silent\"\nline = \"L1\"\nunit = 1\n";
