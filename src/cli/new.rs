@@ -153,12 +153,17 @@ async fn look(line: &LineDef, known: &[Arc<PlantDef>]) -> Result<Option<(Vec<Fou
     }
     let mut units = Vec::new();
     for finding in &run.findings {
-        scan::describe(finding).iter().for_each(|words| say(&format!("  {words}")));
+        if units.len() < UNITS_MANY {
+            scan::describe(finding).iter().for_each(|words| say(&format!("  {words}")));
+        }
         if let Finding::Unit { unit, words, certain: true, .. } = finding {
             units.push((*unit, words.starts_with("register ")));
         }
     }
     let names: Vec<String> = units.iter().map(|(unit, _)| unit.to_string()).collect();
+    if UNITS_MANY < names.len() {
+        say(&format!("  … {} in all: is it one device that answers at every address?", names.len()));
+    }
     let usual = if UNITS_MANY < names.len() { names[0].as_str() } else { "all" };
     let chosen = match names.len() {
         0 => {
@@ -286,7 +291,7 @@ async fn add_device(
         device.unpolled = left_out(&def, &kept);
         device.profile = Some((def.name.clone(), if all { of_interest(&kept) } else { kept }));
     } else if *has_register {
-        say("  its register 0 is kept as R0; `sightglass open` shows the others and S writes them as tags");
+        say("  its register 0 is kept as R0; `sightglass open` shows the others, S saves them");
         let (table, kind, order) = (Table::Holding, DataType::U16, ByteOrder::Abcd);
         let point = Point { table, address: 0, kind, order, field: None };
         device.tags.push(TagDef::new(TagId(0), DeviceId(0), "R0", point));
@@ -356,7 +361,7 @@ async fn save(plant: &NewPlant, profiles: &OwnProfiles, path: &Path) -> Result<(
     let path = path.display();
     let (lines, devices, alarms) = (plant.lines.len(), plant.devices.len(), plant.alarms.len());
     say(&format!("saved {path}: lines {lines}, devices {devices}, alarms {alarms}"));
-    say(&format!("`sightglass {path}` shows the plant, `sightglass check {path}` its read plan"));
+    say(&format!("`sightglass {path}` shows it, `sightglass check {path}` its read plan"));
     Ok(())
 }
 
