@@ -227,12 +227,13 @@ impl TabView for Registers {
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.writing.follow(cx, self.line);
+        let mut actions = self.watch_time(cx);
         self.follow_graph(cx);
         let now = cx.steady();
         let wanted = self
             .on_way
             .is_some_and(|(_, at, span)| span != self.span(cx) || (LOST_AFTER + self.period) < now.duration_since(at));
-        let mut actions = self.recognise(cx);
+        actions.extend(self.recognise(cx));
         // A window closes when a session begins.
         actions.extend(self.said.take_if(|_| cx.session.who.is_some()));
         if !self.paused && (self.on_way.is_none() || wanted) {

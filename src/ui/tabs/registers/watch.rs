@@ -5,14 +5,18 @@ pub(super) mod start;
 
 use std::{collections::VecDeque, path::PathBuf};
 
-use super::{Asking, Registers, decode, names::Named, view::named_text};
+use super::{
+    Asking, Registers, decode,
+    names::Named,
+    view::{is_past, named_text},
+};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         event::Fault,
         live::{AddressSpan, LiveReading},
         number::{to_f32, to_u32},
-        sample::{Cause, Sample},
+        sample::{Cause, Quality, Sample},
         tag::{ByteOrder, DataType, Table},
     },
     report::value_log,
@@ -62,6 +66,14 @@ impl WatchList {
     /// Is a log under way?
     pub fn is_logging(&self) -> bool {
         self.log.is_some()
+    }
+
+    /// Writes a row, where a log is under way.
+    fn log_row(&mut self, at: Timestamp, cells: Vec<(String, Quality)>) -> Vec<UiAction> {
+        let Some(log) = &mut self.log else { return Vec::new() };
+        log.rows += 1;
+        let bytes = value_log::row(at, cells.into_iter());
+        vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path: log.path.clone(), bytes, new: false })]
     }
 
     /// How the log stands, at length and in short, and whether all is well.
@@ -194,10 +206,26 @@ impl Registers {
             item.push(sample);
             cells.push((sample.good_value().map_or(String::new(), |value| exact(named, value)), sample.quality));
         }
-        let Some(log) = &mut self.watch.log else { return Vec::new() };
-        log.rows += 1;
-        let bytes = value_log::row(at, cells.into_iter());
-        vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path: log.path.clone(), bytes, new: false })]
+        self.watch.log_row(at, cells)
+    }
+
+    /// Ends values that may be others by now, in the graph and, by a row, in the log.
+    pub(super) fn watch_time(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let good = |item: &Watched| item.samples.back().copied().filter(|last| last.quality.is_good());
+        let is_old = |item: &Watched| good(item).is_some_and(|last| is_past(self, cx, last.at));
+        if self.watch.is_shown_log() || !self.watch.items.iter().any(is_old) {
+            return Vec::new();
+        }
+        let latest = self.watch.items.iter().filter_map(|item| item.samples.back()).map(|last| last.at).max();
+        let at = latest.and_then(|at| at.checked_add(self.period).ok()).map_or(cx.now, |at| at.min(cx.now));
+        for item in &mut self.watch.items {
+            if let Some(last) = good(item) {
+                item.push(Sample { at, ..last }.uncertain(Cause::Stale));
+            }
+        }
+        let qualities = self.watch.items.iter().filter_map(|item| item.samples.back()).map(|last| last.quality);
+        let cells = qualities.map(|quality| (String::new(), quality)).collect();
+        self.watch.log_row(at, cells)
     }
 
     /// Begins a log of the list, or ends it.

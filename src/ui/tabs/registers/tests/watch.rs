@@ -51,6 +51,21 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
 }
 
 #[test]
+fn a_log_says_when_its_values_became_old() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("pL");
+    bench.answer(1, device);
+    bench.snapshot(2, LineState::Connected);
+    assert_eq!(bench.rows.len(), 2, "a heading and a value: {:?}", bench.rows);
+    bench.snapshot(3, LineState::Connecting);
+    bench.snapshot(30, LineState::Connecting);
+    assert_eq!(bench.rows.len(), 3, "one row for the whole time: {:?}", bench.rows);
+    assert!(bench.rows[2].ends_with("Z,,uncertain: stale"), "{:?}", bench.rows);
+}
+
+#[test]
 fn a_log_that_cannot_be_written_ends_and_says_why() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");

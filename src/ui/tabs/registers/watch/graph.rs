@@ -5,10 +5,7 @@ use std::{collections::VecDeque, sync::Arc};
 use super::{Named, Registers, WatchList, Watched};
 use crate::ui::tabs::{
     prelude::*,
-    registers::{
-        save,
-        view::{is_past, state},
-    },
+    registers::{save, view::state},
     trends,
 };
 use crate::{
@@ -20,7 +17,7 @@ use crate::{
         PlantDef,
         def::{Pen, TrendGroup},
         number::to_u16,
-        sample::{Cause, Sample},
+        sample::Sample,
         tag::{ByteOrder, DataType, Table, TagDef},
     },
     report::{
@@ -194,28 +191,16 @@ impl Registers {
         self.follow_graph(cx);
     }
 
-    /// Gives the graph what was read; values that may be others by now end there.
+    /// Gives the graph what was read.
     pub(in crate::ui::tabs::registers) fn follow_graph(&mut self, cx: &ViewContext) {
-        let period = self.period;
-        let old: Vec<bool> = self.watch.items.iter().map(|item| self.is_stale(cx, item)).collect();
         let WatchList { graph, items, .. } = &mut self.watch;
-        let end = graph.as_ref().and_then(|graph| graph.log.as_ref()).map(|(end, _)| *end);
-        for (item, _) in items.iter_mut().zip(old).filter(|(_, old)| *old && end.is_none()) {
-            if let Some(last) = item.samples.back().filter(|last| last.quality.is_good()) {
-                let at = last.at.checked_add(period).unwrap_or(cx.now).min(cx.now);
-                item.push(Sample { at, ..*last }.uncertain(Cause::Stale));
-            }
-        }
         let Some(graph) = graph else { return };
-        (graph.snapshot.at, graph.snapshot.stepped) = (end.unwrap_or(cx.now), cx.snapshot.stepped);
+        let now = graph.log.as_ref().map_or(cx.now, |(end, _)| *end);
+        (graph.snapshot.at, graph.snapshot.stepped) = (now, cx.snapshot.stepped);
         for (shown, item) in graph.snapshot.samples.iter_mut().zip(items.iter()) {
             *shown = item.shown().unwrap_or(*shown);
         }
         graph.act(cx, items, |trends, cx| trends.on_snapshot(cx));
-    }
-
-    fn is_stale(&self, cx: &ViewContext, item: &Watched) -> bool {
-        item.samples.back().is_some_and(|last| is_past(self, cx, last.at))
     }
 
     /// A key of the trends.
