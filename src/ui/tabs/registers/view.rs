@@ -275,8 +275,13 @@ fn is_old(tab: &Registers, cx: &ViewContext, cell: &Cell) -> bool {
 pub fn is_past(tab: &Registers, cx: &ViewContext, at: Timestamp) -> bool {
     let line = cx.snapshot.lines.get(tab.line.index());
     let connected = line.is_some_and(|line| line.state == LineState::Connected);
+    !connected || is_long_ago(tab, cx, at)
+}
+
+/// Was it read so long ago that reads are missing since?
+pub fn is_long_ago(tab: &Registers, cx: &ViewContext, at: Timestamp) -> bool {
     let limit = tab.period.max(tab.took) * 3 + SignedDuration::from_secs(2);
-    !connected || limit < cx.now.duration_since(at)
+    limit < cx.now.duration_since(at)
 }
 
 /// A named value, and whether it is good: `70.0 °C`, `70.0 °C?` for an old one, `----` for none.

@@ -8,7 +8,7 @@ use std::{collections::VecDeque, path::PathBuf};
 use super::{
     Asking, Registers, decode,
     names::Named,
-    view::{is_past, named_text},
+    view::{is_long_ago, named_text},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -212,7 +212,7 @@ impl Registers {
     /// Ends values that may be others by now, in the graph and, by a row, in the log.
     pub(super) fn watch_time(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let good = |item: &Watched| item.samples.back().copied().filter(|last| last.quality.is_good());
-        let is_old = |item: &Watched| good(item).is_some_and(|last| is_past(self, cx, last.at));
+        let is_old = |item: &Watched| good(item).is_some_and(|last| is_long_ago(self, cx, last.at));
         if self.watch.is_shown_log() || !self.watch.items.iter().any(is_old) {
             return Vec::new();
         }

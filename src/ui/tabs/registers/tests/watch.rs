@@ -60,6 +60,10 @@ fn a_log_says_when_its_values_became_old() {
     bench.snapshot(2, LineState::Connected);
     assert_eq!(bench.rows.len(), 2, "a heading and a value: {:?}", bench.rows);
     bench.snapshot(3, LineState::Connecting);
+    assert_eq!(bench.rows.len(), 2, "a line may connect after its first answer: {:?}", bench.rows);
+    bench.keys("g");
+    bench.snapshot(4, LineState::Connecting);
+    assert!(bench.screen(80, 24).contains("700?"), "{}", bench.screen(80, 24));
     bench.snapshot(30, LineState::Connecting);
     assert_eq!(bench.rows.len(), 3, "one row for the whole time: {:?}", bench.rows);
     assert!(bench.rows[2].ends_with("Z,,uncertain: stale"), "{:?}", bench.rows);

@@ -5,7 +5,10 @@ use std::{collections::VecDeque, sync::Arc};
 use super::{Named, Registers, WatchList, Watched};
 use crate::ui::tabs::{
     prelude::*,
-    registers::{save, view::state},
+    registers::{
+        save,
+        view::{is_past, state},
+    },
     trends,
 };
 use crate::{
@@ -17,7 +20,7 @@ use crate::{
         PlantDef,
         def::{Pen, TrendGroup},
         number::to_u16,
-        sample::Sample,
+        sample::{Cause, Sample},
         tag::{ByteOrder, DataType, Table, TagDef},
     },
     report::{
@@ -193,14 +196,21 @@ impl Registers {
 
     /// Gives the graph what was read.
     pub(in crate::ui::tabs::registers) fn follow_graph(&mut self, cx: &ViewContext) {
+        let old: Vec<bool> = self.watch.items.iter().map(|item| self.is_old(cx, item)).collect();
         let WatchList { graph, items, .. } = &mut self.watch;
         let Some(graph) = graph else { return };
         let now = graph.log.as_ref().map_or(cx.now, |(end, _)| *end);
         (graph.snapshot.at, graph.snapshot.stepped) = (now, cx.snapshot.stepped);
-        for (shown, item) in graph.snapshot.samples.iter_mut().zip(items.iter()) {
-            *shown = item.shown().unwrap_or(*shown);
+        for ((shown, item), old) in graph.snapshot.samples.iter_mut().zip(items.iter()).zip(old) {
+            let sample = item.shown().unwrap_or(*shown);
+            *shown = if old { sample.uncertain(Cause::Stale) } else { sample };
         }
         graph.act(cx, items, |trends, cx| trends.on_snapshot(cx));
+    }
+
+    fn is_old(&self, cx: &ViewContext, item: &Watched) -> bool {
+        let good = item.samples.back().filter(|last| last.quality.is_good());
+        !self.watch.is_shown_log() && good.is_some_and(|last| is_past(self, cx, last.at))
     }
 
     /// A key of the trends.
