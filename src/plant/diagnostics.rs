@@ -133,6 +133,16 @@ pub struct RegisterWrite {
 }
 
 impl RegisterWrite {
+    /// Function 5 or 6 for one, 15 or 16 for more, or where the device has only those.
+    pub fn function(&self) -> u8 {
+        match (self.table.is_bits(), self.words.len() == 1 && !self.multiple) {
+            (true, true) => 5,
+            (true, false) => 15,
+            (false, true) => 6,
+            (false, false) => 16,
+        }
+    }
+
     fn check(&self) -> Result<(), String> {
         let most = match self.table {
             Table::Coil => 1_968,

@@ -22,7 +22,6 @@ pub fn step_of(write: &RegisterWrite, n: u32) -> Step {
     }
 }
 
-/// Function 5 or 6 for one, 15 or 16 for more, or where the device has only those.
 fn message(write: &RegisterWrite) -> Vec<u8> {
     let [high, low] = write.address.to_be_bytes();
     let count = to_u16(write.words.len()).to_be_bytes();
@@ -31,7 +30,7 @@ fn message(write: &RegisterWrite) -> Vec<u8> {
         [word] if !write.multiple => {
             let word = if bits { if *word == 0 { 0 } else { 0xFF00 } } else { *word };
             let [a, b] = word.to_be_bytes();
-            vec![write.unit, if bits { 5 } else { 6 }, high, low, a, b]
+            vec![write.unit, write.function(), high, low, a, b]
         }
         words => {
             let data: Vec<u8> = match bits {
@@ -39,7 +38,7 @@ fn message(write: &RegisterWrite) -> Vec<u8> {
                 false => words.iter().flat_map(|word| word.to_be_bytes()).collect(),
             };
             let length = crate::plant::number::to_u8(data.len());
-            let head = [write.unit, if bits { 15 } else { 16 }, high, low, count[0], count[1], length];
+            let head = [write.unit, write.function(), high, low, count[0], count[1], length];
             head.into_iter().chain(data).collect()
         }
     }

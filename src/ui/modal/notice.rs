@@ -18,6 +18,8 @@ use crate::{
 pub struct Notice {
     title: String,
     words: Vec<String>,
+    /// The first line is why it is there.
+    worry: bool,
 }
 
 impl Notice {
@@ -27,7 +29,7 @@ impl Notice {
         let why = Notice::why_unreachable(cx, device)?;
         let words =
             vec![t!("{name} is not responding", name = def.name), why, t!("Writing is not possible now.").to_owned()];
-        Some(Notice { title: def.name.clone(), words })
+        Some(Notice::new(def.name.clone(), words))
     }
 
     /// The same as one sentence.
@@ -59,7 +61,12 @@ impl Notice {
 
     /// Words to be read, the first line as the worry.
     pub fn new(title: impl Into<String>, words: Vec<String>) -> Notice {
-        Notice { title: title.into(), words }
+        Notice { title: title.into(), words, worry: true }
+    }
+
+    /// A list without a worry; the first lines where there is not room for all.
+    pub fn list(title: impl Into<String>, words: Vec<String>) -> Notice {
+        Notice { title: title.into(), words, worry: false }
     }
 
     pub(super) fn on_key(self, event: KeyEvent) -> Next {
@@ -75,7 +82,7 @@ impl Notice {
         let inner = rows.iter().map(|row| width(row)).max().unwrap_or(0);
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() + 2));
         for (y, row) in rows.iter().enumerate() {
-            let style = if y == 0 { cx.theme.trouble() } else { cx.theme.normal() };
+            let style = if y == 0 && self.worry { cx.theme.trouble() } else { cx.theme.normal() };
             canvas.text(0, y, row, style);
         }
         let last = canvas.height().saturating_sub(1);

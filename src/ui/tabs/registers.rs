@@ -189,7 +189,7 @@ impl TabView for Registers {
             Action::Write => return self.ask_write(),
             Action::Add(by) => return self.add(by),
             Action::Undo => return self.undo(cx),
-            Action::Writes => return vec![self.writing.window(cx)],
+            Action::Writes => return vec![self.writing.window(cx, &self.names)],
             Action::GoTo => {
                 let hint = t!("1002, 0x3EA, 41003, or input:1000");
                 return self.ask_text(Asking::Address, t!("go to address"), hint);

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::decode;
-use crate::plant::tag::{ByteOrder, DataType, Table};
+use crate::plant::tag::{ByteOrder, DataType, Point, Table};
 
 /// A register, or some that stand together, with a name: `value = raw · scale + offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,6 +69,11 @@ impl Named {
         }
         let value = format!("{:.*}", usize::from(self.decimals), raw * self.scale + self.offset);
         Some(if self.unit.is_empty() { value } else { format!("{value} {}", self.unit) })
+    }
+
+    /// Where and as what it is encoded.
+    pub fn point(&self) -> Point {
+        Point { table: self.table, address: self.address, kind: self.kind, order: self.order, field: None }
     }
 
     fn raw(&self, words: &[u16]) -> Option<f64> {

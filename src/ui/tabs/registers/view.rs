@@ -310,7 +310,7 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         theme.strong(),
     );
     let (recognised, right) = (tab.recognition.words(), width.saturating_sub(2));
-    if let Some((words, trouble)) = tab.writing.last() {
+    if let Some((words, trouble)) = tab.writing.last(&tab.names) {
         let words = format!(" {} ", fit_words(&words, width.saturating_sub(40)));
         canvas.text_right(right, 0, &words, if trouble { theme.trouble() } else { theme.normal() });
     } else if !recognised.is_empty() {

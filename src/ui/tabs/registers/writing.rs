@@ -1,12 +1,19 @@
 //! Writing what is selected: asked with old and new value, sent once, read back, and kept in a list.
 
-use super::Registers;
+#[cfg(test)]
+mod tests;
+
+use super::{
+    Registers,
+    names::{Named, Names},
+};
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
 use crate::{
     bus::codec,
     plant::{
-        command::{CommandId, Outcome},
+        command::{CommandId, Outcome, Refusal},
         diagnostics::{Diagnostic, DiagnosticState, Finding, RegisterWrite},
+        event::ExceptionCode,
         live::number,
         tag::{ByteOrder, DataType, Point, Table},
     },
@@ -50,19 +57,40 @@ impl Writing {
     }
 
     /// The last write in words, and whether its reader should worry.
-    pub fn last(&self) -> Option<(String, bool)> {
+    pub fn last(&self, names: &Names) -> Option<(String, bool)> {
         let written = self.list.last()?;
         let (outcome, trouble) = outcome_words(&written.outcome);
-        Some((format!("{outcome}: {}", change(&written.write)), trouble))
+        Some((format!("{outcome}: {}", change(names, &written.write)), trouble))
+    }
+
+    /// The last verified write that no later one has taken back.
+    fn undoable(&self) -> Option<&RegisterWrite> {
+        let mut standing: Vec<&RegisterWrite> = Vec::new();
+        for write in self.list.iter().filter(|written| written.outcome == Outcome::Verified).map(|one| &one.write) {
+            if standing.pop_if(|last| inverse(last) == *write).is_none() {
+                standing.push(write);
+            }
+        }
+        standing.pop()
+    }
+
+    /// Function 15 or 16 also for one: as the last write of one there, unless the unit does not know that function.
+    fn multiple(&self, unit: u8, table: Table) -> bool {
+        let same = |written: &&Written| {
+            let write = &written.write;
+            (write.unit, write.table, write.words.len()) == (unit, table, 1)
+        };
+        let unknown = Outcome::Refused(Refusal::Exception(ExceptionCode::ILLEGAL_FUNCTION));
+        self.list.iter().rev().find(same).is_some_and(|last| last.write.multiple != (last.outcome == unknown))
     }
 
     /// All of them, the latest first.
-    pub fn window(&self, cx: &ViewContext) -> UiAction {
-        let mut lines: Vec<String> = self.list.iter().rev().map(|written| words(cx, written)).collect();
+    pub fn window(&self, cx: &ViewContext, names: &Names) -> UiAction {
+        let mut lines: Vec<String> = self.list.iter().rev().map(|written| words(cx, names, written)).collect();
         if lines.is_empty() {
             lines.push(t!("Nothing was written.").to_owned());
         }
-        UiAction::Open(Modal::Notice(Notice::new(t!("what was written"), lines)))
+        UiAction::Open(Modal::Notice(Notice::list(t!("what was written"), lines)))
     }
 }
 
@@ -77,6 +105,19 @@ impl Registers {
         let Some(word) = held.first() else {
             return vec![unknown()];
         };
+        if let Some((named, held)) = self.named_and_held() {
+            let title =
+                t!("write {name}, now {value}", name = named.name, value = named.text(&held).unwrap_or_default());
+            let hint = match named.kind {
+                DataType::Text(most) => t!("at most {most} characters", most),
+                _ if !named.labels.is_empty() => {
+                    let labels: Vec<&str> = named.labels.iter().map(|(_, label)| label.as_str()).collect();
+                    labels.join(", ")
+                }
+                _ => t!("a value as it is shown, or +1; 0x2BC: words as they are").to_owned(),
+            };
+            return self.ask_text(super::Asking::Write, &title, &hint);
+        }
         let title = t!("write {place}, now {word}", place = self.table.modicon(self.selected), word);
         let hint = if self.table.is_bits() {
             t!("0 or 1; several with blanks").to_owned()
@@ -102,8 +143,18 @@ impl Registers {
     pub(super) fn write_typed(&self, text: &str) -> Result<Vec<UiAction>, String> {
         let held = self.cells.words(self.table, self.selected, 1);
         let first = held.first().copied().ok_or_else(|| t!("it is not known what it holds now").to_owned())?;
-        let words = typed(text, self.table, self.order, first)?;
+        let words = match self.named_and_held() {
+            Some((named, held)) if !text.starts_with("0x") && !text.starts_with("0X") => typed_as(text, named, &held)?,
+            Some(_) | None => typed(text, self.table, self.order, first)?,
+        };
         self.confirm(words)
+    }
+
+    /// The name of what is selected, if it has one, and the words that it holds.
+    fn named_and_held(&self) -> Option<(&Named, Vec<u16>)> {
+        let named = self.names.get(self.table, self.selected).filter(|named| !named.table.is_bits())?;
+        let held = self.cells.words(self.table, self.selected, named.len());
+        (held.len() == usize::from(named.len())).then_some((named, held))
     }
 
     /// Asks whether to add to the selected register.
@@ -112,20 +163,23 @@ impl Registers {
             return self.ask_write();
         }
         let held = self.cells.words(self.table, self.selected, 1);
-        let sum = held.first().map(|word| word.wrapping_add_signed(by));
-        let confirm = sum.ok_or_else(String::new).and_then(|word| self.confirm(vec![word]));
-        confirm.unwrap_or_else(|_| vec![unknown()])
+        let Some(word) = held.first() else { return vec![unknown()] };
+        let most = if self.table.is_bits() { 1 } else { u16::MAX };
+        let words = match self.named_and_held() {
+            Some((named, held)) => next_step(named, &held, by),
+            None => word.checked_add_signed(by).filter(|word| *word <= most).map(|word| vec![word]),
+        };
+        let confirm =
+            words.ok_or_else(|| t!("There is no further value.").to_owned()).and_then(|words| self.confirm(words));
+        confirm.unwrap_or_else(|why| vec![UiAction::Open(Modal::Notice(Notice::new(t!("write"), vec![why])))])
     }
 
-    /// Asks whether to write back what the last verified write has replaced.
+    /// Asks whether to write back what the last verified write has replaced, and after it the one before.
     pub(super) fn undo(&self, cx: &ViewContext) -> Vec<UiAction> {
-        let verified = |written: &&Written| written.outcome == Outcome::Verified;
-        let Some(written) = self.writing.list.iter().rev().find(verified) else {
-            return vec![self.writing.window(cx)];
-        };
-        let write = &written.write;
-        let back = RegisterWrite { words: write.expected.clone(), expected: write.words.clone(), ..write.clone() };
-        vec![self.confirmation(t!("undo"), back)]
+        match self.writing.undoable() {
+            Some(write) => vec![self.confirmation(t!("undo"), inverse(write))],
+            None => vec![self.writing.window(cx, &self.names)],
+        }
     }
 
     fn confirm(&self, words: Vec<u16>) -> Result<Vec<UiAction>, String> {
@@ -134,27 +188,42 @@ impl Registers {
             return Err(t!("it is not known what all of them hold now").to_owned());
         }
         let (unit, table, address) = (self.unit, self.table, self.selected);
-        let write = RegisterWrite { unit, table, address, words, expected, multiple: false };
+        let multiple = words.len() == 1 && self.writing.multiple(unit, table);
+        let write = RegisterWrite { unit, table, address, words, expected, multiple };
         Diagnostic::Write(write.clone()).check()?;
         Ok(vec![self.confirmation(t!("write"), write)])
     }
 
     fn confirmation(&self, title: &str, write: RegisterWrite) -> UiAction {
-        let words = t!("{change}. It is sent once and read back. Write it?", change = change(&write));
+        let (change, function) = (change(&self.names, &write), write.function());
+        let words =
+            t!("{change}. It is sent once, with function {function}, and read back. Write it?", change, function);
         let kind = CommandKind::Test(self.line, Diagnostic::Write(write));
         UiAction::Open(Modal::Confirm(Confirm::command(title, words, kind)))
     }
 }
 
-/// `unit 1 41003: 700 → 601`.
-fn change(write: &RegisterWrite) -> String {
-    let (old, new) = (list(&write.expected), list(&write.words));
-    t!("unit {unit} {place}: {old} to {new}", unit = write.unit, place = write.table.modicon(write.address), old, new)
+/// What takes a write back.
+fn inverse(write: &RegisterWrite) -> RegisterWrite {
+    RegisterWrite { words: write.expected.clone(), expected: write.words.clone(), ..write.clone() }
 }
 
-fn words(cx: &ViewContext, written: &Written) -> String {
+/// `unit 1 41003: 700 to 601`, for a name `SV 70.0 °C to 60.1 °C, unit 1 41003: 700 to 601`.
+fn change(names: &Names, write: &RegisterWrite) -> String {
+    let (old, new) = (list(&write.expected), list(&write.words));
+    let place = write.table.modicon(write.address);
+    let raw = t!("unit {unit} {place}: {old} to {new}", unit = write.unit, place, old, new);
+    let named = names.get(write.table, write.address).filter(|named| usize::from(named.len()) == write.words.len());
+    let said = named.and_then(|named| {
+        let (old, new) = (named.text(&write.expected)?, named.text(&write.words)?);
+        Some(t!("{name} {old} to {new}, {raw}", name = named.name, old, new, raw))
+    });
+    said.unwrap_or(raw)
+}
+
+fn words(cx: &ViewContext, names: &Names, written: &Written) -> String {
     let at = clock(written.at, &cx.def().time_zone);
-    format!("{at} {}  {}", change(&written.write), outcome_words(&written.outcome).0)
+    format!("{at} {}  {}", change(names, &written.write), outcome_words(&written.outcome).0)
 }
 
 fn list(words: &[u16]) -> String {
@@ -164,6 +233,58 @@ fn list(words: &[u16]) -> String {
 fn unknown() -> UiAction {
     let why = t!("It is not known what this address holds now, so nothing is written over it.").to_owned();
     UiAction::Open(Modal::Notice(Notice::new(t!("write"), vec![why])))
+}
+
+/// The words of a named value: a number as it is shown, `+1` to add, one of its words, or a text.
+fn typed_as(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String> {
+    if let DataType::Text(most) = named.kind {
+        let words = codec::encode_text(named.point(), text);
+        return words.ok_or_else(|| t!("found `{text}`, expected at most {most} printable characters", text, most));
+    }
+    if let Some((raw, _)) = named.labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text)) {
+        return encode(named, *raw as f64).ok_or_else(|| does_not_fit(text, named));
+    }
+    let wrong = || {
+        t!(
+            "found `{text}`, expected one value of {name}, such as {shown}",
+            text,
+            name = named.name,
+            shown = named.text(held).unwrap_or_default()
+        )
+    };
+    let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
+    let value = match text.strip_prefix('+') {
+        Some(by) => number(by).zip(named.value(held)).map(|(by, value)| value + by),
+        None => number(text),
+    };
+    let raw = (value.ok_or_else(wrong)? - named.offset) / named.scale;
+    if matches!(named.kind, DataType::F32 | DataType::F64) {
+        return encode(named, raw).ok_or_else(|| does_not_fit(text, named));
+    }
+    // 70.2 / 0.1 is not quite 702.
+    if 1e-6 * raw.abs().max(1.0) < (raw - raw.round()).abs() {
+        return Err(t!("{text}: {name} has steps of {step}", text, name = named.name, step = named.scale.abs()));
+    }
+    encode(named, raw.round()).ok_or_else(|| does_not_fit(text, named))
+}
+
+fn does_not_fit(text: &str, named: &Named) -> String {
+    t!("{text} does not fit {kind}", text, kind = named.kind.name())
+}
+
+/// One step of its last digit up or down; `None` where the type ends.
+fn next_step(named: &Named, held: &[u16], by: i16) -> Option<Vec<u16>> {
+    let raw = (named.value(held)? - named.offset) / named.scale;
+    match named.kind {
+        DataType::F32 | DataType::F64 => {
+            encode(named, raw + f64::from(by) * 10_f64.powi(-i32::from(named.decimals)) / named.scale)
+        }
+        _ => encode(named, raw.round() + f64::from(by)),
+    }
+}
+
+fn encode(named: &Named, raw: f64) -> Option<Vec<u16>> {
+    codec::encode(named.point(), raw)
 }
 
 /// The words that a text means: whole numbers one each, a float or a greater number two in this order; `+10` adds.
@@ -195,26 +316,4 @@ fn typed(text: &str, table: Table, order: ByteOrder, held: u16) -> Result<Vec<u1
     };
     let words = text.split_whitespace().map(one).collect::<Result<Vec<_>, _>>()?.concat();
     if words.is_empty() { Err(wrong(text)) } else { Ok(words) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_typed_becomes_words() {
-        let words = |text: &str| typed(text, Table::Holding, ByteOrder::Abcd, 700);
-        assert_eq!(words("601"), Ok(vec![601]));
-        assert_eq!(words("-5"), Ok(vec![0xFFFB]));
-        assert_eq!(words("0x2BC 1"), Ok(vec![700, 1]));
-        assert_eq!(words("+10"), Ok(vec![710]));
-        assert_eq!(words("104.0"), Ok(vec![0x42D0, 0]));
-        assert_eq!(words("70000"), Ok(vec![1, 4464]));
-        assert_eq!(typed("70000", Table::Holding, ByteOrder::Cdab, 0), Ok(vec![4464, 1]));
-        for wrong in ["", "x", "+x", "99999999999", "NaN", "+65000"] {
-            assert!(words(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(typed("1 0", Table::Coil, ByteOrder::Abcd, 0), Ok(vec![1, 0]));
-        assert!(typed("2", Table::Coil, ByteOrder::Abcd, 0).is_err());
-    }
 }
