@@ -2,6 +2,7 @@
 //!
 //! The tab asks the line for what is on the screen; each answer brings the next question, due one period later.
 
+mod advice;
 mod cells;
 mod decode;
 mod find;

@@ -64,6 +64,11 @@ impl Cells {
         good.map(|(address, _)| *address)
     }
 
+    /// Was nothing ever read?
+    pub fn is_blank(&self) -> bool {
+        self.0.values().all(|cell| cell.word.is_none())
+    }
+
     /// Takes what a read has brought.
     pub fn take(&mut self, reading: &LiveReading) {
         if CELLS_MAX < self.0.len() {

@@ -315,6 +315,24 @@ fn what_was_read_before_the_line_was_lost_is_marked_as_old() {
 }
 
 #[test]
+fn where_nothing_answers_the_tab_says_what_to_check() {
+    let mut bench = Bench::new();
+    let silent = |bench: &mut Bench, fault| {
+        let (id, read) = bench.asked.pop().expect("a question");
+        let part = LivePart { at: now(), span: read.spans[0], words: Err(fault) };
+        let reading = LiveReading { parts: vec![part], requests: 1, ..LiveReading::default() };
+        bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
+        bench.screen(80, 24)
+    };
+    let shown = silent(&mut bench, Fault::Timeout);
+    assert!(shown.contains("another unit address") && shown.contains("response timeout"), "{shown}");
+    let shown = silent(&mut bench, Fault::Exception(ExceptionCode(0x0B)));
+    assert!(shown.contains("the gateway answers"), "{shown}");
+    bench.answer(1, device);
+    assert!(!silent(&mut bench, Fault::Timeout).contains("likelihood"), "it has answered before");
+}
+
+#[test]
 fn a_system_clock_that_was_set_does_not_stop_reading() {
     let mut bench = Bench::new();
     let (id, read) = bench.asked.pop().expect("a question");

@@ -1,6 +1,6 @@
 //! How the registers are drawn: a row each, and the selected one below in every meaning.
 
-use super::{Base, Registers, cells::Cell, decode, names::Named, watch};
+use super::{Base, Registers, advice::advice, cells::Cell, decode, names::Named, watch};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -44,9 +44,17 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     heading(tab, cx, canvas);
     let height = canvas.height();
     let room = rows(tab, height);
-    columns(tab, cx, canvas);
-    for (y, address) in tab.rows(cx).map(to_u16).enumerate() {
-        row(tab, cx, canvas, HEAD + to_u16(y), address);
+    let advice = advice(tab, cx);
+    if advice.is_empty() {
+        columns(tab, cx, canvas);
+        for (y, address) in tab.rows(cx).map(to_u16).enumerate() {
+            row(tab, cx, canvas, HEAD + to_u16(y), address);
+        }
+    } else {
+        canvas.text(2, HEAD, t!("In the order of likelihood:"), cx.theme.normal());
+        for (n, line) in (1..).zip(advice.iter().take(room.saturating_sub(1))) {
+            canvas.text(4, HEAD + n, &fit_words(line, canvas.width().saturating_sub(5)), cx.theme.normal());
+        }
     }
     if DETAIL_FROM <= height {
         let (width, y) = (canvas.width(), HEAD + to_u16(room));
