@@ -328,7 +328,7 @@ fn where_nothing_answers_the_tab_says_what_to_check() {
     assert!(shown.contains("another unit address") && shown.contains("response timeout"), "{shown}");
     let shown = silent(&mut bench, Fault::Exception(ExceptionCode(0x0B)));
     assert!(shown.contains("the gateway answers"), "{shown}");
-    bench.answer(1, device);
+    bench.answer(1, Some);
     assert!(!silent(&mut bench, Fault::Timeout).contains("likelihood"), "it has answered before");
 }
 
