@@ -12,14 +12,15 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<&'static str> {
     let mut lines = match fault {
         Fault::Timeout if serial => vec![
             t!("another unit address: U; or a scan of all: tab Bus"),
-            t!("another baud rate, parity or mode: quit, and open without --baud and --parity"),
+            t!("another baud rate or parity: quit, and open without --baud and --parity"),
             t!("A and B exchanged, or the device without power"),
             t!("no termination or common ground, another master on the line"),
         ],
         Fault::Timeout => vec![
             t!("another unit address: U; 255 and 0 are usual of devices, 1 behind a gateway"),
-            t!("no device behind the gateway, or without power; the gateway's own serial settings"),
-            t!("the device takes one connection at a time, and another program has it"),
+            t!("no device behind the gateway, or the device without power"),
+            t!("other serial settings in the gateway than in the device"),
+            t!("the device takes one connection, and another program has it"),
             t!("another protocol on this TCP port"),
         ],
         Fault::Exception(code) if code.is_of_gateway() => vec![
@@ -28,14 +29,18 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<&'static str> {
             t!("other serial settings in the gateway than in the device"),
         ],
         fault if fault.is_corrupt() => vec![
-            t!("another baud rate or parity: quit, and open without --baud and --parity"),
+            if serial {
+                t!("another baud rate or parity: quit, and open without --baud and --parity")
+            } else {
+                t!("other serial settings in the gateway than in the device")
+            },
             t!("two devices with the same unit address, or another master on the line"),
             t!("noise: screen, termination, common ground; every byte stands on tab Bus"),
         ],
         _ => return Vec::new(),
     };
     if cx.snapshot.lines[tab.line.index()].counters.echoes {
-        lines.insert(0, t!("local echo: the adapter gives back what it sends; it is taken out of the answers"));
+        lines.insert(0, t!("local echo: the adapter gives back what it sends (removed from answers)"));
     }
     lines
 }
