@@ -41,6 +41,16 @@ pub async fn ask_until<T>(
     }
 }
 
+/// Is it agreed to? Enter means no.
+pub async fn is_agreed(question: &str) -> Result<bool, CliError> {
+    ask_until(&format!("{question}, yes or no"), "no", |answer| match answer {
+        "yes" | "y" => Ok(true),
+        "no" | "n" => Ok(false),
+        _ => Err(format!("found `{answer}`, expected yes or no")),
+    })
+    .await
+}
+
 /// The places in a list that an answer means: `all`, `none`, or numbers from 1, ranges and names: `1 3-5 PV`.
 pub fn selection(answer: &str, names: &[String]) -> Result<Vec<usize>, String> {
     let count = names.len();

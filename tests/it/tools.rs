@@ -67,6 +67,17 @@ fn options_behind_the_bytes_are_options() {
 }
 
 #[test]
+fn send_asks_before_it_changes_something() {
+    let unit = peer(answers(|_| vec![0, 1, 0, 0, 0, 6, 1, 6, 0, 5, 0, 7]));
+    let (code, said) = run(&["send", &unit, "01 06 00 05 00 07"]);
+    assert!(code == Some(2) && said.contains("nothing was sent") && said.contains("--yes"), "{code:?} {said}");
+    let (code, said) = run(&["send", &unit, "--yes", "01 06 00 05 00 07"]);
+    assert!(code == Some(0) && said.contains("ok, after"), "{code:?} {said}");
+    let (code, said) = run(&["send", &unit, "--as-is", "55 55"]);
+    assert!(code == Some(2) && said.contains("--yes"), "bytes that are no request may do anything: {code:?} {said}");
+}
+
+#[test]
 fn send_fails_on_an_invalid_response_and_counts_its_bytes() {
     let garbage = peer(answers(|_| vec![0x55; 8_128]));
     for mode in ["tcp", "rtu-over-tcp"] {

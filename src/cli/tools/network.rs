@@ -57,12 +57,7 @@ async fn permitted(network: Network, line: &LineDef) -> Result<bool, CliError> {
         port_of(line),
         worst.as_secs()
     ));
-    prompt::ask_until("scan it, yes or no", "no", |answer| match answer {
-        "yes" | "y" => Ok(true),
-        "no" | "n" => Ok(false),
-        _ => Err(format!("found `{answer}`, expected yes or no")),
-    })
-    .await
+    prompt::is_agreed("scan it").await
 }
 
 async fn scanned(network: Network, line: &LineDef) -> Result<Vec<(Ipv4Addr, HostAnswer)>, CliError> {

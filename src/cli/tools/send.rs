@@ -3,7 +3,7 @@
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
     bus::{ascii, dissect, frame, hex_input, request_lint::check_request},
-    cli::{CliError, say, say_error},
+    cli::{CliError, in_runtime, menu, prompt, say, say_error},
     plant::{
         def::Framing,
         diagnostics::{Diagnostic, Finding},
@@ -25,7 +25,14 @@ pub struct Args {
     /// Send it although something is wrong with it, or every unit would obey it
     #[arg(long)]
     force: bool,
+    /// Send without a question what may change something
+    #[arg(long)]
+    yes: bool,
 }
+
+/// Functions that change nothing in a device: the reads, exception status, event counter and log, server identification,
+/// file record, FIFO and device identification (V1.1b3, 6).
+const READS: [u8; 11] = [0x01, 0x02, 0x03, 0x04, 0x07, 0x0B, 0x0C, 0x11, 0x14, 0x18, 0x2B];
 
 /// Sends once; an answer that is no Modbus is shown all the same.
 pub fn main(args: Args) -> Result<(), CliError> {
@@ -48,6 +55,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     };
     refuse(&message, framing, &args)?;
     let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
+    if !args.yes && message.get(1).is_none_or(|function| !READS.contains(function)) {
+        agree(&format!("{} on {}", dissection.summary, line.transport))?;
+    }
     let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", dissection.summary)];
     let request = message.clone();
     let run = run(&line, Diagnostic::Send(frame), |finding| match finding {
@@ -84,6 +94,19 @@ pub fn main(args: Args) -> Result<(), CliError> {
         (Some(bytes), _) => verdict(framing, &message, bytes)
             .map(drop)
             .map_err(|why| CliError::Failed(format!("what came back is no answer to this: {why}"))),
+    }
+}
+
+/// Asks whether a request that may change something is to be sent.
+fn agree(what: &str) -> Result<(), CliError> {
+    if !menu::is_asked() {
+        let words = format!("nothing was sent: this may change something in the device ({what}): --yes sends it");
+        return Err(CliError::Usage(words));
+    }
+    say(&format!("This may change something in the device: {what}."));
+    match in_runtime(prompt::is_agreed("send it"))? {
+        true => Ok(()),
+        false => Err(CliError::Failed("nothing was sent".to_owned())),
     }
 }
 
