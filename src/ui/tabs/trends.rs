@@ -211,7 +211,8 @@ impl Trends {
                 let day = midnight(cx.now, &cx.def().time_zone);
                 View::since(self.since.map_or(day, |since| since.max(day)), cx.now, columns)
             }
-            (_, end) => View::ending(end.unwrap_or(cx.now), WINDOWS[self.window], columns),
+            (_, None) => View::live(cx.now, WINDOWS[self.window], columns),
+            (_, Some(end)) => View::ending(end, WINDOWS[self.window], columns),
         }
     }
 

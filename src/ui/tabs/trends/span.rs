@@ -8,13 +8,16 @@ pub const WINDOWS: [i64; 12] = [60, 120, 300, 600, 900, 1_800, 3_600, 7_200, 14_
 /// How often the history may be queried, milliseconds.
 pub const RATES: [u64; 5] = [500, 1_000, 2_000, 5_000, 10_000];
 
+/// A living view of a short window moves so seldom.
+const HOP: SignedDuration = SignedDuration::from_millis(2_500);
+
 /// A stretch of time cut into columns of equal width, on a grid that does not move with the clock: so a curve travels
 /// by whole columns and does not shimmer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct View {
     /// Left edge.
     pub from: Timestamp,
-    /// Right edge; for a living view up to one column after now.
+    /// Right edge; for a living view up to one column, or [`HOP`], after now.
     pub to: Timestamp,
     /// Number of columns.
     pub columns: usize,
@@ -27,6 +30,15 @@ impl View {
         let step = (seconds.max(1) * 1_000_000 + columns as i64 - 1) / columns as i64;
         let to = (end.as_microsecond().div_euclid(step) + 1) * step;
         View { from: instant(to - step * columns as i64), to: instant(to), columns }
+    }
+
+    /// The view of `seconds` in which `now` is one of the last columns. It moves by [`HOP`] or by a column: each move sends
+    /// every cell of the curves again.
+    pub fn live(now: Timestamp, seconds: i64, columns: usize) -> View {
+        let step = View::ending(now, seconds, columns).step().as_micros().max(1);
+        let hop = step * (HOP.as_micros() / step).max(1);
+        let last = (i128::from(now.as_microsecond()).div_euclid(hop) + 1) * hop - 1;
+        View::ending(instant(i64::try_from(last).unwrap_or(i64::MAX)), seconds, columns)
     }
 
     /// The view from `from` to `end`, at least a minute wide. Columns are half seconds or multiples, so that it grows by
@@ -109,6 +121,22 @@ mod tests {
         check("06:00:05", 600, 120, "05:50:10", "06:00:10");
         check("06:00:00.2", 60, 120, "05:59:00.5", "06:00:00.5");
         check("06:00:00", 3_600, 1, "06:00:00", "07:00:00");
+    }
+
+    #[test]
+    fn a_living_view_holds_now_and_moves_seldom() {
+        for (seconds, columns, most) in [(60, 120, 25), (60, 7, 25), (600, 120, 13), (86_400, 120, 2)] {
+            let views: Vec<View> = (0..600)
+                .map(|n| at("06:00:00") + SignedDuration::from_millis(100 * n))
+                .map(|now| {
+                    let view = View::live(now, seconds, columns);
+                    assert!(view.holds(now) && view.to <= now + HOP.max(view.step()), "{now}: {view:?}");
+                    view
+                })
+                .collect();
+            let moves = views.windows(2).filter(|pair| pair[0] != pair[1]).count();
+            assert!(moves <= most, "{seconds} s in {columns}: {moves} moves in a minute");
+        }
     }
 
     #[test]
