@@ -73,6 +73,13 @@ fn send_asks_before_it_changes_something() {
     assert!(code == Some(2) && said.contains("nothing was sent") && said.contains("--yes"), "{code:?} {said}");
     let (code, said) = run(&["send", &unit, "--yes", "01 06 00 05 00 07"]);
     assert!(code == Some(0) && said.contains("ok, after"), "{code:?} {said}");
+    for more in [&[][..], &["--force"], &["--as-is"]] {
+        let two = "00 01 00 00 00 06 01 03 00 00 00 01 00 02 00 00 00 06 01 06 00 05 00 07";
+        let (code, said) = run(&[&["send", &unit, two], more].concat());
+        assert!(code == Some(2) && said.contains("nothing was sent"), "a write behind a read: {code:?} {said}");
+    }
+    let (code, said) = run(&["send", &unit, "01 2B 0D 00 00"]);
+    assert!(code == Some(2) && said.contains("nothing was sent"), "CANopen may write: {code:?} {said}");
     let (code, said) = run(&["send", &unit, "--as-is", "55 55"]);
     assert!(code == Some(2) && said.contains("--yes"), "bytes that are no request may do anything: {code:?} {said}");
 }

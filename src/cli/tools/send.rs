@@ -30,9 +30,14 @@ pub struct Args {
     yes: bool,
 }
 
-/// Functions that change nothing in a device: the reads, exception status, event counter and log, server identification,
-/// file record, FIFO and device identification (V1.1b3, 6).
-const READS: [u8; 11] = [0x01, 0x02, 0x03, 0x04, 0x07, 0x0B, 0x0C, 0x11, 0x14, 0x18, 0x2B];
+/// Does a request change nothing in a device? The reads, exception status, event counter and log, server identification,
+/// file record, FIFO, and of 2B the device identification, because CANopen may write (V1.1b3, 6).
+fn is_read(message: &[u8]) -> bool {
+    match message.get(1) {
+        Some(0x2B) => message.get(2) == Some(&0x0E),
+        function => matches!(function, Some(0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18)),
+    }
+}
 
 /// Sends once; an answer that is no Modbus is shown all the same.
 pub fn main(args: Args) -> Result<(), CliError> {
@@ -53,9 +58,16 @@ pub fn main(args: Args) -> Result<(), CliError> {
         }
         (None, _) => (typed.bytes.clone(), frame::wrap(framing, 1, &typed.bytes)),
     };
-    refuse(&message, framing, &args)?;
+    let wrong = errors(&message, &frame, framing);
+    // Bytes that are to go out as they are may be anything.
+    if !wrong.is_empty() && !(args.as_is && message.is_empty()) {
+        if !args.force {
+            return Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", wrong.join("; "))));
+        }
+        wrong.iter().for_each(|error| say_error(&format!("--force: {error}")));
+    }
     let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
-    if !args.yes && message.get(1).is_none_or(|function| !READS.contains(function)) {
+    if !args.yes && !(wrong.is_empty() && is_read(&message)) {
         agree(&format!("{} on {}", dissection.summary, line.transport))?;
     }
     let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", dissection.summary)];
@@ -123,12 +135,8 @@ fn verdict(framing: Framing, request: &[u8], bytes: &[u8]) -> Result<String, Str
     }
 }
 
-/// What is wrong with a request stops it, unless forced.
-fn refuse(message: &[u8], framing: Framing, args: &Args) -> Result<(), CliError> {
-    // Bytes that are to go out as they are may be anything.
-    if args.as_is && message.is_empty() {
-        return Ok(());
-    }
+/// What is wrong with a request, and with what would go out behind it.
+fn errors(message: &[u8], frame: &[u8], framing: Framing) -> Vec<String> {
     let mut errors: Vec<String> = check_request(message, framing).into_iter().map(|error| error.to_string()).collect();
     if let (Framing::Rtu, Some((inner, check))) = (framing, message.split_last_chunk::<2>())
         && !errors.is_empty()
@@ -141,12 +149,9 @@ fn refuse(message: &[u8], framing: Framing, args: &Args) -> Result<(), CliError>
     if framing != Framing::Mbap && message.first() == Some(&0) && errors.is_empty() {
         errors.push("unit 0 is a broadcast: every unit on the line executes it and none responds".into());
     }
-    if errors.is_empty() {
-        return Ok(());
+    let behind = frame.len().saturating_sub(frame::wrap(framing, 1, message).len());
+    if 0 < behind {
+        errors.push(format!("{behind} bytes behind the first request: they may be another"));
     }
-    if args.force {
-        errors.iter().for_each(|error| say_error(&format!("sent all the same: {error}")));
-        return Ok(());
-    }
-    Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", errors.join("; "))))
+    errors
 }
