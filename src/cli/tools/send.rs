@@ -60,14 +60,16 @@ pub fn main(args: Args) -> Result<(), CliError> {
     };
     let wrong = errors(&message, &frame, framing);
     // Bytes that are to go out as they are may be anything.
-    if !wrong.is_empty() && !(args.as_is && message.is_empty()) {
+    let anything = args.as_is && message.is_empty();
+    if !wrong.is_empty() && !anything {
         if !args.force {
             return Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", wrong.join("; "))));
         }
         wrong.iter().for_each(|error| say_error(&format!("--force: {error}")));
     }
     let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
-    if !args.yes && !(wrong.is_empty() && is_read(&message)) {
+    let harmless = wrong.is_empty() && is_read(&message);
+    if !args.yes && !harmless {
         agree(&format!("{} on {}", dissection.summary, line.transport))?;
     }
     let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", dissection.summary)];
