@@ -60,12 +60,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
     };
     let wrong = errors(&message, &frame, framing);
     // Bytes that are to go out as they are may be anything.
-    let anything = args.as_is && message.is_empty();
-    if !wrong.is_empty() && !anything {
-        if !args.force {
-            return Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", wrong.join("; "))));
-        }
-        wrong.iter().for_each(|error| say_error(&format!("--force: {error}")));
+    if !(args.as_is && message.is_empty()) {
+        refuse(&wrong, args.force)?;
     }
     let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
     let harmless = wrong.is_empty() && is_read(&message);
@@ -135,6 +131,15 @@ fn verdict(framing: Framing, request: &[u8], bytes: &[u8]) -> Result<String, Str
         Err(fault @ Fault::Exception(_)) => Ok(fault.to_string()),
         Err(fault) => Err(fault.to_string()),
     }
+}
+
+/// What is wrong stops it, unless forced.
+fn refuse(wrong: &[String], force: bool) -> Result<(), CliError> {
+    if !wrong.is_empty() && !force {
+        return Err(CliError::Usage(format!("nothing was sent (--force sends it): {}", wrong.join("; "))));
+    }
+    wrong.iter().for_each(|error| say_error(&format!("--force: {error}")));
+    Ok(())
 }
 
 /// What is wrong with a request, and with what would go out behind it.
