@@ -1,5 +1,6 @@
 //! What the plant remembers: one thread writes it with DuckDB, another answers queries about it.
 
+pub mod tiers;
 pub mod series;
 pub mod alarm_state;
 pub mod words;

@@ -4,7 +4,10 @@ use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{Bucket, Series};
+use super::{
+    Bucket, Series,
+    tiers::{Part, Tier, floor},
+};
 use crate::{
     plant::{def::TagId, sample::Sample},
     report::step_series::{HoldInterval, IntervalStats, StepSeries},
@@ -19,6 +22,27 @@ pub struct Span {
     pub to: Timestamp,
     /// Nothing is known from here on: now, where the span reaches into the future.
     pub until: Timestamp,
+}
+
+/// The grid of a curve of at most `buckets` columns, and the widest aggregates that it may be made of: where these are
+/// minutes or hours, columns begin and end with them, and the span is a little longer than asked.
+pub fn grid(span: Span, buckets: usize) -> (Span, usize, Tier) {
+    let (from, to) = (span.from.as_microsecond(), span.to.as_microsecond());
+    let count = i64::try_from(buckets.max(1)).unwrap_or(i64::MAX);
+    let tier = Tier::within((to - from) / count);
+    let Some(step) = tier.step() else { return (span, buckets, tier) };
+    let from = floor(from, step);
+    let column = ceil_div(ceil_div(to - from, count), step) * step;
+    let count = ceil_div(to - from, column);
+    let instant = |micros| Timestamp::from_microsecond(micros).ok();
+    match (instant(from), instant(from + count * column)) {
+        (Some(from), Some(to)) => (Span { from, to, ..span }, usize::try_from(count).unwrap_or(buckets), tier),
+        _ => (span, buckets, Tier::Raw),
+    }
+}
+
+fn ceil_div(number: i64, by: i64) -> i64 {
+    -(-number).div_euclid(by)
 }
 
 /// Computes a curve of at most `buckets` columns. The samples come in order of time and begin
@@ -44,14 +68,14 @@ impl Curve {
     /// The next sample.
     pub fn next(&mut self, sample: Sample) {
         if let Some(piece) = self.steps.next(sample) {
-            self.add(piece);
+            self.add(Part::Held(piece));
         }
     }
 
     /// The curve, when the last sample has come.
     pub fn end(mut self) -> Series {
         if let Some(piece) = self.steps.clone().end() {
-            self.add(piece);
+            self.add(Part::Held(piece));
         }
         let Curve { tag, from, columns, stats, whole, steps: _ } = self;
         let bucket =
@@ -66,10 +90,20 @@ impl Curve {
         }
     }
 
-    fn add(&mut self, piece: HoldInterval) {
+    /// The next part: a value that stood, or an aggregate that lies in one column.
+    pub fn add(&mut self, part: Part) {
         let Curve { columns, stats, whole, .. } = self;
-        IntervalStats::add(whole, piece);
-        columns.cut(piece, |column, part| IntervalStats::add(&mut stats[column], part));
+        match part {
+            Part::Held(piece) => {
+                IntervalStats::add(whole, piece);
+                columns.cut(piece, |column, part| IntervalStats::add(&mut stats[column], part));
+            }
+            Part::Aggregate(aggregate) => {
+                let Ok(at) = Timestamp::from_microsecond(aggregate.at) else { return };
+                IntervalStats::add(whole, aggregate.stats);
+                IntervalStats::add(&mut stats[columns.column_of(at)], aggregate.stats);
+            }
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
     DECIMALS_UNKNOWN, RecordRow, SuppressedSummary, TagFigures,
-    step_series::{HoldInterval, IntervalStats, StepSeries, good_value},
+    step_series::{HoldInterval, IntervalStats, StepSeries, gain, good_value},
 };
 use crate::plant::{
     def::TagId,
@@ -78,13 +78,15 @@ impl Figures {
         }
     }
 
-    fn add(&mut self, span: HoldInterval) {
-        let last = self.stats.map_or(span.value, |stats| stats.last);
-        // A counter that shows less than half of its last value, but not less than nothing, was reset or has rolled over:
-        // it counts from zero. Any other step back is that of a balance, as of energy taken and fed back.
-        let reset = (0.0..last / 2.0).contains(&span.value);
-        self.counted += if reset { span.value } else { span.value - last };
-        IntervalStats::add(&mut self.stats, span);
+    /// The next span with a good value.
+    pub fn add(&mut self, span: HoldInterval) {
+        self.add_stats(span.value, span.into(), 0.0);
+    }
+
+    /// The next stretch of values, by its first one, its figures, and how far it counted from the first to the last.
+    pub fn add_stats(&mut self, first: f64, stats: IntervalStats, counted: f64) {
+        self.counted += self.stats.map_or(0.0, |stats| gain(stats.last, first)) + counted;
+        IntervalStats::add(&mut self.stats, stats);
     }
 
     /// The figures, when the last sample has come.

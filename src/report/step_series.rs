@@ -134,22 +134,38 @@ pub struct IntervalStats {
     pub seconds: f64,
 }
 
-impl IntervalStats {
-    /// Adds a span to what there is.
-    pub fn add(stats: &mut Option<IntervalStats>, span: HoldInterval) {
+impl From<HoldInterval> for IntervalStats {
+    fn from(span: HoldInterval) -> IntervalStats {
         let HoldInterval { value, .. } = span;
-        let seconds = span.seconds();
-        let Some(old) = stats else {
-            *stats = Some(IntervalStats { min: value, max: value, mean: value, last: value, seconds });
-            return;
-        };
-        old.seconds += seconds;
-        old.min = old.min.min(value);
-        old.max = old.max.max(value);
-        // Kept as a running mean, so that a constant stays exactly what it is; rounding never leaves the extremes.
-        old.mean = (old.mean + (value - old.mean) * (seconds / old.seconds)).clamp(old.min, old.max);
-        old.last = value;
+        IntervalStats { min: value, max: value, mean: value, last: value, seconds: span.seconds() }
     }
+}
+
+impl IntervalStats {
+    /// Adds those of a later span to what there is.
+    pub fn add(stats: &mut Option<IntervalStats>, later: impl Into<IntervalStats>) {
+        match stats {
+            Some(stats) => stats.merge(later.into()),
+            None => *stats = Some(later.into()),
+        }
+    }
+
+    /// Adds those of a later span.
+    pub fn merge(&mut self, later: IntervalStats) {
+        self.seconds += later.seconds;
+        self.min = self.min.min(later.min);
+        self.max = self.max.max(later.max);
+        // Kept as a running mean, so that a constant stays exactly what it is; rounding never leaves the extremes.
+        self.mean = (self.mean + (later.mean - self.mean) * (later.seconds / self.seconds)).clamp(self.min, self.max);
+        self.last = later.last;
+    }
+}
+
+/// How far a counter counted between two values. One that shows less than half of its last value, but not less than
+/// nothing, was reset or has rolled over: it counts from zero. Any other step back is that of a balance, as of energy taken
+/// and fed back.
+pub fn gain(last: f64, value: f64) -> f64 {
+    if (0.0..last / 2.0).contains(&value) { value } else { value - last }
 }
 
 /// A good value that is a number. A stored NaN or infinity is no value, whatever its quality says.

@@ -22,6 +22,8 @@ pub mod store;
 pub mod open;
 pub mod read;
 pub mod samples;
+pub mod archive;
+pub mod aggregates;
 pub mod report;
 pub mod alarm_metrics;
 pub mod chain;

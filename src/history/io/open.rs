@@ -111,13 +111,13 @@ impl Store {
         }
         let try_open = || {
             let unclean = files::has_log(path);
-            let store = Store::open_file(path, def)?;
+            let (store, archive) = Store::open_file(path, def, now)?;
             if unclean {
                 // A block that a checkpoint needs and cannot read would end every later one.
                 store.checkpoint().map_err(|error| failure(path, error))?;
             }
             let read = read(&store).map_err(|error| failure(path, error))?;
-            Ok((store, read))
+            Ok((store, archive, read))
         };
         let mut opened = try_open();
         for part in [Part::Log, Part::Everything] {
@@ -127,7 +127,7 @@ impl Store {
                 opened = try_open();
             }
         }
-        let (store, read) = opened.map_err(|failure| {
+        let (store, archive, read) = opened.map_err(|failure| {
             if fresh {
                 files::remove(path);
             }
@@ -137,7 +137,7 @@ impl Store {
             }
         })?;
         let missing = missing(&noted, &store.last_commit(), trouble.is_some());
-        let trouble = joined([&trouble, &missing]);
+        let trouble = joined([&trouble, &missing, &archive]);
         store.note_last_commit();
         drop(opening);
         Ok(Opened { store, trouble, read })
@@ -166,7 +166,8 @@ impl Store {
         Ok(store)
     }
 
-    fn open_file(path: &Path, def: &Arc<PlantDef>) -> Result<Store, Failure> {
+    /// Opens the file and compares it with its archive; with what is wrong with that, in words.
+    fn open_file(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<(Store, Option<String>), Failure> {
         let failed = |error: duckdb::Error| files::diagnose(path, &error.to_string());
         let db = connect(path, AccessMode::ReadWrite).map_err(failed)?;
         let mut store = Store::around(db, path, def);
@@ -175,13 +176,15 @@ impl Store {
         if sql::MIGRATIONS.len() < version as usize {
             return Err(Failure::Obstacle(other_schema(path, version)));
         }
+        let other = store.adopt_tags(now).map_err(|error| failure(path, error))?;
         store.register_tags().map_err(failed)?;
         if store.ids.contains(&None) {
             let words = "the file has 65536 tags, no more are possible: start a new one";
             return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
         }
+        let missing = store.adopt_files().map_err(|error| failure(path, error))?;
         store.read_last_commit().map_err(failed)?;
-        Ok(store)
+        Ok((store, joined([&other, &missing])))
     }
 
     fn migrate(&self) -> duckdb::Result<()> {

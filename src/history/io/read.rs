@@ -30,10 +30,19 @@ pub const ROWS_MAX: u64 = 200_000;
 /// Stored samples behind one answer: what is read in some seconds (see the bench `history`).
 pub const SAMPLES_MAX: u64 = 100_000_000;
 
+/// A query is answered once more so often at most, where the archive changed or a file of it could not be read.
+const CHANGES_MAX: u32 = 8;
+
 impl Store {
     /// Answers a query; nothing after `now` is known.
     pub fn answer(&self, query: &Query, now: Timestamp) -> Result<Answer, HistoryError> {
-        let answer = self.look_up(query, now);
+        let mut answer = self.look_up(query, now);
+        for _ in 0..CHANGES_MAX {
+            if !self.changed.take() {
+                break;
+            }
+            answer = self.look_up(query, now);
+        }
         if let Err(error) = &answer
             && is_damage(error)
         {
@@ -82,8 +91,12 @@ impl Store {
         check_span(span.from, span.to)?;
         self.bounded(tags.len(), span.from, span.to, span.until, SAMPLES_MAX)?;
         let tags = Distinct::new(tags);
+        let (span, buckets, tier) = series::grid(span, buckets);
         let mut curves: Vec<Curve> = tags.each.iter().map(|tag| Curve::new(*tag, span, buckets)).collect();
-        self.each_sample(&tags.each, span.from, span.to, |place, sample| curves[place].next(sample))?;
+        let known = (span.from, span.to.min(span.until));
+        if known.0 < known.1 {
+            self.each_part(&tags.each, known, tier, |place, part| curves[place].add(part))?;
+        }
         Ok(tags.all(curves.into_iter().map(Curve::end)))
     }
 
@@ -135,7 +148,9 @@ impl Store {
         params: &[&dyn duckdb::ToSql],
         read: fn(&Row) -> duckdb::Result<T>,
     ) -> Result<Vec<T>, HistoryError> {
-        let mut statement = self.db.prepare_cached(sql).map_err(engine)?;
+        // Not from the cache: after a change of the catalog, as by a temporary table, a cached statement reads garbage
+        // (measured).
+        let mut statement = self.db.prepare(sql).map_err(engine)?;
         let rows = statement.query_map(params, read).map_err(engine)?;
         rows.collect::<duckdb::Result<_>>().map_err(engine)
     }

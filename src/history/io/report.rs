@@ -1,5 +1,5 @@
-//! The report of a period: every sample is read once, for the figures of its tag, for the names and units that a device
-//! chooses, and for the record.
+//! The report of a period: figures from hours, minutes and samples, of which the names and units that a device chooses come
+//! too, and the record from the samples of its controller.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -16,10 +16,13 @@ use super::{
     store::{Store, utc},
 };
 use crate::{
-    history::HistoryError,
-    plant::{PlantDef, def::TagId, record::AlarmRecord, sample::Sample},
+    history::{
+        HistoryError,
+        tiers::{Aggregate, Part, Tier},
+    },
+    plant::{PlantDef, def::TagId, record::AlarmRecord},
     report::{
-        Period, ShiftReport,
+        Period, RecordRow, ShiftReport,
         figures::{self, Figures, TagDescription},
         step_series::ValuesAt,
     },
@@ -28,19 +31,19 @@ use crate::{
 /// What is gathered of one tag.
 struct Gathered {
     figures: Option<Figures>,
-    record: Option<ValuesAt>,
     latest_good: Option<f64>,
 }
 
 impl Gathered {
-    fn next(&mut self, sample: Sample) {
+    fn add(&mut self, part: Part) {
+        let (first, stats, gain) = match part {
+            Part::Held(held) => (held.value, held.into(), 0.0),
+            Part::Aggregate(Aggregate { stats, first, gain, .. }) => (first, stats, gain),
+        };
         if let Some(figures) = &mut self.figures {
-            figures.next(sample);
+            figures.add_stats(first, stats, gain);
         }
-        if let Some(record) = &mut self.record {
-            record.next(sample);
-        }
-        self.latest_good = sample.good_value().or(self.latest_good);
+        self.latest_good = Some(stats.last);
     }
 }
 
@@ -60,7 +63,6 @@ impl Store {
         let (def, reported) = (&*self.def, reported_tags(&self.def));
         let recorded = self.recorded(from, until)?;
         let tags = tags_to_read(def, &reported, recorded.as_ref());
-        self.bounded(tags.len(), from, until, now, SAMPLES_MAX)?;
         let active = self.active_at(from)?;
         let alarms = self.events(from, until)?;
         let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
@@ -71,24 +73,17 @@ impl Store {
         let shown: HashSet<TagId> = reported.iter().copied().collect();
         let gather = |tag: &TagId| Gathered {
             figures: shown.contains(tag).then(|| Figures::new(from, until)),
-            record: recorded
-                .as_ref()
-                .filter(|recorded| [recorded.sv, recorded.pv].contains(tag))
-                .map(|recorded| ValuesAt::new(recorded.instants.clone())),
             latest_good: None,
         };
         let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
-        let unreadable = self.each_sample(&tags, from, until, |place, sample| gathered[place].next(sample))?;
+        let unreadable = self.each_part(&tags, (from, until), Tier::Hour, |place, part| gathered[place].add(part))?;
         let latest: HashMap<TagId, f64> =
             tags.iter().zip(&gathered).filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?))).collect();
         let mut gathered: HashMap<TagId, Gathered> = tags.into_iter().zip(gathered).collect();
-        let mut as_of = |tag| gathered.get_mut(&tag).and_then(|tag| tag.record.take()).map(ValuesAt::end);
         let (record, record_of) = match recorded {
-            Some(Recorded { name, sv, pv, instants }) => {
-                let pv_stood = as_of(pv).unwrap_or_default();
-                let sv_stood = if sv == pv { pv_stood.clone() } else { as_of(sv).unwrap_or_default() };
-                let rows = figures::record(&instants, &sv_stood, &pv_stood);
-                (rows, Some((name, TagDescription::at(def.tag(pv), &latest).unit)))
+            Some(recorded) => {
+                let rows = self.record(&recorded, (from, until), now)?;
+                (rows, Some((recorded.name, TagDescription::at(def.tag(recorded.pv), &latest).unit)))
             }
             None => (Vec::new(), None),
         };
@@ -116,6 +111,22 @@ impl Store {
             record,
             record_of,
         })
+    }
+
+    fn record(
+        &self,
+        recorded: &Recorded,
+        (from, until): (Timestamp, Timestamp),
+        now: Timestamp,
+    ) -> Result<Vec<RecordRow>, HistoryError> {
+        let Recorded { sv, pv, instants, .. } = recorded;
+        let tags = if sv == pv { vec![*sv] } else { vec![*sv, *pv] };
+        self.bounded(tags.len(), from, until, now, SAMPLES_MAX)?;
+        let mut stood: Vec<ValuesAt> = tags.iter().map(|_| ValuesAt::new(instants.clone())).collect();
+        self.each_sample(&tags, from, until, |place, sample| stood[place].next(sample))?;
+        let stood: Vec<_> = stood.into_iter().map(ValuesAt::end).collect();
+        let [sv, pv] = [stood.first(), stood.last()].map(|stood| stood.map_or(&[][..], Vec::as_slice));
+        Ok(figures::record(instants, sv, pv))
     }
 
     /// The controller of the record and the instants of its rows.

@@ -11,12 +11,13 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
+    archive::{ArchiveFile, overlapping},
     read::within,
     sql,
     store::{Store, engine, instant, utc},
 };
 use crate::{
-    history::HistoryError,
+    history::{HistoryError, tiers::Tier},
     plant::{
         def::TagId,
         number::{to_i64, to_u32, to_u64},
@@ -45,11 +46,46 @@ struct Row {
     quality: u8,
 }
 
+/// What is handed over.
+enum Read {
+    /// A sample, with the place of its tag.
+    Sample(u32, Sample),
+    /// From then on nothing can be read of any tag.
+    Nothing(Timestamp),
+}
+
+/// Where the samples of a span lie.
+struct Sources {
+    /// In the table.
+    table: bool,
+    /// In these files.
+    files: Vec<ArchiveFile>,
+}
+
+impl Sources {
+    fn are_damaged(&self, error: &HistoryError) -> bool {
+        is_damage(error) || !self.files.is_empty() && is_damage_of_file(error)
+    }
+}
+
 /// What became of reading a piece.
 enum Piece {
     Whole,
     /// It has more rows than are held.
     TooLong,
+}
+
+/// Which stored numbers of tags are read, and where each stands among them.
+pub(super) struct Wanted {
+    places: Vec<u32>,
+    /// The condition in SQL.
+    pub(super) tags: String,
+}
+
+impl Wanted {
+    pub(super) fn place(&self, number: u16) -> Option<usize> {
+        Some(self.places[usize::from(number)]).filter(|place| *place != NONE).map(|place| place as usize)
+    }
 }
 
 impl Store {
@@ -63,13 +99,47 @@ impl Store {
         to: Timestamp,
         mut each: impl FnMut(usize, Sample),
     ) -> Result<Vec<Gap>, HistoryError> {
-        let (places, sql) = self.asked_for(tags);
-        let mut next = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN).as_microsecond();
-        let end = to.as_microsecond();
+        let all = 0..tags.len();
+        let gaps = self.each_row(&self.wanted(tags), from, to, |read| match read {
+            Read::Sample(place, sample) => each(place as usize, sample),
+            Read::Nothing(at) => all.clone().for_each(|place| each(place, Sample::bad(Cause::Unreadable, at))),
+        })?;
+        if let Some(at) = self.ended {
+            all.for_each(|place| each(place, Sample::bad(Cause::StationOff, at)));
+        }
+        Ok(gaps)
+    }
+
+    /// The same of all tags that are stored, each with its stored number.
+    pub(super) fn each_stored(
+        &self,
+        from: Timestamp,
+        to: Timestamp,
+        mut each: impl FnMut(u16, Sample),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        let all = Wanted { places: (0..=u32::from(u16::MAX)).collect(), tags: sql::of_tags(None) };
+        self.each_row(&all, from, to, |read| {
+            if let Read::Sample(place, sample) = read {
+                each(u16::try_from(place).unwrap_or(u16::MAX), sample);
+            }
+        })
+    }
+
+    fn each_row(
+        &self,
+        wanted: &Wanted,
+        from: Timestamp,
+        to: Timestamp,
+        mut each: impl FnMut(Read),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        let begin = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN).as_microsecond();
+        let (mut next, end) = (begin, to.as_microsecond());
         let gap_min = ((end - next) / GAP_PARTS).max(GAP_MIN);
         let (mut span, mut span_max) = (end - next, end - next);
         let (mut rows, mut gaps) = (Vec::new(), Vec::<Gap>::new());
-        if let Some((stored, micros)) = self.spread(to) {
+        let files = self.files(Some((Tier::Raw, next..end)))?;
+        let hot = self.oldest_in_table()?.unwrap_or(i64::MAX);
+        if let Some((stored, micros)) = self.spread(to)? {
             // Few rows need one piece, however close together they are: those of a start have one time.
             let of = |rows: f64| if rows < stored { to_i64(rows / stored * micros).max(1) } else { i64::MAX };
             (span, span_max) = (span.min(of(self.piece as f64)), of(SCANNED_ROWS));
@@ -78,26 +148,29 @@ impl Store {
             let to = next.saturating_add(span).min(end);
             // What happened at one instant is never cut.
             let max = if to - next > 1 { 2 * self.piece } else { usize::MAX };
-            match self.read(&sql, (next, to), &places, max, &mut rows) {
+            let sources = Sources { table: hot < to, files: overlapping(&files, &(next..to)) };
+            match self.read(wanted, &sources, (next, to), max, &mut rows) {
                 Ok(Piece::TooLong) => span = ((to - next) / 8).max(1),
                 Ok(Piece::Whole) => {
                     // Rows of one instant keep the order in which they were written.
                     if !rows.is_sorted_by_key(|row: &Row| row.micros) {
                         rows.sort_by_key(|row| row.micros);
                     }
-                    rows.iter().for_each(|row| row.hand_to(&mut each));
+                    rows.iter().filter_map(Row::sample).for_each(|(place, sample)| each(Read::Sample(place, sample)));
                     next = to;
-                    span = if rows.len() < self.piece / 8 { span.saturating_mul(8).min(span_max) } else { span };
+                    let longest = if sources.table { span_max } else { i64::MAX };
+                    span = if rows.len() < self.piece / 8 { span.saturating_mul(8).min(longest) } else { span };
                 }
-                Err(error) if is_damage(&error) && to - next > gap_min => span = ((to - next) / 8).max(gap_min),
-                Err(error) if is_damage(&error) => {
+                Err(error) if sources.are_damaged(&error) && self.are_replaced(&sources.files)? => return Err(error),
+                Err(error) if sources.are_damaged(&error) && to - next > gap_min => {
+                    span = ((to - next) / 8).max(gap_min)
+                }
+                Err(error) if sources.are_damaged(&error) => {
                     tracing::error!(?error, "a part of the history cannot be read");
                     let (Some(from), Some(until)) = (instant(next), instant(to)) else { return Err(error) };
                     // Each is in force no longer than any other sample.
                     let bad = std::iter::successors(Some(from), |at| at.checked_add(HOLD_MAX).ok());
-                    for at in bad.take_while(|at| *at < until) {
-                        (0..tags.len()).for_each(|place| each(place, Sample::bad(Cause::Unreadable, at)));
-                    }
+                    bad.take_while(|at| *at < until).for_each(|at| each(Read::Nothing(at)));
                     self.unreadable.replace(Some(format!("{from:.0} to {until:.0} cannot be read: {}", error.words())));
                     match gaps.last_mut().filter(|last| last.to == from) {
                         Some(last) => last.to = until,
@@ -108,15 +181,22 @@ impl Store {
                 Err(error) => return Err(error),
             }
         }
-        if let Some(at) = self.ended {
-            (0..tags.len()).for_each(|place| each(place, Sample::bad(Cause::StationOff, at)));
+        // An hour that was archived meanwhile was read neither here nor there.
+        if hot < end && self.files(Some((Tier::Raw, begin..end)))? != files {
+            self.changed.set(true);
         }
         Ok(gaps)
     }
 
-    /// The place of each stored number, and the query for their rows. A list of numbers is worth its cost where it
-    /// leaves most rows out.
-    fn asked_for(&self, tags: &[TagId]) -> (Vec<u32>, String) {
+    /// Whether one of these files was replaced by another while it was read.
+    fn are_replaced(&self, files: &[ArchiveFile]) -> Result<bool, HistoryError> {
+        let known = self.files(None)?;
+        self.changed.set(!files.iter().all(|file| known.contains(file)));
+        Ok(self.changed.get())
+    }
+
+    /// A list of numbers is worth its cost where it leaves most rows out.
+    pub(super) fn wanted(&self, tags: &[TagId]) -> Wanted {
         let numbers: Vec<Option<u16>> = tags.iter().map(|tag| self.id(*tag)).collect();
         let mut places = vec![NONE; usize::from(u16::MAX) + 1];
         for (place, number) in numbers.iter().enumerate() {
@@ -125,26 +205,32 @@ impl Store {
             }
         }
         let list: Vec<String> = numbers.iter().flatten().map(u16::to_string).collect();
-        let some = (2 * list.len() < self.ids.len()).then(|| list.join(", "));
-        (places, sql::samples(some.as_deref()))
+        let some = (2 * list.len() < self.ids.len()).then_some(list.as_slice());
+        Wanted { places, tags: sql::of_tags(some) }
     }
 
     fn read(
         &self,
-        sql: &str,
+        wanted: &Wanted,
+        sources: &Sources,
         (from, to): (i64, i64),
-        places: &[u32],
         max: usize,
         rows: &mut Vec<Row>,
     ) -> Result<Piece, HistoryError> {
         rows.clear();
         let (Some(from), Some(to)) = (instant(from), instant(to)) else { return Ok(Piece::Whole) };
+        if !sources.table && sources.files.is_empty() {
+            return Ok(Piece::Whole);
+        }
+        let files = (!sources.files.is_empty()).then(|| self.parquet(&sources.files));
+        let sql = sql::samples(&wanted.tags, sources.table, files.as_deref());
         // Not from the cache: a statement that is left before its end must go.
-        let mut statement = self.db.prepare(sql).map_err(engine)?;
+        let mut statement = self.db.prepare(&sql).map_err(engine)?;
         // The rows are fetched by `step`, because the stream itself panics where it meets an error.
         let _ = statement.stream_arrow(params![utc(from), utc(to)]).map_err(engine)?;
         while let Some(batch) = statement.step().map_err(engine)? {
-            push(&batch, places, rows).ok_or_else(|| HistoryError::Engine("unexpected columns of samples".into()))?;
+            let read = push(&batch, wanted, rows);
+            read.ok_or_else(|| HistoryError::Engine("unexpected columns of samples".into()))?;
             if rows.len() > max {
                 return Ok(Piece::TooLong);
             }
@@ -153,7 +239,7 @@ impl Store {
     }
 
     /// Refuses a query behind which more rows lie than can be answered in time, without counting them: as if the rows
-    /// of the file lay evenly over its period and its tags.
+    /// of the history lay evenly over its period and its tags.
     pub(super) fn bounded(
         &self,
         tags: usize,
@@ -170,14 +256,19 @@ impl Store {
     }
 
     /// The rows up to an instant and the microseconds that they lie in, about; `None` if that is not known.
-    fn spread(&self, to: Timestamp) -> Option<(f64, f64)> {
-        let (first, last) = self.period(to).ok()??;
-        Some((self.rows_about().ok()? as f64, (last - first).max(1) as f64))
+    fn spread(&self, to: Timestamp) -> Result<Option<(f64, f64)>, HistoryError> {
+        let Some((first, last)) = self.period(to)? else { return Ok(None) };
+        Ok(Some((self.rows_about()? as f64, (last - first).max(1) as f64)))
     }
 
-    /// Rows of the table of samples, as the engine believes.
+    /// Rows of samples, as the engine believes, and as the manifest knows.
     fn rows_about(&self) -> Result<u64, HistoryError> {
         self.db.query_row(sql::ROWS_ABOUT, [], |row| row.get(0)).map_err(engine)
+    }
+
+    /// When the oldest sample was stored that is not archived; microseconds.
+    fn oldest_in_table(&self) -> Result<Option<i64>, HistoryError> {
+        self.db.query_row(sql::OLDEST_IN_TABLE, [], |row| row.get(0)).map_err(engine)
     }
 
     /// About when the first sample was stored, and the last or `now`, in microseconds.
@@ -193,8 +284,8 @@ impl Store {
 }
 
 impl Row {
-    fn hand_to(&self, each: &mut impl FnMut(usize, Sample)) {
-        let Some(at) = instant(self.micros) else { return };
+    fn sample(&self) -> Option<(u32, Sample)> {
+        let at = instant(self.micros)?;
         // A number that no version wrote is no value.
         let quality = Quality::from_code(self.quality).unwrap_or(Quality::Bad(Cause::Corrupt));
         let sample = match (self.value, quality) {
@@ -202,22 +293,21 @@ impl Row {
             (None, Quality::Good) => Sample::bad(Cause::Corrupt, at),
             (None, Quality::Uncertain(cause)) | (_, Quality::Bad(cause)) => Sample::bad(cause, at),
         };
-        each(self.place as usize, sample);
+        Some((self.place, sample))
     }
 }
 
 /// Adds the rows of a batch that are asked for; `None` if its columns are not those of samples.
-fn push(batch: &StructArray, places: &[u32], rows: &mut Vec<Row>) -> Option<()> {
+fn push(batch: &StructArray, wanted: &Wanted, rows: &mut Vec<Row>) -> Option<()> {
     let [utc, tags, values, qualities] = batch.columns() else { return None };
     let micros = utc.as_primitive_opt::<TimestampMicrosecondType>()?.values();
     let tags = tags.as_primitive_opt::<UInt16Type>()?.values();
     let values = values.as_primitive_opt::<Float64Type>()?;
     let qualities = qualities.as_primitive_opt::<UInt8Type>()?.values();
     for (index, tag) in tags.iter().enumerate() {
-        let place = places[usize::from(*tag)];
-        if place != NONE {
+        if let Some(place) = wanted.place(*tag) {
             let value = values.is_valid(index).then(|| values.value(index));
-            rows.push(Row { micros: micros[index], value, place, quality: qualities[index] });
+            rows.push(Row { micros: micros[index], value, place: to_u32(place), quality: qualities[index] });
         }
     }
     Some(())
@@ -226,4 +316,10 @@ fn push(batch: &StructArray, places: &[u32], rows: &mut Vec<Row>) -> Option<()> 
 /// A block of the file cannot be read; what lies in other blocks can.
 pub(super) fn is_damage(error: &HistoryError) -> bool {
     matches!(error, HistoryError::Engine(words) if words.contains("checksum") || words.contains("Corrupt"))
+}
+
+/// A file of the archive cannot be read. Its damage has many names; what else can fail has few.
+pub(super) fn is_damage_of_file(error: &HistoryError) -> bool {
+    const OTHERS: [&str; 5] = ["INTERRUPT", "Interrupted", "Out of Memory", "Too many open files", "FATAL"];
+    matches!(error, HistoryError::Engine(words) if !OTHERS.iter().any(|other| words.contains(other)))
 }

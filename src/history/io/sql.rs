@@ -1,6 +1,8 @@
 //! The schema as numbered migrations, and the queries in SQL. Times are UTC; local time is Rust's business.
 
-use crate::plant::record::NOT_PROCESS_ACTIONS;
+use std::ops::Range;
+
+use crate::{history::tiers::Tier, plant::record::NOT_PROCESS_ACTIONS};
 
 /// The migrations; the schema's version is their number. Each runs in one transaction, followed by a checkpoint before
 /// any data, because data definitions among data in the log are what DuckDB's known recovery bugs need.
@@ -16,7 +18,10 @@ use crate::plant::record::NOT_PROCESS_ACTIONS;
 /// times, rows of two need not be.
 ///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
-pub const MIGRATIONS: [&str; 8] = [
+///
+/// `archive` is the manifest of the files in the archive, see there; `watched` are windows of ten minutes, by their number
+/// since 1970, in which archived samples lie.
+pub const MIGRATIONS: [&str; 9] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -71,6 +76,12 @@ UPDATE alarm_journal SET event = CASE event
     WHEN 'returned' || ' quietly' THEN 'RTN (suppressed)' WHEN 'raised again' THEN 're-alarmed'
     WHEN 'suppressed' THEN 'suppressed by design' WHEN 'released' THEN 'unsuppressed' ELSE event END;
 ",
+    "
+CREATE TABLE archive (
+    tier VARCHAR NOT NULL, path VARCHAR NOT NULL, from_utc TIMESTAMP NOT NULL, to_utc TIMESTAMP NOT NULL,
+    rows UBIGINT NOT NULL, bytes UBIGINT NOT NULL, sha256 VARCHAR NOT NULL);
+CREATE TABLE watched (ten_minutes BIGINT NOT NULL);
+",
 ];
 
 /// Columns of an alarm event, in the order that it is read.
@@ -113,26 +124,41 @@ pub const END_CURVES: &str = "INSERT INTO sample
     SELECT ?, tag, NULL, ?, ? FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= ? GROUP BY tag)
     WHERE last < 128";
 
-/// Samples in a span, of some stored numbers of tags or of all, in the order in which they were written.
-pub fn samples(tags: Option<&str>) -> String {
-    let some = match tags {
+/// Samples in a span, of some stored numbers of tags or of all, from the table or from files as well, each in the order in
+/// which they were written.
+pub fn samples(tags: &str, table: bool, files: Option<&str>) -> String {
+    let from =
+        |source: &str| format!("SELECT utc, tag, value, quality FROM {source} WHERE utc >= $1 AND utc < $2{tags}");
+    let sources = files.into_iter().chain(table.then_some("sample"));
+    sources.map(from).collect::<Vec<_>>().join(" UNION ALL ")
+}
+
+/// The condition for some stored numbers of tags; for all of them without a list.
+pub fn of_tags(list: Option<&[String]>) -> String {
+    match list {
         None => String::new(),
-        Some("") => " AND false".into(),
-        Some(list) => format!(" AND tag IN ({list})"),
-    };
-    format!("SELECT utc, tag, value, quality FROM sample WHERE utc >= ? AND utc < ?{some}")
+        Some([]) => " AND false".into(),
+        Some(list) => format!(" AND tag IN ({})", list.join(", ")),
+    }
 }
 /// Rows of the table of samples, from what the engine keeps of it: nothing is read.
-pub const ROWS_ABOUT: &str = "SELECT estimated_size FROM duckdb_tables() WHERE table_name = 'sample'";
+pub const ROWS_ABOUT: &str =
+    "SELECT estimated_size + (SELECT coalesce(sum(rows), 0) FROM archive WHERE tier = 'raw')::BIGINT
+    FROM duckdb_tables() WHERE table_name = 'sample'";
+/// When the oldest sample of the table was stored.
+pub const OLDEST_IN_TABLE: &str = "SELECT min(utc) FROM sample";
 /// When the first sample in the file was stored.
 pub const FIRST_STORED: &str = "SELECT epoch_us(utc) FROM sample LIMIT 1";
 /// The first and the last instant of the journal.
 pub const JOURNALED: &str = "SELECT min(utc), max(utc) FROM alarm_journal";
 
-/// The windows of ten minutes, by their number since 1970, in which a line or an alarm did anything: in these a station ran.
+/// The windows of ten minutes, by their number since 1970, in which a line or an alarm did anything, or which are archived: in
+/// these a station ran.
 pub const WATCHED_BY_LINES: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
         SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
-        UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2)
+        UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2
+        UNION ALL SELECT make_timestamp(ten_minutes * 600000000) FROM watched
+            WHERE ten_minutes >= epoch_us($1) // 600000000 AND ten_minutes < (epoch_us($2) + 599999999) // 600000000)
     ORDER BY 1 LIMIT $3";
 
 /// The same by the samples, which are far more rows.
@@ -212,3 +238,104 @@ pub const LINE_MINUTES: &str = "SELECT * FROM (
     SELECT utc, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes,
         utilisation, reply_p99_ms, reply_max_ms
     FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";
+
+/// How files of the archive are written: version 1, which every engine reads.
+pub const PARQUET: &str = "FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE 122880";
+
+/// When the oldest sample was stored that is not archived, from an instant on.
+pub const OLDEST_SAMPLE: &str = "SELECT min(utc) FROM sample WHERE utc >= ?";
+
+/// The files of the archive, oldest first.
+pub const FILES: &str =
+    "SELECT tier, path, from_utc, to_utc, rows, bytes, sha256 FROM archive ORDER BY from_utc, to_utc, rowid";
+/// Enters a file.
+pub const ENTER_FILE: &str = "INSERT INTO archive VALUES (?, ?, ?, ?, ?, ?, ?)";
+/// Removes one.
+pub const REMOVE_FILE: &str = "DELETE FROM archive WHERE path = ?";
+/// The windows of ten minutes in which samples lie that are about to be archived.
+pub const ENTER_WATCHED: &str = "INSERT INTO watched SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample
+    WHERE utc >= $1 AND utc < $2 AND epoch_us(utc) // 600000000 NOT IN (FROM watched)";
+/// Deletes the samples of a span.
+pub const DELETE_SAMPLES: &str = "DELETE FROM sample WHERE utc >= ? AND utc < ?";
+/// Widens what is known to be stored.
+pub const WIDEN: &str = "UPDATE last_commit SET
+    first_utc = least(coalesce(first_utc, $1), $1), last_utc = greatest(coalesce(last_utc, $2), $2)";
+
+/// Columns of a file of a tier.
+pub fn columns(tier: Tier) -> &'static str {
+    match tier {
+        Tier::Raw => "utc, tag, value, quality, epoch",
+        Tier::Minute | Tier::Hour => "utc, tag, min, max, mean, first, last, gain, good_ms, n",
+    }
+}
+
+/// The tables in which minutes and hours are formed.
+pub const FORMED: [&str; 2] = ["m1_formed", "h1_formed"];
+
+/// Makes them, of this connection alone. `gain` is how far a counter counted from the first value to the last, `good_ms` for
+/// how long the values were good, `n` how many samples were stored.
+pub fn form_tables() -> String {
+    let columns = "utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, min DOUBLE NOT NULL, max DOUBLE NOT NULL, mean DOUBLE NOT NULL,
+        first DOUBLE NOT NULL, last DOUBLE NOT NULL, gain DOUBLE NOT NULL, good_ms UINTEGER NOT NULL, n UINTEGER NOT NULL";
+    FORMED.map(|table| format!("CREATE OR REPLACE TEMP TABLE {table} ({columns});")).concat()
+}
+
+fn within(span: &Range<i64>) -> String {
+    format!("utc >= make_timestamp({}) AND utc < make_timestamp({})", span.start, span.end)
+}
+
+/// The samples of a span as they are archived: in whole milliseconds.
+pub fn samples_of(span: &Range<i64>) -> String {
+    format!(
+        "SELECT date_trunc('millisecond', utc) AS utc, tag, value, quality, epoch FROM sample WHERE {}",
+        within(span)
+    )
+}
+
+/// What was formed of a span.
+pub fn formed(tier: Tier, span: &Range<i64>) -> String {
+    let [minutes, hours] = FORMED;
+    let table = if tier == Tier::Hour { hours } else { minutes };
+    format!("SELECT {} FROM {table} WHERE {}", columns(tier), within(span))
+}
+
+/// The rows of a file with those of a span replaced by what was formed of it.
+pub fn others(tier: Tier, file: &str, span: &Range<i64>) -> String {
+    let (columns, formed) = (columns(tier), formed(tier, span));
+    format!("SELECT * FROM (SELECT {columns} FROM {file} WHERE NOT ({}) UNION ALL {formed})", within(span))
+}
+
+/// The order of rows in files.
+pub const HOUR_BY_HOUR: &str = "ORDER BY time_bucket(INTERVAL 1 HOUR, utc), tag, utc";
+
+/// An hour of files that overlap.
+pub fn hour_of(tier: Tier, files: &str, hour: &Range<i64>) -> String {
+    let columns = columns(tier);
+    let last = if tier == Tier::Raw { ", epoch" } else { "" };
+    format!("(SELECT {columns} FROM {files} WHERE {} ORDER BY tag, utc{last})", within(hour))
+}
+
+/// Rows of files in a span.
+pub fn count_rows_of(files: &str, span: &Range<i64>) -> String {
+    format!("SELECT count(*) FROM {files} WHERE {}", within(span))
+}
+
+/// Samples in a span that are not archived.
+pub fn count_samples(span: &Range<i64>) -> String {
+    count_rows_of("sample", span)
+}
+
+/// Tags of a dictionary whose numbers mean other tags here.
+pub fn other_tags(dictionary: &str) -> String {
+    format!("SELECT count(*) FROM {dictionary} d JOIN tag USING (id) WHERE d.name <> tag.name OR d.unit <> tag.unit")
+}
+
+/// Takes over the tags of a dictionary that are not known here.
+pub fn missing_tags(dictionary: &str) -> String {
+    format!("INSERT INTO tag SELECT id, name, unit FROM {dictionary} WHERE id NOT IN (SELECT id FROM tag)")
+}
+
+/// Rows of aggregates in a span.
+pub fn aggregates(files: &str, tags: &str) -> String {
+    format!("SELECT {} FROM {files} WHERE utc >= $1 AND utc < $2{tags}", columns(Tier::Minute))
+}

@@ -2,6 +2,7 @@
 
 use std::{
     cell::{Cell, RefCell},
+    collections::BTreeSet,
     path::{Path, PathBuf},
     sync::{Arc, Weak},
     time::Duration,
@@ -20,7 +21,7 @@ use super::{
     sql,
 };
 use crate::{
-    history::HistoryError,
+    history::{HistoryError, tiers::in_milliseconds},
     plant::{
         def::PlantDef,
         line_minute::LineMinute,
@@ -34,7 +35,7 @@ use crate::{
 pub struct Store {
     pub(super) db: Connection,
     pub(super) def: Arc<PlantDef>,
-    path: PathBuf,
+    pub(super) path: PathBuf,
     /// The first and last instant stored, kept because reading them scans the whole file.
     extent: Cell<Option<(Timestamp, Timestamp)>>,
     /// The last commit, as the database itself has it, and the epoch that it ended in.
@@ -50,6 +51,10 @@ pub struct Store {
     pub(super) piece: usize,
     /// What could not be read of the file, until it is reported.
     pub(super) unreadable: RefCell<Option<String>>,
+    /// Files of the archive that could not be read: what lies beneath them answers.
+    pub(super) avoided: RefCell<BTreeSet<String>>,
+    /// The archive is not what it was when a query began: it is answered once more.
+    pub(super) changed: Cell<bool>,
     /// Shared with every clone, and dropped after their connections: while one is left, the file is not closed.
     alive: Arc<()>,
 }
@@ -151,6 +156,8 @@ impl Store {
             ended: None,
             piece: PIECE,
             unreadable: RefCell::default(),
+            avoided: RefCell::default(),
+            changed: Cell::default(),
             alive: Arc::default(),
         }
     }
@@ -220,7 +227,7 @@ impl Store {
         Ok(())
     }
 
-    fn transaction<T>(&self, work: impl FnOnce() -> duckdb::Result<T>) -> Result<T, HistoryError> {
+    pub(super) fn transaction<T>(&self, work: impl FnOnce() -> duckdb::Result<T>) -> Result<T, HistoryError> {
         let rollback = || self.db.execute_batch("ROLLBACK");
         let begin = || self.db.execute_batch("BEGIN");
         // A rollback that had no memory has left the last transaction open.
@@ -261,7 +268,7 @@ impl Store {
             }
         }
         self.append_rows("sample", samples, |to, (id, &Sample { at, value, quality })| {
-            to.append_row((utc(at), id, value, quality.code(), epoch))
+            to.append_row((utc(in_milliseconds(at)), id, value, quality.code(), epoch))
         })?;
         self.append_rows("alarm_journal", alarms, |to, alarm| append_alarm(to, alarm, epoch))?;
         self.remove_unsealed(&actions)?;

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    history::series::{Curve, Span},
+    history::series::{Curve, Span, grid},
     plant::sample::Quality,
     report::{figures::Figures, figures::TagDescription, step_series::HOLD_MAX},
 };
@@ -47,10 +47,11 @@ proptest! {
         let until = to - Duration::from_secs(1);
         let tags = [2, 0, 2, 1].map(TagId);
         let query = Query::Series { tags: tags.to_vec(), from, to, buckets };
-        let samples = |tag| by_itself(&store, tag).into_iter().filter(|s| from - HOLD_MAX <= s.at && s.at < to);
+        let samples = |tag, from: Timestamp| by_itself(&store, tag).into_iter().filter(move |s| from - HOLD_MAX <= s.at && s.at < to);
         let curve = |tag| {
-            let mut curve = Curve::new(tag, Span { from, to, until }, buckets);
-            samples(tag).for_each(|sample| curve.next(sample));
+            let (span, buckets, _) = grid(Span { from, to, until }, buckets);
+            let mut curve = Curve::new(tag, span, buckets);
+            samples(tag, span.from).for_each(|sample| curve.next(sample));
             curve.end()
         };
         prop_assert_eq!(store.answer(&query, until), Ok(Answer::Series(tags.map(curve).to_vec())));
@@ -59,7 +60,7 @@ proptest! {
             let Ok(Answer::Report(report)) = store.answer(&Query::Report { period }, until) else { panic!("no report") };
             for (place, row) in report.tags.iter().enumerate() {
                 let mut figures = Figures::new(from, until);
-                samples(TagId(place as u16)).filter(|s| s.at < until).for_each(|sample| figures.next(sample));
+                samples(TagId(place as u16), from).filter(|s| s.at < until).for_each(|sample| figures.next(sample));
                 let label = TagDescription { tag: row.tag.clone(), unit: row.unit.clone(), decimals: row.decimals, counts: false };
                 prop_assert_eq!(row, &figures.end(label, Duration::ZERO));
             }

@@ -1,0 +1,147 @@
+//! Curves and figures over any span: aggregates where closed hours keep them, samples elsewhere.
+
+use std::{collections::BTreeSet, ops::Range};
+
+use duckdb::{
+    arrow::{
+        array::{AsArray, StructArray},
+        datatypes::{Float64Type, TimestampMicrosecondType, UInt16Type, UInt32Type},
+    },
+    params,
+};
+use jiff::Timestamp;
+
+use super::{
+    archive::ArchiveFile,
+    samples::{Wanted, is_damage_of_file},
+    sql,
+    store::{Store, engine, instant, utc},
+};
+use crate::{
+    history::{
+        HistoryError,
+        tiers::{Aggregate, Part, Tier, pieces},
+    },
+    plant::def::TagId,
+    report::{
+        Gap,
+        step_series::{IntervalStats, StepSeries},
+    },
+};
+
+impl Store {
+    /// Hands over the good values of some different tags in a span, each tag's parts in order of time, with the place of
+    /// the tag in `tags`; aggregates of `widest` at most. Returns what could not be read.
+    pub(super) fn each_part(
+        &self,
+        tags: &[TagId],
+        (from, to): (Timestamp, Timestamp),
+        widest: Tier,
+        mut each: impl FnMut(usize, Part),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        let avoided = self.avoided.borrow().clone();
+        let kept: Vec<(Tier, Vec<Range<i64>>)> =
+            Tier::ALL.into_iter().map(|tier| Ok((tier, self.kept(tier, &avoided)?))).collect::<Result<_, _>>()?;
+        let kept = |tier| kept.iter().find(|(one, _)| *one == tier).map_or_else(Vec::new, |(_, spans)| spans.clone());
+        let mut gaps = Vec::new();
+        for piece in pieces(from.as_microsecond(), to.as_microsecond(), widest, &kept) {
+            let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { continue };
+            if piece.tier != Tier::Raw {
+                self.each_aggregate(tags, piece.tier, (from, to), &mut each)?;
+                continue;
+            }
+            let mut steps = vec![StepSeries::new(from, to); tags.len()];
+            gaps.extend(self.each_sample(tags, from, to, |place, sample| {
+                if let Some(held) = steps[place].next(sample) {
+                    each(place, Part::Held(held));
+                }
+            })?);
+            for (place, steps) in steps.into_iter().enumerate() {
+                if let Some(held) = steps.end() {
+                    each(place, Part::Held(held));
+                }
+            }
+        }
+        Ok(gaps)
+    }
+
+    /// The spans that the files of a tier cover, sorted; without those that could not be read.
+    fn kept(&self, tier: Tier, avoided: &BTreeSet<String>) -> Result<Vec<Range<i64>>, HistoryError> {
+        let files = self.files(None)?;
+        let files = files.iter().filter(|file| file.tier == tier && !avoided.contains(&file.path));
+        let mut spans: Vec<Range<i64>> = Vec::new();
+        for file in files {
+            match spans.last_mut().filter(|last| file.from <= last.end) {
+                Some(last) => last.end = last.end.max(file.to),
+                None => spans.push(file.from..file.to),
+            }
+        }
+        Ok(spans)
+    }
+
+    fn each_aggregate(
+        &self,
+        tags: &[TagId],
+        tier: Tier,
+        (from, to): (Timestamp, Timestamp),
+        each: &mut impl FnMut(usize, Part),
+    ) -> Result<(), HistoryError> {
+        let wanted = self.wanted(tags);
+        for file in self.files(Some((tier, from.as_microsecond()..to.as_microsecond())))? {
+            let read = self.read_aggregates(&file, &wanted, (from, to), each);
+            if let Err(error) = &read
+                && is_damage_of_file(error)
+            {
+                // The query is answered once more, from what lies beneath.
+                if self.is_known(&file)? {
+                    tracing::error!(?error, path = file.path, "a file of the archive cannot be read");
+                    self.unreadable.replace(Some(format!("{} cannot be read: {}", file.path, error.words())));
+                    self.avoided.borrow_mut().insert(file.path);
+                }
+                self.changed.set(true);
+            }
+            read?;
+        }
+        Ok(())
+    }
+
+    fn read_aggregates(
+        &self,
+        file: &ArchiveFile,
+        wanted: &Wanted,
+        (from, to): (Timestamp, Timestamp),
+        each: &mut impl FnMut(usize, Part),
+    ) -> Result<(), HistoryError> {
+        let sql = sql::aggregates(&self.parquet(std::slice::from_ref(file)), &wanted.tags);
+        let mut statement = self.db.prepare(&sql).map_err(engine)?;
+        // By `step`, see `samples`.
+        let _ = statement.stream_arrow(params![utc(from), utc(to)]).map_err(engine)?;
+        while let Some(batch) = statement.step().map_err(engine)? {
+            let handed = hand_over(&batch, wanted, each);
+            handed.ok_or_else(|| HistoryError::Engine("unexpected columns of aggregates".into()))?;
+        }
+        Ok(())
+    }
+}
+
+/// Hands over the rows of a batch; `None` if its columns are not those of aggregates.
+fn hand_over(batch: &StructArray, wanted: &Wanted, each: &mut impl FnMut(usize, Part)) -> Option<()> {
+    let [utc, tags, min, max, mean, first, last, gain, good, samples] = batch.columns() else { return None };
+    let micros = utc.as_primitive_opt::<TimestampMicrosecondType>()?.values();
+    let tags = tags.as_primitive_opt::<UInt16Type>()?.values();
+    let mut numbers = Vec::new();
+    for column in [min, max, mean, first, last, gain] {
+        numbers.push(column.as_primitive_opt::<Float64Type>()?.values());
+    }
+    let [min, max, mean, first, last, gain] = numbers[..] else { return None };
+    let good = good.as_primitive_opt::<UInt32Type>()?.values();
+    let samples = samples.as_primitive_opt::<UInt32Type>()?.values();
+    for (row, tag) in tags.iter().enumerate() {
+        let Some(place) = wanted.place(*tag) else { continue };
+        let seconds = f64::from(good[row]) / 1_000.0;
+        let stats = IntervalStats { min: min[row], max: max[row], mean: mean[row], last: last[row], seconds };
+        let aggregate = Aggregate { at: micros[row], stats, first: first[row], gain: gain[row], samples: samples[row] };
+        each(place, Part::Aggregate(aggregate));
+    }
+    Some(())
+}

@@ -1,0 +1,125 @@
+//! A closed hour: its samples into a file, its minutes and hours beside it, and out of the database.
+
+use std::{collections::HashMap, ops::Range};
+
+use duckdb::params;
+
+use super::{ArchiveFile, Steps, Written, overlapping};
+use crate::{
+    history::{
+        HistoryError,
+        io::{
+            sql,
+            store::{Store, engine, instant, utc},
+        },
+        tiers::{Aggregate, HOUR, Hours, Minutes, Tier},
+    },
+    plant::sample::Sample,
+};
+
+/// The aggregates of one tag under way.
+struct Forming {
+    minutes: Minutes,
+    hours: Hours,
+}
+
+impl Store {
+    /// Archives the samples of an hour. Where files have it already, those came late, after a clock that was set back or
+    /// by an import: they get a file of their own, and what was formed of the hour is formed again.
+    pub(super) fn archive_hour(&self, hour: i64, steps: Steps) -> Result<(), HistoryError> {
+        let span = hour..hour + HOUR;
+        let late = !self.files(Some((Tier::Raw, span.clone())))?.is_empty();
+        let samples = sql::samples_of(&span);
+        let raw = self.write_file(Tier::Raw, span.clone(), &samples, "ORDER BY tag, utc, rowid")?;
+        let rows = raw.as_ref().map_or(0, |raw| raw.file.rows);
+        steps("samples written")?;
+        // The first minutes of the next hour begin with values of this one.
+        let formed = if late { hour..hour + 2 * HOUR } else { span.clone() };
+        self.form(formed.clone())?;
+        steps("aggregates formed")?;
+        let (mut new, mut old) = (Vec::from_iter(raw), Vec::new());
+        for tier in [Tier::Minute, Tier::Hour] {
+            let replaced = self.files(Some((tier, formed.clone())))?;
+            new.extend(self.write_aggregates(tier, &formed, &replaced)?);
+            old.extend(replaced);
+        }
+        steps("aggregates written")?;
+        self.write_tags()?;
+        // The samples last: with their file an hour is whole, see `adopt`.
+        new.reverse();
+        let new: Vec<ArchiveFile> = new.into_iter().map(Written::rename).collect::<Result<_, _>>()?;
+        steps("renamed")?;
+        let within = [span.start, span.end].map(|at| instant(at).map(utc));
+        self.enter(&new, &old, || {
+            self.db.execute(sql::ENTER_WATCHED, params![within[0], within[1]])?;
+            let deleted = self.db.execute(sql::DELETE_SAMPLES, params![within[0], within[1]])?;
+            // What came meanwhile is not in the file: all of it once more.
+            if deleted as u64 == rows { Ok(()) } else { Err(duckdb::Error::StatementChangedRows(deleted)) }
+        })?;
+        steps("entered")?;
+        self.remove_files(&old);
+        Ok(())
+    }
+
+    /// Forms the minutes and hours of a span in two tables of this connection.
+    fn form(&self, span: Range<i64>) -> Result<(), HistoryError> {
+        let (Some(from), Some(to)) = (instant(span.start), instant(span.end)) else { return Ok(()) };
+        self.db.execute_batch(&sql::form_tables()).map_err(engine)?;
+        let mut minutes = self.db.appender(sql::FORMED[0]).map_err(engine)?;
+        let mut hours = self.db.appender(sql::FORMED[1]).map_err(engine)?;
+        let mut failed = None;
+        let mut append = |to: &mut duckdb::Appender, tag: u16, row: Aggregate| {
+            let Aggregate { at, stats, first, gain, samples } = row;
+            let (at, good_ms) = (instant(at).map(utc), (stats.seconds * 1_000.0).round());
+            let appended = to.append_row(params![
+                at, tag, stats.min, stats.max, stats.mean, first, stats.last, gain, good_ms, samples
+            ]);
+            failed = failed.take().or(appended.err());
+        };
+        let mut tags: HashMap<u16, Forming> = HashMap::new();
+        let begin = || Forming { minutes: Minutes::new(from, to), hours: Hours::default() };
+        let gaps = self.each_stored(from, to, |tag: u16, sample: Sample| {
+            let Forming { minutes: forming, hours: formed } = tags.entry(tag).or_insert_with(begin);
+            forming.next(sample, |minute| {
+                append(&mut minutes, tag, minute);
+                formed.next(minute).into_iter().for_each(|hour| append(&mut hours, tag, hour));
+            });
+        })?;
+        for (tag, Forming { minutes: forming, hours: mut formed }) in tags {
+            forming.end(|minute| {
+                append(&mut minutes, tag, minute);
+                formed.next(minute).into_iter().for_each(|hour| append(&mut hours, tag, hour));
+            });
+            formed.end().into_iter().for_each(|hour| append(&mut hours, tag, hour));
+        }
+        match failed {
+            Some(error) => return Err(engine(error)),
+            None => minutes.flush().and_then(|()| hours.flush()).map_err(engine)?,
+        }
+        match gaps.first() {
+            None => Ok(()),
+            Some(gap) => Err(HistoryError::Engine(format!("{:.0} cannot be read: {}", gap.from, gap.why))),
+        }
+    }
+
+    /// What was formed of an hour, and perhaps of the next one, as files: one of its own, or those that have it already
+    /// written again.
+    fn write_aggregates(
+        &self,
+        tier: Tier,
+        formed: &Range<i64>,
+        replaced: &[ArchiveFile],
+    ) -> Result<Vec<Written>, HistoryError> {
+        let mut written = Vec::new();
+        for file in replaced {
+            let within = formed.start.max(file.from)..formed.end.min(file.to);
+            let others = sql::others(tier, &self.parquet(std::slice::from_ref(file)), &within);
+            written.extend(self.write_file(tier, file.from..file.to, &others, sql::HOUR_BY_HOUR)?);
+        }
+        let hour = formed.start..formed.start + HOUR;
+        if overlapping(replaced, &hour).is_empty() {
+            written.extend(self.write_file(tier, hour.clone(), &sql::formed(tier, &hour), "ORDER BY tag, utc")?);
+        }
+        Ok(written)
+    }
+}
