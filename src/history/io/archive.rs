@@ -82,18 +82,16 @@ pub enum Job {
 pub type Steps<'a> = &'a mut dyn FnMut(&'static str) -> Result<(), HistoryError>;
 
 impl Store {
-    /// Does what is due in the archive: one job at most, the oldest first. Hours before `after` could not be archived.
-    /// `None` if there was nothing to do.
-    pub fn archive(&self, now: Timestamp, after: Timestamp, steps: Steps) -> Result<Option<Job>, HistoryError> {
-        let Some(job) = self.next_job(now, after)? else { return Ok(None) };
-        match &job {
-            Job::Hour(hour) => self.archive_hour(*hour, steps)?,
-            Job::Merge(tier, span) => self.merge_files(*tier, span.clone(), steps)?,
+    /// Does a job.
+    pub fn archive(&self, job: &Job, steps: Steps) -> Result<(), HistoryError> {
+        match job {
+            Job::Hour(hour) => self.archive_hour(*hour, steps),
+            Job::Merge(tier, span) => self.merge_files(*tier, span.clone(), steps),
         }
-        Ok(Some(job))
     }
 
-    fn next_job(&self, now: Timestamp, after: Timestamp) -> Result<Option<Job>, HistoryError> {
+    /// What is due in the archive, the oldest first; without hours before `after`, which could not be archived.
+    pub fn archive_due(&self, now: Timestamp, after: Timestamp) -> Result<Option<Job>, HistoryError> {
         let closed = now.checked_sub(GRACE).unwrap_or(now).as_microsecond();
         let oldest: Option<i64> =
             self.db.query_row(sql::OLDEST_SAMPLE, params![utc(after)], |row| row.get(0)).map_err(engine)?;

@@ -23,6 +23,7 @@ pub mod open;
 pub mod read;
 pub mod samples;
 pub mod archive;
+pub mod archiver;
 pub mod aggregates;
 pub mod report;
 pub mod alarm_metrics;

@@ -196,7 +196,7 @@ async fn commit_first(writer: &mpsc::Sender<Request>) {
 }
 
 /// Interrupts work until it has ended.
-async fn stop<T>(work: &mut JoinHandle<T>, interrupt: impl Fn()) {
+pub(super) async fn stop<T>(work: &mut JoinHandle<T>, interrupt: impl Fn()) {
     loop {
         interrupt();
         if timeout(INTERRUPT_EVERY, &mut *work).await.is_ok() {

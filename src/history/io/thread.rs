@@ -9,7 +9,9 @@ use tokio::{
 };
 
 use super::{
-    QueryRequest, files,
+    QueryRequest,
+    archiver::Archiver,
+    files,
     open::{Opened, Restored},
     reader::{Answerer, QUESTIONS_MAX, Reader, Request},
     store::Store,
@@ -146,6 +148,7 @@ async fn run(
     outputs: &mut Outputs,
 ) -> Option<Opening> {
     let mut opening = None;
+    let mut archiver = Archiver::new(commit_every);
     let mut tick = tokio::time::interval(commit_every);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -157,6 +160,11 @@ async fn run(
             biased;
             _ = tick.tick() => {
                 writer.commit(clock.utc());
+                archiver.begin(writer.store().ok(), clock.utc());
+                outputs.publish(writer);
+            }
+            failed = archiver.ended() => {
+                writer.archived(failed);
                 outputs.publish(writer);
             }
             result = opened(&mut opening) => {
@@ -164,7 +172,10 @@ async fn run(
                 outputs.publish(writer);
             }
             batch = records.recv() => {
-                let Some(batch) = batch else { return opening };
+                let Some(batch) = batch else {
+                    archiver.stop().await;
+                    return opening;
+                };
                 if writer.accept(batch) {
                     writer.commit(clock.utc());
                     outputs.publish(writer);

@@ -59,6 +59,8 @@ pub struct Writer {
     failing: Option<String>,
     /// What was wrong with the last checkpoint; goes with the next good one.
     unchecked: Option<String>,
+    /// Why the last job of the archive failed; goes with the next good one.
+    unarchived: Option<String>,
     /// What a query could not read; stays until the station ends.
     unreadable: Option<String>,
     /// A store was open before.
@@ -242,6 +244,12 @@ impl Writer {
         self.describe();
     }
 
+    /// Notes how a job of the archive ended.
+    pub fn archived(&mut self, failed: Option<HistoryError>) {
+        self.unarchived = failed.map(|error| format!("it is not archived: {}", error.words()));
+        self.describe();
+    }
+
     /// The orderly end: everything stored, every curve ended, the log written into the file.
     pub fn finish(&mut self, now: Timestamp) {
         // Some tries, because this is the last chance; what still fails is lost, and said so.
@@ -298,7 +306,7 @@ impl Writer {
     fn describe(&mut self) {
         let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
         let damaged = joined([&self.unreadable, &self.damaged]);
-        self.status.trouble = joined([&self.failing, &self.unchecked, &lost, &damaged, &self.clock]);
+        self.status.trouble = joined([&self.failing, &self.unchecked, &self.unarchived, &lost, &damaged, &self.clock]);
         self.status.epoch = self.store.as_ref().map_or(self.status.epoch, Store::epoch);
         (self.status.waiting, self.status.waiting_max) = (self.pending.len() as u64, PENDING_MAX as u64);
         self.status.failing.clone_from(&self.failing);

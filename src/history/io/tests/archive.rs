@@ -45,7 +45,9 @@ fn filled(db: &Path, rows: &[Record]) -> Store {
 
 /// Does all that is due at an hour.
 fn archive_all(store: &Store, hour: i64) -> Vec<Job> {
-    std::iter::from_fn(|| store.archive(sec(hour * HOUR_S + 600), Timestamp::MIN, &mut |_| Ok(())).unwrap()).collect()
+    let due = || store.archive_due(sec(hour * HOUR_S + 600), Timestamp::MIN).unwrap();
+    let work = |job: &Job| store.archive(job, &mut |_| Ok(())).unwrap();
+    std::iter::from_fn(|| due().inspect(work)).collect()
 }
 
 fn near(a: f64, b: f64) -> bool {
@@ -172,13 +174,13 @@ fn a_kill_at_any_step_loses_nothing_and_doubles_nothing() {
     let mut steps_to_kill = 1;
     loop {
         let (mut steps, mut last) = (0, "");
-        let done = store.archive(sec(26 * HOUR_S + 600), Timestamp::MIN, &mut |step| {
+        let Some(job) = store.archive_due(sec(26 * HOUR_S + 600), Timestamp::MIN).unwrap() else { break };
+        let done = store.archive(&job, &mut |step| {
             (steps, last) = (steps + 1, step);
             if steps == steps_to_kill { Err(HistoryError::NotOpen) } else { Ok(()) }
         });
         match done {
-            Ok(None) => break,
-            Ok(Some(_)) => steps_to_kill = 1,
+            Ok(()) => steps_to_kill = 1,
             Err(HistoryError::NotOpen) => {
                 kills += 1;
                 drop(store);

@@ -1,0 +1,93 @@
+//! When the archive is worked on: one job at a time, on a connection of its own, while the writer goes on.
+
+use std::{sync::Arc, time::Duration};
+
+use duckdb::InterruptHandle;
+use jiff::Timestamp;
+use tokio::task::{JoinHandle, spawn_blocking};
+
+use super::{
+    archive::Job,
+    reader::stop,
+    samples::is_damage,
+    store::{Store, instant},
+};
+use crate::history::{HistoryError, tiers::HOUR};
+
+/// Real time between two looks at what is due.
+const LOOK_EVERY: Duration = Duration::from_secs(60);
+/// The same after a failure.
+const RETRY_AFTER: Duration = Duration::from_secs(600);
+
+/// What became of a job.
+type Done = Result<Option<Job>, (Option<Job>, HistoryError)>;
+
+/// Works on the archive of one store after the other.
+pub struct Archiver {
+    running: Option<(JoinHandle<Done>, Arc<InterruptHandle>)>,
+    /// Commits until the next look: a start is not the time for it.
+    wait: u32,
+    commit_every: Duration,
+    /// Hours before it cannot be read in the database, and stay there.
+    after: Timestamp,
+}
+
+impl Archiver {
+    /// Nothing is due for a minute; the interval is that between two calls of [`Archiver::begin`].
+    pub fn new(commit_every: Duration) -> Archiver {
+        Archiver { running: None, wait: commits(LOOK_EVERY, commit_every), commit_every, after: Timestamp::MIN }
+    }
+
+    /// Begins the next job if it is time, on a connection of its own to the store.
+    pub fn begin(&mut self, store: Option<&Store>, now: Timestamp) {
+        self.wait = self.wait.saturating_sub(1);
+        if self.running.is_some() || self.wait > 0 {
+            return;
+        }
+        let Some(Ok(store)) = store.map(Store::try_clone) else { return };
+        let (interrupt, after) = (store.interrupt_handle(), self.after);
+        let work = move || {
+            let Some(job) = store.archive_due(now, after).map_err(|error| (None, error))? else { return Ok(None) };
+            let done = store.archive(&job, &mut |_| Ok(()));
+            done.map_err(|error| (Some(job.clone()), error))?;
+            Ok(Some(job))
+        };
+        self.running = Some((spawn_blocking(work), interrupt));
+    }
+
+    /// Waits for the end of a job, for ever without one. Returns why it failed.
+    pub async fn ended(&mut self) -> Option<HistoryError> {
+        let Some((work, _)) = &mut self.running else { return std::future::pending().await };
+        let done = work.await;
+        self.running = None;
+        let (again, failed) = match done {
+            Ok(Ok(Some(job))) => {
+                tracing::info!(?job, "archived");
+                (Duration::ZERO, None)
+            }
+            Ok(Ok(None)) => (LOOK_EVERY, None),
+            Ok(Err((Some(Job::Hour(hour)), error))) if is_damage(&error) => {
+                self.after = instant(hour + HOUR).unwrap_or(Timestamp::MAX);
+                (Duration::ZERO, Some(error))
+            }
+            Ok(Err((_, error))) => (RETRY_AFTER, Some(error)),
+            Err(_) => (RETRY_AFTER, Some(HistoryError::Engine("internal error, see the log".into()))),
+        };
+        self.wait = commits(again, self.commit_every);
+        if let Some(error) = &failed {
+            tracing::error!(?error, "the history is not archived");
+        }
+        failed
+    }
+
+    /// Ends what is running: a station that stops does not wait for it, and the next one does it again.
+    pub async fn stop(mut self) {
+        if let Some((work, interrupt)) = &mut self.running {
+            stop(work, || interrupt.interrupt()).await;
+        }
+    }
+}
+
+fn commits(time: Duration, every: Duration) -> u32 {
+    u32::try_from(time.as_nanos() / every.as_nanos().max(1)).unwrap_or(u32::MAX)
+}
