@@ -30,8 +30,8 @@ pub const COLUMNS_MAX: usize = 65_536;
 pub const SERIES_MAX: usize = 64;
 /// Most rows of one answer.
 const ROWS_MAX: usize = 10_000;
-/// Longest period of a report.
-const REPORT_MAX: SignedDuration = SignedDuration::from_hours(92 * 24);
+/// Longest period of a report: five years.
+const REPORT_MAX: SignedDuration = SignedDuration::from_hours(5 * 366 * 24);
 
 /// `Err` says what a command names that this plant does not have.
 pub fn command(def: &PlantDef, kind: &CommandKind) -> Result<(), String> {

@@ -9,7 +9,7 @@ use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
     DECIMALS_UNKNOWN, RecordRow, SuppressedSummary, TagFigures,
-    step_series::{HoldInterval, IntervalStats, StepSeries, gain, good_value},
+    step_series::{IntervalStats, gain, good_value},
 };
 use crate::plant::{
     def::TagId,
@@ -56,11 +56,9 @@ pub fn scaling_tags(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
     def.decimals.source().into_iter().chain(def.unit_from.as_ref().map(|(tag, _)| *tag))
 }
 
-/// Computes the figures of one tag over a period. The samples come in order of time and begin
-/// [`HOLD_MAX`](super::step_series::HOLD_MAX) before it.
+/// Computes the figures of one tag over a period, from stretches of good values in order of time.
 pub struct Figures {
     seconds: f64,
-    steps: StepSeries,
     stats: Option<IntervalStats>,
     counted: f64,
 }
@@ -68,33 +66,18 @@ pub struct Figures {
 impl Figures {
     /// Over `from..until`; nothing has come yet.
     pub fn new(from: Timestamp, until: Timestamp) -> Figures {
-        let seconds = until.duration_since(from).as_secs_f64();
-        Figures { seconds, steps: StepSeries::new(from, until), stats: None, counted: 0.0 }
+        Figures { seconds: until.duration_since(from).as_secs_f64(), stats: None, counted: 0.0 }
     }
 
-    pub fn next(&mut self, sample: Sample) {
-        if let Some(span) = self.steps.next(sample) {
-            self.add(span);
-        }
-    }
-
-    /// The next span with a good value.
-    pub fn add(&mut self, span: HoldInterval) {
-        self.add_stats(span.value, span.into(), 0.0);
-    }
-
-    /// The next stretch of values, by its first one, its figures, and how far it counted from the first to the last.
-    pub fn add_stats(&mut self, first: f64, stats: IntervalStats, counted: f64) {
+    /// The next stretch, by its first value, its figures, and how far it counted from the first to the last.
+    pub fn add(&mut self, first: f64, stats: IntervalStats, counted: f64) {
         self.counted += self.stats.map_or(0.0, |stats| gain(stats.last, first)) + counted;
         IntervalStats::add(&mut self.stats, stats);
     }
 
-    /// The figures, when the last sample has come.
-    pub fn end(mut self, label: TagDescription, in_alarm: Duration) -> TagFigures {
-        if let Some(span) = self.steps.clone().end() {
-            self.add(span);
-        }
-        let Figures { seconds, stats, counted, steps: _ } = self;
+    /// The figures, when the last stretch has come.
+    pub fn end(self, label: TagDescription, in_alarm: Duration) -> TagFigures {
+        let Figures { seconds, stats, counted } = self;
         let (mean, difference) = match label.counts {
             true => (None, stats.map(|_| counted)),
             false => (stats.map(|stats| stats.mean), None),

@@ -4,8 +4,10 @@ use std::time::Duration;
 
 use jiff::{Timestamp, civil::time, tz::TimeZone};
 
+use super::{figures::Figures, step_series::StepSeries};
 use crate::plant::{
     def::{CsvDialect, DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, ReportDef, ShiftDef, TagId},
+    sample::Sample,
     tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
 };
 
@@ -101,4 +103,12 @@ pub fn tag(id: u16, short: &str) -> TagDef {
         unit: unit.into(),
         ..TagDef::new(TagId(id), DeviceId(0), &name, point)
     }
+}
+
+/// The figures of samples, which come in order of time.
+pub fn figures_of(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Figures {
+    let (mut figures, mut steps) = (Figures::new(from, until), StepSeries::new(from, until));
+    let held: Vec<_> = samples.filter_map(|sample| steps.next(sample)).collect();
+    held.into_iter().chain(steps.end()).for_each(|held| figures.add(held.value, held.into(), 0.0));
+    figures
 }

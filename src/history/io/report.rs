@@ -41,7 +41,7 @@ impl Gathered {
             Part::Aggregate(Aggregate { stats, first, gain, .. }) => (first, stats, gain),
         };
         if let Some(figures) = &mut self.figures {
-            figures.add_stats(first, stats, gain);
+            figures.add(first, stats, gain);
         }
         self.latest_good = Some(stats.last);
     }

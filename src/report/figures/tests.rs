@@ -8,13 +8,11 @@ use super::*;
 use crate::{
     plant::{def::Priority, sample::Cause},
     report::step_series::ValuesAt,
-    report::testing::{at, sec, tag, zone},
+    report::testing::{at, figures_of, sec, tag, zone},
 };
 
 fn figures(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> TagFigures {
-    let mut figures = Figures::new(from, until);
-    samples.for_each(|sample| figures.next(sample));
-    figures.end(label(), Duration::ZERO)
+    figures_of(samples, from, until).end(label(), Duration::ZERO)
 }
 
 fn label() -> TagDescription {
@@ -68,9 +66,9 @@ fn a_counter_has_a_difference_and_no_mean() {
         (vec![(0, -10.0), (20, -11.0), (40, -9.0)], Some(1.0)),
         (vec![(0, 1.0), (20, -1.0), (40, 1.0)], Some(0.0)),
     ] {
-        let mut figures = Figures::new(sec(0), sec(100));
-        readings.iter().for_each(|(at, value)| figures.next(Sample::good(*value, sec(*at))));
-        let got = figures.end(TagDescription { unit: "kWh".into(), counts: true, ..label() }, Duration::ZERO);
+        let samples = readings.iter().map(|(at, value)| Sample::good(*value, sec(*at)));
+        let got = figures_of(samples, sec(0), sec(100))
+            .end(TagDescription { unit: "kWh".into(), counts: true, ..label() }, Duration::ZERO);
         assert_eq!((got.difference, got.mean), (expect, None), "{readings:?}");
     }
     let mut def = crate::report::testing::tag(0, "E");

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 pub use self::keys::{Action, KEYS};
 use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
-use crate::ui::tabs::prelude::*;
+use crate::ui::tabs::{prelude::*, reports::period};
 use crate::{
     history::Series,
     plant::{
@@ -123,6 +123,23 @@ impl TabView for Trends {
         find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
     }
 
+    fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        let asked = period::typed(cx.def(), text, cx.now)?;
+        self.accumulate = false;
+        if asked.to < cx.now {
+            self.window = nearest(asked.to.duration_since(asked.from));
+            self.end = Some(asked.to);
+        } else {
+            // A moment: a quarter of the window after it, and the cursor on it.
+            let after = SignedDuration::from_secs(WINDOWS[self.window]) / 4;
+            self.end = asked.from.checked_add(after).ok().filter(|end| *end < cx.now);
+            self.cursor = Some(asked.from);
+        }
+        self.since = None;
+        self.moved();
+        Ok(self.ask(cx))
+    }
+
     fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
         hints(KEYS)
     }
@@ -172,6 +189,12 @@ impl Trends {
             }
             (None, Action::Rate) => self.rate = (self.rate + 1) % RATES.len(),
             (None, Action::Cursor) => self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) },
+            // A log has no history behind it.
+            (None, Action::GoTo) if self.apart => {}
+            (None, Action::GoTo) => {
+                let prompt = Prompt::new(t!("Go to a time"), t!("03:12   2026-11-20   2026-11-20 22:00-06:00"), "");
+                return vec![UiAction::Open(Modal::Prompt(prompt))];
+            }
             (None, Action::Live) => {
                 (self.end, self.cursor) = (None, None);
                 self.moved();

@@ -8,7 +8,7 @@ use super::*;
 use crate::{
     history::series::{Curve, Span, grid},
     plant::sample::Quality,
-    report::{figures::Figures, figures::TagDescription, step_series::HOLD_MAX},
+    report::{figures::TagDescription, step_series::HOLD_MAX, testing::figures_of},
 };
 
 /// The samples of a tag in order of time, as one plain query has them.
@@ -59,8 +59,7 @@ proptest! {
             let period = Period { name: "period".into(), from, to };
             let Ok(Answer::Report(report)) = store.answer(&Query::Report { period }, until) else { panic!("no report") };
             for (place, row) in report.tags.iter().enumerate() {
-                let mut figures = Figures::new(from, until);
-                samples(TagId(place as u16), from).filter(|s| s.at < until).for_each(|sample| figures.next(sample));
+                let figures = figures_of(samples(TagId(place as u16), from).filter(|s| s.at < until), from, until);
                 let label = TagDescription { tag: row.tag.clone(), unit: row.unit.clone(), decimals: row.decimals, counts: false };
                 prop_assert_eq!(row, &figures.end(label, Duration::ZERO));
             }

@@ -8,8 +8,8 @@ use crate::{
     report::{Period, period_parser, shift},
 };
 
-/// The longest free period: a quarter of a year.
-const LONGEST: SignedDuration = SignedDuration::from_hours(24 * 92);
+/// The longest free period: five years.
+const LONGEST: SignedDuration = SignedDuration::from_hours(24 * 5 * 366);
 /// What may be typed, for the entry window.
 pub const FORMS: &str = "06:00-14:00  2026-11-20  2026-11-20 22:00-06:00  night@2026-11-20";
 
@@ -58,7 +58,7 @@ pub fn typed(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, Strin
         }
     };
     if period.to.duration_since(period.from) > LONGEST {
-        return Err(t!("a report covers 92 days at most").to_owned());
+        return Err(t!("five years at most").to_owned());
     }
     Ok(period)
 }
@@ -158,7 +158,7 @@ mod tests {
         check("last", "morning 2026-11-21: 11-21 06:00 to 11-21 14:00");
         check("25:00-26:00", "`25:00` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
         check("6 o'clock", "`6 o'clock` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
-        check("2026-01-01 - 2026-11-01", "a report covers 92 days at most");
+        check("2016-01-01 - 2026-11-01", "five years at most");
         check("", &format!("expected {FORMS}"));
         for nonsense in
             ["2027-01-01", "-", "–", "::", "2026-11-20 2026-11-21", "lunch", "..", "2026-11-21 - 2026-11-20"]

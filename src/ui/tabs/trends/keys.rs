@@ -27,6 +27,8 @@ pub enum Action {
     Hold,
     /// Back to the present.
     Live,
+    /// Ask for a time to go to.
+    GoTo,
     /// Curves, or the list of all values.
     Values,
     /// Say why the selected value is what it is.
@@ -43,6 +45,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Down), "", "select the pen below", Action::Move(Motion::Rows(1))),
     Key::new(char('l'), "live", "back to the present", Action::Live),
     Key::new(char('p'), "pause", "hold the picture, or back to the present", Action::Hold),
+    Key::new(char('t'), "time", "go to a time: 03:12, 2026-11-20, or a period", Action::GoTo),
     Key::new(char('+'), "zoom", "shorter window", Action::Zoom(-1)),
     Key::new(char('='), "", "shorter window", Action::Zoom(-1)),
     Key::new(char('-'), "", "longer window", Action::Zoom(1)),

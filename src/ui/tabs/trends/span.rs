@@ -1,10 +1,34 @@
 //! Which stretch of time the trends show: windows, zoom, pan and the grid of columns; pure arithmetic.
 
 use crate::ui::tabs::prelude::*;
+use crate::{history::tiers::Tier, plant::number::to_usize};
 use jiff::tz::TimeZone;
 
-/// The windows that zooming steps through, seconds: 1 min to 24 h.
-pub const WINDOWS: [i64; 12] = [60, 120, 300, 600, 900, 1_800, 3_600, 7_200, 14_400, 28_800, 43_200, 86_400];
+/// The windows that zooming steps through, seconds: 1 min to 5 years.
+pub const WINDOWS: [i64; 20] = [
+    60,
+    120,
+    300,
+    600,
+    900,
+    1_800,
+    3_600,
+    7_200,
+    14_400,
+    28_800,
+    43_200,
+    DAY,
+    2 * DAY,
+    7 * DAY,
+    14 * DAY,
+    30 * DAY,
+    90 * DAY,
+    YEAR,
+    2 * YEAR,
+    5 * YEAR,
+];
+const DAY: i64 = 86_400;
+const YEAR: i64 = 366 * DAY;
 /// How often the history may be queried, milliseconds.
 pub const RATES: [u64; 5] = [500, 1_000, 2_000, 5_000, 10_000];
 
@@ -27,7 +51,11 @@ impl View {
     /// The view of `seconds` that ends with the column in which `end` lies.
     pub fn ending(end: Timestamp, seconds: i64, columns: usize) -> View {
         let columns = columns.max(1);
-        let step = (seconds.max(1) * 1_000_000 + columns as i64 - 1) / columns as i64;
+        let width = seconds.max(1) * 1_000_000;
+        let least = (width + columns as i64 - 1) / columns as i64;
+        let step = of_aggregates(least);
+        // Wider columns are fewer: the view is not.
+        let columns = if step > least { to_usize((width + step - 1) / step) } else { columns };
         let to = (end.as_microsecond().div_euclid(step) + 1) * step;
         View { from: instant(to - step * columns as i64), to: instant(to), columns }
     }
@@ -47,7 +75,7 @@ impl View {
         let columns = columns.max(2);
         let count = columns as i64;
         let width = (end.as_microsecond() - from.as_microsecond()).max(60_000_000);
-        let step = (width / (count - 1) / 500_000 + 1) * 500_000;
+        let step = of_aggregates((width / (count - 1) / 500_000 + 1) * 500_000);
         let from = from.as_microsecond().div_euclid(step) * step;
         View { from: instant(from), to: instant(from + step * count), columns }
     }
@@ -68,6 +96,11 @@ impl View {
     }
 }
 
+/// The width of a column that begins and ends with the aggregates that it is made of, in microseconds.
+fn of_aggregates(step: i64) -> i64 {
+    Tier::within(step).step().map_or(step, |row| (step + row - 1) / row * row)
+}
+
 /// The end of a view after a step of `by` to the right (left if negative); `None` when that reaches the present, and
 /// the view is alive again.
 pub fn pan(end: Timestamp, by: SignedDuration, now: Timestamp) -> Option<Timestamp> {
@@ -85,9 +118,15 @@ pub fn midnight(now: Timestamp, zone: &TimeZone) -> Timestamp {
     now.to_zoned(zone.clone()).start_of_day().map_or(now, |start| start.timestamp())
 }
 
-/// A window as it is written: `10 min`, `1 h`.
+/// A window as it is written: `10 min`, `1 h`, `7 d`.
 pub fn window_text(seconds: i64) -> String {
-    if seconds < 3_600 { t!("{seconds} min", seconds = seconds / 60) } else { format!("{} h", seconds / 3_600) }
+    match seconds {
+        0..3_600 => t!("{seconds} min", seconds = seconds / 60),
+        3_600..=DAY => format!("{} h", seconds / 3_600),
+        86_401..YEAR => format!("{} d", seconds / DAY),
+        YEAR => t!("1 year").to_owned(),
+        _ => t!("{years} years", years = seconds / YEAR),
+    }
 }
 
 /// A rate as it is written: `0.5 s`, `10 s`.
@@ -169,10 +208,14 @@ mod tests {
     #[test]
     fn windows_and_rates_read_well() {
         let words: Vec<String> = WINDOWS.into_iter().map(window_text).collect();
-        assert_eq!(words.join(", "), "1 min, 2 min, 5 min, 10 min, 15 min, 30 min, 1 h, 2 h, 4 h, 8 h, 12 h, 24 h");
+        assert_eq!(
+            words.join(", "),
+            "1 min, 2 min, 5 min, 10 min, 15 min, 30 min, 1 h, 2 h, 4 h, 8 h, 12 h, 24 h, 2 d, 7 d, 14 d, \
+             30 d, 90 d, 1 year, 2 years, 5 years"
+        );
         let words: Vec<String> = RATES.into_iter().map(rate_text).collect();
         assert_eq!(words.join(", "), "0.5 s, 1 s, 2 s, 5 s, 10 s");
-        for (seconds, expect) in [(10, 60), (60, 60), (61, 120), (90_000, 86_400)] {
+        for (seconds, expect) in [(10, 60), (60, 60), (61, 120), (90_000, 172_800)] {
             assert_eq!(WINDOWS[nearest(SignedDuration::from_secs(seconds))], expect);
         }
     }
@@ -185,11 +228,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_present_is_always_in_the_last_column(second in 0i64..4_000_000_000, window in 0usize..12, columns in 1usize..500) {
+        fn the_present_is_always_in_the_last_column(second in 0i64..4_000_000_000, window in 0usize..20, columns in 1usize..500) {
             let now = instant(second * 1_000_003);
             let view = View::ending(now, WINDOWS[window], columns);
             prop_assert!(view.holds(now) && view.to.duration_since(now) <= view.step() + SignedDuration::from_micros(columns as i64));
-            prop_assert_eq!((view.to.as_microsecond() - view.from.as_microsecond()) % columns as i64, 0);
+            prop_assert_eq!((view.to.as_microsecond() - view.from.as_microsecond()) % view.columns as i64, 0);
         }
     }
 }

@@ -245,16 +245,34 @@ fn keys_move_through_time() {
     check("", "window 10 min   live ●");
     check("-", "window 15 min   live ●");
     check("+++++++++", "window 1 min   live ●");
-    check("----------------", "window 24 h   live ●");
-    check("+", "window 12 h   live ●");
-    check("←", "past 11-20 23:03 – 11-21 11:03");
+    check("-------------------------", "window 5 years   live ●   columns of");
+    check("+++++++++", "window 12 h   live ●");
+    check("←", "past 11-20 23:06 – 11-21 11:06");
     check("→", "live ●");
+    check("+++", "window 2 h   live ●   update 1 s");
     check("u", "update 2 s");
+    check("---", "window 12 h   live ●   columns of 6 min, min–max");
     check("m", "all since midnight");
     check("m", "window 12 h");
     check("g", "Levels group 2/2");
     check("v↓↓↓↓⏎", "TIC-1.I group 3/3");
     check("v⏎", "TIC-1 group 1/3");
+}
+
+#[test]
+fn a_time_can_be_typed() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    let mut check = |text: &str, expect: &str| {
+        stand.press("t");
+        stand.press(text);
+        stand.press("⏎");
+        stand.answer();
+        let title = stand.screen().lines().nth(4).map(str::to_owned).unwrap_or_default();
+        assert!(title.contains(expect), "{text}: {title}");
+    };
+    check("13:12", "past 13:04:");
+    check("2026-11-20", "window 24 h    past 11-20 00:");
+    check("2025-11-20..2026-02-01", "window 90 d    past 2025-11-04");
 }
 
 #[test]

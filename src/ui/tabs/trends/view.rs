@@ -90,7 +90,12 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         None => (t!("live *").to_owned(), theme.normal()),
     };
     x = canvas.text(x + 3, 0, &time, style);
-    if trends.end.is_none() && !brief && !trends.ended {
+    // What is drawn of a wide column: least to greatest, so that no spike is lost.
+    let column = view.step().as_secs();
+    if column >= 60 && !brief {
+        let column = t!("columns of {width}, min–max", width = window_text(column));
+        x = canvas.text(x + 3, 0, &column, theme.normal());
+    } else if trends.end.is_none() && !brief && !trends.ended {
         let rate = t!("update {rate_text}", rate_text = rate_text(RATES[trends.rate]));
         x = canvas.text(x + 3, 0, &rate, theme.normal());
     }
@@ -347,10 +352,12 @@ fn moment_exact(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     local.strftime(form).to_string()
 }
 
-/// `13:40:04 – 13:50:04` today, `11-20 13:40 – 13:50` on another day, both dates where it spans midnight.
+/// `13:40:04 – 13:50:04` today, `11-20 13:40 – 13:50` on another day, both dates where it spans midnight, with the year
+/// where it begins in another.
 fn stretch(from: Timestamp, to: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     let [from, to, now] = [from, to, now].map(|at| at.to_zoned(zone.clone()));
     let (first, last) = match (from.date() == to.date(), from.date() == now.date()) {
+        _ if from.year() != now.year() => ("%Y-%m-%d", "%Y-%m-%d"),
         (true, true) => ("%H:%M:%S", "%H:%M:%S"),
         (true, false) => ("%m-%d %H:%M", "%H:%M"),
         (false, _) => ("%m-%d %H:%M", "%m-%d %H:%M"),

@@ -108,13 +108,16 @@ pub fn nice_step(span: f64, intervals: usize) -> f64 {
 }
 
 /// Steps of a time axis that people count in, seconds.
-const TIME_STEPS: [i64; 23] = [
+const TIME_STEPS: [i64; 22] = [
     1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1_800, 3_600, 7_200, 10_800, 14_400, 21_600, 43_200, 86_400, 172_800,
-    604_800, 1_209_600, 2_419_200,
+    604_800, 1_209_600,
 ];
+/// The same in months, for longer spans.
+const MONTH_STEPS: [i64; 5] = [1, 2, 3, 6, 12];
 
 /// Round local times between `from` and `to`, with their labels: `13:45`, with seconds where ticks are closer than a
-/// minute, and the date (`11-22`) at midnight. At most one in `cells_min` cells of `cells`.
+/// minute, the date (`11-22`) at midnight, and the month (`2026-11`) where ticks are months apart. At most one in `cells_min`
+/// cells of `cells`.
 pub fn time_ticks(
     from: Timestamp,
     to: Timestamp,
@@ -126,7 +129,7 @@ pub fn time_ticks(
     let room = (cells / cells_min.max(1)).max(1) as i64;
     let steps = TIME_STEPS.into_iter();
     let Some(step) = steps.filter(|step| *step >= 60 || cells_min > 8).find(|step| span / step <= room) else {
-        return Vec::new();
+        return month_ticks(from, to, zone, room);
     };
     let mut ticks = Vec::new();
     let mut next = round_up(from, step, zone);
@@ -145,6 +148,18 @@ pub fn time_ticks(
         next = Timestamp::from_second(at.as_second() + 1).ok().and_then(|after| round_up(after, step, zone));
     }
     ticks
+}
+
+/// The beginnings of months, or of every second, third … one.
+fn month_ticks(from: Timestamp, to: Timestamp, zone: &TimeZone, room: i64) -> Vec<(Timestamp, String)> {
+    const SECONDS: i64 = 2_629_746;
+    let months = (to.as_second() - from.as_second()) / SECONDS;
+    let step = MONTH_STEPS.into_iter().find(|step| months / step <= room).unwrap_or(months / room.max(1) + 1);
+    let first = from.to_zoned(zone.clone()).date().first_of_month();
+    let begin = |n: i64| first.checked_add(jiff::Span::new().try_months(n).ok()?).ok()?.to_zoned(zone.clone()).ok();
+    let ticks = (0..=months + 1).map_while(begin).filter(|at| (i64::from(at.month()) - 1) % step.min(12) == 0);
+    let seen = ticks.filter(|at| from <= at.timestamp() && at.timestamp() <= to);
+    seen.map(|at| (at.timestamp(), at.strftime("%Y-%m").to_string())).collect()
 }
 
 /// The first instant from `at` on whose local time is a multiple of `step` seconds, counted from a midnight.
