@@ -111,7 +111,7 @@ fn pieces(from: Timestamp, every: Duration, rows: usize, tags: usize) -> impl It
 /// The tags that were named, or all that are stored.
 fn tags(def: &PlantDef, names: &[String]) -> Result<Vec<TagId>, CliError> {
     if names.is_empty() {
-        return Ok(def.tags.iter().filter(|tag| tag.store).map(|tag| tag.id).collect());
+        return Ok(def.tags.iter().filter(|tag| tag.is_stored()).map(|tag| tag.id).collect());
     }
     let find = |name: &String| {
         def.tag_named(name)

@@ -10,7 +10,7 @@ use super::{
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
-    tag::{Decimals, Poll, TagDef},
+    tag::{Decimals, Poll, StorePolicy, TagDef},
 };
 use crate::plant::{number::to_i64, time::elapsed};
 
@@ -18,8 +18,6 @@ use crate::plant::{number::to_i64, time::elapsed};
 pub const PERIODS_UNCERTAIN: u32 = 3;
 /// See [`PERIODS_UNCERTAIN`].
 pub const PERIODS_BAD: u32 = 10;
-/// An unchanged good value is stored again after this time, so that a silent stretch in the history means "no data".
-pub const STORE_EVERY: Duration = Duration::from_secs(60);
 
 /// A value that is never polled becomes uncertain after this time.
 const NEVER_READ_AGAIN: Duration = Duration::from_secs(60);
@@ -139,7 +137,7 @@ impl ProcessImage {
         for tag in &def.tags {
             let sample = self.sample(tag.id);
             let stored = self.stored[tag.id.index()];
-            if stored.is_none_or(|stored| is_due(tag, sample, Some(stored), at)) {
+            if stored.is_none_or(|stored| self.is_due(tag, sample, Some(stored), at)) {
                 self.touched.push(tag.id);
             }
             let period = match tag.poll {
@@ -160,28 +158,53 @@ impl ProcessImage {
         }
     }
 
-    /// The records due at `at`: changes beyond the deadband, changes of quality, and unchanged values once a minute.
+    /// The records due at `at`: changes beyond the deadband, changes of quality, and unchanged values at their interval, so
+    /// that a silent stretch in the history means "no data".
     /// A loss of quality is stored with the time at which it arose, not with the time of the value.
     pub fn records(&mut self, at: Timestamp) -> Vec<Record> {
         let mut records = Vec::new();
         let mut touched = std::mem::take(&mut self.touched);
         touched.sort_unstable();
         touched.dedup();
-        for tag in touched.drain(..).map(|tag| self.def.tag(tag)).filter(|tag| tag.store) {
+        for tag in touched.drain(..).map(|tag| self.def.tag(tag)).filter(|tag| tag.is_stored()) {
             let sample = self.samples[tag.id.index()];
-            let stored = &mut self.stored[tag.id.index()];
-            if !is_due(tag, sample, *stored, at) {
+            let stored = self.stored[tag.id.index()];
+            if !self.is_due(tag, sample, stored, at) {
                 continue;
             }
             // A good value that has not been read since it was last stored still stands: it is stored again as of now.
             let fresh = sample.quality.is_good() && stored.is_none_or(|stored| stored.at < sample.at);
             let record = if fresh { sample } else { Sample { at, ..sample } };
-            *stored = Some(record);
+            self.stored[tag.id.index()] = Some(record);
             records.push(Record::Sample(tag.id, record));
         }
         // Its room is used again.
         self.touched = touched;
         records
+    }
+
+    /// Whether a sample is to be stored, after what was `stored` last.
+    fn is_due(&self, tag: &TagDef, sample: Sample, stored: Option<Sample>, at: Timestamp) -> bool {
+        let Some(stored) = stored else { return true };
+        let waited = Duration::try_from(at.duration_since(stored.at)).unwrap_or_default();
+        stored.quality != sample.quality
+            || match (stored.value, sample.value) {
+                (Some(old), Some(new)) => {
+                    let changed = match tag.store {
+                        StorePolicy::Always => stored.at < sample.at,
+                        StorePolicy::Change => self.deadband(tag) < (new - old).abs(),
+                        StorePolicy::Never => false,
+                    };
+                    changed || (sample.quality.is_good() && tag.store_every <= waited)
+                }
+                (None, None) => false,
+                (None, Some(_)) | (Some(_), None) => true,
+            }
+    }
+
+    /// The largest change that is not stored. Half a digit: what a person would not see, and rounding alone.
+    fn deadband(&self, tag: &TagDef) -> f64 {
+        tag.deadband.unwrap_or_else(|| 0.5 * 10f64.powi(-i32::from(self.shown_decimals(tag))))
     }
 
     /// Decimals that the device announces for a tag: they scale its raw number. 0 for tags with fixed decimals.
@@ -292,20 +315,6 @@ fn effect_of(fault: Fault) -> FaultEffect {
         FaultKind::NotConnected => FaultEffect::Gone(Cause::NotConnected),
         FaultKind::BackedOff => FaultEffect::Gone(Cause::DeviceDown),
     }
-}
-
-fn is_due(tag: &TagDef, sample: Sample, stored: Option<Sample>, at: Timestamp) -> bool {
-    let Some(stored) = stored else { return true };
-    let waited = at.duration_since(stored.at);
-    stored.quality != sample.quality
-        || match (stored.value, sample.value) {
-            (Some(old), Some(new)) => {
-                tag.deadband < (new - old).abs()
-                    || (sample.quality.is_good() && STORE_EVERY <= Duration::try_from(waited).unwrap_or_default())
-            }
-            (None, None) => false,
-            (None, Some(_)) | (Some(_), None) => true,
-        }
 }
 
 #[cfg(test)]

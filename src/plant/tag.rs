@@ -72,10 +72,12 @@ pub struct TagDef {
     pub poll: Poll,
     /// What happens to its reading on a line with too much to do.
     pub class: PollClass,
-    /// Smallest change that is stored; 0 stores every change.
-    pub deadband: f64,
-    /// Stored in the history.
-    pub store: bool,
+    /// Changes up to this are not stored; `None` is half the last shown digit, 0 stores every change.
+    pub deadband: Option<f64>,
+    /// Whether and when it is stored in the history.
+    pub store: StorePolicy,
+    /// An unchanged good value is stored again after this time, at most [`STORE_EVERY_MAX`].
+    pub store_every: Duration,
     /// Whether it counts up, so that a report gives its difference and no mean; `None`: by its unit.
     pub counter: Option<bool>,
     /// How sure the register map is of this row.
@@ -89,6 +91,22 @@ pub struct TagDef {
     /// Part of a parameter set: a setting, not a command and not a measurement.
     pub in_sets: bool,
 }
+
+keyword_enum! {
+    /// When a value is stored in the history.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum StorePolicy: "store policy" {
+        /// When it changes by more than its deadband, and at its longest interval.
+        Change => "change",
+        /// At every reading.
+        Always => "always",
+        /// Not at all.
+        Never => "never",
+    }
+}
+
+/// A value without a successor for longer is not known any more, see the hold of `report`: no longer interval can be.
+pub const STORE_EVERY_MAX: Duration = Duration::from_secs(60);
 
 impl TagDef {
     /// A plain quantity: read only, unscaled, without unit, read every second, stored. A caller changes what it knows
@@ -121,8 +139,9 @@ impl TagDef {
             group: String::new(),
             poll: Poll::Every(Duration::from_secs(1)),
             class: PollClass::Normal,
-            deadband: 0.0,
-            store: true,
+            deadband: None,
+            store: StorePolicy::Change,
+            store_every: STORE_EVERY_MAX,
             counter: None,
             confidence: Confidence::Proven,
             source: String::new(),
@@ -131,6 +150,11 @@ impl TagDef {
             in_sets: false,
         }
     }
+    /// Is it stored in the history?
+    pub fn is_stored(&self) -> bool {
+        self.store != StorePolicy::Never
+    }
+
     /// The tags without which its value cannot be shown or evaluated.
     pub fn needs(&self) -> impl Iterator<Item = TagId> {
         let unit = self.unit_from.as_ref().map(|(tag, _)| *tag);

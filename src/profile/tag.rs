@@ -15,7 +15,10 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, TagId},
-    tag::{Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, Table, TagDef},
+    tag::{
+        Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, STORE_EVERY_MAX,
+        StorePolicy, Table, TagDef,
+    },
 };
 
 /// What a tag must know of its device.
@@ -78,6 +81,10 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     }
     let short = text(&row.name);
     let name = format!("{}.{short}", context.device_name);
+    let usually = || match !is_text && access != Access::Write && matches!(poll, Poll::Every(_)) {
+        true => StorePolicy::Change,
+        false => StorePolicy::Never,
+    };
     let tag = TagDef {
         label: row.label.as_ref().map_or_else(|| short.clone(), |label| label.value.clone()),
         meaning: text(&row.meaning),
@@ -99,8 +106,9 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         group: text(&row.group),
         poll,
         // Known when all tags and alarms are.
-        deadband: row.deadband.value_or(0.0),
-        store: !is_text && row.store.value_or(access != Access::Write && matches!(poll, Poll::Every(_))),
+        deadband: row.deadband.map(|deadband| deadband.value),
+        store: row.store.map_or_else(usually, |store| store.value),
+        store_every: store_every(&row, problems),
         counter: row.counter.map(|counter| counter.value),
         confidence: row.confidence.value_or(Confidence::Medium),
         source: text(&row.source),
@@ -114,6 +122,9 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     let simulate = row.simulate.map(|simulate| simulate.value);
     Defined { tag, class, in_sets: row.in_sets, address_at, needs: links.needs, unlock: links.unlock, simulate }
 }
+
+/// The shortest interval at which an unchanged value may be stored.
+const STORE_EVERY_MIN: Duration = Duration::from_secs(1);
 
 /// Stands in for an address that is wrong; it never leaves the loader.
 const NOWHERE: Point =
@@ -254,6 +265,15 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
     (0..=6).find(whole).unwrap_or(6)
 }
 
+/// The longest time between two stored values.
+fn store_every(row: &TagTable, problems: &mut Problems) -> Duration {
+    let Some(every) = row.store_every else { return STORE_EVERY_MAX };
+    if every.value < STORE_EVERY_MIN || STORE_EVERY_MAX < every.value {
+        problems.add(every.at, "a value can be stored every 1 to 60 s").label("expected \"1 s\" … \"60 s\"");
+    }
+    every.value
+}
+
 /// Checks scale and bounds against each other and against what the raw type can hold.
 fn check_scaling(row: &TagTable, kind: Option<Raws>, decimals: Decimals, problems: &mut Problems) {
     if let Some(scale) = row.scale.filter(|scale| scale.value == 0.0) {
@@ -327,7 +347,7 @@ fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
     if let Some(access) = row.access.filter(|access| access.value != Access::Read) {
         problems.add(access.at, "a text can only be read").label("expected access = \"r\"");
     }
-    if let Some(store) = row.store.filter(|store| store.value) {
+    if let Some(store) = row.store.filter(|store| store.value != StorePolicy::Never) {
         problems.add(store.at, "the history keeps numbers, this is a text").label("leave it out");
     }
 }

@@ -282,7 +282,7 @@ impl Running {
 #[test]
 fn an_export_takes_more_tags_than_one_query_and_keeps_units() {
     let running = Running::start(TWO);
-    let stored: Vec<&str> = running.def.tags.iter().filter(|tag| tag.store).map(|tag| &*tag.name).collect();
+    let stored: Vec<&str> = running.def.tags.iter().filter(|tag| tag.is_stored()).map(|tag| &*tag.name).collect();
     assert!(64 < stored.len(), "{} tags fit into one query", stored.len());
     let from = (Timestamp::now() - SignedDuration::from_secs(5)).to_string();
     let end = Instant::now() + PATIENCE;

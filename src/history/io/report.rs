@@ -149,7 +149,7 @@ fn rows(from: Timestamp, until: Timestamp, interval: Duration) -> u64 {
 /// The tags that the plant file asks for, or every stored tag with a unit; each once.
 fn reported_tags(def: &PlantDef) -> Vec<TagId> {
     let mut tags = match def.report.tags.as_slice() {
-        [] => def.tags.iter().filter(|tag| tag.store && !tag.unit.is_empty()).map(|tag| tag.id).collect(),
+        [] => def.tags.iter().filter(|tag| tag.is_stored() && !tag.unit.is_empty()).map(|tag| tag.id).collect(),
         tags => tags.to_vec(),
     };
     let mut seen = HashSet::new();

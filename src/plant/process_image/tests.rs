@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::plant::fixture::{self, DP, FAULT, PV, RUN, TIC};
-use crate::plant::tag::DataType;
+use crate::plant::tag::{DataType, StorePolicy};
 
 fn at(second: i64) -> Timestamp {
     Timestamp::from_second(second).expect("a small number")
@@ -41,7 +41,7 @@ fn a_value_that_stays_bad_keeps_the_time_since_when() {
 #[test]
 fn a_text_is_trusted_and_doubted_like_a_number_and_never_stored() {
     let mut def = fixture::plant();
-    (def.tags[PV.index()].point.kind, def.tags[PV.index()].store) = (DataType::Text(8), false);
+    (def.tags[PV.index()].point.kind, def.tags[PV.index()].store) = (DataType::Text(8), StorePolicy::Never);
     let mut image = ProcessImage::new(Arc::new(def), at(0));
     assert_eq!(image.texts[PV.index()], None);
     image.read_texts(&[(PV, "PXR4".into())], at(1));
@@ -131,6 +131,39 @@ fn a_device_that_is_gone_takes_its_values_with_it() {
     assert_eq!(image.sample(PV), Sample::bad(Cause::NotConnected, at(5)));
     image.failed(&[PV], Fault::Timeout, at(6));
     assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::NotConnected), "a probe in vain changes nothing");
+}
+
+/// How many samples of PV are stored of readings (second, raw) in tenths of a degree, with these settings.
+fn stored(set: impl Fn(&mut TagDef), readings: &[(i64, f64)]) -> usize {
+    let mut def = fixture::plant();
+    set(&mut def.tags[PV.index()]);
+    let mut image = ProcessImage::new(Arc::new(def), at(0));
+    image.read(&[(DP, 1.0), (FAULT, 0.0)], at(0));
+    let count = |records: Vec<Record>| {
+        records.iter().filter(|record| matches!(record, Record::Sample(PV, sample) if sample.quality.is_good())).count()
+    };
+    let read = |&(second, raw): &(i64, f64)| {
+        image.read(&[(PV, raw)], at(second));
+        count(image.records(at(second)))
+    };
+    readings.iter().map(read).sum()
+}
+
+#[test]
+fn a_value_is_stored_as_its_policy_says() {
+    let slow: Vec<(i64, f64)> = (1..=10).map(|second| (second, 724.0 + 0.4 * second as f64)).collect();
+    let still: Vec<(i64, f64)> = (1..=120).map(|second| (second, 724.0)).collect();
+    // Half a tenth by default: 0.04 a second is stored every second time.
+    assert_eq!(stored(|_| {}, &slow), 5);
+    assert_eq!(stored(|tag| tag.deadband = Some(0.0), &slow), 10);
+    assert_eq!(stored(|tag| tag.deadband = Some(0.3), &slow), 2);
+    assert_eq!(stored(|_| {}, &still), 2);
+    assert_eq!(stored(|tag| tag.store_every = Duration::from_secs(10), &still), 12);
+    assert_eq!(stored(|tag| tag.store = StorePolicy::Always, &still), 120);
+    assert_eq!(stored(|tag| tag.store = StorePolicy::Never, &slow), 0);
+    // A whole number with labels is stored at each change.
+    let steps: Vec<(i64, f64)> = (1..=10).map(|second| (second, second as f64)).collect();
+    assert_eq!(stored(|tag| (tag.scale, tag.decimals) = (1.0, Decimals::Fixed(0)), &steps), 10);
 }
 
 #[test]

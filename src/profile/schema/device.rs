@@ -6,7 +6,7 @@ use crate::{
     plant::{
         def::Reauthentication,
         keyword::keyword_enum,
-        tag::{Access, ByteOrder, Confidence, DataType, PollClass, Table},
+        tag::{Access, ByteOrder, Confidence, DataType, PollClass, StorePolicy, Table},
     },
     profile::{
         address::{Location, Modicon},
@@ -104,7 +104,8 @@ toml_tables! {
         opt "poll" poll: PollWord,
         opt "poll_class" poll_class: PollClass,
         opt "deadband" deadband: f64,
-        opt "store" store: bool,
+        opt "store" store: StorePolicy,
+        opt "store_every" store_every: Duration,
         /// Counts up, or not: by its unit if this is not said.
         opt "counter" counter: bool,
         opt "confidence" confidence: Confidence,

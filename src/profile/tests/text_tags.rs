@@ -1,6 +1,7 @@
 //! Tags that hold text.
 
 use super::*;
+use crate::plant::tag::StorePolicy;
 
 /// A tag that holds text, added to the small plant's meter.
 fn with_text(keys: &str) -> Result<PlantDef, Errors> {
@@ -13,7 +14,7 @@ fn a_text_is_read_and_never_stored() {
     let plant = with_text("type = \"string(9)\"\norder = \"BADC\"").unwrap();
     let tag = plant.tag(plant.tag_named("D1.MODEL").unwrap());
     assert_eq!((tag.point.kind, tag.point.len()), (DataType::Text(9), 5));
-    assert!(tag.is_text() && !tag.store && !tag.writable());
+    assert!(tag.is_text() && !tag.is_stored() && !tag.writable());
 }
 
 #[test]
@@ -27,7 +28,7 @@ fn a_text_takes_no_key_that_is_for_numbers() {
         ("field = 3", "this is not a field of bits"),
         ("order = \"CDAB\"", "the words of a text cannot be reversed"),
         ("access = \"rw\"", "a text can only be read"),
-        ("store = true", "the history keeps numbers, this is a text"),
+        ("store = \"always\"", "the history keeps numbers, this is a text"),
     ] {
         let text = with_text(&format!("type = \"string(8)\"\n{key}")).expect_err(key).to_string();
         assert!(text.contains(expect), "{key}: {text}");
@@ -54,4 +55,27 @@ fn nothing_counts_with_a_text() {
     let scaled = meter.replace("decimals_from = \"DP\"", "decimals_from = \"MODEL\"");
     let text = load(PLANT.as_bytes(), &scaled, PLC).expect_err("no decimals").to_string();
     assert!(text.contains("D1.MODEL is a text"), "{text}");
+}
+
+#[test]
+fn what_is_stored_and_when_can_be_chosen() {
+    let number = |keys: &str| {
+        let tag = "\n[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 2000\ntype = \"int16\"\n";
+        load(PLANT.as_bytes(), &format!("{METER}{tag}{keys}\n"), PLC)
+    };
+    let plant = number("store = \"always\"\nstore_every = \"10 s\"\ndeadband = 0").unwrap();
+    let tag = plant.tag(plant.tag_named("D1.X").unwrap());
+    assert_eq!(
+        (tag.store, tag.store_every, tag.deadband),
+        (StorePolicy::Always, std::time::Duration::from_secs(10), Some(0.0))
+    );
+    for (key, expect) in [
+        ("store = \"sometimes\"", "sometimes"),
+        ("store = false", "found a boolean"),
+        ("store_every = \"61 s\"", "a value can be stored every 1 to 60 s"),
+        ("store_every = \"0.5 s\"", "a value can be stored every 1 to 60 s"),
+    ] {
+        let text = number(key).expect_err(key).to_string();
+        assert!(text.contains(expect), "{key}: {text}");
+    }
 }

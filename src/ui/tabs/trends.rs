@@ -344,5 +344,5 @@ impl Trends {
 
 /// All stored tags, in the order of the plant.
 fn stored(cx: &ViewContext) -> Vec<TagId> {
-    cx.def().tags.iter().filter(|tag| tag.store).map(|tag| tag.id).collect()
+    cx.def().tags.iter().filter(|tag| tag.is_stored()).map(|tag| tag.id).collect()
 }

@@ -255,7 +255,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
 
 /// Values that are not good, and alarms that have been active for a day.
 fn doubtful(cx: &ViewContext) -> Vec<String> {
-    let polled = cx.def().tags.iter().filter(|tag| tag.store);
+    let polled = cx.def().tags.iter().filter(|tag| tag.is_stored());
     let bad: Vec<String> = polled
         .filter(|tag| !cx.snapshot.sample(tag.id).quality.is_good())
         .map(|tag| format!("{} {}", tag.name, value::show(cx, tag.id).whole()))
