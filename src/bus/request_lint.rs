@@ -140,7 +140,24 @@ fn check_data(message: &[u8], items: &[Item]) -> Vec<RequestError> {
                 let wrong = usize::from(got) != expected;
                 errors.extend(wrong.then_some(RequestError::ByteCount { got, count, what, expected }));
             }
-            _ => {}
+            // Any value is right.
+            Item::Register
+            | Item::Byte(..)
+            | Item::Word(..)
+            | Item::OrMask
+            | Item::Data
+            | Item::WordCount
+            | Item::FifoCount
+            | Item::Bits
+            | Item::Registers
+            | Item::Events
+            | Item::ServerId
+            | Item::FileRequests
+            | Item::FileWrites
+            | Item::FileRecords
+            | Item::MeiType
+            | Item::NextObject
+            | Item::Objects => {}
         }
         at += item.size();
     }

@@ -54,12 +54,18 @@ fn move_note(note: &mut OperatorNote, by: SignedDuration) {
 impl CommandKind {
     /// The same in the plant's own time: what names an alarm by the instant that a snapshot showed.
     pub fn move_from_utc(&mut self, by: SignedDuration) {
-        match self {
-            CommandKind::Alarm(AlarmCommand::Acknowledge { annunciated_at, .. }) => move_by(annunciated_at, -by),
-            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms }) => {
+        let CommandKind::Alarm(command) = self else { return };
+        match command {
+            AlarmCommand::Acknowledge { annunciated_at, .. } => move_by(annunciated_at, -by),
+            AlarmCommand::AcknowledgeAll { alarms } => {
                 *alarms = alarms.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
             }
-            _ => {}
+            AlarmCommand::Silence
+            | AlarmCommand::Reset(_)
+            | AlarmCommand::Shelve { .. }
+            | AlarmCommand::Unshelve(_)
+            | AlarmCommand::OutOfService(_)
+            | AlarmCommand::InService(_) => {}
         }
     }
 }

@@ -268,7 +268,7 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
             let word = match outcome {
                 Outcome::NotConfirmed(_) => t!("accepted"),
                 Outcome::Unchanged => t!("unchanged"),
-                _ => t!("done"),
+                Outcome::Pending | Outcome::Verified | Outcome::Refused(_) | Outcome::Failed(_) => t!("done"),
             };
             return Some((format!("{} {word}", theme.pick("✓", t!("ok"))), theme.normal()));
         }

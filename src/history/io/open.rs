@@ -256,7 +256,7 @@ fn missing(noted: &Noted, open: &LastCommit, set_aside: bool) -> Option<String> 
     match noted {
         Noted::Commit(noted) if set_aside && noted.identity != open.identity => None,
         Noted::Unreadable if set_aside => None,
-        _ => last::missing(noted, open),
+        Noted::Nothing | Noted::Unreadable | Noted::Commit(_) => last::missing(noted, open),
     }
 }
 

@@ -66,7 +66,16 @@ impl Plant {
                 Arc::make_mut(run).stopping = true;
                 Some(Outcome::Verified)
             }
-            _ => None,
+            CommandKind::Write { .. }
+            | CommandKind::Alarm(_)
+            | CommandKind::Refresh(_)
+            | CommandKind::Connect(..)
+            | CommandKind::Configure(_)
+            | CommandKind::SaveSettings(_)
+            | CommandKind::Test(..)
+            | CommandKind::StopTest(_)
+            | CommandKind::HandOver
+            | CommandKind::TakeOver => None,
         }
     }
 

@@ -36,7 +36,16 @@ impl Plant {
             CommandKind::SaveSettings(line) => {
                 effects.save = Some((status.command.id, self.settings(*line).clone()));
             }
-            _ => {}
+            CommandKind::Write { .. }
+            | CommandKind::Alarm(_)
+            | CommandKind::Refresh(_)
+            | CommandKind::Connect(..)
+            | CommandKind::ReadSets
+            | CommandKind::SaveSet { .. }
+            | CommandKind::Restore(_)
+            | CommandKind::StopRestore(_)
+            | CommandKind::HandOver
+            | CommandKind::TakeOver => {}
         }
         None
     }

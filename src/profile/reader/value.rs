@@ -39,7 +39,9 @@ impl Value for f64 {
         let number = match value {
             Node::Whole(number) => *number as f64,
             Node::Number(number) => *number,
-            _ => return wrong_type(value, at, "a number", problems),
+            Node::Text(_) | Node::Flag(_) | Node::Time(_) | Node::Array(_) | Node::Table(_) => {
+                return wrong_type(value, at, "a number", problems);
+            }
         };
         if !number.is_finite() {
             problems.add(at, "not a usable number").label("expected a finite number");
@@ -148,7 +150,7 @@ impl Value for Choice {
             Node::Text(word) => Some(Choice::Word(word.clone())),
             Node::Flag(flag) => Some(Choice::Number(f64::from(u8::from(*flag)))),
             Node::Whole(_) | Node::Number(_) => f64::read(value, at, problems).map(Choice::Number),
-            _ => wrong_type(value, at, "a number or a word", problems),
+            Node::Time(_) | Node::Array(_) | Node::Table(_) => wrong_type(value, at, "a number or a word", problems),
         }
     }
 }

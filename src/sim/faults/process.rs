@@ -26,7 +26,17 @@ impl ProcessFaults {
                 InjectedFault::ValveStuck(Valve::Drain, position) => process_faults.drain = Some(position),
                 InjectedFault::ValveStuck(Valve::Fill, position) => process_faults.fill = Some(position),
                 InjectedFault::Leak(ml_per_min) => process_faults.leak_l_per_min = f64::from(ml_per_min) / 1e3,
-                _ => {}
+                // Of the line or of a unit.
+                InjectedFault::Noise(_)
+                | InjectedFault::Silent
+                | InjectedFault::Late(_)
+                | InjectedFault::BadCrc
+                | InjectedFault::Cut
+                | InjectedFault::Exception(_)
+                | InjectedFault::Stuck
+                | InjectedFault::Torn
+                | InjectedFault::WordOrder
+                | InjectedFault::SensorBurnout => {}
             }
         }
         process_faults

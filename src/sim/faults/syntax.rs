@@ -138,7 +138,17 @@ impl InjectedFault {
             InjectedFault::Late(by) => Some(by.as_secs_f64()),
             InjectedFault::Exception(code) => Some(f64::from(code)),
             InjectedFault::Leak(ml_per_min) => Some(f64::from(ml_per_min) / 1e3),
-            _ => None,
+            InjectedFault::Silent
+            | InjectedFault::BadCrc
+            | InjectedFault::Cut
+            | InjectedFault::Stuck
+            | InjectedFault::Torn
+            | InjectedFault::WordOrder
+            | InjectedFault::SensorBurnout
+            | InjectedFault::HeaterBurnout
+            | InjectedFault::ValveStuck(..)
+            | InjectedFault::PumpFailed
+            | InjectedFault::AgitatorFailed => None,
         }
     }
 
@@ -177,7 +187,17 @@ impl fmt::Display for InjectedFault {
             InjectedFault::Exception(code) => write!(f, " {code}"),
             InjectedFault::Noise(percent) => write!(f, " {percent} %"),
             InjectedFault::Leak(ml_per_min) => write!(f, " {} l/min", f64::from(*ml_per_min) / 1e3),
-            _ => Ok(()),
+            InjectedFault::Silent
+            | InjectedFault::BadCrc
+            | InjectedFault::Cut
+            | InjectedFault::Stuck
+            | InjectedFault::Torn
+            | InjectedFault::WordOrder
+            | InjectedFault::SensorBurnout
+            | InjectedFault::HeaterBurnout
+            | InjectedFault::ValveStuck(..)
+            | InjectedFault::PumpFailed
+            | InjectedFault::AgitatorFailed => Ok(()),
         }
     }
 }

@@ -126,6 +126,17 @@ fn lack(fault: InjectedFault) -> &'static str {
     match fault {
         InjectedFault::Torn | InjectedFault::WordOrder => "has no value of 32 bits",
         InjectedFault::SensorBurnout => "has no mark for a broken sensor in its profile (bad_if)",
-        _ => "has no value that is only read",
+        InjectedFault::Stuck
+        | InjectedFault::Noise(_)
+        | InjectedFault::Silent
+        | InjectedFault::Late(_)
+        | InjectedFault::BadCrc
+        | InjectedFault::Cut
+        | InjectedFault::Exception(_)
+        | InjectedFault::HeaterBurnout
+        | InjectedFault::ValveStuck(..)
+        | InjectedFault::Leak(_)
+        | InjectedFault::PumpFailed
+        | InjectedFault::AgitatorFailed => "has no value that is only read",
     }
 }

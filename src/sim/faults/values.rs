@@ -61,7 +61,17 @@ impl Values {
             InjectedFault::Stuck => !self.measured.is_empty(),
             InjectedFault::Torn | InjectedFault::WordOrder => !self.pairs.is_empty(),
             InjectedFault::SensorBurnout => !self.marks.is_empty(),
-            _ => false,
+            InjectedFault::Noise(_)
+            | InjectedFault::Silent
+            | InjectedFault::Late(_)
+            | InjectedFault::BadCrc
+            | InjectedFault::Cut
+            | InjectedFault::Exception(_)
+            | InjectedFault::HeaterBurnout
+            | InjectedFault::ValveStuck(..)
+            | InjectedFault::Leak(_)
+            | InjectedFault::PumpFailed
+            | InjectedFault::AgitatorFailed => false,
         }
     }
 
@@ -76,7 +86,18 @@ impl Values {
                 InjectedFault::Torn => self.tear(&mut cells, &now, memory),
                 InjectedFault::WordOrder => self.swap(&mut cells),
                 InjectedFault::SensorBurnout => self.mark(&mut cells),
-                _ => {}
+                // They leave the values alone.
+                InjectedFault::Noise(_)
+                | InjectedFault::Silent
+                | InjectedFault::Late(_)
+                | InjectedFault::BadCrc
+                | InjectedFault::Cut
+                | InjectedFault::Exception(_)
+                | InjectedFault::HeaterBurnout
+                | InjectedFault::ValveStuck(..)
+                | InjectedFault::Leak(_)
+                | InjectedFault::PumpFailed
+                | InjectedFault::AgitatorFailed => {}
             }
         }
         memory.before.extend(now.each());

@@ -145,7 +145,13 @@ impl Judge {
                 {
                     mark.broken.get_or_insert((at, step.value));
                 }
-                _ => {}
+                Expectation::Alarm(..)
+                | Expectation::NoAlarm(_)
+                | Expectation::Written(..)
+                | Expectation::NotGood(_)
+                | Expectation::Good(_)
+                | Expectation::Within { .. }
+                | Expectation::True(..) => {}
             }
         }
     }

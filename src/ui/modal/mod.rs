@@ -112,7 +112,18 @@ impl Modal {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
                 Modal::UserForm(form) => form.below(),
-                _ => None,
+                Modal::Help(_)
+                | Modal::Entry(_)
+                | Modal::Choice(_)
+                | Modal::Prompt(_)
+                | Modal::Reason(_)
+                | Modal::Faceplate(_)
+                | Modal::Notice(_)
+                | Modal::Guidance(_)
+                | Modal::Why(_)
+                | Modal::Settings(_)
+                | Modal::Bus(_)
+                | Modal::AuditEntry(_) => None,
             };
             return (back, Vec::new());
         }

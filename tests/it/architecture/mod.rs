@@ -6,6 +6,7 @@
 //! | `edge` | only `io`, and named files of `station` and `cli`, touch the outside world |
 //! | `size` | files below 400 lines, functions below 70, a header in every file |
 //! | `style` | tests assert visibly, have short names and no wall clock |
+//! | `arms` | a decision over an own enum names every variant |
 //! | `words` | no text that people see uses a banned word |
 //!
 //! Each law is a function from the facts of files to complaints, and has a test with a snippet that breaks it.
@@ -14,6 +15,7 @@
 
 use std::{collections::BTreeMap, sync::Mutex};
 
+mod arms;
 mod edge;
 mod line;
 mod reader;

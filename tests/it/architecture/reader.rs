@@ -48,7 +48,7 @@ struct Reader<'a> {
 }
 
 /// `true` if this is compiled only for tests: `#[test]`, `#[cfg(test)]`, `#[cfg(all(test, …))]`.
-fn is_test(attrs: &[Attribute]) -> bool {
+pub fn is_test(attrs: &[Attribute]) -> bool {
     attrs.iter().any(|attr| {
         let is_cfg = attr.path().is_ident("cfg");
         is_test_function(attr) || is_cfg && attr.parse_args::<Meta>().is_ok_and(|meta| needs_test(&meta))

@@ -77,7 +77,12 @@ impl Registers {
                 }
                 Finding::Failed { fault: why, .. } => fault = Some(*why),
                 // A read finds nothing else.
-                _ => {}
+                Finding::Exchange(_)
+                | Finding::Bytes { .. }
+                | Finding::Unit { .. }
+                | Finding::Object { .. }
+                | Finding::Written(_)
+                | Finding::Verdict(_) => {}
             }
         }
         let at = clock(run.started, &cx.def().time_zone);

@@ -38,7 +38,20 @@ impl Controllers {
             Action::Pattern => write(cx, device.program.as_ref().and_then(|program| program.pattern)),
             Action::Stop => vec![UiAction::Command(CommandKind::StopRestore(device.id))],
             Action::ReadSets => vec![UiAction::Command(CommandKind::ReadSets)],
-            _ => Vec::new(),
+            // Of one page: it has done them itself.
+            Action::Device(_)
+            | Action::Move(_)
+            | Action::Column(_)
+            | Action::Open
+            | Action::Program
+            | Action::Sets
+            | Action::Find
+            | Action::Defaults
+            | Action::Guide
+            | Action::Turn(_)
+            | Action::Save
+            | Action::All
+            | Action::Turnaround => Vec::new(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What to check next where nothing was read yet, in the order of likelihood.
 
 use super::Registers;
-use crate::plant::{def::Transport, event::Fault};
+use crate::plant::{def::Transport, event::FaultKind};
 use crate::ui::tabs::prelude::*;
 
 /// Lines of advice, while no register of the unit was ever read; none once something was, or nothing is known yet.
@@ -9,26 +9,26 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<&'static str> {
     let fault = tab.last.as_ref().and_then(|last| last.parts.first()?.words.as_ref().err().copied());
     let Some(fault) = fault.filter(|_| tab.cells.is_blank()) else { return Vec::new() };
     let serial = matches!(cx.def().lines[tab.line.index()].transport, Transport::Serial { .. });
-    let mut lines = match fault {
-        Fault::Timeout if serial => vec![
+    let mut lines = match fault.kind() {
+        FaultKind::Timeout if serial => vec![
             t!("another unit address: U; or a scan of all: tab Bus"),
             t!("another baud rate or parity: quit, and open without --baud and --parity"),
             t!("A and B exchanged, or the device without power"),
             t!("no termination or common ground, another master on the line"),
         ],
-        Fault::Timeout => vec![
+        FaultKind::Timeout => vec![
             t!("another unit address: U; 255 and 0 are usual of devices, 1 behind a gateway"),
             t!("no device behind the gateway, or the device without power"),
             t!("other serial settings in the gateway than in the device"),
             t!("the device takes one connection, and another program has it"),
             t!("another protocol on this TCP port"),
         ],
-        Fault::Exception(code) if code.is_of_gateway() => vec![
+        FaultKind::Exception(code) if code.is_of_gateway() => vec![
             t!("the gateway answers, the device behind it does not: another unit address: U"),
             t!("the device without power, or its serial line disconnected"),
             t!("other serial settings in the gateway than in the device"),
         ],
-        fault if fault.is_corrupt() => vec![
+        FaultKind::Corrupt => vec![
             if serial {
                 t!("another baud rate or parity: quit, and open without --baud and --parity")
             } else {
@@ -37,7 +37,11 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<&'static str> {
             t!("two devices with the same unit address, or another master on the line"),
             t!("noise: screen, termination, common ground; every byte stands on tab Bus"),
         ],
-        _ => return Vec::new(),
+        FaultKind::Exception(_)
+        | FaultKind::OutOfSync
+        | FaultKind::NotANumber
+        | FaultKind::NotConnected
+        | FaultKind::BackedOff => return Vec::new(),
     };
     if cx.snapshot.lines[tab.line.index()].counters.echoes {
         lines.insert(0, t!("local echo: the adapter gives back what it sends (removed from answers)"));

@@ -274,7 +274,18 @@ fn exact(named: &Named, value: f64) -> String {
     match named.kind {
         DataType::F32 if named.scale == 1.0 => to_f32(value).to_string(),
         DataType::F64 if named.scale == 1.0 => value.to_string(),
-        _ => format!("{value:.*}", usize::from(named.decimals)),
+        DataType::Bool
+        | DataType::I16
+        | DataType::U16
+        | DataType::I32
+        | DataType::U32
+        | DataType::I64
+        | DataType::U64
+        | DataType::F32
+        | DataType::F64
+        | DataType::Bcd16
+        | DataType::Bcd32
+        | DataType::Text(_) => format!("{value:.*}", usize::from(named.decimals)),
     }
 }
 

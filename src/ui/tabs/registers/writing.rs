@@ -108,13 +108,13 @@ impl Registers {
         if let Some((named, held)) = self.named_and_held() {
             let title =
                 t!("write {name}, now {value}", name = named.name, value = named.text(&held).unwrap_or_default());
-            let hint = match named.kind {
-                DataType::Text(most) => t!("at most {most} characters", most),
-                _ if !named.labels.is_empty() => {
-                    let labels: Vec<&str> = named.labels.iter().map(|(_, label)| label.as_str()).collect();
-                    labels.join(", ")
-                }
-                _ => t!("a value as it is shown, or +1; 0x2BC: words as they are").to_owned(),
+            let hint = if let DataType::Text(most) = named.kind {
+                t!("at most {most} characters", most)
+            } else if named.labels.is_empty() {
+                t!("a value as it is shown, or +1; 0x2BC: words as they are").to_owned()
+            } else {
+                let labels: Vec<&str> = named.labels.iter().map(|(_, label)| label.as_str()).collect();
+                labels.join(", ")
             };
             return self.ask_text(super::Asking::Write, &title, &hint);
         }
