@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 pub use super::{
     data_type::{DataType, Encoding},
     poll_class::PollClass,
+    store_policy::{STORE_EVERY_MAX, StorePolicy},
 };
 use super::{
     id::{DeviceId, TagId},
@@ -91,22 +92,6 @@ pub struct TagDef {
     /// Part of a parameter set: a setting, not a command and not a measurement.
     pub in_sets: bool,
 }
-
-keyword_enum! {
-    /// When a value is stored in the history.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-    pub enum StorePolicy: "store policy" {
-        /// When it changes by more than its deadband, and at its longest interval.
-        Change => "change",
-        /// At every reading.
-        Always => "always",
-        /// Not at all.
-        Never => "never",
-    }
-}
-
-/// A value without a successor for longer is not known any more, see the hold of `report`: no longer interval can be.
-pub const STORE_EVERY_MAX: Duration = Duration::from_secs(60);
 
 impl TagDef {
     /// A plain quantity: read only, unscaled, without unit, read every second, stored. A caller changes what it knows

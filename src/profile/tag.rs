@@ -81,10 +81,6 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     }
     let short = text(&row.name);
     let name = format!("{}.{short}", context.device_name);
-    let usually = || match !is_text && access != Access::Write && matches!(poll, Poll::Every(_)) {
-        true => StorePolicy::Change,
-        false => StorePolicy::Never,
-    };
     let tag = TagDef {
         label: row.label.as_ref().map_or_else(|| short.clone(), |label| label.value.clone()),
         meaning: text(&row.meaning),
@@ -107,7 +103,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         poll,
         // Known when all tags and alarms are.
         deadband: row.deadband.map(|deadband| deadband.value),
-        store: row.store.map_or_else(usually, |store| store.value),
+        store: store_policy(&row, is_text, access, poll),
         store_every: store_every(&row, problems),
         counter: row.counter.map(|counter| counter.value),
         confidence: row.confidence.value_or(Confidence::Medium),
@@ -263,6 +259,12 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
         ((scale * 10f64.powi(i32::from(*digits))).round() / 10f64.powi(i32::from(*digits)) - scale).abs() < 1e-9
     };
     (0..=6).find(whole).unwrap_or(6)
+}
+
+/// What is read regularly is stored, unless the row says otherwise.
+fn store_policy(row: &TagTable, is_text: bool, access: Access, poll: Poll) -> StorePolicy {
+    let stored = !is_text && access != Access::Write && matches!(poll, Poll::Every(_));
+    row.store.map_or(if stored { StorePolicy::Change } else { StorePolicy::Never }, |store| store.value)
 }
 
 /// The longest time between two stored values.

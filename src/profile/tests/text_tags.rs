@@ -71,7 +71,7 @@ fn what_is_stored_and_when_can_be_chosen() {
     );
     for (key, expect) in [
         ("store = \"sometimes\"", "sometimes"),
-        ("store = false", "found a boolean"),
+        ("store = false", "found true or false, expected a string"),
         ("store_every = \"61 s\"", "a value can be stored every 1 to 60 s"),
         ("store_every = \"0.5 s\"", "a value can be stored every 1 to 60 s"),
     ] {
