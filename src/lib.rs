@@ -43,6 +43,8 @@
 //! outcome as recorded; the history follows within a second.
 //! Queries go to the history; one that reads registers goes to the line, which answers it between polls.
 //! The history thread only writes; a second one answers queries, each on a connection of its own and for a bounded time.
+//! Closed hours leave the database for an [archive](history::io::archive) of Parquet files, with minutes and hours as
+//! aggregates; a query is cut into [pieces](history::tiers::pieces), each answered by the widest of these that has it.
 //!
 //! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
 //! plant task never blocks and deadlock is ruled out by shape. Shutdown runs downstream: the links stop, the plant ends
@@ -91,6 +93,7 @@
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
 //! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
+//! | tier, archive, manifest | samples, minutes or hours; the files of closed hours; the table that names these |
 //! | fault, injected fault | why a request or the station failed; what a trainer puts into the simulated plant
 //! | scenario, drill | a scripted plant for tests; one that evaluates an operator |
 //!

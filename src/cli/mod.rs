@@ -11,6 +11,7 @@ mod demo;
 mod drill;
 mod experiments;
 mod export;
+mod history;
 mod decode;
 mod init;
 mod log;
@@ -106,6 +107,8 @@ enum Command {
     Report(report::Args),
     /// Write stored values of tags at a fixed interval as CSV
     Export(export::Args),
+    /// Show what the history holds and where: spans, files, sizes, gaps; `--verify` reads every file of the archive
+    History(history::Args),
     /// Show alarm performance in a shift or period: rates, floods, chattering, stale, against their targets
     Alarms(alarms::Args),
     /// Decode a Modbus frame: every field, its checksum, and what is wrong with it
@@ -255,6 +258,7 @@ fn carry_out(args: Args) -> Result<(), CliError> {
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Export(args)) => export::main(args),
+        Some(Command::History(args)) => history::main(args),
         Some(Command::Alarms(args)) => alarms::main(args),
         Some(Command::Decode(args)) => decode::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),

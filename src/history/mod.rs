@@ -6,11 +6,12 @@ pub mod alarm_state;
 pub mod words;
 pub mod io;
 
-use std::time::Duration;
+use std::{path::PathBuf, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
+use self::tiers::Tier;
 use crate::{
     plant::{
         alarm::PeriodMetrics,
@@ -103,6 +104,8 @@ pub enum Query {
         /// Instants.
         count: usize,
     },
+    /// What is stored, and where.
+    Overview,
     /// Registers of a unit as they are now: the line answers it, not the history.
     Registers(LiveRead),
 }
@@ -124,8 +127,46 @@ pub enum Answer {
     AlarmMetrics(Box<PeriodMetrics>),
     /// By tag the value in force at each instant; `None` where nothing is stored, or nothing recent enough.
     Values(Vec<Vec<Option<HeldValue>>>),
+    /// What is stored.
+    Overview(Box<Overview>),
     /// What the unit holds.
     Registers(LiveReading),
+}
+
+/// What is stored, and where.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Overview {
+    /// The database.
+    pub database: PathBuf,
+    /// Its bytes, with its log.
+    pub database_bytes: u64,
+    /// Samples in it: those that are not archived yet.
+    pub samples: u64,
+    /// The first and last instant stored, in the database or in the archive.
+    pub extent: Option<(Timestamp, Timestamp)>,
+    /// The folder of the archive.
+    pub folder: PathBuf,
+    /// Its files, oldest first.
+    pub files: Vec<ArchiveFile>,
+}
+
+/// A file of the archive.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ArchiveFile {
+    /// How finely.
+    pub tier: Tier,
+    /// Below the folder of the archive.
+    pub path: String,
+    /// From, inclusive; microseconds since 1970.
+    pub from: i64,
+    /// To, exclusive.
+    pub to: i64,
+    /// Its rows.
+    pub rows: u64,
+    /// Its bytes.
+    pub bytes: u64,
+    /// SHA-256 of them, in hexadecimal.
+    pub sha256: String,
 }
 
 /// A curve reduced to columns of equal width.

@@ -3,6 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `architecture` | the laws: the line of modules, the io edge, sizes, style of tests, words |
+//! | `archive` | closed hours as files: what `sightglass history` says of them, and what polars reads |
 //! | `attach` | the station's socket: equal snapshots at both ends, stuck and hostile terminals, reconnecting |
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
@@ -31,6 +32,7 @@
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 mod architecture;
+mod archive;
 mod attach;
 mod capture;
 mod commands;

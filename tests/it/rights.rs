@@ -341,6 +341,7 @@ fn of_question(query: &Query) -> Row {
         Query::Values { .. } => look("", "-VTSL-"),
         Query::AlarmMetrics { .. } => look("", "-VTSL-"),
         Query::Report { .. } => look("", "-VTSL-"),
+        Query::Overview => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
@@ -363,6 +364,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::Values { tags: vec![def.tags[0].id], from, every: std::time::Duration::from_secs(10), count: 6 },
         Query::AlarmMetrics { from, to },
         Query::Report { period: Period { name: "period".into(), from, to } },
+        Query::Overview,
         Query::Audit { from, to, words, by, action, limit },
         Query::Registers(registers(def)),
     ]

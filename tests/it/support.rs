@@ -221,7 +221,7 @@ pub fn have(program: &str, package: &str) -> bool {
     present(found(), &format!("{program} (Debian package {package})"))
 }
 
-/// The Python with pymodbus and minimalmodbus, in a virtual environment of the tests.
+/// The Python with pymodbus, minimalmodbus and polars, in a virtual environment of the tests.
 pub fn python() -> Option<PathBuf> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON
@@ -230,17 +230,17 @@ pub fn python() -> Option<PathBuf> {
             let python = folder.join("bin/python");
             let works = || {
                 Command::new(&python)
-                    .args(["-c", "import minimalmodbus, pymodbus, serial; assert (minimalmodbus.__version__, pymodbus.__version__) == ('2.1.1', '3.16.1')"])
+                    .args(["-c", "import minimalmodbus, polars, pymodbus, serial; assert (minimalmodbus.__version__, polars.__version__, pymodbus.__version__) == ('2.1.1', '2.1.0', '3.16.1')"])
                     .stderr(Stdio::null())
                     .status()
                     .is_ok_and(|status| status.success())
             };
             if !works() {
                 let _ = Command::new("python3").args(["-m", "venv"]).arg(&folder).status();
-                let pip = ["-m", "pip", "-q", "install", "pymodbus[serial]==3.16.1", "minimalmodbus==2.1.1"];
+                let pip = ["-m", "pip", "-q", "install", "pymodbus[serial]==3.16.1", "minimalmodbus==2.1.1", "polars==2.1.0"];
                 let _ = Command::new(&python).args(pip).status();
             }
-            present(works(), "pymodbus 3.16.1 and minimalmodbus 2.1.1 (PyPI, through python3 -m venv)").then_some(python)
+            present(works(), "pymodbus 3.16.1, minimalmodbus 2.1.1 and polars 2.1.0 (PyPI, through python3 -m venv)").then_some(python)
         })
         .clone()
 }

@@ -12,14 +12,13 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
-    archive::ArchiveFile,
     samples::{Wanted, is_damage_of_file},
     sql,
     store::{Store, engine, instant, utc},
 };
 use crate::{
     history::{
-        HistoryError,
+        ArchiveFile, HistoryError,
         tiers::{Aggregate, Part, Tier, pieces},
     },
     plant::def::TagId,

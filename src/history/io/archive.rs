@@ -36,7 +36,7 @@ use super::{
 };
 use crate::{
     history::{
-        HistoryError,
+        ArchiveFile, HistoryError, Overview,
         tiers::{HOUR, Tier, floor},
     },
     profile::io::atomic::{sync_folder, with_suffix},
@@ -49,25 +49,6 @@ const GRACE: Duration = Duration::from_secs(5 * 60);
 const UNFINISHED: &str = ".new";
 /// The dictionary of tags.
 const TAGS: &str = "tag.parquet";
-
-/// A file of the archive.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ArchiveFile {
-    /// How finely.
-    pub tier: Tier,
-    /// Below the folder of the archive.
-    pub path: String,
-    /// From, inclusive; microseconds since 1970.
-    pub from: i64,
-    /// To, exclusive.
-    pub to: i64,
-    /// Its rows.
-    pub rows: u64,
-    /// Its bytes.
-    pub bytes: u64,
-    /// SHA-256 of them, in hexadecimal.
-    pub sha256: String,
-}
 
 /// What is to be done next.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -115,6 +96,18 @@ impl Store {
     /// Whether the manifest names a file: what it does not name any more was replaced by another.
     pub(super) fn is_known(&self, file: &ArchiveFile) -> Result<bool, HistoryError> {
         Ok(self.files(None)?.contains(file))
+    }
+
+    /// What is stored, and where.
+    pub(super) fn overview(&self) -> Result<Overview, HistoryError> {
+        Ok(Overview {
+            database: self.path.clone(),
+            database_bytes: self.file_bytes(),
+            samples: self.db.query_row(sql::COUNT_SAMPLES, [], |row| row.get(0)).map_err(engine)?,
+            extent: self.extent(),
+            folder: self.archive_folder(),
+            files: self.files(None)?,
+        })
     }
 
     /// Where the archive lies.
@@ -286,7 +279,7 @@ pub(super) fn quoted(path: &Path) -> String {
 }
 
 /// Bytes and SHA-256 of a file, which is on disk when this returns.
-fn sync_and_hash(path: &Path) -> std::io::Result<(u64, String)> {
+pub fn sync_and_hash(path: &Path) -> std::io::Result<(u64, String)> {
     let mut file = File::open(path)?;
     file.sync_all()?;
     let mut hash = Sha256::new();

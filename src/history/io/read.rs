@@ -59,6 +59,7 @@ impl Store {
             Query::Values { tags, from, every, count } => {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
+            Query::Overview => self.overview().map(|overview| Answer::Overview(Box::new(overview))),
             Query::Registers(_) => Err(HistoryError::Engine("registers are read by the line".to_owned())),
             Query::Journal { from, to, limit } => {
                 self.span_list(&sql::journal(sql::NEWEST), (*from, *to, *limit), &[], alarm).map(Answer::Journal)

@@ -11,13 +11,13 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
-    archive::{ArchiveFile, overlapping},
+    archive::overlapping,
     read::within,
     sql,
     store::{Store, engine, instant, utc},
 };
 use crate::{
-    history::{HistoryError, tiers::Tier},
+    history::{ArchiveFile, HistoryError, tiers::Tier},
     plant::{
         def::TagId,
         number::{to_i64, to_u32, to_u64},

@@ -245,6 +245,8 @@ pub const PARQUET: &str = "FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE 1228
 /// When the oldest sample was stored that is not archived, from an instant on.
 pub const OLDEST_SAMPLE: &str = "SELECT min(utc) FROM sample WHERE utc >= ?";
 
+/// Samples that are not archived.
+pub const COUNT_SAMPLES: &str = "SELECT count(*) FROM sample";
 /// The files of the archive, oldest first.
 pub const FILES: &str =
     "SELECT tier, path, from_utc, to_utc, rows, bytes, sha256 FROM archive ORDER BY from_utc, to_utc, rowid";

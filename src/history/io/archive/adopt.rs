@@ -11,10 +11,10 @@ use std::{
 use duckdb::params;
 use jiff::{Timestamp, civil::Date, tz::TimeZone};
 
-use super::{ArchiveFile, TAGS, UNFINISHED, day, month, quoted, sync_and_hash, wrong};
+use super::{TAGS, UNFINISHED, day, month, quoted, sync_and_hash, wrong};
 use crate::{
     history::{
-        HistoryError,
+        ArchiveFile, HistoryError,
         io::{
             sql,
             store::{Store, engine, instant, utc},

@@ -4,10 +4,10 @@ use std::{collections::HashMap, ops::Range};
 
 use duckdb::params;
 
-use super::{ArchiveFile, Steps, Written, overlapping};
+use super::{Steps, Written, overlapping};
 use crate::{
     history::{
-        HistoryError,
+        ArchiveFile, HistoryError,
         io::{
             sql,
             store::{Store, engine, instant, utc},

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::{ArchiveFile, Steps, Written};
+use super::{Steps, Written};
 use crate::history::{
-    HistoryError,
+    ArchiveFile, HistoryError,
     io::{sql, store::Store},
     tiers::{HOUR, Tier, floor},
 };

@@ -1,0 +1,127 @@
+//! `sightglass history`: what is stored, where, and whether the archive is sound.
+
+use std::{path::Path, sync::Arc};
+
+use jiff::Timestamp;
+
+use crate::{
+    history::{Answer, ArchiveFile, Overview, Query, io::archive::sync_and_hash, tiers::Tier},
+    plant::PlantDef,
+};
+
+use super::{
+    CliError, StationArgs, client, in_runtime, load, local, say,
+    source::{Source, unexpected},
+};
+
+/// Arguments of `history`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A plant file, or the name of a shipped plant
+    plant: String,
+    /// Read every file of the archive and compare it with the manifest: exit code 1 if one is missing or was changed
+    #[arg(long)]
+    verify: bool,
+    /// Print JSON instead of lines
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    login: client::Login,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+/// Asks the station, or reads the file, and prints.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let def = Arc::new(load(&args.plant, &args.station)?);
+    in_runtime(async {
+        let source = Source::open(&def, &args.station, &args.login).await?;
+        let Answer::Overview(overview) = source.query(Query::Overview).await? else { return Err(unexpected()) };
+        match args.json {
+            true => {
+                say(&serde_json::to_string_pretty(&overview).expect("its keys are words and its numbers are finite"))
+            }
+            false => in_words(&overview, &def).iter().for_each(|line| say(line)),
+        }
+        if args.verify { verify(&overview) } else { Ok(()) }
+    })
+}
+
+/// One fact a line.
+fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
+    let Overview { database, database_bytes, samples, extent, folder, files } = overview;
+    let time = |at: Timestamp| local(at, def);
+    let stored =
+        extent.map_or_else(|| "nothing yet".to_owned(), |(from, to)| format!("{} to {}", time(from), time(to)));
+    let mut lines = vec![
+        format!("stored    {stored}"),
+        format!("database  {}: {samples} samples not archived yet, {}", database.display(), size(*database_bytes)),
+        format!("archive   {}: {} files, {}", folder.display(), files.len(), size(bytes(files.iter()))),
+    ];
+    for tier in Tier::ALL {
+        let files: Vec<&ArchiveFile> = files.iter().filter(|file| file.tier == tier).collect();
+        let (Some(first), Some(last)) = (files.first(), files.last()) else { continue };
+        let rows: u64 = files.iter().map(|file| file.rows).sum();
+        let all = bytes(files.iter().copied());
+        let span = [first.from, last.to].map(|at| Timestamp::from_microsecond(at).map_or_else(|_| "?".into(), time));
+        let each = all as f64 / rows.max(1) as f64;
+        lines.push(format!(
+            "{:9} {} to {}: {rows} rows in {} files, {}, {each:.2} bytes a row",
+            tier.word(),
+            span[0],
+            span[1],
+            files.len(),
+            size(all)
+        ));
+    }
+    for pair in files.iter().filter(|file| file.tier == Tier::Raw).collect::<Vec<_>>().windows(2) {
+        if pair[0].to < pair[1].from
+            && let (Ok(from), Ok(to)) =
+                (Timestamp::from_microsecond(pair[0].to), Timestamp::from_microsecond(pair[1].from))
+        {
+            lines.push(format!("gap       {} to {}: nothing was stored", time(from), time(to)));
+        }
+    }
+    lines
+}
+
+/// Compares the files of the archive with the manifest.
+fn verify(overview: &Overview) -> Result<(), CliError> {
+    let wrong: Vec<String> = overview
+        .files
+        .iter()
+        .filter_map(|file| Some(format!("{}: {}", file.path, trouble(&overview.folder, file)?)))
+        .collect();
+    wrong.iter().for_each(|wrong| say(wrong));
+    match wrong.len() {
+        0 => {
+            say(&format!("verified  {} files: each is as it was written", overview.files.len()));
+            Ok(())
+        }
+        count => {
+            Err(CliError::Failed(format!("{count} of {} files of the archive are not sound", overview.files.len())))
+        }
+    }
+}
+
+fn trouble(folder: &Path, file: &ArchiveFile) -> Option<String> {
+    match sync_and_hash(&folder.join(&file.path)) {
+        Err(error) => Some(error.to_string()),
+        Ok((bytes, _)) if bytes != file.bytes => Some(format!("found {bytes} bytes, expected {}", file.bytes)),
+        Ok((_, sha256)) if sha256 != file.sha256 => Some("its bytes were changed: another SHA-256".to_owned()),
+        Ok(_) => None,
+    }
+}
+
+fn bytes<'a>(files: impl Iterator<Item = &'a ArchiveFile>) -> u64 {
+    files.map(|file| file.bytes).sum()
+}
+
+/// `12.3 MiB`.
+fn size(bytes: u64) -> String {
+    match bytes {
+        0..1_048_576 => format!("{:.1} KiB", bytes as f64 / 1_024.0),
+        1_048_576..1_073_741_824 => format!("{:.1} MiB", bytes as f64 / 1_048_576.0),
+        _ => format!("{:.1} GiB", bytes as f64 / 1_073_741_824.0),
+    }
+}

@@ -1,0 +1,101 @@
+//! Closed hours as files: what `sightglass history` says of them, and what another engine reads.
+
+use std::{path::Path, process::Command};
+
+use jiff::{SignedDuration, Timestamp};
+use sightglass::{
+    history::io::store::Store,
+    plant::{record::Record, sample::Sample},
+    profile::{self, Search},
+};
+
+use crate::support::{folder, python, sightglass};
+
+const START: &str = "2026-03-02T06:00:00Z";
+/// Samples of each tag, one a second: 26 hours.
+const SECONDS: i64 = 26 * 3_600;
+
+/// A closed history of the tank, archived up to its last hour.
+fn archived(path: &Path) {
+    let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let start: Timestamp = START.parse().unwrap();
+    let store = Store::open(path, &def, start).unwrap().store;
+    let tags = ["TIC-1.PV", "TIC-1.SV"].map(|name| def.tag_named(name).unwrap());
+    let row = |second: i64| {
+        let sample = |value| Sample::good(value, start + SignedDuration::from_secs(second));
+        [Record::Sample(tags[0], sample((second % 1_000) as f64 / 10.0)), Record::Sample(tags[1], sample(70.0))]
+    };
+    for part in (0..SECONDS).collect::<Vec<i64>>().chunks(20_000) {
+        store.append(&part.iter().flat_map(|second| row(*second)).collect::<Vec<_>>()).unwrap();
+    }
+    let now = start + SignedDuration::from_secs(SECONDS);
+    while let Some(job) = store.archive_due(now, Timestamp::MIN).unwrap() {
+        store.archive(&job, &mut |_| Ok(())).unwrap();
+    }
+    store.checkpoint().unwrap();
+}
+
+fn history(path: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let output = sightglass().args(["history", "tank", "--history"]).arg(path).args(args).output().unwrap();
+    let text = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8(text).unwrap())
+}
+
+#[test]
+fn the_archive_is_listed_and_verified() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    archived(&path);
+    let (code, text) = history(&path, &["--verify"]);
+    assert_eq!(code, Some(0), "{text}");
+    for expect in [
+        "stored    2026-03-02 13:00:00 to 2026-03-03 14:59:59",
+        "7200 samples not archived yet",
+        "raw       2026-03-02 07:00:00 to 2026-03-03 14:00:00: 180000 rows",
+        "m1        2026-03-02 07:00:00 to 2026-03-03 14:00:00: 3000 rows",
+        "h1        2026-03-02 07:00:00 to 2026-03-03 14:00:00: 50 rows",
+        "each is as it was written",
+    ] {
+        assert!(text.contains(expect), "{expect} in\n{text}");
+    }
+    let (code, text) = history(&path, &["--json"]);
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((code, json["samples"].as_u64()), (Some(0), Some(7_200)));
+    // One bit, and one file.
+    let day = folder.path().join("tank.archive/raw/date=2026-03-02/day.parquet");
+    let mut bytes = std::fs::read(&day).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&day, bytes).unwrap();
+    std::fs::remove_file(folder.path().join("tank.archive/h1/date=2026-03-02/day.parquet")).unwrap();
+    let (code, text) = history(&path, &["--verify"]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("raw/date=2026-03-02/day.parquet: its bytes were changed"), "{text}");
+    assert!(text.contains("h1/date=2026-03-02/day.parquet: No such file"), "{text}");
+    assert!(text.contains("2 of "), "{text}");
+}
+
+#[test]
+fn polars_reads_the_archive_as_it_lies() {
+    let Some(python) = python() else { return };
+    let folder = folder();
+    archived(&folder.path().join("tank.duckdb"));
+    let script = "
+import sys, polars
+folder = sys.argv[1]
+tags = polars.read_parquet(folder + '/tag.parquet')
+raw = polars.scan_parquet(folder + '/raw/**/*.parquet').collect().join(tags, left_on='tag', right_on='id')
+pv = raw.filter(polars.col('name') == 'TIC-1.PV')
+minutes = polars.scan_parquet(folder + '/m1/**/*.parquet').collect().join(tags, left_on='tag', right_on='id')
+pv_minutes = minutes.filter(polars.col('name') == 'TIC-1.PV')
+print(raw.height, round(pv['value'].sum(), 3), pv['utc'].min(), pv['utc'].max(), pv_minutes.height,
+    round((pv_minutes['mean'] * pv_minutes['good_ms']).sum() / 1000, 3), pv_minutes['n'].sum())
+";
+    let output = Command::new(python).args(["-c", script]).arg(folder.path().join("tank.archive")).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // 25 hours of one sample a second, each in force for one second: both sums are those of 0.0 … 99.9, ninety times.
+    let sum = (0..90_000).map(|second| (second % 1_000) as f64 / 10.0).sum::<f64>();
+    let expect = format!("180000 {sum:.1} 2026-03-02 06:00:00 2026-03-03 06:59:59 1500 {sum:.1} 90000");
+    assert_eq!(text.trim(), expect);
+}
