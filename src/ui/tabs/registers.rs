@@ -8,6 +8,8 @@ mod decode;
 mod find;
 mod import;
 mod keys;
+mod layout;
+mod likely;
 mod list;
 mod names;
 mod recognise;

@@ -1,6 +1,14 @@
 //! How the registers are drawn: a row each, and the selected one below in every meaning.
 
-use super::{Base, Registers, advice::advice, cells::Cell, decode, names::Named, watch};
+use super::{
+    Base, Registers,
+    advice::advice,
+    cells::Cell,
+    decode,
+    layout::{Columns, layout, name_column},
+    names::Named,
+    watch,
+};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -128,31 +136,6 @@ pub fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
     }
 }
 
-/// Where each column begins; the widest screens have all of them.
-struct Columns {
-    unsigned: u16,
-    signed: u16,
-    long: Option<u16>,
-    float: u16,
-    bits: u16,
-    text: u16,
-    age: u16,
-    hint: u16,
-}
-
-fn layout(width: u16) -> Columns {
-    let long = (100 <= width).then_some(37);
-    let float = if long.is_some() { 50 } else { 36 };
-    let bits = float + 12;
-    Columns { unsigned: 22, signed: 29, long, float, bits, text: bits + 20, age: bits + 23, hint: bits + 30 }
-}
-
-/// Where names stand, and their room: behind the other columns, else over the bits.
-fn name_column(at: &Columns, width: u16) -> (u16, u16) {
-    let behind = width.saturating_sub(at.hint);
-    if 20 <= behind { (at.hint + 1, behind - 1) } else { (at.bits, 22) }
-}
-
 fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let (theme, at) = (cx.theme, layout(canvas.width()));
     let base = match tab.base {
@@ -169,6 +152,9 @@ fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     canvas.text(17, 2, t!("hex"), theme.dim());
     canvas.text_right(at.unsigned + 6, 2, "uint16", theme.dim());
     canvas.text_right(at.signed + 6, 2, "int16", theme.dim());
+    if let Some(bcd) = at.bcd {
+        canvas.text_right(bcd + 5, 2, "BCD", theme.dim());
+    }
     if let Some(long) = at.long {
         canvas.text_right(long + 12, 2, "uint32", theme.dim());
     }
@@ -234,16 +220,19 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
         (None, _) => String::new(),
     };
     canvas.text(at.age, y, &fit(&words, 6), style);
-    let words = tab.cells.words(tab.table, address, 4);
     if let Some(named) = tab.names.get(tab.table, address) {
         let (value, _) = named_text(tab, cx, named);
         let (x, room) = name_column(&at, canvas.width());
         canvas.text(x, y, &pad(&format!("{}  {value}", named.name), room), style);
-    } else if let Some(order) = decode::likely_float(words.get(..2).unwrap_or(&words))
+    } else if let Some((kind, order)) = tab.cells.likely(tab.table, address)
         && at.hint < canvas.width()
-        && !tab.table.is_bits()
     {
-        canvas.text(at.hint, y, &t!("likely float {order}", order = order.word()), theme.dim());
+        let order = order.word();
+        let words = match kind {
+            DataType::F32 => t!("likely float {order}", order),
+            _ => t!("likely counter {order}", order),
+        };
+        canvas.text(at.hint, y, &words, theme.dim());
     }
 }
 
@@ -260,6 +249,10 @@ fn numbers(
     canvas.text(17, y, hex, style);
     canvas.text_right(at.unsigned + 6, y, &word.to_string(), style);
     canvas.text_right(at.signed + 6, y, &word.cast_signed().to_string(), style);
+    if let Some(x) = at.bcd {
+        let bcd = decode::number(DataType::Bcd16, tab.order, &[word]).map(|value| decode::short(value, 4));
+        canvas.text_right(x + 5, y, bcd.as_deref().unwrap_or("–"), style);
+    }
     let long = decode::number(DataType::U32, tab.order, &words).map(|value| decode::short(value, 11));
     if let Some(x) = at.long {
         canvas.text_right(x + 12, y, long.as_deref().unwrap_or("–"), style);
@@ -339,7 +332,9 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
             double = number(DataType::F64, tab.order),
             text = decode::text(&words)
         );
-        canvas.text(1, 1, &fit(&plain, width.saturating_sub(2)), normal);
+        let stamps = decode::stamps(&tab.cells.words(tab.table, address, 6));
+        let stamps = stamps.into_iter().map(|(kind, stamp)| format!("   {kind} {stamp}")).collect::<String>();
+        canvas.text(1, 1, &fit(&(plain + &stamps), width.saturating_sub(2)), normal);
         // All four where two stand beside each other, else the usual one and the chosen one.
         let other = if tab.order == ByteOrder::Abcd { ByteOrder::Cdab } else { tab.order };
         let orders = if 108 <= width { ByteOrder::ALL.to_vec() } else { vec![ByteOrder::Abcd, other] };

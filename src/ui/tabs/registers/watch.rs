@@ -6,7 +6,7 @@ pub(super) mod start;
 use std::{collections::VecDeque, path::PathBuf};
 
 use super::{
-    Asking, Registers, decode,
+    Asking, Registers,
     names::Named,
     view::{is_long_ago, named_text},
 };
@@ -137,12 +137,10 @@ impl Registers {
         Vec::new()
     }
 
-    /// The selected register by its number: a float where it looks like one.
+    /// The selected register by its number: of the type that it looks like.
     fn unnamed(&self) -> Named {
-        let words = self.cells.words(self.table, self.selected, 2);
-        let float = decode::likely_float(&words).filter(|_| !self.table.is_bits());
-        let (kind, order) = match float {
-            Some(order) => (DataType::F32, order),
+        let (kind, order) = match self.cells.likely(self.table, self.selected) {
+            Some(likely) => likely,
             None if self.table.is_bits() => (DataType::Bool, ByteOrder::Abcd),
             None => (DataType::U16, self.order),
         };
