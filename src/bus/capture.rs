@@ -23,7 +23,7 @@ use super::{
 use crate::plant::{
     line::Framing,
     number::{to_u16, to_u32},
-    traffic::Frame,
+    traffic::{Frame, FrameResult},
 };
 
 /// Link types (www.tcpdump.org/linktypes.html), each an interface of the capture.
@@ -53,7 +53,7 @@ pub fn pcapng(frames: &[Frame]) -> Vec<u8> {
     file
 }
 
-/// One line a frame: time, direction, bytes, meaning, verdict. `sightglass decode` reads it back.
+/// One line a frame: time, direction, bytes, meaning, result. `sightglass decode` reads it back.
 pub fn text(frames: &[Frame]) -> String {
     let mut lines = String::new();
     for (index, frame) in frames.iter().enumerate() {
@@ -63,7 +63,7 @@ pub fn text(frames: &[Frame]) -> String {
             Framing::Ascii | Framing::Rtu | Framing::Mbap => hex(&frame.bytes),
         };
         let direction = if frame.sent { "TX" } else { "RX" };
-        lines += &format!("{} {direction} {bytes} | {} | {}\n", micros(frame.at), dissection.summary, frame.verdict);
+        lines += &format!("{} {direction} {bytes} | {} | {}\n", micros(frame.at), dissection.summary, frame.result);
     }
     lines
 }
@@ -99,8 +99,8 @@ fn packet_block(frame: &Frame, interface: u32, packet: &[u8]) -> Vec<u8> {
         .concat();
     let direction: u32 = if frame.sent { 2 } else { 1 };
     let mut options = option(2, &direction.to_le_bytes());
-    if !matches!(&*frame.verdict, "ok" | "sent") {
-        options.extend(option(1, frame.verdict.as_bytes()));
+    if let FrameResult::Wrong(why) = &frame.result {
+        options.extend(option(1, why.as_bytes()));
     }
     options.extend(option(0, &[]));
     block(6, &[head, padded(packet), options].concat())
@@ -182,9 +182,9 @@ fn checksum(bytes: &[u8]) -> u16 {
 mod tests {
     use super::*;
 
-    fn frame(sent: bool, framing: Framing, bytes: Vec<u8>, verdict: &'static str) -> Frame {
+    fn frame(sent: bool, framing: Framing, bytes: Vec<u8>, result: FrameResult) -> Frame {
         let at = Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_micros(1_700_000_000_123_456);
-        Frame { at, sent, bytes: bytes.into(), framing, verdict: verdict.into(), unit: Some(1), number: 1 }
+        Frame { at, sent, bytes: bytes.into(), framing, result, unit: Some(1), number: 1 }
     }
 
     /// Types and bodies of the blocks; panics when lengths do not lead from one to the next.
@@ -204,9 +204,9 @@ mod tests {
     fn every_frame_is_a_packet_with_its_time_to_the_microsecond() {
         let request = frame::with_mbap(1, &[1, 3, 0, 10, 0, 1]);
         let frames = [
-            frame(true, Framing::Mbap, request.clone(), "sent"),
-            frame(true, Framing::Rtu, frame::with_crc(&[1, 3, 0, 10, 0, 1]), "sent"),
-            frame(false, Framing::Rtu, vec![0xFF, 0, 0x55], "noise before the answer"),
+            frame(true, Framing::Mbap, request.clone(), FrameResult::Sent),
+            frame(true, Framing::Rtu, frame::with_crc(&[1, 3, 0, 10, 0, 1]), FrameResult::Sent),
+            frame(false, Framing::Rtu, vec![0xFF, 0, 0x55], FrameResult::wrong("noise before the answer")),
         ];
         let file = pcapng(&frames);
         let blocks = blocks(&file);
@@ -225,9 +225,9 @@ mod tests {
 
     #[test]
     fn a_corrupt_ascii_frame_does_not_become_a_good_one() {
-        let corrupt = frame(false, Framing::Ascii, b":01030200010A\r\n".to_vec(), "LRC error");
+        let corrupt = frame(false, Framing::Ascii, b":01030200010A\r\n".to_vec(), FrameResult::wrong("LRC error"));
         assert!(upper_pdu(&corrupt).ends_with(b":01030200010A\r\n"));
-        let good = frame(false, Framing::Ascii, ascii::encode(&[1, 3, 2, 0, 1]), "ok");
+        let good = frame(false, Framing::Ascii, ascii::encode(&[1, 3, 2, 0, 1]), FrameResult::Good);
         assert!(upper_pdu(&good).ends_with(&frame::with_crc(&[1, 3, 2, 0, 1])));
     }
 
@@ -243,9 +243,9 @@ mod tests {
     #[test]
     fn the_text_form_says_all_in_a_line_and_can_be_read_back() {
         let frames = [
-            frame(true, Framing::Rtu, frame::with_crc(&[1, 3, 3, 0xEA, 0, 1]), "sent"),
-            frame(false, Framing::Rtu, frame::with_crc(&[1, 3, 2, 0, 50]), "ok"),
-            frame(false, Framing::Ascii, ascii::encode(&[1, 0x83, 2]), "ok"),
+            frame(true, Framing::Rtu, frame::with_crc(&[1, 3, 3, 0xEA, 0, 1]), FrameResult::Sent),
+            frame(false, Framing::Rtu, frame::with_crc(&[1, 3, 2, 0, 50]), FrameResult::Good),
+            frame(false, Framing::Ascii, ascii::encode(&[1, 0x83, 2]), FrameResult::Good),
         ];
         let lines = text(&frames);
         assert_eq!(

@@ -76,7 +76,7 @@ fn once(place: &mut Option<u8>, word: &'static str, found: Option<&str>) -> Resu
 /// Corrupt, late or dropped; or a refusal.
 fn is_error(frame: &Frame, message: &[u8]) -> bool {
     let refused = !frame.sent && message.get(1).is_some_and(|code| 0x80 <= *code);
-    refused || !matches!(&*frame.verdict, "ok" | "sent")
+    refused || frame.result.is_wrong()
 }
 
 fn contains(bytes: &[u8], part: &[u8]) -> bool {
@@ -110,27 +110,30 @@ mod tests {
     use jiff::Timestamp;
 
     use super::*;
-    use crate::{bus::ascii, plant::line::Framing};
+    use crate::{
+        bus::ascii,
+        plant::{line::Framing, traffic::FrameResult},
+    };
 
     fn frames() -> Vec<Frame> {
-        let frame = |number: u64, sent: bool, framing: Framing, bytes: Vec<u8>, verdict: &'static str| Frame {
+        let frame = |number: u64, sent: bool, framing: Framing, bytes: Vec<u8>, result: FrameResult| Frame {
             at: Timestamp::UNIX_EPOCH,
             sent,
             bytes: bytes.into(),
             framing,
-            verdict: verdict.into(),
+            result,
             unit: None,
             number,
         };
         let mut corrupt = frame::with_crc(&[1, 3, 2, 0, 5]);
         corrupt[4] = 9;
         vec![
-            frame(0, true, Framing::Rtu, frame::with_crc(&[1, 3, 3, 0xEA, 0, 1]), "sent"),
-            frame(1, false, Framing::Rtu, frame::with_crc(&[1, 0x83, 2]), "ok"),
-            frame(2, true, Framing::Mbap, frame::with_mbap(9, &[2, 16, 3, 0xEA, 0, 1, 2, 0, 0]), "sent"),
-            frame(3, false, Framing::Ascii, ascii::encode(&[1, 3, 2, 3, 0xEA]), "ok"),
-            frame(4, false, Framing::Rtu, corrupt, "CRC error: got 7BB8, computed 7EB8"),
-            frame(5, false, Framing::Rtu, vec![0xFF], "noise before the answer"),
+            frame(0, true, Framing::Rtu, frame::with_crc(&[1, 3, 3, 0xEA, 0, 1]), FrameResult::Sent),
+            frame(1, false, Framing::Rtu, frame::with_crc(&[1, 0x83, 2]), FrameResult::Good),
+            frame(2, true, Framing::Mbap, frame::with_mbap(9, &[2, 16, 3, 0xEA, 0, 1, 2, 0, 0]), FrameResult::Sent),
+            frame(3, false, Framing::Ascii, ascii::encode(&[1, 3, 2, 3, 0xEA]), FrameResult::Good),
+            frame(4, false, Framing::Rtu, corrupt, FrameResult::wrong("CRC error: got 7BB8, computed 7EB8")),
+            frame(5, false, Framing::Rtu, vec![0xFF], FrameResult::wrong("noise before the answer")),
         ]
     }
 

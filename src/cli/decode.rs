@@ -50,9 +50,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let typed =
             hex_input::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
         describe(&typed, framing, None).iter().for_each(|line| say(line));
-        return match dissection(&typed, framing, None).verdict {
-            verdict if verdict == "ok" => Ok(()),
-            wrong => Err(CliError::Failed(format!("the frame is wrong: {wrong}"))),
+        return match dissection(&typed, framing, None).wrong {
+            None => Ok(()),
+            Some(wrong) => Err(CliError::Failed(format!("the frame is wrong: {wrong}"))),
         };
     }
     if std::io::stdin().is_terminal() {
@@ -84,7 +84,7 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
         }
         frames += 1;
         describe(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
-        wrong += usize::from(dissection(&typed, framing, asked.as_ref()).verdict != "ok");
+        wrong += usize::from(dissection(&typed, framing, asked.as_ref()).wrong.is_some());
         let dissection = dissection(&typed, framing, None);
         asked = (dissection.direction != Some(Direction::Answer)).then_some(dissection);
     }
@@ -131,14 +131,14 @@ fn describe(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissec
     let mut lines = wrap(&format!("{kind}: {}", dissection.summary), WIDTH, 2);
     lines.extend(table(&dissection));
     lines.extend(checks(&dissection));
-    if dissection.verdict != "ok" {
-        lines.extend(wrap(&format!("wrong: {}", dissection.verdict), WIDTH, 2));
+    if let Some(wrong) = &dissection.wrong {
+        lines.extend(wrap(&format!("wrong: {wrong}"), WIDTH, 2));
     }
     if let Some(also) = &dissection.also {
         let words = if dissection.direction.is_none() { also.clone() } else { format!("may also be {also}") };
         lines.extend(wrap(&words, WIDTH, 2));
     }
-    if dissection.direction != Some(Direction::Answer) && dissection.verdict == "ok" {
+    if dissection.direction != Some(Direction::Answer) && dissection.wrong.is_none() {
         for error in check_request(&dissection.message, dissection.framing.unwrap_or(Framing::Rtu)) {
             lines.extend(wrap(&format!("must not be sent: {error}"), WIDTH, 2));
         }

@@ -1,6 +1,6 @@
 //! What went over a line: frames as bytes, requests with their answers. The source frame of every value.
 
-use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
+use std::{borrow::Cow, collections::VecDeque, fmt, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -21,12 +21,48 @@ pub struct Frame {
     pub bytes: Arc<[u8]>,
     /// How the line frames its messages.
     pub framing: Framing,
-    /// `sent`, `ok`, or what was wrong with it.
-    pub verdict: Cow<'static, str>,
+    /// What became of it.
+    pub result: FrameResult,
     /// The unit that was asked or has answered, if that is known.
     pub unit: Option<u8>,
     /// Running number on its line, from 1.
     pub number: u64,
+}
+
+/// What became of a frame.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FrameResult {
+    /// It was sent.
+    Sent,
+    /// A response that fits its request.
+    Good,
+    /// Received after bytes that an operator typed: nothing was expected of it.
+    Unchecked,
+    /// Corrupt, late or dropped: what is wrong with it.
+    Wrong(Cow<'static, str>),
+}
+
+impl FrameResult {
+    /// Says what is wrong.
+    pub fn wrong(why: impl Into<Cow<'static, str>>) -> FrameResult {
+        FrameResult::Wrong(why.into())
+    }
+
+    /// Is something wrong with the frame?
+    pub fn is_wrong(&self) -> bool {
+        matches!(self, FrameResult::Wrong(_))
+    }
+}
+
+impl fmt::Display for FrameResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            FrameResult::Sent => "sent",
+            FrameResult::Good => "ok",
+            FrameResult::Unchecked => "received",
+            FrameResult::Wrong(why) => why,
+        })
+    }
 }
 
 /// The latest frames of a line, oldest first. Cheap to clone: a snapshot carries it.
@@ -118,7 +154,7 @@ mod tests {
             sent: true,
             bytes: [1].into(),
             framing: Framing::Rtu,
-            verdict: "sent".into(),
+            result: FrameResult::Sent,
             unit: Some(1),
             number,
         };

@@ -30,7 +30,7 @@ use sightglass::{
         line_report::{LineReport, PollReport},
         request_stats::RequestStats,
         tag::{ByteOrder, DataType, Point, Poll, PollClass, Table, TagDef},
-        traffic::{Exchange, Frame},
+        traffic::{Exchange, Frame, FrameResult},
     },
     profile::{self, Search},
     station::{Request, SessionAcceptor},
@@ -169,8 +169,15 @@ async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<s
             let poll = report.polls.iter_mut().find(|poll| poll.device == device.id).unwrap();
             poll.stats.count(Ok(()), Some(reply + Duration::from_millis(round % 9)));
             poll.next = Some(at + jiff::SignedDuration::from_secs(1));
-            let frame =
-                |bytes, sent, number| Frame { at, sent, bytes, framing, verdict: "ok".into(), unit: Some(1), number };
+            let frame = |bytes, sent, number| Frame {
+                at,
+                sent,
+                bytes,
+                framing,
+                result: FrameResult::Good,
+                unit: Some(1),
+                number,
+            };
             number += 2;
             report.frames.extend(vec![frame(sent, true, number - 1), frame(got, false, number)]);
         }

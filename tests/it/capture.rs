@@ -5,7 +5,10 @@ use std::{fs, process::Command, sync::Arc};
 use jiff::{SignedDuration, Timestamp};
 use sightglass::{
     bus::{ascii, capture, frame},
-    plant::{line::Framing, traffic::Frame},
+    plant::{
+        line::Framing,
+        traffic::{Frame, FrameResult},
+    },
 };
 
 use crate::support::{folder, have};
@@ -31,7 +34,7 @@ fn traffic(framing: Framing) -> Vec<Frame> {
             sent: number % 2 == 0,
             bytes: bytes.into(),
             framing,
-            verdict: if number % 2 == 0 { "sent" } else { "ok" }.into(),
+            result: if number % 2 == 0 { FrameResult::Sent } else { FrameResult::Good },
             unit: Some(message[0]),
             number: number as u64,
         });
@@ -112,7 +115,7 @@ fn what_was_corrupt_is_no_modbus_and_says_why() {
     }
     let mut frames = traffic(Framing::Rtu);
     Arc::make_mut(&mut frames[1].bytes)[4] ^= 1;
-    frames[1].verdict = "CRC error: got 9139, computed 5138".into();
+    frames[1].result = FrameResult::wrong("CRC error: got 9139, computed 5138");
     let lines = tshark(&frames[..2], &["-T", "fields", "-e", "frame.protocols", "-e", "frame.comment"]);
     check(&lines, &[&["mbrtu"], &["data", "CRC error"]]);
 }

@@ -7,7 +7,7 @@ use crate::{
         frame::{self, Mbap, hex},
         names::counted,
     },
-    plant::line::Framing,
+    plant::{event::Fault, line::Framing},
 };
 
 /// A message and what stood around it.
@@ -90,7 +90,9 @@ fn in_ascii(bytes: &[u8]) -> Envelope {
     let framing = Some(Framing::Ascii);
     let start = usize::from(bytes.starts_with(b":"));
     let end = bytes.iter().position(|byte| matches!(byte, b'\r' | b'\n')).unwrap_or(bytes.len()).max(start);
-    let mut fault = ascii::open(bytes).err().map(|fault| fault.to_string());
+    let fault = ascii::open(bytes).err();
+    let mut is_cut = matches!(fault, Some(Fault::Truncated { .. }));
+    let mut fault = fault.map(|fault| fault.to_string());
     let mut before = Vec::new();
     if start == 1 {
         before.push(field(0, 1, "start", "`:` begins an ASCII frame".into()));
@@ -108,6 +110,7 @@ fn in_ascii(bytes: &[u8]) -> Envelope {
             message
         }
         Err(why) => {
+            is_cut = false;
             after.push(field(start, end, "digits", format!("\"{}\"", bytes[start..end].escape_ascii())));
             fault = Some(match bytes[start..end].iter().position(|digit| !digit.is_ascii_hexdigit()) {
                 Some(at) => {
@@ -121,7 +124,7 @@ fn in_ascii(bytes: &[u8]) -> Envelope {
     if end < bytes.len() {
         let right = &bytes[end..] == b"\r\n";
         after.push(field(end, bytes.len(), "end", if right { "CR LF" } else { "must be CR LF" }.into()));
-    } else if before.len() == 1 && matches!(&fault, Some(words) if words.contains("incomplete")) {
+    } else if before.len() == 1 && is_cut {
         fault = Some("CR LF missing at the end".into());
     }
     Envelope { framing, message, offset: start, step: 2, before, after, fault }

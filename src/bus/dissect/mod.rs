@@ -57,8 +57,8 @@ pub struct Dissection {
     pub fields: Vec<Field>,
     /// One line: `unit 1 read holding registers 41003–41012 (0x03EA, 10)`.
     pub summary: String,
-    /// `ok`, or the first thing that is wrong.
-    pub verdict: String,
+    /// The first thing that is wrong.
+    pub wrong: Option<String>,
     /// What else these bytes may be: the other reading, or why both are the same.
     pub also: Option<String>,
 }
@@ -103,7 +103,7 @@ pub fn dissect(
         let fault = frame::check_answer(asked, &envelope.message).err()?;
         (!matches!(fault, crate::plant::event::Fault::Exception(_))).then(|| fault.to_string())
     });
-    let verdict = envelope.fault.clone().or(reading.trouble).or(wrong).unwrap_or_else(|| "ok".into());
+    let wrong = envelope.fault.clone().or(reading.trouble).or(wrong);
     let place = |field: Field| Field {
         range: field.range.start * envelope.step + envelope.offset..field.range.end * envelope.step + envelope.offset,
         ..field
@@ -117,7 +117,7 @@ pub fn dissect(
         message: envelope.message,
         fields,
         summary: reading.summary,
-        verdict,
+        wrong,
         also,
     }
 }

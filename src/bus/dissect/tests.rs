@@ -2,7 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
-use crate::bus::{ascii, frame::with_crc, frame::with_mbap};
+use crate::{
+    bus::{ascii, frame::with_crc, frame::with_mbap},
+    plant::traffic::FrameResult,
+};
 
 /// Message in hex; request in hex or nothing; the summary expected.
 fn check(message: &str, asked: &str, summary: &str) -> Dissection {
@@ -13,7 +16,7 @@ fn check(message: &str, asked: &str, summary: &str) -> Dissection {
     for frame in [with_crc(&message), ascii::encode(&message), with_mbap(1, &message), message.clone()] {
         let dissection = dissect(&frame, None, None, asked);
         assert_eq!(dissection.summary, summary);
-        assert_eq!(dissection.verdict, "ok", "{summary}");
+        assert_eq!(dissection.wrong, None, "{summary}");
         assert_eq!(dissection.message, message);
         // Every byte is described, once and in order.
         let mut at = 0;
@@ -124,23 +127,23 @@ fn what_may_be_two_things_says_so() {
 
 #[test]
 fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
-    let verdict = |bytes: &[u8]| dissect(bytes, None, None, None).verdict;
-    assert_eq!(verdict(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got A5 BB, computed A5 BA");
-    assert_eq!(verdict(b":010303EA00010F\r\n"), "LRC error: got 0F, computed 0E");
-    assert_eq!(verdict(b":010303EA00010E"), "CR LF missing at the end");
-    assert_eq!(verdict(b":01G303EA00010E\r\n"), "`G` at character 4 is not a hex digit");
-    assert_eq!(verdict(&[1, 3, 3, 0xEA, 0]), "cut short: 1 byte of count missing");
-    assert_eq!(verdict(&[1, 3, 4, 0, 1]), "cut short: 2 bytes of register 2 missing");
-    assert_eq!(verdict(&[1, 6, 0, 1, 0, 1, 9]), "1 byte too many");
-    assert_eq!(verdict(&[]), "cut short: 1 byte of unit missing");
-    let tcp = |bytes: &[u8]| dissect(bytes, Some(Framing::Mbap), None, None).verdict;
+    let wrong = |bytes: &[u8]| dissect(bytes, None, None, None).wrong.unwrap();
+    assert_eq!(wrong(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got A5 BB, computed A5 BA");
+    assert_eq!(wrong(b":010303EA00010F\r\n"), "LRC error: got 0F, computed 0E");
+    assert_eq!(wrong(b":010303EA00010E"), "CR LF missing at the end");
+    assert_eq!(wrong(b":01G303EA00010E\r\n"), "`G` at character 4 is not a hex digit");
+    assert_eq!(wrong(&[1, 3, 3, 0xEA, 0]), "cut short: 1 byte of count missing");
+    assert_eq!(wrong(&[1, 3, 4, 0, 1]), "cut short: 2 bytes of register 2 missing");
+    assert_eq!(wrong(&[1, 6, 0, 1, 0, 1, 9]), "1 byte too many");
+    assert_eq!(wrong(&[]), "cut short: 1 byte of unit missing");
+    let tcp = |bytes: &[u8]| dissect(bytes, Some(Framing::Mbap), None, None).wrong.unwrap();
     assert_eq!(tcp(&[0, 1, 0, 0, 0, 9, 1, 3, 0, 0, 0, 1]), "MBAP length says 9, 6 bytes follow");
     assert_eq!(tcp(&[0, 1, 0, 7, 0, 6, 1, 3, 0, 0, 0, 1]), "MBAP protocol 7, expected 0");
     let swapped = dissect(&[1, 3, 3, 0xEA, 0, 1, 0xBA, 0xA5], None, None, None);
     assert!(swapped.fields.last().unwrap().words.starts_with("bytes swapped: A5 BA is right"));
     let asked = [1, 3, 0, 0, 0, 1];
     let answer = dissect(&with_crc(&[2, 3, 2, 0, 1]), None, None, Some(&asked));
-    assert_eq!(answer.verdict, "response from unit 2, expected unit 1");
+    assert_eq!(answer.wrong.as_deref(), Some("response from unit 2, expected unit 1"));
 }
 
 #[test]
@@ -159,7 +162,7 @@ fn an_answer_on_a_line_finds_its_request_before_it() {
         sent,
         bytes: with_mbap(transaction, message).into(),
         framing: Framing::Mbap,
-        verdict: "ok".into(),
+        result: FrameResult::Good,
         unit: Some(1),
         number: 0,
     };
@@ -179,7 +182,7 @@ proptest::proptest! {
         direction in proptest::option::of(proptest::sample::select(vec![Direction::Request, Direction::Answer])),
     ) {
         let dissection = dissect(&bytes, framing, direction, None);
-        proptest::prop_assert!(!dissection.summary.is_empty() && !dissection.verdict.is_empty());
+        proptest::prop_assert!(!dissection.summary.is_empty() && dissection.wrong.is_none_or(|wrong| !wrong.is_empty()));
         let mut at = 0;
         for field in &dissection.fields {
             proptest::prop_assert_eq!(field.range.start, at);

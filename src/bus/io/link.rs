@@ -13,7 +13,7 @@ mod raw;
 mod receive;
 mod transactions;
 
-use std::{borrow::Cow, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
@@ -43,7 +43,7 @@ use crate::{
         def::{Framing, LineDef},
         event::{ExceptionCode, Fault, FaultKind, LineCounters},
         number::to_u32,
-        traffic::{Exchange, Frame},
+        traffic::{Exchange, Frame, FrameResult},
     },
 };
 
@@ -321,7 +321,7 @@ impl Link {
 
     fn note_sent(&mut self, frame: Arc<[u8]>) {
         self.wire.counters.requests += 1;
-        self.wire.record(true, frame, Cow::Borrowed("sent"));
+        self.wire.record(true, frame, FrameResult::Sent);
     }
 
     fn remember_exchange(

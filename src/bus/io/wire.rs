@@ -1,6 +1,6 @@
 //! The bytes of one open port: silent intervals are kept, every byte is counted and recorded, unexpected bytes are dropped.
 
-use std::{borrow::Cow, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use futures_util::FutureExt;
 use tokio::{
@@ -20,7 +20,7 @@ use crate::{
         def::{Framing, LineDef},
         event::LineCounters,
         number::{to_u16, to_u32},
-        traffic::{FRAMES_MAX, Frame},
+        traffic::{FRAMES_MAX, Frame, FrameResult},
     },
 };
 
@@ -246,7 +246,7 @@ impl Wire {
         self.counters.late += 1;
         self.late.push(unit);
         tracing::debug!(unit, bytes = %frame::hex(frame), "late answer dropped");
-        self.record(false, frame.into(), Cow::Borrowed("late, dropped"));
+        self.record(false, frame.into(), FrameResult::wrong("late, dropped"));
     }
 
     /// So many stray bytes have come.
@@ -292,11 +292,11 @@ impl Wire {
                 self.replies.mark_all_unproven();
             }
         }
-        self.record(false, bytes.into(), Cow::Borrowed(if late { "late, dropped" } else { "stale, dropped" }));
+        self.record(false, bytes.into(), FrameResult::wrong(if late { "late, dropped" } else { "stale, dropped" }));
     }
 
     /// Puts bytes on record.
-    pub fn record(&mut self, sent: bool, bytes: Arc<[u8]>, verdict: Cow<'static, str>) {
+    pub fn record(&mut self, sent: bool, bytes: Arc<[u8]>, result: FrameResult) {
         self.counters.frames += 1;
         // Between two reports a fast line carries more than anybody can look at: the latest are enough.
         if self.frames.len() == 2 * FRAMES_MAX {
@@ -306,7 +306,7 @@ impl Wire {
         let moved_at = if sent { self.counters.last_tx } else { self.counters.last_rx };
         let at = moved_at.unwrap_or_else(|| self.clock.utc());
         let (framing, number) = (self.framing, self.counters.frames);
-        self.frames.push(Frame { at, sent, bytes, framing, verdict, unit, number });
+        self.frames.push(Frame { at, sent, bytes, framing, result, unit, number });
     }
 
     /// The frames since they were last taken, oldest first.

@@ -1,6 +1,6 @@
 //! Requests of diagnostics: raw bytes, and the loopback that resynchronises a unit.
 
-use std::{borrow::Cow, time::Duration};
+use std::time::Duration;
 
 use tokio::time::Instant;
 
@@ -10,7 +10,7 @@ use crate::{
         frame::{self, Mbap},
         framing::{self, FrameMatch},
     },
-    plant::{def::Framing, event::Fault, number::to_u32},
+    plant::{def::Framing, event::Fault, number::to_u32, traffic::FrameResult},
 };
 
 impl Link {
@@ -48,7 +48,7 @@ impl Link {
         };
         self.asked = None;
         if !buffer.is_empty() {
-            self.wire.record(false, buffer[..].into(), Cow::Borrowed("received"));
+            self.wire.record(false, buffer[..].into(), FrameResult::Unchecked);
         }
         self.wire.hold_off(self.wire.silent_interval);
         // What was sent may have been a request whose answer is still to come.

@@ -1,6 +1,6 @@
 //! Receives bytes until they are the answer or the deadline passes.
 
-use std::{borrow::Cow, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use tokio::time::Instant;
 
@@ -10,7 +10,7 @@ use crate::{
         frame::{self, Shape},
         framing::{self, FrameMatch},
     },
-    plant::{def::Framing, event::Fault, number::to_u32},
+    plant::{def::Framing, event::Fault, number::to_u32, traffic::FrameResult},
 };
 
 /// Characters of an ASCII frame may be this far apart (Modbus over serial line V1.02, 2.5.2.1).
@@ -53,7 +53,11 @@ impl Link {
         loop {
             // An adapter that gives back what it sends: its echo is no answer, however much it looks like one.
             if let Some(sent) = echo.filter(|sent| buffer.starts_with(sent)) {
-                self.wire.record(false, buffer.drain(..sent.len()).collect(), Cow::Borrowed("echo of the adapter"));
+                self.wire.record(
+                    false,
+                    buffer.drain(..sent.len()).collect(),
+                    FrameResult::wrong("echo of the adapter"),
+                );
                 (self.echoes, echo) = (true, None);
             }
             let echo_begun = self.echoes && echo.is_some_and(|sent| sent.starts_with(&buffer));
@@ -63,7 +67,7 @@ impl Link {
                 FrameMatch::Answer(range) => {
                     self.wire.drop_stale(&buffer[..range.start]);
                     let frame: Arc<[u8]> = buffer[range].into();
-                    self.wire.record(false, frame.clone(), Cow::Borrowed("ok"));
+                    self.wire.record(false, frame.clone(), FrameResult::Good);
                     let answer = frame::unwrap(framing, &frame)
                         .and_then(|answer| frame::check_answer(message, &answer).map(|()| answer));
                     return Ok(Received { answer, frame, reply });
@@ -90,7 +94,7 @@ impl Link {
             };
             let frame: Arc<[u8]> = buffer.into();
             if !frame.is_empty() {
-                self.wire.record(false, frame.clone(), Cow::Owned(fault.to_string()));
+                self.wire.record(false, frame.clone(), FrameResult::wrong(fault.to_string()));
             }
             return Ok(Received { answer: Err(fault), frame, reply });
         }

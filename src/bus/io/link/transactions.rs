@@ -7,11 +7,11 @@
 
 mod busy;
 
-use std::{borrow::Cow, collections::VecDeque, sync::Arc, time::Duration};
+use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use tokio::time::Instant;
 
-use super::{Link, LinkError};
+use super::{FrameResult, Link, LinkError};
 use crate::{
     bus::frame::{self, Mbap},
     plant::{def::Framing, event::Fault, traffic::Exchange},
@@ -317,7 +317,7 @@ impl Link {
         let now = Instant::now();
         let expired = self.transactions.expire(now);
         if !expired.is_empty() && self.transactions.is_cut_short() {
-            self.wire.record(false, self.transactions.inbox[..].into(), Cow::Borrowed("cut short"));
+            self.wire.record(false, self.transactions.inbox[..].into(), FrameResult::wrong("cut short"));
             // The rest may come later and would stand before the next header.
             return Err(LinkError::Gone("a response was incomplete, the stream is out of sync".into()));
         }
@@ -337,7 +337,7 @@ impl Link {
     fn take_frames_mbap(&mut self) -> Result<(), LinkError> {
         let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
         if frame::is_out_of_sync(&bytes) {
-            self.wire.record(false, bytes.into(), Cow::Borrowed("no MBAP header"));
+            self.wire.record(false, bytes.into(), FrameResult::wrong("no MBAP header"));
             return Err(LinkError::Gone("the stream is out of sync".into()));
         }
         while let Mbap::Whole { transaction, end } = frame::mbap(&bytes[start..]) {
@@ -374,11 +374,11 @@ impl Link {
         }
         let reply = (!frame.is_empty()).then(|| now.saturating_duration_since(sent_at));
         if reply.is_some() {
-            let verdict = match &answer {
-                Ok(_) | Err(Fault::Exception(_)) => Cow::Borrowed("ok"),
-                Err(fault) => Cow::Owned(fault.to_string()),
+            let result = match &answer {
+                Ok(_) | Err(Fault::Exception(_)) => FrameResult::Good,
+                Err(fault) => FrameResult::wrong(fault.to_string()),
             };
-            self.wire.record(false, frame.clone(), verdict);
+            self.wire.record(false, frame.clone(), result);
         }
         self.wire.hold_off(self.wire.silent_interval);
         let exchange = Exchange {

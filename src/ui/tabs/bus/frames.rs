@@ -231,7 +231,7 @@ impl Ring {
         let wide = 100 <= canvas.width();
         let time = draw::local(cx, frame.at, if wide { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
         let dissection = dissect::in_traffic(frame, self.before(frame.number));
-        let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
+        let good = !frame.result.is_wrong();
         let refused = !frame.sent && dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
         let style = match frame.sent && good && !selected {
             true => theme.dim(),
@@ -247,8 +247,8 @@ impl Ring {
         let words = match (good, refused) {
             (true, false) => summary,
             (true, true) => format!("! {summary}"),
-            (false, _) if wide => format!("✗ {}   {summary}", frame.verdict),
-            (false, _) => format!("✗ {}", frame.verdict),
+            (false, _) if wide => format!("✗ {}   {summary}", frame.result),
+            (false, _) => format!("✗ {}", frame.result),
         };
         canvas.text(x, 0, &pad(&fit_words(&words, room), room), style);
     }

@@ -141,10 +141,10 @@ fn came_back(
         .collect();
     let reply = reply.map_or(String::new(), |reply| t!("   after {short_ms} ms", short_ms = short_ms(reply)));
     let refused = dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
-    let (mark, style) = match (dissection.verdict.as_str(), refused) {
-        ("ok", false) => (t!("✓ ok").to_owned(), theme.normal()),
-        ("ok", true) => (t!("✗ refused by the device").to_owned(), theme.trouble()),
-        (verdict, _) => (format!("✗ {verdict}"), theme.trouble()),
+    let (mark, style) = match (&dissection.wrong, refused) {
+        (None, false) => (t!("✓ ok").to_owned(), theme.normal()),
+        (None, true) => (t!("✗ refused by the device").to_owned(), theme.trouble()),
+        (Some(wrong), _) => (format!("✗ {wrong}"), theme.trouble()),
     };
     rows.push(plain(format!("{mark}{reply}"), style));
     rows.extend(dissection_rows(cx, &dissection, room));

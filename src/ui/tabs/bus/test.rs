@@ -203,22 +203,22 @@ fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
         Diagnostic::Send(bytes) => {
             let framing = at.settings.transport.framing();
             let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Request), None);
-            let whole =
-                dissection.verdict == "ok" && request_lint::check_request(&dissection.message, framing).is_empty();
+            let lint = || request_lint::check_request(&dissection.message, framing).first().map(ToString::to_string);
+            let wrong = dissection.wrong.clone().or_else(lint);
             let broadcast = dissection.message.first() == Some(&0) && framing != Framing::Mbap;
-            match (whole, broadcast, only_reads(&dissection.message)) {
-                (true, false, true) => None,
-                (true, true, _) => Some(t!(
+            match (wrong, broadcast, only_reads(&dissection.message)) {
+                (None, false, true) => None,
+                (None, true, _) => Some(t!(
                     "{summary}. Broadcast: every device executes it, none responds. Send it?",
                     summary = dissection.summary
                 )),
-                (true, false, false) => Some(t!(
+                (None, false, false) => Some(t!(
                     "{summary}. This bypasses all limits of the plant file and is not read back. Send it?",
                     summary = dissection.summary
                 )),
-                (false, ..) => Some(t!(
-                    "These bytes are not a valid request: {verdict}. Send {hex} anyway?",
-                    verdict = dissection.verdict,
+                (Some(wrong), ..) => Some(t!(
+                    "These bytes are not a valid request: {wrong}. Send {hex} anyway?",
+                    wrong,
                     hex = hex(bytes)
                 )),
             }

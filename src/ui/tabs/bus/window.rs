@@ -15,7 +15,7 @@ use crate::{
     bus::{dissect, frame::hex, names},
     plant::{
         tag::Table,
-        traffic::{Exchange, Frame},
+        traffic::{Exchange, Frame, FrameResult},
     },
     ui::{
         modal::{Next, window},
@@ -177,11 +177,13 @@ fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection,
     rows.extend(
         broken(&bytes_text(frame.framing, &frame.bytes), room).into_iter().map(|line| plain(line, theme.strong())),
     );
-    let good = matches!(&*frame.verdict, "ok" | "sent" | "received");
-    let verdict = if good { frame.verdict.to_string() } else { format!("✗ {}", frame.verdict) };
-    rows.push(plain(verdict, if good { theme.normal() } else { theme.trouble() }));
-    if dissection.verdict != "ok" && dissection.verdict != *frame.verdict {
-        rows.push(plain(format!("! {}", dissection.verdict), theme.trouble()));
+    let good = !frame.result.is_wrong();
+    let result = if good { frame.result.to_string() } else { format!("✗ {}", frame.result) };
+    rows.push(plain(result, if good { theme.normal() } else { theme.trouble() }));
+    if let Some(wrong) =
+        dissection.wrong.as_ref().filter(|wrong| !matches!(&frame.result, FrameResult::Wrong(why) if why == *wrong))
+    {
+        rows.push(plain(format!("! {wrong}"), theme.trouble()));
     }
     rows.extend(dissection_rows(cx, dissection, room));
     rows

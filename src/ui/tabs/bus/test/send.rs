@@ -63,8 +63,8 @@ impl Send {
         let dissection = dissect::dissect(&frame, Some(framing), Some(Direction::Request), None);
         let mut errors: Vec<String> =
             request_lint::check_request(&dissection.message, framing).iter().map(ToString::to_string).collect();
-        if dissection.verdict != "ok" && errors.is_empty() {
-            errors.push(dissection.verdict.clone());
+        if errors.is_empty() {
+            errors.extend(dissection.wrong.clone());
         }
         Ok(Ready { frame, added, dissection, errors })
     }
