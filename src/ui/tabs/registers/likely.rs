@@ -86,7 +86,8 @@ mod tests {
 
     #[test]
     fn value_and_change_hint_the_type() {
-        let cases: [(&str, &[[u16; 2]], Option<(DataType, ByteOrder)>); 12] = [
+        type Case = (&'static str, &'static [[u16; 2]], Option<(DataType, ByteOrder)>);
+        let cases: [Case; 12] = [
             ("100 that stands still", &[[0x42C8, 0]], Some((FLOAT, ByteOrder::Abcd))),
             ("104.69399 that stands still", &[[0x42D1, 0x6353]], None),
             ("104.694 then 104.71", &[[0x42D1, 0x6353], [0x42D1, 0x6B85]], None),
