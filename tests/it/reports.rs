@@ -179,7 +179,10 @@ fn a_history_of_an_older_version_is_read_after_one_start() {
     history(&path, |_, _| Vec::new());
     // The last migration only adds two tables.
     let old = duckdb::Connection::open(&path).unwrap();
-    old.execute_batch("DROP TABLE archive; DROP TABLE watched; DELETE FROM schema_version WHERE version > 8; CHECKPOINT").unwrap();
+    old.execute_batch(
+        "DROP TABLE archive; DROP TABLE watched; DELETE FROM schema_version WHERE version > 8; CHECKPOINT",
+    )
+    .unwrap();
     drop(old);
     let period = ["--from", START, "--to", "2026-03-02T08:00:00Z"];
     let commands = [("report", &["--out", "-"][..]), ("export", &["--tags", "TIC-1.PV"]), ("alarms", &["--stats"])];
