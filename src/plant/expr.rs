@@ -1,21 +1,23 @@
-//! A condition over tags, as plant files write it: `PLC-1.HEATER = ON and PLC-1.LT-1 > 5 cm`.
+//! The expression language of plant files: a condition `PLC-1.HEATER = ON and PLC-1.LT-1 > 5 cm`, or what a calculated
+//! tag is: `max(TIC-1.PV, TIC-2.PV) - 5`.
 
 use serde::{Deserialize, Serialize};
 
-use super::id::TagId;
+use super::{id::TagId, keyword::keyword_enum};
 
-/// A condition over tags.
+/// An expression over tags. As a number, true is 1 and false 0; as a condition, every number but 0 is true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Expr {
-    /// A tag is compared with a value.
-    Test {
-        /// Which tag.
-        tag: TagId,
-        /// How.
-        compare: Compare,
-        /// With this, in the tag's unit.
-        value: f64,
-    },
+    /// The same always.
+    Number(f64),
+    /// The value of a tag, in its unit.
+    Tag(TagId),
+    /// Two numbers become one.
+    Arithmetic(Box<Expr>, Operator, Box<Expr>),
+    /// A function of numbers; never without any.
+    Call(Function, Vec<Expr>),
+    /// Two numbers are compared.
+    Test(Box<Expr>, Compare, Box<Expr>),
     /// The other way round.
     Not(Box<Expr>),
     /// All of these.
@@ -24,7 +26,37 @@ pub enum Expr {
     Any(Vec<Expr>),
 }
 
-/// How a tag is compared.
+keyword_enum! {
+    /// How two numbers become one.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum Operator: "operator" {
+        /// Sum.
+        Add => "+",
+        /// Difference.
+        Subtract => "-",
+        /// Product.
+        Multiply => "*",
+        /// Quotient.
+        Divide => "/",
+    }
+}
+
+keyword_enum! {
+    /// A function of numbers.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+    pub enum Function: "function" {
+        /// The least.
+        Min => "min",
+        /// The greatest.
+        Max => "max",
+        /// The arithmetic mean.
+        Mean => "mean",
+        /// Without its sign; of one number.
+        Abs => "abs",
+    }
+}
+
+/// How two numbers are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Compare {
     /// `=`
@@ -42,23 +74,61 @@ pub enum Compare {
 }
 
 impl Expr {
+    /// A tag is compared with a fixed value.
+    pub fn test(tag: TagId, compare: Compare, value: f64) -> Expr {
+        Expr::Test(Box::new(Expr::Tag(tag)), compare, Box::new(Expr::Number(value)))
+    }
+
     /// Whether it is true; `None` if the known tags do not decide it. `value` gives the good value of a
     /// tag.
     pub fn holds(&self, value: &impl Fn(TagId) -> Option<f64>) -> Option<bool> {
         match self {
-            Expr::Test { tag, compare, value: with } => value(*tag).map(|value| compare.holds(value, *with)),
+            Expr::Test(left, compare, right) => Some(compare.holds(left.number(value)?, right.number(value)?)),
             Expr::Not(inner) => inner.holds(value).map(|holds| !holds),
             Expr::All(parts) => decided(parts, value, false),
             Expr::Any(parts) => decided(parts, value, true),
+            Expr::Number(_) | Expr::Tag(_) | Expr::Arithmetic(..) | Expr::Call(..) => {
+                self.number(value).map(|number| number != 0.0)
+            }
         }
     }
 
-    /// Every tag in it.
+    /// Its value; `None` where a tag is unknown, and for a division by zero and an overflow.
+    pub fn number(&self, value: &impl Fn(TagId) -> Option<f64>) -> Option<f64> {
+        let number = match self {
+            Expr::Number(number) => *number,
+            Expr::Tag(tag) => value(*tag)?,
+            Expr::Arithmetic(left, operator, right) => {
+                let (left, right) = (left.number(value)?, right.number(value)?);
+                match operator {
+                    Operator::Add => left + right,
+                    Operator::Subtract => left - right,
+                    Operator::Multiply => left * right,
+                    Operator::Divide => left / right,
+                }
+            }
+            Expr::Call(function, of) => {
+                let numbers = of.iter().map(|part| part.number(value)).collect::<Option<Vec<f64>>>()?;
+                match function {
+                    Function::Min => numbers.into_iter().fold(f64::INFINITY, f64::min),
+                    Function::Max => numbers.into_iter().fold(f64::NEG_INFINITY, f64::max),
+                    Function::Mean => numbers.iter().sum::<f64>() / numbers.len() as f64,
+                    Function::Abs => numbers.first()?.abs(),
+                }
+            }
+            Expr::Test(..) | Expr::Not(_) | Expr::All(_) | Expr::Any(_) => f64::from(u8::from(self.holds(value)?)),
+        };
+        Some(number).filter(|number| number.is_finite())
+    }
+
+    /// Every tag in it, in the order in which they are written.
     pub fn tags(&self) -> Vec<TagId> {
         match self {
-            Expr::Test { tag, .. } => vec![*tag],
+            Expr::Number(_) => Vec::new(),
+            Expr::Tag(tag) => vec![*tag],
             Expr::Not(inner) => inner.tags(),
-            Expr::All(parts) | Expr::Any(parts) => parts.iter().flat_map(Expr::tags).collect(),
+            Expr::Arithmetic(left, _, right) | Expr::Test(left, _, right) => [left.tags(), right.tags()].concat(),
+            Expr::Call(_, parts) | Expr::All(parts) | Expr::Any(parts) => parts.iter().flat_map(Expr::tags).collect(),
         }
     }
 }
@@ -95,7 +165,7 @@ mod tests {
 
     #[test]
     fn what_is_unknown_decides_nothing_unless_the_rest_decides() {
-        let test = |n, compare| Expr::Test { tag: TagId(n), compare, value: 5.0 };
+        let test = |n, compare| Expr::test(TagId(n), compare, 5.0);
         let (low, high, unknown) = (TagId(0), TagId(1), TagId(2));
         let value = |tag: TagId| match tag {
             _ if tag == low => Some(4.0),
@@ -119,6 +189,27 @@ mod tests {
             (Expr::Any(vec![no, maybe]), None),
         ] {
             assert_eq!(expr.holds(&value), expect, "{expr:?}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_does_not_exist_is_none() {
+        let (tag, zero) = (|n| Box::new(Expr::Tag(TagId(n))), || Box::new(Expr::Number(0.0)));
+        let value = |of: TagId| [Some(6.0), Some(f64::MAX), None].get(of.index()).copied().flatten();
+        let call = |function, tags: &[u16]| Expr::Call(function, tags.iter().map(|n| Expr::Tag(TagId(*n))).collect());
+        for (expr, expect) in [
+            (Expr::Arithmetic(tag(0), Operator::Subtract, Box::new(Expr::Number(8.0))), Some(-2.0)),
+            (Expr::Arithmetic(tag(0), Operator::Divide, zero()), None),
+            (Expr::Arithmetic(zero(), Operator::Divide, zero()), None),
+            (Expr::Arithmetic(tag(1), Operator::Add, tag(1)), None),
+            (Expr::Arithmetic(tag(0), Operator::Multiply, tag(2)), None),
+            (call(Function::Max, &[0, 1]), Some(f64::MAX)),
+            (call(Function::Min, &[0, 1]), Some(6.0)),
+            (call(Function::Mean, &[0, 0]), Some(6.0)),
+            (call(Function::Min, &[0, 2]), None),
+            (Expr::test(TagId(0), Compare::Above, 5.0), Some(1.0)),
+        ] {
+            assert_eq!(expr.number(&value), expect, "{expr:?}");
         }
     }
 }

@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
+    calculation::Calculator,
     def::{DeviceId, PlantDef, TagId},
     event::{ExceptionCode, Fault, FaultKind},
     record::Record,
@@ -39,6 +40,7 @@ pub struct ProcessImage {
     touched: Vec<TagId>,
     /// Tags whose value depends on this one (decimals, fault word), by tag.
     dependents: Vec<Vec<TagId>>,
+    calculator: Calculator,
 }
 
 /// A raw number, when it was read, and what has made it uncertain since.
@@ -68,6 +70,7 @@ impl ProcessImage {
             // That nothing is known is a fact to store too.
             touched: def.tags.iter().map(|tag| tag.id).collect(),
             dependents,
+            calculator: Calculator::new(&def.tags),
             def,
         }
     }
@@ -103,7 +106,8 @@ impl ProcessImage {
 
     /// A request for these tags failed: they lose trust, and at once their value where the fault says that there is none.
     pub fn failed(&mut self, tags: &[TagId], fault: Fault, at: Timestamp) {
-        for tag in tags {
+        let def = self.def.clone();
+        for tag in tags.iter().filter(|tag| def.tag(**tag).calculation.is_none()) {
             match effect_of(fault) {
                 // The last value of a device that is down is bad, not uncertain. The reading is marked all the same:
                 // what has made it bad may go before it is read again.
@@ -124,7 +128,7 @@ impl ProcessImage {
     /// Everything of a device is gone at once.
     pub fn gone(&mut self, device: DeviceId, cause: Cause, at: Timestamp) {
         let def = self.def.clone();
-        for tag in def.tags_of(device) {
+        for tag in def.tags_of(device).filter(|tag| tag.calculation.is_none()) {
             if self.sample(tag.id).quality != Quality::Bad(cause) {
                 self.drop_value(tag.id, cause, at);
             }
@@ -139,6 +143,10 @@ impl ProcessImage {
             let stored = self.stored[tag.id.index()];
             if stored.is_none_or(|stored| self.is_due(tag, sample, Some(stored), at)) {
                 self.touched.push(tag.id);
+            }
+            // It is as old as its inputs, which grow old themselves.
+            if tag.calculation.is_some() {
+                continue;
             }
             let period = match tag.poll {
                 Poll::Every(period) => period,
@@ -156,6 +164,15 @@ impl ProcessImage {
                 self.mark_uncertain(tag.id, Cause::Stale);
             }
         }
+    }
+
+    /// Calculates the tags of which an input was set since records were last taken, each after its inputs.
+    pub fn calculate(&mut self) {
+        let calculator = std::mem::take(&mut self.calculator);
+        for (tag, sample) in calculator.changed(&self.def, &self.touched, &self.samples) {
+            self.set(tag, sample);
+        }
+        self.calculator = calculator;
     }
 
     /// The records due at `at`: changes beyond the deadband, changes of quality, and unchanged values at their interval, so

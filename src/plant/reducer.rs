@@ -340,6 +340,7 @@ impl Plant {
     /// Evaluates the alarms and gathers what must be stored.
     fn evaluate(&mut self, at: Timestamp) -> Effects {
         self.at = self.at.max(at);
+        self.image.calculate();
         let asked = self.watch_controllers();
         let image = &self.image;
         self.watch.look(&self.def.logic, |tag| image.sample(tag), self.at);

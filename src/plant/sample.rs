@@ -42,7 +42,8 @@ keyword_enum! {
         SensorFault = 8 => "sensor fault",
         /// A value that this one needs (decimals, unit, range) is not known.
         Unscaled = 9 => "scale unknown",
-        // 10 was never stored.
+        /// The calculation has no result: a division by zero, or a number that is too large.
+        Undefined = 10 => "calculation undefined",
         /// The station was not running.
         StationOff = 11 => "station not running",
         /// There is a value, but no user who may see it is logged in here. Never stored.

@@ -10,6 +10,7 @@ pub use super::{
     store_policy::{STORE_EVERY_MAX, StorePolicy},
 };
 use super::{
+    expr::Expr,
     id::{DeviceId, TagId},
     keyword::keyword_enum,
     number::to_u8,
@@ -87,6 +88,8 @@ pub struct TagDef {
     pub source: String,
     /// How a simulated device fills it; `None` holds what is written.
     pub simulate: Option<Arc<Simulate>>,
+    /// What it is calculated from, instead of being read: its device only names it, and [`TagDef::point`] means nothing.
+    pub calculation: Option<Arc<Calculation>>,
     /// What the maker sets it to before delivery, in the tag's unit; `None` if the profile is silent.
     pub default: Option<f64>,
     /// Part of a parameter set: a setting, not a command and not a measurement.
@@ -131,6 +134,7 @@ impl TagDef {
             confidence: Confidence::Proven,
             source: String::new(),
             simulate: None,
+            calculation: None,
             default: None,
             in_sets: false,
         }
@@ -200,6 +204,15 @@ impl TagDef {
     pub fn label_of(&self, value: f64) -> Option<&str> {
         self.labels.iter().find(|(number, _)| *number as f64 == value).map(|(_, text)| text.as_str())
     }
+}
+
+/// How a value is calculated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calculation {
+    /// As it is written.
+    pub text: String,
+    /// What that means.
+    pub expr: Expr,
 }
 
 /// Where a value lives in its device: wire address, 0-based.

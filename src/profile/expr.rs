@@ -1,12 +1,13 @@
-//! Reads a condition over tags: `PLC-1.HEATER = ON and (PLC-1.LT-1 > 5 cm or not PLC-1.AUTO = AUTO)`.
+//! Reads an expression over tags: `PLC-1.HEATER = ON and (PLC-1.LT-1 > 5 cm or not PLC-1.AUTO = AUTO)`,
+//! `max(TIC-1.PV, TIC-2.PV) - 5`. A name may hold `-`, `+` and `/`, so that these are operators only between spaces.
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Defs, number_of},
+    names::{Defs, check_number, number_of},
     reader::{At, Choice},
 };
 use crate::plant::{
-    expr::{Compare, Expr},
+    expr::{Compare, Expr, Function, Operator},
     tag::TagDef,
 };
 
@@ -24,15 +25,32 @@ const COMPARES: [(&str, Compare); 6] = [
 
 /// The condition that is written in a string. `None` after the problem was added.
 pub(super) fn expr(words: &At<String>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
-    let tokens = tokens(&words.value).into_iter();
-    let tokens = tokens.map(|(start, word)| At { value: word, at: words.at.inside_quotes(start, word.len()) });
-    let mut reader = Reader { tokens: tokens.collect(), next: 0, depth: 0, end: words.at, defs, problems };
+    let expr = near(words, None, defs, problems)?;
+    if matches!(expr, Expr::Number(_) | Expr::Tag(_) | Expr::Arithmetic(..) | Expr::Call(..)) {
+        problems.add(words.at, "this is a number, not a condition").label("expected `=`, `!=`, `<`, `<=`, `>` or `>=`");
+        return None;
+    }
+    Some(expr)
+}
+
+/// The expression that is written in a string; the tags of `device` may be named without it.
+pub(super) fn near(words: &At<String>, device: Option<&str>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
+    let text = words.value.as_str();
+    let (starts, tokens): (Vec<usize>, Vec<At<&str>>) = tokens(text)
+        .into_iter()
+        .map(|(start, word)| (start, At { value: word, at: words.at.inside_quotes(start, word.len()) }))
+        .unzip();
+    let mut reader =
+        Reader { text, starts, tokens, next: 0, depth: 0, calls: 0, end: words.at, device, defs, problems };
     let expr = reader.any()?;
     match reader.peek() {
         None => Some(expr),
         Some(token) => {
             let (at, word) = (token.at, token.value);
-            reader.problems.add(at, format!("`{word}` is one too many")).label("expected `and`, `or` or the end");
+            reader
+                .problems
+                .add(at, format!("`{word}` is one too many"))
+                .label("expected an operator, `and`, `or` or the end");
             None
         }
     }
@@ -47,12 +65,12 @@ fn tokens(text: &str) -> Vec<(usize, &str)> {
         let length = if first.is_whitespace() {
             at += first.len_utf8();
             continue;
-        } else if first == '(' || first == ')' {
+        } else if "(),*".contains(first) {
             1
         } else if let Some((word, _)) = COMPARES.iter().find(|(word, _)| rest.starts_with(word)) {
             word.len()
         } else {
-            let ends = |c: char| c.is_whitespace() || "()=<>!".contains(c);
+            let ends = |c: char| c.is_whitespace() || "()=<>!,*".contains(c);
             // A lone `!` is a word of its own, so that the reader always goes on.
             rest.find(ends).filter(|end| 0 < *end).unwrap_or(if first == '!' { 1 } else { rest.len() })
         };
@@ -63,11 +81,18 @@ fn tokens(text: &str) -> Vec<(usize, &str)> {
 }
 
 struct Reader<'a, 'd> {
+    text: &'a str,
+    /// The byte where each token starts.
+    starts: Vec<usize>,
     tokens: Vec<At<&'a str>>,
     next: usize,
     depth: usize,
+    /// Functions whose parenthesis is open.
+    calls: usize,
     /// The whole string, for what is missing at its end.
     end: Span,
+    /// Where names are looked up first.
+    device: Option<&'a str>,
     defs: &'a Defs<'d>,
     problems: &'a mut Problems,
 }
@@ -106,71 +131,155 @@ impl<'a> Reader<'a, '_> {
     }
 
     fn one(&mut self) -> Option<Expr> {
+        if self.takes("not") {
+            return self.nested(|reader| Some(Expr::Not(Box::new(reader.one()?))));
+        }
+        let left = self.sum()?;
+        let found = self.peek().and_then(|found| COMPARES.iter().find(|(word, _)| *word == found.value));
+        let Some((_, compare)) = found else { return Some(left) };
+        self.next += 1;
+        let right = match &left {
+            Expr::Tag(tag) => self.value(&self.defs.tags[tag.index()])?,
+            _ => self.sum()?,
+        };
+        Some(Expr::Test(Box::new(left), *compare, Box::new(right)))
+    }
+
+    /// One level deeper, unless that is too deep.
+    fn nested(&mut self, read: impl FnOnce(&mut Self) -> Option<Expr>) -> Option<Expr> {
         self.depth += 1;
-        let at = self.peek().map_or(self.end, |token| token.at);
         if DEPTH_MAX < self.depth {
+            let at = self.peek().map_or(self.end, |token| token.at);
             self.problems.add(at, "parentheses nested too deeply").label("too deep");
             return None;
         }
-        let expr = if self.takes("not") {
-            Expr::Not(Box::new(self.one()?))
-        } else if self.takes("(") {
-            let inner = self.any()?;
-            if !self.takes(")") {
-                let at_end = self.peek().map_or(self.end, |token| token.at);
-                self.problems.add(at_end, "a parenthesis is not closed").label("expected `)`").also(at, "opened here");
-                return None;
-            }
-            inner
-        } else {
-            self.test()?
-        };
+        let expr = read(self)?;
         self.depth -= 1;
         Some(expr)
     }
 
-    /// `TAG compare value`.
-    fn test(&mut self) -> Option<Expr> {
-        let name = self.take().filter(|token| !is_sign(token.value));
-        let Some(name) = name else {
-            let at = self.tokens.get(self.next - 1).map_or(self.end, |token| token.at);
-            self.problems.add(at, "a tag is missing").label("expected DEVICE.TAG, `not` or `(`");
-            return None;
-        };
-        let tag = self.defs.tag(&At { value: name.value.to_owned(), at: name.at }, self.problems)?;
-        let found = self.take();
-        let compare = found.and_then(|found| COMPARES.iter().find(|(word, _)| *word == found.value));
-        let Some((_, compare)) = compare else {
-            let at = found.map_or(self.end, |found| found.at);
-            let problem = self.problems.add(at, format!("how is {} compared?", tag.name));
-            problem.label("expected `=`, `!=`, `<`, `<=`, `>` or `>=`");
-            return None;
-        };
-        let value = self.value(tag)?;
-        Some(Expr::Test { tag: tag.id, compare: *compare, value })
+    fn sum(&mut self) -> Option<Expr> {
+        self.chain(&[Operator::Add, Operator::Subtract], Self::product)
     }
 
-    /// A number with or without the tag's unit, or a label, which may have several words.
-    fn value(&mut self, tag: &TagDef) -> Option<f64> {
-        let start = self.next;
-        while self.peek().is_some_and(|token| !is_sign(token.value) && !["and", "or"].contains(&token.value)) {
-            self.next += 1;
+    fn product(&mut self) -> Option<Expr> {
+        self.chain(&[Operator::Multiply, Operator::Divide], Self::operand)
+    }
+
+    /// Operators of one rank, from left to right.
+    fn chain(&mut self, operators: &[Operator], part: fn(&mut Self) -> Option<Expr>) -> Option<Expr> {
+        let mut expr = part(self)?;
+        while let Some(operator) = operators.iter().copied().find(|operator| self.takes(operator.word())) {
+            expr = Expr::Arithmetic(Box::new(expr), operator, Box::new(part(self)?));
         }
-        let words = &self.tokens[start..self.next];
+        Some(expr)
+    }
+
+    /// A number, a tag, a function or what stands in parentheses.
+    fn operand(&mut self) -> Option<Expr> {
+        let token = self.take().filter(|token| !is_sign(token.value) || token.value == "(");
+        let Some(token) = token else {
+            let at = self.tokens.get(self.next - 1).map_or(self.end, |token| token.at);
+            self.problems.add(at, "a tag is missing").label("expected DEVICE.TAG, a number, `not` or `(`");
+            return None;
+        };
+        if token.value == "(" {
+            let calls = std::mem::take(&mut self.calls);
+            let inner = self.nested(Self::any)?;
+            self.calls = calls;
+            self.close(token.at)?;
+            return Some(inner);
+        }
+        if let Some(number) = token.value.parse::<f64>().ok().filter(|number| number.is_finite()) {
+            return Some(Expr::Number(number));
+        }
+        if self.peek().is_some_and(|next| next.value == "(") {
+            return self.call(token);
+        }
+        let name = At { value: token.value.to_owned(), at: token.at };
+        let id = match self.device {
+            Some(device) if !self.defs.names.tags.contains_key(&name.value) && !name.value.contains('.') => {
+                self.defs.names.near(&name, device, self.problems)
+            }
+            Some(device) if self.defs.names.tags.contains_key(&format!("{device}.{}", name.value)) => {
+                self.defs.names.near(&name, device, self.problems)
+            }
+            _ => self.defs.names.full(&name, self.problems),
+        }?;
+        check_number(token.at, &self.defs.tags[id.index()], self.problems);
+        Some(Expr::Tag(id))
+    }
+
+    fn call(&mut self, name: At<&'a str>) -> Option<Expr> {
+        let Some(function) = Function::ALL.into_iter().find(|function| function.word() == name.value) else {
+            let problem = self.problems.add(name.at, format!("unknown function `{}`", name.value));
+            let known = Function::ALL.map(Function::word);
+            problem.label(format!("expected one of {}", known.join(", "))).suggest(name.value, known.into_iter());
+            return None;
+        };
+        self.next += 1;
+        self.calls += 1;
+        let mut of = vec![self.nested(Self::any)?];
+        while self.takes(",") {
+            of.push(self.nested(Self::any)?);
+        }
+        self.calls -= 1;
+        self.close(name.at)?;
+        if function == Function::Abs && of.len() != 1 {
+            self.problems.add(name.at, "abs is of one number").label(format!("found {}", of.len()));
+            return None;
+        }
+        Some(Expr::Call(function, of))
+    }
+
+    fn close(&mut self, opened: Span) -> Option<()> {
+        if self.takes(")") {
+            return Some(());
+        }
+        let at = self.peek().map_or(self.end, |token| token.at);
+        self.problems.add(at, "a parenthesis is not closed").label("expected `)`").also(opened, "opened here");
+        None
+    }
+
+    /// What a tag is compared with: a number with or without the tag's unit, a label, which may have several words, or an
+    /// expression.
+    fn value(&mut self, tag: &TagDef) -> Option<Expr> {
+        let start = self.next;
+        let ends = |token: &At<&str>| {
+            let comma = token.value == ",";
+            (is_sign(token.value) && !comma) || (comma && self.calls > 0) || ["and", "or"].contains(&token.value)
+        };
+        let count = self.tokens[start..].iter().take_while(|token| !ends(token)).count();
+        let words = &self.tokens[start..start + count];
         let (Some(first), Some(last)) = (words.first(), words.last()) else {
+            if self.peek().is_some_and(|next| next.value == "(") {
+                return self.sum();
+            }
             let at = self.peek().map_or(self.end, |token| token.at);
             self.problems.add(at, format!("{} is compared with nothing", tag.name)).label("expected a value");
             return None;
         };
         let at = Span { end: last.at.end, ..first.at };
-        let text = words.iter().map(|word| word.value).collect::<Vec<_>>().join(" ");
-        if let Ok(number) = first.value.parse::<f64>()
+        let text = self.text[self.starts[start]..self.starts[start + count - 1] + last.value.len()].to_owned();
+        let is_label = tag.labels.iter().any(|(_, label)| *label == text);
+        let in_device = self.device.map(|device| format!("{device}.{}", first.value));
+        let is_tag = [Some(first.value), in_device.as_deref()]
+            .into_iter()
+            .flatten()
+            .any(|name| self.defs.names.tags.contains_key(name));
+        let is_call = self.tokens.get(start + 1).is_some_and(|next| next.value == "(");
+        let operator = words.get(1).is_some_and(|next| Operator::ALL.iter().any(|known| known.word() == next.value));
+        if !is_label && (is_tag || is_call || operator) {
+            return self.sum();
+        }
+        let (first, rest) = (first.value, text[first.value.len()..].trim());
+        self.next += count;
+        if let Ok(number) = first.parse::<f64>()
             && number.is_finite()
             && tag.labels.is_empty()
         {
-            let unit = text[first.value.len()..].trim();
-            if !unit.is_empty() && unit != tag.unit {
-                let problem = self.problems.add(at, format!("`{unit}` is not the unit of {}", tag.name));
+            if !rest.is_empty() && rest != tag.unit {
+                let problem = self.problems.add(at, format!("`{rest}` is not the unit of {}", tag.name));
                 problem.label(if tag.unit.is_empty() {
                     "it has none".into()
                 } else {
@@ -178,15 +287,15 @@ impl<'a> Reader<'a, '_> {
                 });
                 return None;
             }
-            return Some(number);
+            return Some(Expr::Number(number));
         }
         let choice = text.parse().map_or(Choice::Word(text), Choice::Number);
-        number_of(&At { value: choice, at }, tag, self.problems)
+        number_of(&At { value: choice, at }, tag, self.problems).map(Expr::Number)
     }
 }
 
 fn is_sign(word: &str) -> bool {
-    word == "(" || word == ")" || COMPARES.iter().any(|(sign, _)| *sign == word)
+    ["(", ")", ","].contains(&word) || COMPARES.iter().any(|(sign, _)| *sign == word)
 }
 
 #[cfg(test)]
@@ -202,6 +311,7 @@ mod tests {
         check("PLC-1.RUN=RUN and(T.L>=5.5 cm)", &["PLC-1.RUN", "=", "RUN", "and", "(", "T.L", ">=", "5.5", "cm", ")"]);
         check("a!=b ! <", &["a", "!=", "b", "!", "<"]);
         check("ü.ß = 1", &["ü.ß", "=", "1"]);
+        check("a - b*2", &["a", "-", "b", "*", "2"]);
         check("", &[]);
     }
 }

@@ -259,7 +259,11 @@ pub(super) fn trends(tables: &[At<TrendTable>], defs: &Defs, problems: &mut Prob
         groups.push(TrendGroup { name: name.value.clone(), pens: pens.collect() });
     }
     if tables.is_empty() {
-        let curve = |tag: &&TagDef| tag.labels.is_empty() && tag.is_stored() && matches!(tag.poll, Poll::Every(_));
+        let curve = |tag: &&TagDef| {
+            tag.labels.is_empty()
+                && tag.is_stored()
+                && (matches!(tag.poll, Poll::Every(_)) || tag.calculation.is_some())
+        };
         let pens = defs.tags.iter().filter(curve).take(PENS_MAX).map(|tag| Pen { tag: tag.id, scale: None });
         groups.push(TrendGroup { name: "all".to_owned(), pens: pens.collect() });
     }

@@ -1,13 +1,13 @@
 //! A plant file and the profiles it names become one `PlantDef`. Pure: the texts come from outside.
 
-use std::{collections::BTreeMap, rc::Rc, time::Duration};
+use std::{collections::BTreeMap, rc::Rc, sync::Arc, time::Duration};
 
 use jiff::tz::TimeZone;
 
 use super::{
     access, alarm, device,
     diagnostic::{Errors, Problems},
-    history, interlock, line, lint, mimic,
+    expr, history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
     program, reader,
     reader::{At, Node, Raw, Written, text},
@@ -17,10 +17,11 @@ use super::{
     tag::{self, DeviceContext},
 };
 use crate::plant::{
+    calculation,
     def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, PlantDef, TagId},
     number::to_u16,
     poll_class,
-    tag::{Access, PollClass, TagDef},
+    tag::{Access, Calculation, PollClass, TagDef},
 };
 
 /// A text and the name the user knows it by.
@@ -68,7 +69,8 @@ fn is_of_size(raw: &Raw, problems: &mut Problems) -> bool {
 
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> Option<PlantDef> {
     let lines = line::lines(&file.lines, problems);
-    let Devices { devices, mut tags, names, classes } = devices(file, &lines, library, problems)?;
+    let Devices { devices, mut tags, names, classes, exprs } = devices(file, &lines, library, problems)?;
+    calculate(exprs, &mut tags, Defs { names: &names, lines: &lines, devices: &devices, tags: &[] }, problems);
     let defs = Defs { names: &names, lines: &lines, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     lint::lint(&file.alarms, problems);
@@ -101,6 +103,26 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     })
 }
 
+/// Reads what the calculated tags are, when all tags are known.
+fn calculate(exprs: Vec<(TagId, At<String>)>, tags: &mut [TagDef], defs: Defs, problems: &mut Problems) {
+    let mut found = Vec::new();
+    for (id, words) in &exprs {
+        // A name of a device has no dot.
+        let device = tags[id.index()].name.split_once('.').map(|(device, _)| device);
+        let expr = expr::near(words, device, &Defs { tags: &*tags, ..defs }, problems);
+        found.extend(expr.map(|expr| (*id, Calculation { text: words.value.clone(), expr })));
+    }
+    for (id, calculation) in found {
+        tags[id.index()].calculation = Some(Arc::new(calculation));
+    }
+    let Some(cycle) = calculation::order(tags).1 else { return };
+    let at = exprs.iter().find(|(id, _)| cycle.first() == Some(id)).map(|(_, words)| words.at);
+    let names: Vec<&str> = cycle.iter().chain(cycle.first()).map(|id| tags[id.index()].name.as_str()).collect();
+    if let Some(at) = at {
+        problems.add(at, "a calculated tag needs itself").label(names.join(" → "));
+    }
+}
+
 fn time_zone(name: &Option<At<String>>, problems: &mut Problems) -> TimeZone {
     let Some(name) = name else { return TimeZone::UTC };
     TimeZone::get(&name.value).unwrap_or_else(|_| {
@@ -127,6 +149,8 @@ struct Devices {
     names: Names,
     /// The classes that are written, by tag.
     classes: Vec<Option<PollClass>>,
+    /// What is calculated.
+    exprs: Vec<(TagId, At<String>)>,
 }
 
 /// `None` where they have too many tags together.
@@ -166,6 +190,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         devices.push(def);
     }
     let classes = defined.iter().map(|defined| defined.class).collect();
+    let exprs = defined.iter().filter_map(|defined| Some((defined.tag.id, defined.expr.clone()?))).collect();
     let written = defined.iter().map(|defined| defined.in_sets).collect::<Vec<_>>();
     let mut tags = device::link(defined, &names, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);
@@ -180,7 +205,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         def.signature = signature.map_or(Vec::new(), |table| device::signature(table, &scope, problems));
     }
     sets::mark(&devices, &mut tags, &written, problems);
-    Some(Devices { devices, tags, names, classes })
+    Some(Devices { devices, tags, names, classes, exprs })
 }
 
 /// Unit 0 of a serial line is a broadcast: it can be written, and no unit answers a read.

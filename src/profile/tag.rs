@@ -45,6 +45,8 @@ pub(super) struct Defined {
     pub needs: Vec<(At<TagId>, &'static str)>,
     /// Where the unlock value stands, which is resolved when the other tag is known.
     pub unlock: Option<(TagId, At<Choice>)>,
+    /// What it is calculated from, which may be any tag of the plant.
+    pub expr: Option<At<String>>,
     /// How it is simulated, which may ask any tag of the plant.
     pub simulate: Option<SimulateTable>,
 }
@@ -57,8 +59,11 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     // A plant file that moves a tag need not repeat the number of the manual.
     supersede(&mut layers, "address", "modicon");
     let row = TagTable::of(&layers, problems);
+    if let Some(expr) = &row.expr {
+        check_calculated(&row, expr.at, problems);
+    }
     let point = point(&row, context, problems);
-    let kind = point.map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
+    let kind = point.filter(|_| row.expr.is_none()).map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
     let is_text = point.is_some_and(|point| matches!(point.kind, DataType::Text(_)));
     if let Some(point) = point.filter(|_| is_text) {
         check_text(&row, point, problems);
@@ -71,6 +76,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     check_scaling(&row, kind, decimals, problems);
     let access = access(&row, point, problems);
     let poll = match row.poll.value_or(PollWord::Slow) {
+        _ if row.expr.is_some() => Poll::Never,
         PollWord::Fast => Poll::Every(context.fast),
         PollWord::Slow => Poll::Every(context.slow),
         PollWord::Once => Poll::Once,
@@ -116,7 +122,16 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     let address_at = point.and(row.address.map(|address| address.at));
     let class = row.poll_class.map(|class| class.value);
     let simulate = row.simulate.map(|simulate| simulate.value);
-    Defined { tag, class, in_sets: row.in_sets, address_at, needs: links.needs, unlock: links.unlock, simulate }
+    Defined {
+        tag,
+        class,
+        in_sets: row.in_sets,
+        address_at,
+        expr: row.expr,
+        needs: links.needs,
+        unlock: links.unlock,
+        simulate,
+    }
 }
 
 /// The shortest interval at which an unchanged value may be stored.
@@ -164,6 +179,12 @@ fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Li
 type Raws = (DataType, Option<u8>);
 
 fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Option<Point> {
+    if row.expr.is_some() {
+        return Some(Point { kind: DataType::F64, ..NOWHERE });
+    }
+    if row.address.is_none() {
+        problems.add(row.at, "a tag needs `address`").label("missing here").help("or `expr`, if it is calculated");
+    }
     let location = row.address.as_ref().filter(|_| row.valid)?;
     let (named, address) = locate(location, context.scheme, problems)?;
     let table = table(row, named, problems)?;
@@ -263,7 +284,7 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
 
 /// What is read regularly is stored, unless the row says otherwise.
 fn store_policy(row: &TagTable, is_text: bool, access: Access, poll: Poll) -> StorePolicy {
-    let stored = !is_text && access != Access::Write && matches!(poll, Poll::Every(_));
+    let stored = !is_text && access != Access::Write && (matches!(poll, Poll::Every(_)) || row.expr.is_some());
     row.store.map_or(if stored { StorePolicy::Change } else { StorePolicy::Never }, |store| store.value)
 }
 
@@ -333,6 +354,24 @@ const FOR_NUMBERS: [&str; 15] = [
     "scale", "offset", "decimals", "decimals_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
     "bad_if", "quality_from", "deadband",
 ];
+
+/// Keys that belong to a register.
+#[rustfmt::skip]
+const FOR_REGISTERS: [&str; 25] = [
+    "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "unit_from", "access", "verify",
+    "confirm", "reauthenticate", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
+    "poll_class", "simulate", "default", "set",
+];
+
+/// What is calculated is neither read nor written.
+fn check_calculated(row: &TagTable, expr: Span, problems: &mut Problems) {
+    for (key, at) in FOR_REGISTERS.into_iter().filter_map(|key| Some((key, row.span_of(key)?))) {
+        problems
+            .add(at, format!("`{key}` is for what is read from a device, this is calculated"))
+            .label("leave it out")
+            .also(expr, "calculated here");
+    }
+}
 
 /// Words have no scale, no limits and no names of numbers, and are neither written nor kept in the history.
 fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {

@@ -225,7 +225,7 @@ fn an_acknowledged_alarm_that_lasts_is_reminded_of() {
 /// The fixture whose alarm "high" is enabled while the facts say so.
 fn enabled_by_design(change: impl Fn(&mut AlarmDef)) -> Arc<PlantDef> {
     use crate::plant::expr::{Compare, Expr};
-    let expr = Expr::Test { tag: PV, compare: Compare::Above, value: 0.0 };
+    let expr = Expr::test(PV, Compare::Above, 0.0);
     with(|alarm| {
         (alarm.on_delay, alarm.enabled_when) = (Duration::ZERO, Some(expr.clone()));
         change(alarm);

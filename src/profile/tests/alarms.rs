@@ -63,7 +63,7 @@ fn errors_of_enabled_when_are_shown_at_their_place() {
         let text = PLANT.replacen("high = 80.0", &format!("high = 80.0\nenabled_when = '{words}'"), 1);
         load(text.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}")).alarms[0].enabled_when.clone()
     };
-    let test = |compare, value| Expr::Test { tag: crate::plant::def::TagId(0), compare, value };
+    let test = |compare, value| Expr::test(crate::plant::def::TagId(0), compare, value);
     let (above, below) = (test(Compare::Above, 5.0), test(Compare::AtMost, 2.5));
     for (words, expect) in [
         ("D1.T > 5", above.clone()),

@@ -60,7 +60,12 @@ struct Signal {
 impl Models {
     /// A model of each of these devices, switched on.
     pub fn new(def: &PlantDef, devices: &[DeviceId]) -> Models {
-        let chart = |id: &DeviceId| Slave::new(Model::new(Arc::new(Chart::new(def.device(*id), def.tags_of(*id)))));
+        let chart = |id: &DeviceId| {
+            Slave::new(Model::new(Arc::new(Chart::new(
+                def.device(*id),
+                def.tags_of(*id).filter(|tag| tag.calculation.is_none()),
+            ))))
+        };
         let of_tag = def.tags.iter().map(|tag| devices.iter().position(|device| *device == tag.device)).collect();
         let mut models = Models { devices: devices.iter().map(chart).collect(), of_tag, ..Models::default() };
         models.values = vec![None; def.tags.len()];

@@ -9,7 +9,7 @@ use crate::{
     bus::source_frame,
     plant::{
         def::{LineDef, TagId},
-        tag::TagDef,
+        tag::{Calculation, TagDef},
     },
     ui::ViewContext,
 };
@@ -21,6 +21,10 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     let exchange = cx.snapshot.source_frames[tag.index()].as_deref();
     let found = exchange.and_then(|exchange| source_frame::find(def.point, exchange));
     let mut rows = value::value_rows(cx, def, exchange, found.as_ref());
+    if let Some(calculation) = &def.calculation {
+        rows.extend(calculation_rows(cx, calculation));
+        return rows;
+    }
     let label = if def.is_text() { t!("text") } else { t!("number") };
     rows.push(Row::new(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
     rows.push(Row::new(t!("address"), wire::place(cx, def, device), cx.theme.normal()));
@@ -33,6 +37,26 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     rows.extend(service::poll_rows(cx, def));
     if let (Some(dissection), Some(exchange)) = (dissection, exchange) {
         rows.extend(wire::every_byte(cx, exchange, &dissection, found.as_ref(), room));
+    }
+    rows
+}
+
+/// What it is calculated from: the expression, and each input as it is now.
+fn calculation_rows(cx: &ViewContext, calculation: &Calculation) -> Vec<Row> {
+    let mut rows = vec![Row::new(t!("expression"), calculation.text.clone(), cx.theme.normal())];
+    for (n, input) in calculation.inputs().into_iter().enumerate() {
+        let (def, sample) = (cx.def().tag(input), cx.snapshot.sample(input));
+        let decimals = usize::from(cx.snapshot.decimals[input.index()]);
+        let value = match sample.value {
+            None => String::new(),
+            Some(value) => match def.label_of(value) {
+                Some(label) => format!("{label}, "),
+                None => format!("{value:.decimals$} {}, ", def.unit_now(|tag| cx.snapshot.sample(tag))),
+            },
+        };
+        let style = if sample.quality.is_good() { cx.theme.normal() } else { cx.theme.trouble() };
+        let label = if n == 0 { t!("inputs") } else { "" };
+        rows.push(Row::new(label, format!("{}  {value}{}", def.name, sample.quality), style));
     }
     rows
 }

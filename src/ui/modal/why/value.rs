@@ -101,7 +101,7 @@ fn because(
             Poll::Once | Poll::Never => Some(t!("it is read on request only").to_owned()),
         },
         // The verdict on the last answer says it all.
-        Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown => None,
+        Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown | Cause::Undefined => None,
         Cause::NotRead | Cause::StationOff | Cause::NotAuthorised | Cause::Unreadable => None,
     }
 }
@@ -135,6 +135,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
             Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),
         },
         Cause::NotAuthorised => Some(t!("log in: tab 0").to_owned()),
+        Cause::Undefined => Some(t!("see its inputs: a division by zero, or a number that is too large").to_owned()),
         Cause::StationOff | Cause::Unreadable => None,
     }
 }

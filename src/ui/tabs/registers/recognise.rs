@@ -102,7 +102,7 @@ impl Registers {
         let Recognition::Done(Some((def, _, taken))) = &mut self.recognition else { return };
         *taken = true;
         let def = Arc::clone(def);
-        for tag in def.tags.iter().filter(|tag| tag.point.field.is_none()) {
+        for tag in def.tags.iter().filter(|tag| tag.point.field.is_none() && tag.calculation.is_none()) {
             if self.names.get(tag.point.table, tag.point.address).is_none() {
                 let named = self.named(&def, tag);
                 self.names.put(named);

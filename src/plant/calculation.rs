@@ -1,0 +1,180 @@
+//! Calculated tags: their values follow from those of other tags, with quality and time.
+
+use super::{
+    def::PlantDef,
+    expr::Expr,
+    id::TagId,
+    sample::{Cause, Quality, Sample},
+    tag::{Calculation, TagDef},
+};
+
+/// The calculated tags, each after those that it needs.
+#[derive(Debug, Clone, Default)]
+pub struct Calculator {
+    order: Vec<(TagId, Vec<TagId>)>,
+}
+
+impl Calculator {
+    /// Of tags without a cycle; those of a cycle are never calculated.
+    pub fn new(tags: &[TagDef]) -> Calculator {
+        Calculator { order: order(tags).0 }
+    }
+
+    /// The new samples of all tags that need a `touched` one, themselves or through others.
+    pub fn changed(&self, def: &PlantDef, touched: &[TagId], samples: &[Sample]) -> Vec<(TagId, Sample)> {
+        if self.order.is_empty() || touched.is_empty() {
+            return Vec::new();
+        }
+        let mut samples = samples.to_vec();
+        let mut is_changed = vec![false; samples.len()];
+        touched.iter().for_each(|tag| is_changed[tag.index()] = true);
+        let mut changed = Vec::new();
+        for (tag, inputs) in &self.order {
+            let is_due = inputs.iter().any(|input| is_changed[input.index()]) || is_changed[tag.index()];
+            if let Some(calculation) = def.tag(*tag).calculation.as_ref().filter(|_| is_due) {
+                let at = samples[tag.index()].at;
+                let sample =
+                    calculate(&calculation.expr, inputs, |of| samples[of.index()], Sample::bad(Cause::NotRead, at));
+                (samples[tag.index()], is_changed[tag.index()]) = (sample, true);
+                changed.push((*tag, sample));
+            }
+        }
+        changed
+    }
+}
+
+/// A value is as good as the worst of its inputs, for the cause of the first of these, and as new as the newest. `none` is
+/// the sample of an expression without inputs, but for its value.
+fn calculate(expr: &Expr, inputs: &[TagId], sample: impl Fn(TagId) -> Sample, none: Sample) -> Sample {
+    let at = inputs.iter().map(|input| sample(*input).at).max().unwrap_or(none.at);
+    let find = |test: fn(Quality) -> bool| {
+        inputs.iter().map(|input| sample(*input).quality).find(|quality| test(*quality)).and_then(Quality::cause)
+    };
+    if let Some(cause) = find(Quality::is_bad) {
+        return Sample::bad(cause, at);
+    }
+    let Some(value) = expr.number(&|tag| sample(tag).value) else { return Sample::bad(Cause::Undefined, at) };
+    let good = Sample::good(value, at);
+    find(|quality| !quality.is_good()).map_or(good, |cause| good.uncertain(cause))
+}
+
+/// The calculated tags in an order in which each stands after its inputs; and the tags of the first cycle, if there is one.
+pub fn order(tags: &[TagDef]) -> (Vec<(TagId, Vec<TagId>)>, Option<Vec<TagId>>) {
+    let mut walk = Walk { tags, seen: vec![false; tags.len()], path: Vec::new(), order: Vec::new(), cycle: None };
+    tags.iter().for_each(|tag| walk.visit(tag.id));
+    (walk.order, walk.cycle)
+}
+
+struct Walk<'a> {
+    tags: &'a [TagDef],
+    seen: Vec<bool>,
+    /// What is being visited, each needed by the one before.
+    path: Vec<TagId>,
+    order: Vec<(TagId, Vec<TagId>)>,
+    cycle: Option<Vec<TagId>>,
+}
+
+impl Walk<'_> {
+    fn visit(&mut self, tag: TagId) {
+        let Some(calculation) = self.tags[tag.index()].calculation.as_deref() else { return };
+        if let Some(start) = self.path.iter().position(|on_path| *on_path == tag) {
+            self.cycle.get_or_insert_with(|| self.path[start..].to_vec());
+            return;
+        }
+        if std::mem::replace(&mut self.seen[tag.index()], true) {
+            return;
+        }
+        let inputs = calculation.inputs();
+        self.path.push(tag);
+        inputs.iter().for_each(|input| self.visit(*input));
+        self.path.pop();
+        self.order.push((tag, inputs));
+    }
+}
+
+impl Calculation {
+    /// The tags of the expression, each once, in the order in which they are written.
+    pub fn inputs(&self) -> Vec<TagId> {
+        let mut inputs = Vec::new();
+        for tag in self.expr.tags() {
+            if !inputs.contains(&tag) {
+                inputs.push(tag);
+            }
+        }
+        inputs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::plant::{
+        expr::Operator,
+        fixture::{self, PV, SV},
+    };
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a small number")
+    }
+
+    fn arithmetic(left: TagId, operator: Operator, right: TagId) -> Expr {
+        Expr::Arithmetic(Box::new(Expr::Tag(left)), operator, Box::new(Expr::Tag(right)))
+    }
+
+    /// The fixture with two more tags: twice the second, and before it in the file.
+    fn plant() -> (PlantDef, TagId, TagId) {
+        let mut def = (*fixture::plant()).clone();
+        let count = u16::try_from(def.tags.len()).expect("a small plant");
+        let (double, deviation) = (TagId(count), TagId(count + 1));
+        let exprs = [arithmetic(deviation, Operator::Add, deviation), arithmetic(PV, Operator::Subtract, SV)];
+        for (id, expr) in [double, deviation].into_iter().zip(exprs) {
+            let tag = TagDef { id, ..def.tags[PV.index()].clone() };
+            def.tags.push(TagDef { calculation: Some(Arc::new(Calculation { text: String::new(), expr })), ..tag });
+        }
+        (def, double, deviation)
+    }
+
+    #[test]
+    fn a_calculated_tag_follows_its_inputs_in_their_order() {
+        let (def, double, deviation) = plant();
+        let calculator = Calculator::new(&def.tags);
+        let mut samples = vec![Sample::bad(Cause::NotRead, at(0)); def.tags.len()];
+        (samples[PV.index()], samples[SV.index()]) = (Sample::good(72.5, at(3)), Sample::good(70.0, at(2)));
+        let expect = [(deviation, Sample::good(2.5, at(3))), (double, Sample::good(5.0, at(3)))];
+        assert_eq!(calculator.changed(&def, &[PV], &samples), expect);
+        assert_eq!(calculator.changed(&def, &[fixture::RUN], &samples), [], "no input of it");
+        assert_eq!(calculator.changed(&def, &[], &samples), []);
+    }
+
+    #[test]
+    fn a_calculated_value_is_as_good_as_its_worst_input() {
+        let (good, zero) = (Sample::good(6.0, at(1)), Sample::good(0.0, at(2)));
+        let uncertain = zero.uncertain(Cause::Stale);
+        let bad = |cause, second| Sample::bad(cause, at(second));
+        for (operator, first, second, expect) in [
+            (Operator::Add, good, zero, Sample::good(6.0, at(2))),
+            (Operator::Add, good, uncertain, Sample::good(6.0, at(2)).uncertain(Cause::Stale)),
+            (Operator::Add, uncertain, bad(Cause::Timeout, 3), bad(Cause::Timeout, 3)),
+            (Operator::Add, bad(Cause::SensorFault, 4), bad(Cause::Timeout, 3), bad(Cause::SensorFault, 4)),
+            (Operator::Divide, good, zero, bad(Cause::Undefined, 2)),
+            (Operator::Multiply, Sample::good(f64::MAX, at(1)), good, bad(Cause::Undefined, 1)),
+        ] {
+            let sample = |tag| if tag == PV { first } else { second };
+            let found = calculate(&arithmetic(PV, operator, SV), &[PV, SV], sample, bad(Cause::NotRead, 0));
+            assert_eq!(found, expect);
+        }
+    }
+
+    #[test]
+    fn a_cycle_is_found_and_named() {
+        let (mut def, double, deviation) = plant();
+        assert_eq!(order(&def.tags).1, None);
+        let expr = arithmetic(double, Operator::Add, PV);
+        def.tags[deviation.index()].calculation = Some(Arc::new(Calculation { text: String::new(), expr }));
+        assert_eq!(order(&def.tags).1, Some(vec![double, deviation]));
+    }
+}

@@ -1,0 +1,32 @@
+//! Calculated tags of plant files.
+
+use super::*;
+
+#[test]
+fn errors_of_a_calculated_tag_are_shown_at_their_place() {
+    let with = |keys: &str| {
+        let tag = format!("unit = 1\n\n[[device.tag]]\nname = \"DEV\"\n{keys}\n");
+        load(PLANT.replacen("unit = 1\n", &tag, 1).as_bytes(), METER, PLC)
+    };
+    for words in ["T - 5", "D1.T - 5 * (T + 1)", "max(T, 5, abs(T))", "T > 5 and T <= T + 2", "mean(T, T) / 2"] {
+        let def = with(&format!("expr = '{words}'")).unwrap_or_else(|errors| panic!("{words}: {errors}"));
+        let tag = def.tag(def.tag_named("D1.DEV").expect("it is there"));
+        let calculation = tag.calculation.as_ref().expect("it is calculated");
+        assert_eq!((calculation.inputs(), tag.is_stored()), (vec![def.tag_named("D1.T").expect("it is there")], true));
+    }
+    for (keys, expect) in [
+        ("expr = 'T -'", "a tag is missing"),
+        ("expr = 'T - Q'", "unknown tag `Q` in D1"),
+        ("expr = 'T - D1.TT'", "did you mean `D1.T`?"),
+        ("expr = 'maxi(T)'", "did you mean `max`?"),
+        ("expr = 'abs(T, T)'", "abs is of one number"),
+        ("expr = 'max(T'", "a parenthesis is not closed"),
+        ("expr = 'T 5'", "`5` is one too many"),
+        ("expr = 'DEV + T'", "D1.DEV → D1.DEV"),
+        ("expr = 'T'\naddress = 7", "`address` is for what is read from a device"),
+        ("type = 'int16'", "a tag needs `address`"),
+    ] {
+        let found = with(keys).expect_err(keys).to_string();
+        assert!(found.contains(expect), "{keys}: {found}");
+    }
+}
