@@ -127,7 +127,7 @@ mod tests {
 
     /// The fixture with two more tags: twice the second, and before it in the file.
     fn plant() -> (PlantDef, TagId, TagId) {
-        let mut def = (*fixture::plant()).clone();
+        let mut def = fixture::plant().clone();
         let count = u16::try_from(def.tags.len()).expect("a small plant");
         let (double, deviation) = (TagId(count), TagId(count + 1));
         let exprs = [arithmetic(deviation, Operator::Add, deviation), arithmetic(PV, Operator::Subtract, SV)];

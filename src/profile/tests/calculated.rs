@@ -5,8 +5,8 @@ use super::*;
 #[test]
 fn errors_of_a_calculated_tag_are_shown_at_their_place() {
     let with = |keys: &str| {
-        let tag = format!("unit = 1\n\n[[device.tag]]\nname = \"DEV\"\n{keys}\n");
-        load(PLANT.replacen("unit = 1\n", &tag, 1).as_bytes(), METER, PLC)
+        let tag = format!("fast = \"1s\"\n\n[[device.tag]]\nname = \"DEV\"\n{keys}\n");
+        load(PLANT.replacen("fast = \"1s\"\n", &tag, 1).as_bytes(), METER, PLC)
     };
     for words in ["T - 5", "D1.T - 5 * (T + 1)", "max(T, 5, abs(T))", "T > 5 and T <= T + 2", "mean(T, T) / 2"] {
         let def = with(&format!("expr = '{words}'")).unwrap_or_else(|errors| panic!("{words}: {errors}"));
