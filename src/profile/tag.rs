@@ -365,7 +365,9 @@ const FOR_REGISTERS: [&str; 25] = [
 
 /// What is calculated is neither read nor written.
 fn check_calculated(row: &TagTable, expr: Span, problems: &mut Problems) {
-    for (key, at) in FOR_REGISTERS.into_iter().filter_map(|key| Some((key, row.span_of(key)?))) {
+    // What the defaults of a profile say is for its registers.
+    let own = |at: &Span| at.source == row.at.source && row.at.start <= at.start;
+    for (key, at) in FOR_REGISTERS.into_iter().filter_map(|key| Some((key, row.span_of(key).filter(own)?))) {
         problems
             .add(at, format!("`{key}` is for what is read from a device, this is calculated"))
             .label("leave it out")

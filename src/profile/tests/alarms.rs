@@ -81,7 +81,7 @@ fn errors_of_enabled_when_are_shown_at_their_place() {
         ("D1.X > 5", &["unknown tag `D1.X`", "[small.toml:27:17]"][..]),
         ("D1.T > 5 cm", &["`cm` is not the unit of D1.T", "expected °C"]),
         ("D1.T > warm", &["`warm` is not a state of D1.T"]),
-        ("D1.T", &["how is D1.T compared?"]),
+        ("D1.T", &["this is a number, not a condition"]),
         ("D1.T > ", &["D1.T is compared with nothing"]),
         ("D1.T > 5 and", &["a tag is missing"]),
         ("(D1.T > 5", &["a parenthesis is not closed"]),
