@@ -1,12 +1,23 @@
 //! Calculated tags: their values follow from those of other tags, with quality and time.
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     def::PlantDef,
     expr::Expr,
     id::TagId,
     sample::{Cause, Quality, Sample},
-    tag::{Calculation, TagDef},
+    tag::TagDef,
 };
+
+/// How a value is calculated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calculation {
+    /// As it is written.
+    pub text: String,
+    /// What that means.
+    pub expr: Expr,
+}
 
 /// The calculated tags, each after those that it needs.
 #[derive(Debug, Clone, Default)]

@@ -25,6 +25,7 @@ pub mod def;
 pub(crate) mod simulate;
 pub mod tag;
 pub(crate) mod poll_class;
+pub(crate) mod confidence;
 pub(crate) mod store_policy;
 pub(crate) mod scale;
 pub mod parameter_set;

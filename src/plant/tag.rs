@@ -5,12 +5,13 @@ use std::{sync::Arc, time::Duration};
 use serde::{Deserialize, Serialize};
 
 pub use super::{
+    calculation::Calculation,
+    confidence::Confidence,
     data_type::{DataType, Encoding},
     poll_class::PollClass,
     store_policy::{STORE_EVERY_MAX, StorePolicy},
 };
 use super::{
-    expr::Expr,
     id::{DeviceId, TagId},
     keyword::keyword_enum,
     number::to_u8,
@@ -206,15 +207,6 @@ impl TagDef {
     }
 }
 
-/// How a value is calculated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Calculation {
-    /// As it is written.
-    pub text: String,
-    /// What that means.
-    pub expr: Expr,
-}
-
 /// Where a value lives in its device: wire address, 0-based.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Point {
@@ -369,21 +361,6 @@ pub enum Poll {
     Once,
     /// Never by itself.
     Never,
-}
-
-keyword_enum! {
-    /// How sure a row of a register map is (see the profile's sources).
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-    pub enum Confidence: "confidence" {
-        /// Recorded on a real device or read in the maker's manual.
-        Proven => "proven",
-        /// Two independent sources agree.
-        High => "high",
-        /// One source: a write is flagged "not verified".
-        Medium => "medium",
-        /// Inference: shown only with `--experimental`.
-        Low => "low",
-    }
 }
 
 #[cfg(test)]

@@ -37,6 +37,7 @@ mod simulate;
 mod set_file;
 mod sets;
 mod tag;
+mod tag_keys;
 mod units;
 
 #[cfg(test)]

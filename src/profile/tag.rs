@@ -11,6 +11,7 @@ use super::{
     names::{Names, check_name, number_of},
     reader::{At, Choice, Raw, Written, either, supersede, text},
     schema::{PollWord, Scheme, SimulateTable, TagTable},
+    tag_keys::{check_calculated, check_text},
     units,
 };
 use crate::plant::{
@@ -59,15 +60,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     // A plant file that moves a tag need not repeat the number of the manual.
     supersede(&mut layers, "address", "modicon");
     let row = TagTable::of(&layers, problems);
-    if let Some(expr) = &row.expr {
-        check_calculated(&row, expr.at, problems);
-    }
-    let point = point(&row, context, problems);
-    let kind = point.filter(|_| row.expr.is_none()).map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
-    let is_text = point.is_some_and(|point| matches!(point.kind, DataType::Text(_)));
-    if let Some(point) = point.filter(|_| is_text) {
-        check_text(&row, point, problems);
-    }
+    let (point, kind, is_text) = place(&row, context, problems);
     let links = links(&row, context, problems);
     let decimals = match links.decimals {
         Some(tag) => Decimals::From(tag),
@@ -75,13 +68,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     };
     check_scaling(&row, kind, decimals, problems);
     let access = access(&row, point, problems);
-    let poll = match row.poll.value_or(PollWord::Slow) {
-        _ if row.expr.is_some() => Poll::Never,
-        PollWord::Fast => Poll::Every(context.fast),
-        PollWord::Slow => Poll::Every(context.slow),
-        PollWord::Once => Poll::Once,
-        PollWord::Never => Poll::Never,
-    };
+    let poll = poll(&row, context);
     if let Some(name) = &row.name {
         check_name(name, "tag", problems);
     }
@@ -178,11 +165,25 @@ fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Li
 /// Raw type and, for a field, its number of bits.
 type Raws = (DataType, Option<u8>);
 
+/// Where it lies, its raw numbers, and whether it is a text.
+fn place(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> (Option<Point>, Option<Raws>, bool) {
+    if let Some(expr) = &row.expr {
+        check_calculated(row, expr.at, problems);
+    }
+    let point = point(row, context, problems);
+    let kind = point.filter(|_| row.expr.is_none()).map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
+    let is_text = point.is_some_and(|point| matches!(point.kind, DataType::Text(_)));
+    if let Some(point) = point.filter(|_| is_text) {
+        check_text(row, point, problems);
+    }
+    (point, kind, is_text)
+}
+
 fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Option<Point> {
     if row.expr.is_some() {
         return Some(Point { kind: DataType::F64, ..NOWHERE });
     }
-    if row.address.is_none() {
+    if row.span_of("address").is_none() {
         problems.add(row.at, "a tag needs `address`").label("missing here").help("or `expr`, if it is calculated");
     }
     let location = row.address.as_ref().filter(|_| row.valid)?;
@@ -282,6 +283,17 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
     (0..=6).find(whole).unwrap_or(6)
 }
 
+/// How often it is read: what is calculated never is.
+fn poll(row: &TagTable, context: &DeviceContext) -> Poll {
+    match row.poll.value_or(PollWord::Slow) {
+        _ if row.expr.is_some() => Poll::Never,
+        PollWord::Fast => Poll::Every(context.fast),
+        PollWord::Slow => Poll::Every(context.slow),
+        PollWord::Once => Poll::Once,
+        PollWord::Never => Poll::Never,
+    }
+}
+
 /// What is read regularly is stored, unless the row says otherwise.
 fn store_policy(row: &TagTable, is_text: bool, access: Access, poll: Poll) -> StorePolicy {
     let stored = !is_text && access != Access::Write && (matches!(poll, Poll::Every(_)) || row.expr.is_some());
@@ -346,53 +358,6 @@ fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
         return Some((0.0, 2f64.powi(i32::from(bits)) - 1.0));
     }
     kind.whole_range()
-}
-
-/// Keys that a text does not have.
-#[rustfmt::skip]
-const FOR_NUMBERS: [&str; 15] = [
-    "scale", "offset", "decimals", "decimals_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
-    "bad_if", "quality_from", "deadband",
-];
-
-/// Keys that belong to a register.
-#[rustfmt::skip]
-const FOR_REGISTERS: [&str; 25] = [
-    "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "unit_from", "access", "verify",
-    "confirm", "reauthenticate", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
-    "poll_class", "simulate", "default", "set",
-];
-
-/// What is calculated is neither read nor written.
-fn check_calculated(row: &TagTable, expr: Span, problems: &mut Problems) {
-    // What the defaults of a profile say is for its registers.
-    let own = |at: &Span| at.source == row.at.source && row.at.start <= at.start;
-    for (key, at) in FOR_REGISTERS.into_iter().filter_map(|key| Some((key, row.span_of(key).filter(own)?))) {
-        problems
-            .add(at, format!("`{key}` is for what is read from a device, this is calculated"))
-            .label("leave it out")
-            .also(expr, "calculated here");
-    }
-}
-
-/// Words have no scale, no limits and no names of numbers, and are neither written nor kept in the history.
-fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
-    for (key, at) in FOR_NUMBERS.into_iter().filter_map(|key| Some((key, row.span_of(key)?))) {
-        problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
-    }
-    if let Some(order) = row.order.filter(|order| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba)) {
-        let problem = problems.add(order.at, "the words of a text cannot be reversed");
-        problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
-    }
-    if point.table.is_bits() {
-        problems.add(row.at, "a text needs registers").label("expected table = \"holding\" or \"input\"");
-    }
-    if let Some(access) = row.access.filter(|access| access.value != Access::Read) {
-        problems.add(access.at, "a text can only be read").label("expected access = \"r\"");
-    }
-    if let Some(store) = row.store.filter(|store| store.value != StorePolicy::Never) {
-        problems.add(store.at, "the history keeps numbers, this is a text").label("leave it out");
-    }
 }
 
 fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Access {
