@@ -183,7 +183,7 @@ fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Op
     if row.expr.is_some() {
         return Some(Point { kind: DataType::F64, ..NOWHERE });
     }
-    if row.span_of("address").is_none() {
+    if row.address.is_none() && row.valid {
         problems.add(row.at, "a tag needs `address`").label("missing here").help("or `expr`, if it is calculated");
     }
     let location = row.address.as_ref().filter(|_| row.valid)?;
