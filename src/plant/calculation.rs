@@ -19,10 +19,13 @@ pub struct Calculation {
     pub expr: Expr,
 }
 
+/// A calculated tag and those that it needs.
+type Inputs = (TagId, Vec<TagId>);
+
 /// The calculated tags, each after those that it needs.
 #[derive(Debug, Clone, Default)]
 pub struct Calculator {
-    order: Vec<(TagId, Vec<TagId>)>,
+    order: Vec<Inputs>,
 }
 
 impl Calculator {
@@ -70,7 +73,7 @@ fn calculate(expr: &Expr, inputs: &[TagId], sample: impl Fn(TagId) -> Sample, no
 }
 
 /// The calculated tags in an order in which each stands after its inputs; and the tags of the first cycle, if there is one.
-pub fn order(tags: &[TagDef]) -> (Vec<(TagId, Vec<TagId>)>, Option<Vec<TagId>>) {
+pub fn order(tags: &[TagDef]) -> (Vec<Inputs>, Option<Vec<TagId>>) {
     let mut walk = Walk { tags, seen: vec![false; tags.len()], path: Vec::new(), order: Vec::new(), cycle: None };
     tags.iter().for_each(|tag| walk.visit(tag.id));
     (walk.order, walk.cycle)
@@ -81,7 +84,7 @@ struct Walk<'a> {
     seen: Vec<bool>,
     /// What is being visited, each needed by the one before.
     path: Vec<TagId>,
-    order: Vec<(TagId, Vec<TagId>)>,
+    order: Vec<Inputs>,
     cycle: Option<Vec<TagId>>,
 }
 

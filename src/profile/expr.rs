@@ -214,7 +214,7 @@ impl<'a> Reader<'a, '_> {
         let Some(function) = Function::ALL.into_iter().find(|function| function.word() == name.value) else {
             let problem = self.problems.add(name.at, format!("unknown function `{}`", name.value));
             let known = Function::ALL.map(Function::word);
-            problem.label(format!("expected one of {}", known.join(", "))).suggest(name.value, known.into_iter());
+            problem.label(format!("expected one of {}", known.join(", "))).suggest(name.value, known);
             return None;
         };
         self.next += 1;
