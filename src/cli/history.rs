@@ -5,7 +5,12 @@ use std::{path::Path, sync::Arc};
 use jiff::Timestamp;
 
 use crate::{
-    history::{Answer, ArchiveFile, Overview, Query, io::archive::sync_and_hash, tiers::Tier},
+    history::{
+        Answer, ArchiveFile, Overview, Query,
+        io::archive::sync_and_hash,
+        retention::{self, Deletion, Why},
+        tiers::Tier,
+    },
     plant::PlantDef,
 };
 
@@ -49,7 +54,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// One fact a line.
 fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
-    let Overview { database, database_bytes, samples, extent, folder, files } = overview;
+    let Overview { database, database_bytes, samples, extent, folder, files, .. } = overview;
     let time = |at: Timestamp| local(at, def);
     let stored =
         extent.map_or_else(|| "nothing yet".to_owned(), |(from, to)| format!("{} to {}", time(from), time(to)));
@@ -74,6 +79,7 @@ fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
             size(all)
         ));
     }
+    lines.extend(of_room(overview, &time));
     for pair in files.iter().filter(|file| file.tier == Tier::Raw).collect::<Vec<_>>().windows(2) {
         if pair[0].to < pair[1].from
             && let (Ok(from), Ok(to)) =
@@ -82,6 +88,37 @@ fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
             lines.push(format!("gap       {} to {}: nothing was stored", time(from), time(to)));
         }
     }
+    lines
+}
+
+/// What the disk has room for, what was deleted, and what will be.
+fn of_room(overview: &Overview, time: &impl Fn(Timestamp) -> String) -> Vec<String> {
+    let Overview { disk, rule, deleted_until, next_deletion, files, database_bytes, .. } = overview;
+    let mut lines = Vec::new();
+    if let Some(disk) = disk {
+        lines.push(format!(
+            "disk      {} free of {}; the history has {} and may take {} % of the disk, {}",
+            size(disk.free),
+            size(disk.all),
+            size(database_bytes + bytes(files.iter())),
+            rule.disk_share_percent_max,
+            size(disk.share(*rule))
+        ));
+    }
+    lines.extend(retention::growth(files).map(|growth| format!("growth    {} a day", size(growth as u64))));
+    lines.extend(deleted_until.map(|until| format!("deleted   samples before {}", time(until))));
+    lines.push(match next_deletion {
+        None => "next      nothing is deleted as things stand".to_owned(),
+        Some(Deletion { file, why, at }) => {
+            let at = Timestamp::from_microsecond(*at).map_or_else(|_| "in a far future".to_owned(), time);
+            let why = match why {
+                Why::Age(days) => format!("kept for {days} days"),
+                Why::Share => format!("the history would have more than {} % of the disk", rule.disk_share_percent_max),
+                Why::DiskFull => "the disk is nearly full".to_owned(),
+            };
+            format!("next      {} is deleted {at}: {why}", file.path)
+        }
+    });
     lines
 }
 

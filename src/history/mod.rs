@@ -1,6 +1,7 @@
 //! What the plant remembers: one thread writes it with DuckDB, another answers queries about it.
 
 pub mod tiers;
+pub mod retention;
 pub mod series;
 pub mod alarm_state;
 pub mod words;
@@ -11,11 +12,14 @@ use std::{path::PathBuf, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use self::tiers::Tier;
+use self::{
+    retention::{Deletion, Disk},
+    tiers::Tier,
+};
 use crate::{
     plant::{
         alarm::PeriodMetrics,
-        def::{LineId, TagId},
+        def::{HistoryDef, LineId, TagId},
         line_minute::LineMinute,
         live::{LiveRead, LiveReading},
         record::{ActionRecord, AlarmRecord},
@@ -146,6 +150,14 @@ pub struct Overview {
     pub extent: Option<(Timestamp, Timestamp)>,
     /// The folder of the archive.
     pub folder: PathBuf,
+    /// The disk that it lies on; `None` where that cannot be told.
+    pub disk: Option<Disk>,
+    /// What is kept, and for how long.
+    pub rule: HistoryDef,
+    /// Until when samples were deleted.
+    pub deleted_until: Option<Timestamp>,
+    /// What is deleted next, and when.
+    pub next_deletion: Option<Deletion>,
     /// Its files, oldest first.
     pub files: Vec<ArchiveFile>,
 }

@@ -24,12 +24,12 @@ pub struct Span {
     pub until: Timestamp,
 }
 
-/// The grid of a curve of at most `buckets` columns, and the widest aggregates that it may be made of: where these are
-/// minutes or hours, columns begin and end with them, and the span is a little longer than asked.
-pub fn grid(span: Span, buckets: usize) -> (Span, usize, Tier) {
+/// The grid of a curve of at most `buckets` columns, and the widest aggregates that it may be made of, `finest` at least:
+/// where these are minutes or hours, columns begin and end with them, and the span is a little longer than asked.
+pub fn grid(span: Span, buckets: usize, finest: Tier) -> (Span, usize, Tier) {
     let (from, to) = (span.from.as_microsecond(), span.to.as_microsecond());
     let count = i64::try_from(buckets.max(1)).unwrap_or(i64::MAX);
-    let tier = Tier::within((to - from) / count);
+    let tier = Tier::within((to - from) / count).max(finest);
     let Some(step) = tier.step() else { return (span, buckets, tier) };
     let from = floor(from, step);
     let column = ceil_div(ceil_div(to - from, count), step) * step;

@@ -9,6 +9,7 @@ use super::tag::{Table, TagDef};
 
 pub use super::{
     alarm::def::Priority,
+    history_def::{HistoryDef, ParquetVersion},
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Serial, Transport},
     mimic_def::MimicDef,
@@ -306,22 +307,6 @@ pub struct ReportDef {
     pub record: Option<(DeviceId, Duration)>,
     /// How CSV is written.
     pub csv: CsvDialect,
-}
-
-/// How little of its disk may be free before the history warns: less than both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct HistoryDef {
-    /// Share of the disk, percent.
-    pub disk_free_percent_min: u8,
-    /// MiB.
-    pub disk_free_mib_min: u32,
-}
-
-impl Default for HistoryDef {
-    /// A tenth of a large disk is plenty, and a small disk never has 1 GiB free.
-    fn default() -> HistoryDef {
-        HistoryDef { disk_free_percent_min: 10, disk_free_mib_min: 1_024 }
-    }
 }
 
 /// How CSV is written.

@@ -11,6 +11,7 @@ pub(crate) mod number;
 pub(crate) mod time;
 pub(crate) mod keyword;
 pub mod visible;
+pub mod history_def;
 pub mod id;
 pub mod role;
 pub mod sample;

@@ -14,7 +14,7 @@ use super::{
     condition::AlarmTable,
     reader::{Choice, Raw, toml_tables},
 };
-use crate::plant::def::{Parity, Role, Rs485};
+use crate::plant::def::{Parity, ParquetVersion, Role, Rs485};
 
 toml_tables! {
     /// A plant file.
@@ -194,10 +194,15 @@ toml_tables! {
         opt "csv" csv: CsvTable,
     }
 
-    /// How little of the disk may be free.
+    /// What the history may take of its disk, and for how long it keeps what.
     HistoryTable, "the history" {
         opt "disk_free_percent_min" disk_free_percent_min: u8,
         opt "disk_free_mib_min" disk_free_mib_min: u32,
+        opt "disk_share_percent_max" disk_share_percent_max: u8,
+        opt "keep_samples_days" keep_samples_days: u32,
+        opt "keep_minutes_days" keep_minutes_days: u32,
+        opt "keep_hours_days" keep_hours_days: u32,
+        opt "parquet" parquet: ParquetVersion,
     }
 
     /// The raw record of a controller.

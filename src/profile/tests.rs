@@ -15,7 +15,7 @@ use super::{
     plant::{Library, Text, build},
 };
 use crate::plant::{
-    def::{Condition, HistoryDef, LineId, PlantDef, Subject},
+    def::{Condition, HistoryDef, LineId, ParquetVersion, PlantDef, Subject},
     interlock::InterlockCondition,
     station::StationFault,
     tag::{Bound, DataType, PollClass},
@@ -301,11 +301,18 @@ fn the_disk_space_that_the_history_needs_is_read_and_checked() {
     let with =
         |keys: &str| load(PLANT.replace("\n[mimic]", &format!("\n[history]\n{keys}\n[mimic]")).as_bytes(), METER, PLC);
     let read = |keys: &str| with(keys).unwrap_or_else(|errors| panic!("{errors}")).history;
-    let usual = HistoryDef { disk_free_percent_min: 10, disk_free_mib_min: 1_024 };
+    let usual = HistoryDef::default();
     assert_eq!(load(PLANT.as_bytes(), METER, PLC).unwrap().history, usual, "without the table");
     assert_eq!(read("disk_free_percent_min = 5"), HistoryDef { disk_free_percent_min: 5, ..usual });
     assert_eq!(read("disk_free_mib_min = 0"), HistoryDef { disk_free_mib_min: 0, ..usual });
+    assert_eq!(
+        read("keep_samples_days = 730\nparquet = \"v2\"\ndisk_share_percent_max = 20"),
+        HistoryDef { keep_samples_days: Some(730), parquet: ParquetVersion::V2, disk_share_percent_max: 20, ..usual }
+    );
     for (key, expect) in [
+        ("keep_minutes_days = 6", ["[small.toml:32:21]", "6 cannot be used here", "expected 7 … 36500"]),
+        ("disk_share_percent_max = 0", ["[small.toml:32:26]", "0 cannot be used here", "expected 1 … 95"]),
+        ("parquet = \"v3\"", ["[small.toml:32:11]", "`v3`", "`v1`"]),
         ("disk_free_percent_min = 51", ["[small.toml:32:25]", "51 cannot be used here", "expected 0 … 50"]),
         ("disk_free_mib_min = 1048577", ["[small.toml:32:21]", "1048577 cannot be used here", "expected 0 … 1048576"]),
         ("disk_free_mib_min = \"1 GiB\"", ["[small.toml:32:21]", "found a string", "expected a whole number"]),

@@ -14,6 +14,7 @@
 //! next start a file that the manifest does not know is either whole and covers what it lacks, or is removed.
 
 mod adopt;
+mod delete;
 mod hour;
 mod merge;
 
@@ -31,12 +32,13 @@ use jiff::{Timestamp, tz::TimeZone};
 use sha2::{Digest, Sha256};
 
 use super::{
-    sql,
+    files, sql,
     store::{Store, engine, instant, utc},
 };
 use crate::{
     history::{
         ArchiveFile, HistoryError, Overview,
+        retention::Deletion,
         tiers::{HOUR, Tier, floor},
     },
     profile::io::atomic::{sync_folder, with_suffix},
@@ -53,6 +55,8 @@ const TAGS: &str = "tag.parquet";
 /// What is to be done next.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Job {
+    /// Delete a file, by the rules of the plant.
+    Delete(Deletion),
     /// Archive the samples of the hour that begins then.
     Hour(i64),
     /// Merge the files of a tier in a closed day or month into one.
@@ -66,13 +70,19 @@ impl Store {
     /// Does a job.
     pub fn archive(&self, job: &Job, steps: Steps) -> Result<(), HistoryError> {
         match job {
+            Job::Delete(deletion) => self.delete(deletion, steps),
             Job::Hour(hour) => self.archive_hour(*hour, steps),
             Job::Merge(tier, span) => self.merge_files(*tier, span.clone(), steps),
         }
     }
 
-    /// What is due in the archive, the oldest first; without hours before `after`, which could not be archived.
+    /// What is due in the archive, the oldest first; without hours before `after`, which could not be archived. Room is made
+    /// before it is needed.
     pub fn archive_due(&self, now: Timestamp, after: Timestamp) -> Result<Option<Job>, HistoryError> {
+        let files = self.files(None)?;
+        if let Some(deletion) = self.next_deletion(&files, now).filter(|next| next.at <= now.as_microsecond()) {
+            return Ok(Some(Job::Delete(deletion)));
+        }
         let closed = now.checked_sub(GRACE).unwrap_or(now).as_microsecond();
         let oldest: Option<i64> =
             self.db.query_row(sql::OLDEST_SAMPLE, params![utc(after)], |row| row.get(0)).map_err(engine)?;
@@ -81,7 +91,7 @@ impl Store {
         if oldest.saturating_add(HOUR) <= closed {
             return Ok(Some(Job::Hour(oldest)));
         }
-        Ok(next_merge(&self.files(None)?, closed.min(oldest)))
+        Ok(next_merge(&files, closed.min(oldest)))
     }
 
     /// The files of the archive that touch a span, or all of them; oldest first.
@@ -99,14 +109,19 @@ impl Store {
     }
 
     /// What is stored, and where.
-    pub(super) fn overview(&self) -> Result<Overview, HistoryError> {
+    pub(super) fn overview(&self, now: Timestamp) -> Result<Overview, HistoryError> {
+        let files = self.files(None)?;
         Ok(Overview {
             database: self.path.clone(),
             database_bytes: self.file_bytes(),
             samples: self.db.query_row(sql::COUNT_SAMPLES, [], |row| row.get(0)).map_err(engine)?,
             extent: self.extent(),
             folder: self.archive_folder(),
-            files: self.files(None)?,
+            disk: files::disk(&self.path),
+            rule: self.def.history,
+            deleted_until: self.deleted_until(Tier::Raw)?,
+            next_deletion: self.next_deletion(&files, now),
+            files,
         })
     }
 
@@ -154,7 +169,9 @@ impl Store {
         let (last, new) = (folder.join(&path), folder.join(format!("{path}{UNFINISHED}")));
         fs::create_dir_all(last.parent().unwrap_or(&folder)).map_err(|error| wrong(&new, &error))?;
         let to = quoted(&new);
-        self.db.execute_batch(&format!("COPY ({rows} {order}) TO {to} ({})", sql::PARQUET)).map_err(engine)?;
+        self.db
+            .execute_batch(&format!("COPY ({rows} {order}) TO {to} ({})", sql::parquet(self.def.history.parquet)))
+            .map_err(engine)?;
         let sum = |from: &str| {
             let sql = format!("SELECT count(*), sum(hash({}))::VARCHAR FROM {from}", sql::columns(tier));
             self.db.query_row(&sql, [], |row| Ok((row.get::<_, u64>(0)?, row.get::<_, Option<String>>(1)?)))
@@ -186,7 +203,8 @@ impl Store {
     fn write_tags(&self) -> Result<(), HistoryError> {
         let path = self.archive_folder().join(TAGS);
         let new = with_suffix(&path, UNFINISHED);
-        let copy = format!("COPY (FROM tag ORDER BY id) TO {} ({})", quoted(&new), sql::PARQUET);
+        let copy =
+            format!("COPY (FROM tag ORDER BY id) TO {} ({})", quoted(&new), sql::parquet(self.def.history.parquet));
         self.db.execute_batch(&copy).map_err(engine)?;
         sync_and_hash(&new)
             .and_then(|_| fs::rename(&new, &path))

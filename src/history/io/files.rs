@@ -11,7 +11,11 @@ use std::{
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use crate::{history::HistoryError, plant::def::HistoryDef, profile::io::atomic::with_suffix};
+use crate::{
+    history::{HistoryError, retention::Disk},
+    plant::def::HistoryDef,
+    profile::io::atomic::with_suffix,
+};
 
 /// Opens that never ended before the log is set aside, as the part that is replayed; after one more, the file too.
 pub const FAILED_OPENS_MAX: u32 = 2;
@@ -144,18 +148,20 @@ pub fn inode(path: &Path) -> Option<(u64, u64)> {
     fs::metadata(path).ok().map(|meta| (meta.dev(), meta.ino()))
 }
 
-/// How little is free of the disk that a history lies on, where that is less than both thresholds.
-pub fn disk_nearly_full(db: &Path, least: HistoryDef) -> Option<String> {
+/// The disk that a history lies on; `None` where that cannot be told.
+pub fn disk(db: &Path) -> Option<Disk> {
     let folder = db.ancestors().skip(1).find(|folder| folder.is_dir())?;
     let disk = rustix::fs::statvfs(folder).ok()?;
-    nearly_full(disk.f_bavail.saturating_mul(disk.f_frsize), disk.f_blocks.saturating_mul(disk.f_frsize), least)
+    let bytes = |blocks: u64| blocks.saturating_mul(disk.f_frsize);
+    Some(Disk { free: bytes(disk.f_bavail), all: bytes(disk.f_blocks) })
 }
 
-fn nearly_full(free: u64, all: u64, least: HistoryDef) -> Option<String> {
-    let full =
-        free < u64::from(least.disk_free_mib_min) << 20 && free < all / 100 * u64::from(least.disk_free_percent_min);
+/// How little is free of a disk, where that is less than both thresholds.
+pub fn disk_nearly_full(disk: Disk, rule: HistoryDef) -> Option<String> {
+    let Disk { free, all } = disk;
     // In steps, so that the words do not change with every record.
-    full.then(|| format!("{} MiB of the disk are free ({} %)", free >> 20 >> 3 << 3, free * 100 / all.max(1)))
+    let words = || format!("{} MiB of the disk are free ({} %)", free >> 20 >> 3 << 3, free * 100 / all.max(1));
+    disk.is_nearly_full(rule).then(words)
 }
 
 /// What a failure to open means.
@@ -236,16 +242,21 @@ mod tests {
             (0, 4 * GIB, Some("0 MiB of the disk are free (0 %)")),
             (0, 0, None),
         ] {
-            assert_eq!(nearly_full(free, all, HistoryDef::default()).as_deref(), expect, "{free} of {all}");
+            let disk = Disk { free, all };
+            assert_eq!(disk_nearly_full(disk, HistoryDef::default()).as_deref(), expect, "{free} of {all}");
         }
-        let least = |percent, mib| HistoryDef { disk_free_percent_min: percent, disk_free_mib_min: mib };
+        let least = |percent, mib| HistoryDef {
+            disk_free_percent_min: percent,
+            disk_free_mib_min: mib,
+            ..HistoryDef::default()
+        };
+        let small = Disk { free: GIB / 4, all: 4 * GIB };
         for (least, expect) in
             [(least(6, 512), false), (least(7, 512), true), (least(7, 256), false), (least(0, 1), false)]
         {
-            assert_eq!(nearly_full(GIB / 4, 4 * GIB, least).is_some(), expect, "{least:?}");
+            assert_eq!(disk_nearly_full(small, least).is_some(), expect, "{least:?}");
         }
-        let no_disk = disk_nearly_full(Path::new("/proc/none/x.duckdb"), HistoryDef::default());
-        assert_eq!(no_disk, nearly_full(0, 0, HistoryDef::default()));
+        assert_eq!(disk(Path::new("/proc/none/x.duckdb")), Some(Disk { free: 0, all: 0 }));
     }
 
     #[test]

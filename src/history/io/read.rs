@@ -59,7 +59,7 @@ impl Store {
             Query::Values { tags, from, every, count } => {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
-            Query::Overview => self.overview().map(|overview| Answer::Overview(Box::new(overview))),
+            Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
             Query::Registers(_) => Err(HistoryError::Engine("registers are read by the line".to_owned())),
             Query::Journal { from, to, limit } => {
                 self.span_list(&sql::journal(sql::NEWEST), (*from, *to, *limit), &[], alarm).map(Answer::Journal)
@@ -92,7 +92,7 @@ impl Store {
         check_span(span.from, span.to)?;
         self.bounded(tags.len(), span.from, span.to, span.until, SAMPLES_MAX)?;
         let tags = Distinct::new(tags);
-        let (span, buckets, tier) = series::grid(span, buckets);
+        let (span, buckets, tier) = series::grid(span, buckets, self.finest(span.from)?);
         let mut curves: Vec<Curve> = tags.each.iter().map(|tag| Curve::new(*tag, span, buckets)).collect();
         let known = (span.from, span.to.min(span.until));
         if known.0 < known.1 {

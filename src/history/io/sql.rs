@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use crate::{history::tiers::Tier, plant::record::NOT_PROCESS_ACTIONS};
+use crate::{
+    history::tiers::Tier,
+    plant::{def::ParquetVersion, record::NOT_PROCESS_ACTIONS},
+};
 
 /// The migrations; the schema's version is their number. Each runs in one transaction, followed by a checkpoint before
 /// any data, because data definitions among data in the log are what DuckDB's known recovery bugs need.
@@ -20,8 +23,8 @@ use crate::{history::tiers::Tier, plant::record::NOT_PROCESS_ACTIONS};
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
 ///
 /// `archive` is the manifest of the files in the archive, see there; `watched` are windows of ten minutes, by their number
-/// since 1970, in which archived samples lie.
-pub const MIGRATIONS: [&str; 9] = [
+/// since 1970, in which archived samples lie; `deleted` are the files that the rules of the plant have deleted.
+pub const MIGRATIONS: [&str; 10] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -81,6 +84,9 @@ CREATE TABLE archive (
     tier VARCHAR NOT NULL, path VARCHAR NOT NULL, from_utc TIMESTAMP NOT NULL, to_utc TIMESTAMP NOT NULL,
     rows UBIGINT NOT NULL, bytes UBIGINT NOT NULL, sha256 VARCHAR NOT NULL);
 CREATE TABLE watched (ten_minutes BIGINT NOT NULL);
+",
+    "
+CREATE TABLE deleted (tier VARCHAR NOT NULL, path VARCHAR NOT NULL, until_utc TIMESTAMP NOT NULL);
 ",
 ];
 
@@ -239,8 +245,10 @@ pub const LINE_MINUTES: &str = "SELECT * FROM (
         utilisation, reply_p99_ms, reply_max_ms
     FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";
 
-/// How files of the archive are written: version 1, which every engine reads.
-pub const PARQUET: &str = "FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE 122880";
+/// How files of the archive are written.
+pub fn parquet(version: ParquetVersion) -> String {
+    format!("FORMAT parquet, PARQUET_VERSION {}, COMPRESSION zstd, ROW_GROUP_SIZE 122880", version.word())
+}
 
 /// When the oldest sample was stored that is not archived, from an instant on.
 pub const OLDEST_SAMPLE: &str = "SELECT min(utc) FROM sample WHERE utc >= ?";
@@ -254,6 +262,10 @@ pub const FILES: &str =
 pub const ENTER_FILE: &str = "INSERT INTO archive VALUES (?, ?, ?, ?, ?, ?, ?)";
 /// Removes one.
 pub const REMOVE_FILE: &str = "DELETE FROM archive WHERE path = ?";
+/// Notes a file that is deleted.
+pub const ENTER_DELETED: &str = "INSERT INTO deleted VALUES (?, ?, ?)";
+/// Until when files of a tier were deleted.
+pub const DELETED_UNTIL: &str = "SELECT max(until_utc) FROM deleted WHERE tier = ?";
 /// The windows of ten minutes in which samples lie that are about to be archived.
 pub const ENTER_WATCHED: &str = "INSERT INTO watched SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample
     WHERE utc >= $1 AND utc < $2 AND epoch_us(utc) // 600000000 NOT IN (FROM watched)";
@@ -305,6 +317,16 @@ pub fn formed(tier: Tier, span: &Range<i64>) -> String {
 pub fn others(tier: Tier, file: &str, span: &Range<i64>) -> String {
     let (columns, formed) = (columns(tier), formed(tier, span));
     format!("SELECT * FROM (SELECT {columns} FROM {file} WHERE NOT ({}) UNION ALL {formed})", within(span))
+}
+
+/// The rows of a file, and what was formed of a span that it does not have.
+pub fn added(tier: Tier, file: &str, span: &Range<i64>) -> String {
+    let (columns, formed) = (columns(tier), formed(tier, span));
+    format!(
+        "SELECT * FROM (SELECT {columns} FROM {file} UNION ALL {formed}
+            AND (tag, utc) NOT IN (SELECT (tag, utc) FROM {file} WHERE {}))",
+        within(span)
+    )
 }
 
 /// The order of rows in files.

@@ -312,7 +312,7 @@ impl Writer {
         self.status.failing.clone_from(&self.failing);
         self.status.damaged = damaged;
         self.status.clock.clone_from(&self.clock);
-        self.status.disk = files::disk_nearly_full(&self.path, self.def.history);
+        self.status.disk = files::disk(&self.path).and_then(|disk| files::disk_nearly_full(disk, self.def.history));
         self.status.file_bytes = files::size(&self.path);
     }
 }

@@ -68,9 +68,25 @@ impl Store {
         for (tier, span, path) in unknown {
             self.adopt_file(tier, span, path)?;
         }
+        self.adopt_deletions()?;
         let (named, others) = missing.split_at(missing.len().min(NAMED_MAX));
         let others = if others.is_empty() { String::new() } else { format!(" and {} more files", others.len()) };
         Ok((!named.is_empty()).then(|| format!("missing of its archive: {}{others}", named.join(", "))))
+    }
+
+    /// What was deleted of an archive whose database was lost: what only the next wider tier has.
+    fn adopt_deletions(&self) -> Result<(), HistoryError> {
+        let files = self.files(None)?;
+        let first = |tier: Tier| files.iter().filter(|file| file.tier == tier).map(|file| file.from).min();
+        let end = |tier: Tier| files.iter().filter(|file| file.tier == tier).map(|file| file.to).max();
+        for (tier, wider) in [(Tier::Raw, Tier::Minute), (Tier::Minute, Tier::Hour)] {
+            let Some(begin) = first(wider) else { continue };
+            let Some(until) = first(tier).or_else(|| end(wider)).filter(|until| begin < *until) else { continue };
+            if self.deleted_until(tier)?.is_none() {
+                self.enter_deleted(tier, "", until).map_err(engine)?;
+            }
+        }
+        Ok(())
     }
 
     /// Takes up a file that the manifest does not know, or removes it where its rows are known otherwise: a program ended

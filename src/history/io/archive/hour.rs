@@ -25,10 +25,13 @@ struct Forming {
 
 impl Store {
     /// Archives the samples of an hour. Where files have it already, those came late, after a clock that was set back or
-    /// by an import: they get a file of their own, and what was formed of the hour is formed again.
+    /// by an import: they get a file of their own, and what was formed of the hour is formed again. Where its samples were
+    /// deleted meanwhile, what was formed of them stays, and only what it lacks is added.
     pub(super) fn archive_hour(&self, hour: i64, steps: Steps) -> Result<(), HistoryError> {
         let span = hour..hour + HOUR;
-        let late = !self.files(Some((Tier::Raw, span.clone())))?.is_empty();
+        let deleted = self.deleted_until(Tier::Raw)?.is_some_and(|until| hour < until.as_microsecond());
+        let replace = if deleted { sql::added } else { sql::others };
+        let late = !deleted && !self.files(Some((Tier::Raw, span.clone())))?.is_empty();
         let samples = sql::samples_of(&span);
         let raw = self.write_file(Tier::Raw, span.clone(), &samples, "ORDER BY tag, utc, rowid")?;
         let rows = raw.as_ref().map_or(0, |raw| raw.file.rows);
@@ -40,7 +43,7 @@ impl Store {
         let (mut new, mut old) = (Vec::from_iter(raw), Vec::new());
         for tier in [Tier::Minute, Tier::Hour] {
             let replaced = self.files(Some((tier, formed.clone())))?;
-            new.extend(self.write_aggregates(tier, &formed, &replaced)?);
+            new.extend(self.write_aggregates(tier, &formed, &replaced, replace)?);
             old.extend(replaced);
         }
         steps("aggregates written")?;
@@ -109,11 +112,12 @@ impl Store {
         tier: Tier,
         formed: &Range<i64>,
         replaced: &[ArchiveFile],
+        replace: fn(Tier, &str, &Range<i64>) -> String,
     ) -> Result<Vec<Written>, HistoryError> {
         let mut written = Vec::new();
         for file in replaced {
             let within = formed.start.max(file.from)..formed.end.min(file.to);
-            let others = sql::others(tier, &self.parquet(std::slice::from_ref(file)), &within);
+            let others = replace(tier, &self.parquet(std::slice::from_ref(file)), &within);
             written.extend(self.write_file(tier, file.from..file.to, &others, sql::HOUR_BY_HOUR)?);
         }
         let hour = formed.start..formed.start + HOUR;

@@ -6,6 +6,7 @@ use crate::{
         io::archive::Job,
         tiers::{HOUR, Tier},
     },
+    plant::def::HistoryDef,
     report::ShiftReport,
 };
 
@@ -297,4 +298,64 @@ fn damage_of_the_archive_costs_no_more_than_it_must() {
     assert!(expect[..47].iter().any(|value| value.is_some_and(|value| value.value.is_some())));
     let words = opened.store.unreadable.take().unwrap();
     assert!(words.contains("1970-01-01T"), "{words}");
+}
+
+/// The plant with a rule for its history.
+fn keeping(rule: HistoryDef) -> Arc<PlantDef> {
+    Arc::new(PlantDef { history: rule, ..PlantDef::clone(&def()) })
+}
+
+#[test]
+fn what_was_deleted_is_answered_by_minutes() {
+    let rows = rows(50);
+    let [(_one, plain), (_other, db)] = [folder(), folder()];
+    let plain = filled(&plain, &rows);
+    drop(filled(&db, &rows));
+    let rule = HistoryDef { keep_samples_days: Some(7), ..HistoryDef::default() };
+    let open = || Store::open(&db, &keeping(rule), sec(50 * HOUR_S)).unwrap().store;
+    let mut store = open();
+    archive_all(&store, 52);
+    let (all, formed) = (content(&store), aggregates(&store));
+    // Eight days later the first day is too old. A kill in between changes nothing.
+    let later = sec(8 * 24 * HOUR_S);
+    let due = |store: &Store| store.archive_due(later, Timestamp::MIN).unwrap();
+    let job = due(&store).unwrap();
+    assert!(matches!(&job, Job::Delete(next) if next.file.path == "raw/date=1970-01-01/day.parquet"), "{job:?}");
+    assert_eq!(store.archive(&job, &mut |_| Err(HistoryError::NotOpen)), Err(HistoryError::NotOpen));
+    drop(store);
+    store = open();
+    while let Some(job) = due(&store) {
+        store.archive(&job, &mut |_| Ok(())).unwrap();
+    }
+    assert_eq!(store.deleted_until(Tier::Raw).unwrap(), Some(sec(24 * HOUR_S)));
+    let kept: Vec<_> = all.iter().copied().filter(|(_, sample)| sample.at >= sec(24 * HOUR_S)).collect();
+    assert!(content(&store) == kept, "the second day and what is not archived");
+    assert_eq!(aggregates(&store), formed);
+    // A short window shows minutes; of hours and days nothing has changed.
+    let short = series(&store, PV, 3_590, 3_900, 100);
+    assert_eq!((short.from, short.step, short.buckets.len()), (sec(3_540), Duration::from_secs(60), 6));
+    let expect = series(&plain, PV, 3_540, 3_900, 6);
+    assert_series(&[short], &[expect], "minutes");
+    for (from, to, buckets) in [(0, 50 * HOUR_S, 50), (HOUR_S, 9 * HOUR_S, 480), (30 * HOUR_S, 31 * HOUR_S, 99)] {
+        let [got, expect] = [&store, &plain].map(|store| series(store, PV, from, to, buckets));
+        assert_series(&[got], &[expect], "as before");
+    }
+    let [got, expect] = [&store, &plain].map(|store| report(store, 6 * HOUR_S, 14 * HOUR_S));
+    for (got, expect) in got.tags.iter().zip(&expect.tags) {
+        assert_eq!((got.min, got.max, got.last), (expect.min, expect.max, expect.last));
+    }
+    // What comes late to an hour without samples does not replace what was formed of them.
+    let late = |tag, second| Record::Sample(tag, Sample::good(9e9, sec(second)));
+    store.append(&[late(PV, HOUR_S + 10), late(TagId(3), HOUR_S + 10)]).unwrap();
+    while let Some(job) = store.archive_due(sec(50 * HOUR_S + 600), Timestamp::MIN).unwrap() {
+        store.archive(&job, &mut |_| Ok(())).unwrap();
+    }
+    let [got, expect] = [&store, &plain].map(|store| series(store, PV, 0, 5 * HOUR_S, 5));
+    assert_series(&[got], &[expect], "late");
+    // A lost database learns from the files what was deleted.
+    drop(store);
+    std::fs::remove_file(&db).unwrap();
+    std::fs::remove_file(with_suffix(&db, ".wal")).ok();
+    std::fs::remove_file(db.with_extension("archive").join("raw/date=1970-01-01/01.parquet")).unwrap();
+    assert_eq!(open().deleted_until(Tier::Raw).unwrap(), Some(sec(24 * HOUR_S)));
 }

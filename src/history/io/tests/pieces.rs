@@ -6,7 +6,10 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    history::series::{Curve, Span, grid},
+    history::{
+        series::{Curve, Span, grid},
+        tiers::Tier,
+    },
     plant::sample::Quality,
     report::{figures::TagDescription, step_series::HOLD_MAX, testing::figures_of},
 };
@@ -49,7 +52,7 @@ proptest! {
         let query = Query::Series { tags: tags.to_vec(), from, to, buckets };
         let samples = |tag, from: Timestamp| by_itself(&store, tag).into_iter().filter(move |s| from - HOLD_MAX <= s.at && s.at < to);
         let curve = |tag| {
-            let (span, buckets, _) = grid(Span { from, to, until }, buckets);
+            let (span, buckets, _) = grid(Span { from, to, until }, buckets, Tier::Raw);
             let mut curve = Curve::new(tag, span, buckets);
             samples(tag, span.from).for_each(|sample| curve.next(sample));
             curve.end()
