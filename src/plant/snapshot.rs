@@ -337,6 +337,8 @@ pub struct HistoryStatus {
     pub waiting_max: u64,
     /// What was damaged or missing, and where it was set aside; since the start.
     pub damaged: Option<String>,
+    /// Why closed hours are not archived: they stay in the database meanwhile.
+    pub unarchived: Option<String>,
     /// How little of the disk is free; `None` while there is enough.
     pub disk: Option<String>,
     /// The clock was behind the last record at the start.

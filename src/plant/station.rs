@@ -25,6 +25,8 @@ keyword_enum! {
         RecordsLost => "history records lost",
         /// A part of the history is damaged, missing or set aside.
         HistoryDamaged => "history damaged",
+        /// Closed hours are not archived.
+        NotArchived => "history not archived",
         /// The disk of the history is nearly full.
         DiskSpace => "disk nearly full",
         /// The audit log cannot be written or sealed, or is damaged.
@@ -61,7 +63,7 @@ impl FaultState {
 impl StationFault {
     fn priority(self) -> Priority {
         match self {
-            StationFault::DiskSpace | StationFault::Clock => Priority::Medium,
+            StationFault::NotArchived | StationFault::DiskSpace | StationFault::Clock => Priority::Medium,
             _ => Priority::High,
         }
     }
@@ -91,6 +93,11 @@ impl StationFault {
                 "a power failure, a failing disk, or a file that was changed, moved or removed manually",
                 "a part of the history is missing; recording continues in a new file",
                 "keep the file that was set aside; check the disk (SMART) and the power supply",
+            ],
+            StationFault::NotArchived => [
+                "the disk is full or read-only, or a part of the history cannot be read",
+                "nothing is lost: samples stay in the database, which grows and answers more slowly",
+                "free the disk; run `sightglass history PLANT --verify`; archiving resumes automatically",
             ],
             StationFault::DiskSpace => [
                 "the history, reports or other files have grown",

@@ -1,11 +1,16 @@
 //! Closed hours as files: what `sightglass history` says of them, and what another engine reads.
 
-use std::{path::Path, process::Command};
+use std::{path::Path, process::Command, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
 use sightglass::{
     history::io::store::Store,
-    plant::{record::Record, sample::Sample},
+    plant::{
+        PlantDef,
+        def::{HistoryDef, ParquetVersion},
+        record::Record,
+        sample::Sample,
+    },
     profile::{self, Search},
 };
 
@@ -16,8 +21,9 @@ const START: &str = "2026-03-02T06:00:00Z";
 const SECONDS: i64 = 26 * 3_600;
 
 /// A closed history of the tank, archived up to its last hour.
-fn archived(path: &Path) {
+fn archived(path: &Path, parquet: ParquetVersion) {
     let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+    let def = Arc::new(PlantDef { history: HistoryDef { parquet, ..def.history }, ..PlantDef::clone(&def) });
     let start: Timestamp = START.parse().unwrap();
     let store = Store::open(path, &def, start).unwrap().store;
     let tags = ["TIC-1.PV", "TIC-1.SV"].map(|name| def.tag_named(name).unwrap());
@@ -45,7 +51,7 @@ fn history(path: &Path, args: &[&str]) -> (Option<i32>, String) {
 fn the_archive_is_listed_and_verified() {
     let folder = folder();
     let path = folder.path().join("tank.duckdb");
-    archived(&path);
+    archived(&path, ParquetVersion::V1);
     let (code, text) = history(&path, &["--verify"]);
     assert_eq!(code, Some(0), "{text}");
     for expect in [
@@ -54,6 +60,9 @@ fn the_archive_is_listed_and_verified() {
         "raw       2026-03-02 07:00:00 to 2026-03-03 14:00:00: 180000 rows",
         "m1        2026-03-02 07:00:00 to 2026-03-03 14:00:00: 3000 rows",
         "h1        2026-03-02 07:00:00 to 2026-03-03 14:00:00: 50 rows",
+        "may take 50 % of the disk, ",
+        "next      raw/date=2026-03-02/day.parquet is deleted ",
+        ": the history would have more than 50 % of the disk",
         "each is as it was written",
     ] {
         assert!(text.contains(expect), "{expect} in\n{text}");
@@ -78,8 +87,6 @@ fn the_archive_is_listed_and_verified() {
 #[test]
 fn polars_reads_the_archive_as_it_lies() {
     let Some(python) = python() else { return };
-    let folder = folder();
-    archived(&folder.path().join("tank.duckdb"));
     let script = "
 import sys, polars
 folder = sys.argv[1]
@@ -91,11 +98,16 @@ pv_minutes = minutes.filter(polars.col('name') == 'TIC-1.PV')
 print(raw.height, round(pv['value'].sum(), 3), pv['utc'].min(), pv['utc'].max(), pv_minutes.height,
     round((pv_minutes['mean'] * pv_minutes['good_ms']).sum() / 1000, 3), pv_minutes['n'].sum())
 ";
-    let output = Command::new(python).args(["-c", script]).arg(folder.path().join("tank.archive")).output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     // 25 hours of one sample a second, each in force for one second: both sums are those of 0.0 … 99.9, ninety times.
     let sum = (0..90_000).map(|second| (second % 1_000) as f64 / 10.0).sum::<f64>();
     let expect = format!("180000 {sum:.1} 2026-03-02 06:00:00 2026-03-03 06:59:59 1500 {sum:.1} 90000");
-    assert_eq!(text.trim(), expect);
+    for version in ParquetVersion::ALL {
+        let folder = folder();
+        archived(&folder.path().join("tank.duckdb"), version);
+        let archive = folder.path().join("tank.archive");
+        let output = Command::new(&python).args(["-c", script]).arg(archive).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(text.trim(), expect, "{version:?}");
+    }
 }

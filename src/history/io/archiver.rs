@@ -19,8 +19,15 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 /// The same after a failure.
 const RETRY_AFTER: Duration = Duration::from_secs(600);
 
-/// What became of a job.
-type Done = Result<Option<Job>, (Option<Job>, HistoryError)>;
+/// What became of a look.
+pub enum Looked {
+    /// A job was due, and is done.
+    Did(Job),
+    /// Nothing was due; this is missing of the archive.
+    Idle(Option<String>),
+}
+
+type Done = Result<Looked, (Option<Job>, HistoryError)>;
 
 /// Works on the archive of one store after the other.
 pub struct Archiver {
@@ -30,12 +37,20 @@ pub struct Archiver {
     commit_every: Duration,
     /// Hours before it cannot be read in the database, and stay there.
     after: Timestamp,
+    /// Why, if there are any.
+    skipped: Option<HistoryError>,
 }
 
 impl Archiver {
     /// Nothing is due for a minute; the interval is that between two calls of [`Archiver::begin`].
     pub fn new(commit_every: Duration) -> Archiver {
-        Archiver { running: None, wait: commits(LOOK_EVERY, commit_every), commit_every, after: Timestamp::MIN }
+        Archiver {
+            running: None,
+            wait: commits(LOOK_EVERY, commit_every),
+            commit_every,
+            after: Timestamp::MIN,
+            skipped: None,
+        }
     }
 
     /// Begins the next job if it is time, on a connection of its own to the store.
@@ -47,37 +62,45 @@ impl Archiver {
         let Some(Ok(store)) = store.map(Store::try_clone) else { return };
         let (interrupt, after) = (store.interrupt_handle(), self.after);
         let work = move || {
-            let Some(job) = store.archive_due(now, after).map_err(|error| (None, error))? else { return Ok(None) };
-            let done = store.archive(&job, &mut |_| Ok(()));
-            done.map_err(|error| (Some(job.clone()), error))?;
-            Ok(Some(job))
+            let nothing = |error| (None, error);
+            let Some(job) = store.archive_due(now, after).map_err(nothing)? else {
+                return store.missing_files().map(Looked::Idle).map_err(nothing);
+            };
+            match store.archive(&job, &mut |_| Ok(())) {
+                Ok(()) => Ok(Looked::Did(job)),
+                Err(error) => Err((Some(job), error)),
+            }
         };
         self.running = Some((spawn_blocking(work), interrupt));
     }
 
-    /// Waits for the end of a job, for ever without one. Returns why it failed.
-    pub async fn ended(&mut self) -> Option<HistoryError> {
+    /// Waits for the end of a look, for ever without one. Returns what came of it, or why the archive stands still.
+    pub async fn ended(&mut self) -> Result<Looked, HistoryError> {
         let Some((work, _)) = &mut self.running else { return std::future::pending().await };
         let done = work.await;
         self.running = None;
-        let (again, failed) = match done {
-            Ok(Ok(Some(job))) => {
+        let (again, looked) = match done {
+            Ok(Ok(Looked::Did(job))) => {
                 tracing::info!(?job, "archived");
-                (Duration::ZERO, None)
+                (Duration::ZERO, Ok(Looked::Did(job)))
             }
-            Ok(Ok(None)) => (LOOK_EVERY, None),
+            Ok(Ok(Looked::Idle(missing))) => (LOOK_EVERY, Ok(Looked::Idle(missing))),
             Ok(Err((Some(Job::Hour(hour)), error))) if is_damage(&error) => {
                 self.after = instant(hour + HOUR).unwrap_or(Timestamp::MAX);
-                (Duration::ZERO, Some(error))
+                self.skipped = Some(error.clone());
+                (Duration::ZERO, Err(error))
             }
-            Ok(Err((_, error))) => (RETRY_AFTER, Some(error)),
-            Err(_) => (RETRY_AFTER, Some(HistoryError::Engine("internal error, see the log".into()))),
+            Ok(Err((_, error))) => (RETRY_AFTER, Err(error)),
+            Err(_) => (RETRY_AFTER, Err(HistoryError::Engine("internal error, see the log".into()))),
         };
         self.wait = commits(again, self.commit_every);
-        if let Some(error) = &failed {
+        if let Err(error) = &looked {
             tracing::error!(?error, "the history is not archived");
         }
-        failed
+        match &self.skipped {
+            Some(skipped) => looked.and(Err(skipped.clone())),
+            None => looked,
+        }
     }
 
     /// Ends what is running: a station that stops does not wait for it, and the next one does it again.

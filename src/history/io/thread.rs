@@ -163,8 +163,8 @@ async fn run(
                 archiver.begin(writer.store().ok(), clock.utc());
                 outputs.publish(writer);
             }
-            failed = archiver.ended() => {
-                writer.archived(failed);
+            looked = archiver.ended() => {
+                writer.archived(looked);
                 outputs.publish(writer);
             }
             result = opened(&mut opening) => {

@@ -10,6 +10,7 @@ use jiff::Timestamp;
 use tokio::sync::mpsc;
 
 use super::{
+    archiver::Looked,
     files,
     open::{Opened, Restored},
     store::Store,
@@ -63,6 +64,8 @@ pub struct Writer {
     unarchived: Option<String>,
     /// What a query could not read; stays until the station ends.
     unreadable: Option<String>,
+    /// What is missing of the archive; goes when it is there again.
+    missing: Option<String>,
     /// A store was open before.
     was_open: bool,
     /// Attempts to open it that failed in a row, and commits until the next.
@@ -244,9 +247,13 @@ impl Writer {
         self.describe();
     }
 
-    /// Notes how a job of the archive ended.
-    pub fn archived(&mut self, failed: Option<HistoryError>) {
-        self.unarchived = failed.map(|error| format!("it is not archived: {}", error.words()));
+    /// Notes how a look at the archive ended.
+    pub fn archived(&mut self, looked: Result<Looked, HistoryError>) {
+        match looked {
+            Ok(Looked::Did(_)) => self.unarchived = None,
+            Ok(Looked::Idle(missing)) => (self.missing, self.unarchived) = (missing, None),
+            Err(error) => self.unarchived = Some(format!("it is not archived: {}", error.words())),
+        }
         self.describe();
     }
 
@@ -305,12 +312,16 @@ impl Writer {
 
     fn describe(&mut self) {
         let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
-        let damaged = joined([&self.unreadable, &self.damaged]);
+        // A start has said already what it missed.
+        let missing =
+            self.missing.clone().filter(|words| self.damaged.as_ref().is_none_or(|said| !said.contains(words)));
+        let damaged = joined([&self.unreadable, &missing, &self.damaged]);
         self.status.trouble = joined([&self.failing, &self.unchecked, &self.unarchived, &lost, &damaged, &self.clock]);
         self.status.epoch = self.store.as_ref().map_or(self.status.epoch, Store::epoch);
         (self.status.waiting, self.status.waiting_max) = (self.pending.len() as u64, PENDING_MAX as u64);
         self.status.failing.clone_from(&self.failing);
         self.status.damaged = damaged;
+        self.status.unarchived.clone_from(&self.unarchived);
         self.status.clock.clone_from(&self.clock);
         self.status.disk = files::disk(&self.path).and_then(|disk| files::disk_nearly_full(disk, self.def.history));
         self.status.file_bytes = files::size(&self.path);

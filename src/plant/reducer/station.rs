@@ -15,6 +15,7 @@ impl Plant {
     /// The state of the store. Alarms follow with the next tick.
     pub fn on_history(&mut self, status: HistoryStatus) {
         self.faults.set(StationFault::NotRecording, FaultState::lasting(status.failing.clone()));
+        self.faults.set(StationFault::NotArchived, FaultState::lasting(status.unarchived.clone()));
         self.faults.set(StationFault::DiskSpace, FaultState::lasting(status.disk.clone()));
         if self.history.lost < status.lost {
             let words = format!("{} records lost since the start", status.lost);
@@ -80,6 +81,17 @@ mod tests {
         plant.on_history(HistoryStatus::default());
         assert_eq!(tick(&mut plant, 5)[0].event, AlarmEvent::ReturnedToNormal);
         assert_eq!(plant.snapshot().alarms[0].state, AlarmState::ReturnedToNormal, "until it is acknowledged");
+    }
+
+    #[test]
+    fn an_archive_that_stands_still_is_an_alarm_until_it_goes_on() {
+        let mut plant = plant();
+        plant.on_history(HistoryStatus { unarchived: Some("no space left".into()), ..HistoryStatus::default() });
+        let raised = tick(&mut plant, 1);
+        assert_eq!((raised.len(), &*raised[0].message), (1, "history not archived"));
+        assert_eq!(tick(&mut plant, 60), []);
+        plant.on_history(HistoryStatus::default());
+        assert_eq!(tick(&mut plant, 61)[0].event, AlarmEvent::ReturnedToNormal);
     }
 
     #[test]

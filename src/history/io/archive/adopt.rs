@@ -50,9 +50,8 @@ impl Store {
     /// Compares the files of the archive with the manifest. Returns in words what is missing.
     pub(in crate::history::io) fn adopt_files(&self) -> Result<Option<String>, HistoryError> {
         let folder = self.archive_folder();
+        let missing = self.missing_files()?;
         let known = self.files(None)?;
-        let missing = known.iter().filter(|file| !folder.join(&file.path).is_file());
-        let missing: Vec<&str> = missing.map(|file| file.path.as_str()).collect();
         let names: HashSet<&str> = known.iter().map(|file| file.path.as_str()).collect();
         let mut unknown = Vec::new();
         for path in parquet_files(&folder) {
@@ -69,6 +68,14 @@ impl Store {
             self.adopt_file(tier, span, path)?;
         }
         self.adopt_deletions()?;
+        Ok(missing)
+    }
+
+    /// Which files of the manifest are not there, in words.
+    pub(in crate::history::io) fn missing_files(&self) -> Result<Option<String>, HistoryError> {
+        let (folder, known) = (self.archive_folder(), self.files(None)?);
+        let missing = known.iter().filter(|file| !folder.join(&file.path).is_file());
+        let missing: Vec<&str> = missing.map(|file| file.path.as_str()).collect();
         let (named, others) = missing.split_at(missing.len().min(NAMED_MAX));
         let others = if others.is_empty() { String::new() } else { format!(" and {} more files", others.len()) };
         Ok((!named.is_empty()).then(|| format!("missing of its archive: {}{others}", named.join(", "))))

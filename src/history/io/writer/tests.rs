@@ -1,4 +1,4 @@
-//! Which records are dropped when the store fails for long.
+//! Which records are dropped when the store fails for long, and what is said of the archive.
 
 use super::*;
 use crate::{
@@ -44,4 +44,18 @@ fn the_oldest_samples_are_dropped_before_alarms() {
     check((0..5).map(sample).collect(), (2..5).map(sample).collect());
     check(vec![alarm(0), sample(1), sample(2), sample(3), alarm(4)], vec![alarm(0), sample(3), alarm(4)]);
     check(vec![alarm(0), alarm(1), sample(2), alarm(3), alarm(4)], vec![alarm(1), alarm(3), alarm(4)]);
+}
+
+#[test]
+fn a_failing_archive_and_a_missing_file_are_said_once_each() {
+    let mut writer = Writer { damaged: Some("missing of its archive: raw/1".into()), ..Writer::default() };
+    writer.archived(Err(HistoryError::Engine("no space left".into())));
+    assert!(writer.status().unarchived.as_ref().is_some_and(|words| words.starts_with("it is not archived: ")));
+    let damaged = |writer: &Writer| writer.status().damaged.clone().unwrap();
+    writer.archived(Ok(Looked::Idle(Some("missing of its archive: raw/1".into()))));
+    assert_eq!((writer.status().unarchived.as_ref(), &*damaged(&writer)), (None, "missing of its archive: raw/1"));
+    writer.archived(Ok(Looked::Idle(Some("missing of its archive: m1/2".into()))));
+    assert_eq!(damaged(&writer), "missing of its archive: m1/2; missing of its archive: raw/1");
+    writer.archived(Ok(Looked::Idle(None)));
+    assert_eq!(damaged(&writer), "missing of its archive: raw/1");
 }
