@@ -11,7 +11,7 @@ use crate::{
         retention::{self, Deletion, Why},
         tiers::Tier,
     },
-    plant::PlantDef,
+    plant::{PlantDef, number::to_u64},
 };
 
 use super::{
@@ -105,7 +105,7 @@ fn of_room(overview: &Overview, time: &impl Fn(Timestamp) -> String) -> Vec<Stri
             size(disk.share(*rule))
         ));
     }
-    lines.extend(retention::growth(files).map(|growth| format!("growth    {} a day", size(growth as u64))));
+    lines.extend(retention::growth(files).map(|growth| format!("growth    {} a day", size(to_u64(growth)))));
     lines.extend(deleted_until.map(|until| format!("deleted   samples before {}", time(until))));
     lines.push(match next_deletion {
         None => "next      nothing is deleted as things stand".to_owned(),

@@ -150,7 +150,7 @@ pub struct Overview {
     pub extent: Option<(Timestamp, Timestamp)>,
     /// The folder of the archive.
     pub folder: PathBuf,
-    /// The disk that it lies on; `None` where that cannot be told.
+    /// The disk that it lies on; `None` where it is unknown.
     pub disk: Option<Disk>,
     /// What is kept, and for how long.
     pub rule: HistoryDef,

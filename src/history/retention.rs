@@ -102,6 +102,7 @@ impl HistoryDef {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

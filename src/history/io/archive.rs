@@ -56,7 +56,7 @@ const TAGS: &str = "tag.parquet";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Job {
     /// Delete a file, by the rules of the plant.
-    Delete(Deletion),
+    Delete(Box<Deletion>),
     /// Archive the samples of the hour that begins then.
     Hour(i64),
     /// Merge the files of a tier in a closed day or month into one.
@@ -81,7 +81,7 @@ impl Store {
     pub fn archive_due(&self, now: Timestamp, after: Timestamp) -> Result<Option<Job>, HistoryError> {
         let files = self.files(None)?;
         if let Some(deletion) = self.next_deletion(&files, now).filter(|next| next.at <= now.as_microsecond()) {
-            return Ok(Some(Job::Delete(deletion)));
+            return Ok(Some(Job::Delete(Box::new(deletion))));
         }
         let closed = now.checked_sub(GRACE).unwrap_or(now).as_microsecond();
         let oldest: Option<i64> =

@@ -148,7 +148,7 @@ pub fn inode(path: &Path) -> Option<(u64, u64)> {
     fs::metadata(path).ok().map(|meta| (meta.dev(), meta.ino()))
 }
 
-/// The disk that a history lies on; `None` where that cannot be told.
+/// The disk that a history lies on; `None` where it is unknown.
 pub fn disk(db: &Path) -> Option<Disk> {
     let folder = db.ancestors().skip(1).find(|folder| folder.is_dir())?;
     let disk = rustix::fs::statvfs(folder).ok()?;

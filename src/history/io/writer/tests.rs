@@ -51,7 +51,7 @@ fn a_failing_archive_and_a_missing_file_are_said_once_each() {
     let mut writer = Writer { damaged: Some("missing of its archive: raw/1".into()), ..Writer::default() };
     writer.archived(Err(HistoryError::Engine("no space left".into())));
     assert!(writer.status().unarchived.as_ref().is_some_and(|words| words.starts_with("it is not archived: ")));
-    let damaged = |writer: &Writer| writer.status().damaged.clone().unwrap();
+    let damaged = |writer: &Writer| writer.status().damaged.clone().unwrap_or_default();
     writer.archived(Ok(Looked::Idle(Some("missing of its archive: raw/1".into()))));
     assert_eq!((writer.status().unarchived.as_ref(), &*damaged(&writer)), (None, "missing of its archive: raw/1"));
     writer.archived(Ok(Looked::Idle(Some("missing of its archive: m1/2".into()))));
