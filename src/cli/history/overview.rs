@@ -1,55 +1,38 @@
-//! `sightglass history`: what is stored, where, and whether the archive is sound.
+//! `sightglass history PLANT`: what is stored, and where.
 
-use std::{path::Path, sync::Arc};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 
 use crate::{
     history::{
         Answer, ArchiveFile, Overview, Query,
-        io::archive::sync_and_hash,
         retention::{self, Deletion, Why},
         tiers::Tier,
     },
     plant::{PlantDef, number::to_u64},
 };
 
-use super::{
-    CliError, StationArgs, client, in_runtime, load, local, say,
-    source::{Source, unexpected},
-};
-
-/// Arguments of `history`.
-#[derive(Debug, clap::Args)]
-pub struct Args {
-    /// A plant file, or the name of a shipped plant
-    plant: String,
-    /// Read every file of the archive and compare it with the manifest: exit code 1 if one is missing or was changed
-    #[arg(long)]
-    verify: bool,
-    /// Print JSON instead of lines
-    #[arg(long)]
-    json: bool,
-    #[command(flatten)]
-    login: client::Login,
-    #[command(flatten)]
-    station: StationArgs,
-}
+use super::{Place, size};
+use crate::cli::{CliError, in_runtime, local, say, source::unexpected};
 
 /// Asks the station, or reads the file, and prints.
-pub fn main(args: Args) -> Result<(), CliError> {
-    let def = Arc::new(load(&args.plant, &args.station)?);
-    in_runtime(async {
-        let source = Source::open(&def, &args.station, &args.login).await?;
-        let Answer::Overview(overview) = source.query(Query::Overview).await? else { return Err(unexpected()) };
-        match args.json {
-            true => {
-                say(&serde_json::to_string_pretty(&overview).expect("its keys are words and its numbers are finite"))
-            }
-            false => in_words(&overview, &def).iter().for_each(|line| say(line)),
-        }
-        if args.verify { verify(&overview) } else { Ok(()) }
-    })
+pub fn main(place: &Place, json: bool) -> Result<(), CliError> {
+    let def = place.load()?;
+    let overview = in_runtime(ask(place, &def))?;
+    match json {
+        true => say(&serde_json::to_string_pretty(&overview).expect("its keys are words and its numbers are finite")),
+        false => in_words(&overview, &def).iter().for_each(|line| say(line)),
+    }
+    Ok(())
+}
+
+/// What is stored, by the station or from the file.
+pub async fn ask(place: &Place, def: &Arc<PlantDef>) -> Result<Overview, CliError> {
+    match place.source(def).await?.query(Query::Overview).await? {
+        Answer::Overview(overview) => Ok(*overview),
+        _ => Err(unexpected()),
+    }
 }
 
 /// One fact a line.
@@ -122,43 +105,6 @@ fn of_room(overview: &Overview, time: &impl Fn(Timestamp) -> String) -> Vec<Stri
     lines
 }
 
-/// Compares the files of the archive with the manifest.
-fn verify(overview: &Overview) -> Result<(), CliError> {
-    let wrong: Vec<String> = overview
-        .files
-        .iter()
-        .filter_map(|file| Some(format!("{}: {}", file.path, trouble(&overview.folder, file)?)))
-        .collect();
-    wrong.iter().for_each(|wrong| say(wrong));
-    match wrong.len() {
-        0 => {
-            say(&format!("verified  {} files: each is as it was written", overview.files.len()));
-            Ok(())
-        }
-        count => {
-            Err(CliError::Failed(format!("{count} of {} files of the archive are not sound", overview.files.len())))
-        }
-    }
-}
-
-fn trouble(folder: &Path, file: &ArchiveFile) -> Option<String> {
-    match sync_and_hash(&folder.join(&file.path)) {
-        Err(error) => Some(error.to_string()),
-        Ok((bytes, _)) if bytes != file.bytes => Some(format!("found {bytes} bytes, expected {}", file.bytes)),
-        Ok((_, sha256)) if sha256 != file.sha256 => Some("its bytes were changed: another SHA-256".to_owned()),
-        Ok(_) => None,
-    }
-}
-
 fn bytes<'a>(files: impl Iterator<Item = &'a ArchiveFile>) -> u64 {
     files.map(|file| file.bytes).sum()
-}
-
-/// `12.3 MiB`.
-fn size(bytes: u64) -> String {
-    match bytes {
-        0..1_048_576 => format!("{:.1} KiB", bytes as f64 / 1_024.0),
-        1_048_576..1_073_741_824 => format!("{:.1} MiB", bytes as f64 / 1_048_576.0),
-        _ => format!("{:.1} GiB", bytes as f64 / 1_073_741_824.0),
-    }
 }

@@ -1,0 +1,46 @@
+//! `sightglass history verify PLANT`: whether the archive is sound.
+
+use std::path::Path;
+
+use super::{Place, overview};
+use crate::{
+    cli::{CliError, in_runtime, say},
+    history::{ArchiveFile, io::archive::sync_and_hash},
+};
+
+/// Arguments of `history verify`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    place: Place,
+}
+
+/// Compares the files of the archive with the manifest.
+pub fn main(args: &Args) -> Result<(), CliError> {
+    let def = args.place.load()?;
+    let overview = in_runtime(overview::ask(&args.place, &def))?;
+    let wrong: Vec<String> = overview
+        .files
+        .iter()
+        .filter_map(|file| Some(format!("{}: {}", file.path, trouble(&overview.folder, file)?)))
+        .collect();
+    wrong.iter().for_each(|wrong| say(wrong));
+    match wrong.len() {
+        0 => {
+            say(&format!("verified  {} files: each is as it was written", overview.files.len()));
+            Ok(())
+        }
+        count => {
+            Err(CliError::Failed(format!("{count} of {} files of the archive are not sound", overview.files.len())))
+        }
+    }
+}
+
+fn trouble(folder: &Path, file: &ArchiveFile) -> Option<String> {
+    match sync_and_hash(&folder.join(&file.path)) {
+        Err(error) => Some(error.to_string()),
+        Ok((bytes, _)) if bytes != file.bytes => Some(format!("found {bytes} bytes, expected {}", file.bytes)),
+        Ok((_, sha256)) if sha256 != file.sha256 => Some("its bytes were changed: another SHA-256".to_owned()),
+        Ok(_) => None,
+    }
+}
