@@ -14,11 +14,16 @@ use crate::plant::PlantDef;
 pub struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    #[command(flatten)]
-    place: Option<Place>,
+    /// A plant file, or the name of a shipped plant
+    #[arg(required = true)]
+    plant: Option<String>,
     /// Print JSON instead of lines
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    login: client::Login,
+    #[command(flatten)]
+    station: StationArgs,
 }
 
 #[derive(Debug, clap::Subcommand)]
@@ -50,10 +55,10 @@ impl Place {
 
 /// Does what the subcommand says; without one it shows what is stored.
 pub fn main(args: Args) -> Result<(), CliError> {
-    match (args.command, args.place) {
-        (Some(Command::Verify(args)), _) => verify::main(&args),
-        (None, Some(place)) => overview::main(&place, args.json),
-        (None, None) => Err(CliError::Usage("which plant?".to_owned())),
+    let Args { command, plant, json, login, station } = args;
+    match command {
+        Some(Command::Verify(args)) => verify::main(&args),
+        None => overview::main(&Place { plant: plant.unwrap_or_default(), login, station }, json),
     }
 }
 
