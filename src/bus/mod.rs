@@ -31,6 +31,7 @@ pub mod hex_input;
 pub mod filter;
 pub mod capture;
 pub mod codec;
+pub mod interpret;
 pub mod plan;
 pub mod backoff;
 pub mod schedule;

@@ -2,14 +2,14 @@
 
 use super::{UnitArgs, exchange_lines, run};
 use crate::{
-    bus::codec,
+    bus::interpret,
     cli::{CliError, say},
     plant::{
         diagnostics::{Diagnostic, Finding},
         event::Fault,
         live::AddressSpan,
-        number::{to_f32, to_u16},
-        tag::{ByteOrder, DataType, Point, Table},
+        number::to_u16,
+        tag::{ByteOrder, Table},
     },
 };
 
@@ -73,21 +73,12 @@ fn value_lines(table: Table, address: u16, words: &[u16]) -> Vec<String> {
     let row = |(n, word): (usize, &u16)| {
         let at = address.wrapping_add(to_u16(n));
         let pair = words.get(n..n + 2);
-        let float = |order| {
-            let point = Point { table, address: at, kind: DataType::F32, order, field: None };
-            pair.and_then(|pair| codec::decode(point, pair)).map_or("–".into(), |value| short(to_f32(value)))
-        };
+        let float = |order| pair.and_then(|pair| interpret::float(order, pair, 10)).unwrap_or_else(|| "–".to_owned());
         let floats = [ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba]
             .map(|order| format!("{:>10}", float(order)));
         format!("{:6} / {at:04X}  {word:04X}  {word:6} {:6} {}", table.modicon(at), *word as i16, floats.join(" "))
     };
     std::iter::once(heads.to_owned()).chain(words.iter().enumerate().map(row)).collect()
-}
-
-/// A float in at most ten characters.
-fn short(value: f32) -> String {
-    let plain = format!("{value}");
-    if plain.len() <= 10 { plain } else { format!("{value:.3e}") }
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 
 mod advice;
 mod cells;
-mod decode;
 mod find;
 mod import;
 mod keys;

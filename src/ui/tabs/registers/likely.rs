@@ -1,12 +1,12 @@
 //! Which type two registers are likely of, by their values and by how they change together.
 
-use super::{
-    cells::Cells,
-    decode::{float_orders, number},
-};
-use crate::plant::{
-    number::to_f32,
-    tag::{ByteOrder, DataType, Table},
+use super::cells::Cells;
+use crate::{
+    bus::interpret::{float_orders, number},
+    plant::{
+        number::to_f32,
+        tag::{ByteOrder, DataType, Table},
+    },
 };
 
 /// A larger part of its value than this a measured value does not change by between two reads.

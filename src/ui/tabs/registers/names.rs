@@ -3,8 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use super::decode;
-use crate::plant::tag::{ByteOrder, DataType, Point, Table};
+use crate::{
+    bus::interpret,
+    plant::tag::{ByteOrder, DataType, Point, Table},
+};
 
 /// A register, or some that stand together, with a name: `value = raw · scale + offset`.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +63,7 @@ impl Named {
     /// `70.0 °C`, `RUN`; `None` as for [`Named::value`].
     pub fn text(&self, words: &[u16]) -> Option<String> {
         if let DataType::Text(_) = self.kind {
-            return words.get(..usize::from(self.len())).map(decode::text);
+            return words.get(..usize::from(self.len())).map(interpret::text);
         }
         let raw = self.raw(words)?;
         if let Some((_, label)) = self.labels.iter().find(|(number, _)| *number as f64 == raw) {
@@ -78,7 +80,7 @@ impl Named {
 
     fn raw(&self, words: &[u16]) -> Option<f64> {
         let bit = || words.first().map(|word| f64::from(*word));
-        if self.table.is_bits() { bit() } else { decode::number(self.kind, self.order, words) }
+        if self.table.is_bits() { bit() } else { interpret::number(self.kind, self.order, words) }
     }
 }
 

@@ -4,13 +4,13 @@ use super::{
     Base, Registers,
     advice::advice,
     cells::Cell,
-    decode,
     layout::{Columns, layout, name_column},
     names::Named,
     watch,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
+    bus::interpret,
     plant::{
         event::LineState,
         live::TABLES,
@@ -43,7 +43,7 @@ pub fn rows(tab: &Registers, height: u16) -> usize {
 /// What words may mean as numbers, in this byte order.
 pub fn meanings(words: &[u16], order: ByteOrder) -> Vec<f64> {
     let kinds = [DataType::U16, DataType::I16, DataType::U32, DataType::I32, DataType::F32, DataType::Bcd16];
-    let number = |kind| decode::number(kind, order, words);
+    let number = |kind| interpret::number(kind, order, words);
     kinds.into_iter().filter_map(number).collect()
 }
 
@@ -250,17 +250,17 @@ fn numbers(
     canvas.text_right(at.unsigned + 6, y, &word.to_string(), style);
     canvas.text_right(at.signed + 6, y, &word.cast_signed().to_string(), style);
     if let Some(x) = at.bcd {
-        let bcd = decode::number(DataType::Bcd16, tab.order, &[word]).map(|value| decode::short(value, 4));
+        let bcd = interpret::number(DataType::Bcd16, tab.order, &[word]).map(|value| interpret::short(value, 4));
         canvas.text_right(x + 5, y, bcd.as_deref().unwrap_or("–"), style);
     }
-    let long = decode::number(DataType::U32, tab.order, &words).map(|value| decode::short(value, 11));
+    let long = interpret::number(DataType::U32, tab.order, &words).map(|value| interpret::short(value, 11));
     if let Some(x) = at.long {
         canvas.text_right(x + 12, y, long.as_deref().unwrap_or("–"), style);
     }
-    let float = decode::float(tab.order, &words, 10);
+    let float = interpret::float(tab.order, &words, 10);
     canvas.text_right(at.float + 11, y, float.as_deref().unwrap_or("–"), style);
     canvas.text(at.bits, y, &bits(word), style);
-    canvas.text(at.text, y, &decode::text(&[word]), style);
+    canvas.text(at.text, y, &interpret::text(&[word]), style);
 }
 
 fn bits(word: u16) -> String {
@@ -323,23 +323,23 @@ fn detail(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let words = tab.cells.words(tab.table, address, 4);
     if !tab.table.is_bits() {
         let number = |kind, order| {
-            decode::number(kind, order, &words).map_or("–".to_owned(), |value| decode::short(value, 20))
+            interpret::number(kind, order, &words).map_or("–".to_owned(), |value| interpret::short(value, 20))
         };
         let plain = t!(
             "BCD {bcd}   64 bits {long}   double {double}   text {text}",
             bcd = number(DataType::Bcd16, tab.order),
             long = number(DataType::U64, tab.order),
             double = number(DataType::F64, tab.order),
-            text = decode::text(&words)
+            text = interpret::text(&words)
         );
-        let stamps = decode::stamps(&tab.cells.words(tab.table, address, 6));
+        let stamps = interpret::stamps(&tab.cells.words(tab.table, address, 6));
         let stamps = stamps.into_iter().map(|(kind, stamp)| format!("   {kind} {stamp}")).collect::<String>();
         canvas.text(1, 1, &fit(&(plain + &stamps), width.saturating_sub(2)), normal);
         // All four where two stand beside each other, else the usual one and the chosen one.
         let other = if tab.order == ByteOrder::Abcd { ByteOrder::Cdab } else { tab.order };
         let orders = if 108 <= width { ByteOrder::ALL.to_vec() } else { vec![ByteOrder::Abcd, other] };
         for (n, order) in orders.into_iter().enumerate() {
-            let float = decode::float(order, &words, 12).unwrap_or_else(|| "–".to_owned());
+            let float = interpret::float(order, &words, 12).unwrap_or_else(|| "–".to_owned());
             let (unsigned, signed) = (number(DataType::U32, order), number(DataType::I32, order));
             let text = format!("{}  {unsigned:>11} {signed:>12} {float:>13}", order.word());
             let style = if order == tab.order { normal } else { theme.dim() };
@@ -373,7 +373,7 @@ fn seen(cx: &ViewContext, cell: &Cell, old: bool, canvas: &mut Canvas) {
         span = running(elapsed(*from, cell.at)),
         least,
         greatest,
-        mean = decode::short((f64::from(to_f32(mean) * 10.0)).round() / 10.0, 9)
+        mean = interpret::short((f64::from(to_f32(mean) * 10.0)).round() / 10.0, 9)
     );
     let x = canvas.text(1, 4, &words, theme.normal()) + 3;
     let room = usize::from(canvas.width().saturating_sub(x + 1)).min(60);

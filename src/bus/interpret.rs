@@ -1,11 +1,9 @@
 //! Words as the numbers they may mean, and which meaning is likely.
 
-use crate::{
-    bus::codec,
-    plant::{
-        number::to_f32,
-        tag::{ByteOrder, DataType, Point, Table},
-    },
+use super::codec;
+use crate::plant::{
+    number::to_f32,
+    tag::{ByteOrder, DataType, Point, Table},
 };
 
 /// Words as a number of a type; `None` where there are too few of them or they hold none.
