@@ -1,10 +1,12 @@
 //! What the history costs: one commit, rows a second, bytes a sample, and reading a curve of a week; with `-- load`, what
-//! queries cost the recording.
+//! queries cost the recording; with `-- year`, what a year of 1,000 tags costs.
 #![allow(clippy::print_stdout, missing_docs)]
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 #[path = "history/load.rs"]
 mod load;
+#[path = "history/year.rs"]
+mod year;
 
 use std::{hint::black_box, path::Path, sync::Arc, time::Duration, time::Instant};
 
@@ -115,9 +117,11 @@ criterion_group! {
 }
 fn main() {
     let words: Vec<String> = std::env::args().collect();
-    match words.iter().position(|word| word == "load") {
-        Some(place) => load::main(&words[place + 1..]),
-        None => {
+    let behind = |name: &str| Some(&words[words.iter().position(|word| word == name)? + 1..]);
+    match (behind("load"), behind("year")) {
+        (Some(words), _) => load::main(words),
+        (None, Some(words)) => year::main(words),
+        (None, None) => {
             benches();
             Criterion::default().configure_from_args().final_summary();
         }

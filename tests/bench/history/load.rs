@@ -26,7 +26,7 @@ use sightglass::{
 };
 use tokio::sync::oneshot;
 
-const TAGS: u16 = 1_000;
+pub const TAGS: u16 = 1_000;
 /// Batches that the samples of a second come in.
 const BATCHES: u16 = 100;
 /// Where the history begins: some day at midnight.
@@ -48,7 +48,7 @@ pub fn main(words: &[String]) {
     run(&path, seconds, hours);
 }
 
-fn def() -> Arc<PlantDef> {
+pub fn def() -> Arc<PlantDef> {
     Arc::new(PlantDef { tags: (0..TAGS).map(super::tag).collect(), ..(*super::tank()).clone() })
 }
 
@@ -192,7 +192,7 @@ fn spread(name: &str, mut times: Vec<Duration>) {
     println!("{name}: {} times, p50 {half:.1} ms, p99 {most:.1} ms, worst {worst:.1} ms", times.len());
 }
 
-fn memory_kb(of: &str) -> u64 {
+pub fn memory_kb(of: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find(|line| line.starts_with(of));
     line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
