@@ -93,6 +93,7 @@ pub fn needs_for_question(query: &Query) -> Role {
         | Query::LineMinutes { .. }
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
+        | Query::Past { .. }
         | Query::Overview
         | Query::Report { .. } => Right::Look,
         Query::Audit { .. } => Right::ManageUsers,

@@ -1,33 +1,51 @@
 //! `sightglass status`: how the station and its plant stand, for people and for scripts.
 
+use std::sync::Arc;
+
 use jiff::Timestamp;
 use serde_json::{Value, json};
 
-use crate::plant::{
-    Snapshot,
-    alarm::manager::subject_name,
-    event::LineState,
-    sample::{Quality, Sample},
-    snapshot::{ActiveAlarm, DeviceState, SuppressedAlarm},
+use crate::{
+    history::{Answer, Query},
+    plant::{
+        Snapshot,
+        alarm::manager::subject_name,
+        event::LineState,
+        line_minute::LineMinute,
+        sample::{Quality, Sample},
+        snapshot::{ActiveAlarm, DeviceState, SuppressedAlarm},
+    },
+    report::period_parser,
 };
 
-use super::{CliError, client, in_runtime, local, say};
+use super::{
+    CliError, StationArgs, client, in_runtime, load, local, say,
+    source::{Source, unexpected},
+};
 
 /// Arguments of `status`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The plant, if stations of more than one run here
     plant: Option<String>,
+    /// As it was at a past time (03:12, 2026-11-21T06:00 or an instant with offset), from its history: PLANT must be given
+    #[arg(long, value_name = "TIME", requires = "plant")]
+    at: Option<String>,
     /// For scripts: everything, as JSON
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     login: client::Login,
+    #[command(flatten)]
+    station: StationArgs,
 }
 
-/// Asks the running station and prints.
+/// Asks the running station and prints; of a past time its history.
 pub fn main(args: Args) -> Result<(), CliError> {
     in_runtime(async {
+        if let (Some(at), Some(plant)) = (&args.at, &args.plant) {
+            return past(&args, plant, at).await;
+        }
         let session = client::attach(args.plant.as_deref(), &args.login).await?;
         let snapshot = session.snapshots.borrow().clone();
         match args.json {
@@ -36,6 +54,35 @@ pub fn main(args: Args) -> Result<(), CliError> {
         }
         Ok(())
     })
+}
+
+/// Prints a past instant.
+async fn past(args: &Args, plant: &str, at: &str) -> Result<(), CliError> {
+    let def = Arc::new(load(plant, &args.station)?);
+    let source = Source::open(&def, &args.station, &args.login).await?;
+    let at = period_parser::past_instant(&def, at, source.now()).map_err(|error| CliError::Usage(error.to_string()))?;
+    let Answer::Past(past) = source.query(Query::Past { at }).await? else { return Err(unexpected()) };
+    let snapshot = past.snapshot(def.clone());
+    if args.json {
+        let mut json = in_json(&snapshot);
+        // What the station itself was like is not kept.
+        json["history"] = Value::Null;
+        json["past"] = Value::Bool(true);
+        say(&format!("{json:#}"));
+        return Ok(());
+    }
+    let now = source.now().duration_since(at).as_secs();
+    say(&format!("PAST     {} h {:02} min {:02} s ago", now / 3_600, now / 60 % 60, now % 60));
+    in_words(&snapshot).iter().filter(|line| !line.starts_with("history ")).for_each(|line| say(line));
+    for (line, minute) in def.lines.iter().zip(&past.minutes) {
+        let Some(minute) = minute else { continue };
+        let LineMinute { requests, ok, timeouts, corrupt, exceptions, .. } = minute;
+        say(&format!(
+            "minute   {:12} {requests} requests, {ok} ok, {timeouts} timeouts, {corrupt} corrupt, {exceptions} exceptions",
+            line.name
+        ));
+    }
+    Ok(())
 }
 
 /// One fact a line: plant, lines, devices, alarms, history, tags.

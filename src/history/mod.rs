@@ -22,6 +22,7 @@ use crate::{
         def::{HistoryDef, LineId, TagId},
         line_minute::LineMinute,
         live::{LiveRead, LiveReading},
+        past::Past,
         record::{ActionRecord, AlarmRecord},
     },
     report::{Period, ShiftReport, step_series::HeldValue},
@@ -108,6 +109,11 @@ pub enum Query {
         /// Instants.
         count: usize,
     },
+    /// The plant as it was at an instant.
+    Past {
+        /// The instant.
+        at: Timestamp,
+    },
     /// What is stored, and where.
     Overview,
     /// Registers of a unit as they are now: the line answers it, not the history.
@@ -131,6 +137,8 @@ pub enum Answer {
     AlarmMetrics(Box<PeriodMetrics>),
     /// By tag the value in force at each instant; `None` where nothing is stored, or nothing recent enough.
     Values(Vec<Vec<Option<HeldValue>>>),
+    /// What is known of the instant.
+    Past(Box<Past>),
     /// What is stored.
     Overview(Box<Overview>),
     /// What the unit holds.
@@ -263,6 +271,16 @@ pub enum HistoryError {
         /// That of this program.
         expected: u32,
     },
+    /// Samples of an instant were not stored, or are deleted.
+    #[error("no samples of {at:.0}: those that are kept begin at {first:.0} and end at {last:.0}")]
+    NotKept {
+        /// The instant.
+        at: Timestamp,
+        /// Where they begin.
+        first: Timestamp,
+        /// Where they end.
+        last: Timestamp,
+    },
     /// The query makes no sense: empty or negative span.
     #[error("empty period")]
     EmptyPeriod,
@@ -287,6 +305,7 @@ impl HistoryError {
             | HistoryError::Missing { .. }
             | HistoryError::TooManyRows { .. }
             | HistoryError::OtherSchema { .. }
+            | HistoryError::NotKept { .. }
             | HistoryError::EmptyPeriod
             | HistoryError::NotOpen
             | HistoryError::TooLong { .. } => self.to_string(),

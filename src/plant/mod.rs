@@ -46,6 +46,7 @@ pub(crate) mod tuning;
 pub mod restore;
 pub mod station;
 pub mod snapshot;
+pub mod past;
 pub(crate) mod calculation;
 pub(crate) mod clock_step;
 pub(crate) mod process_image;

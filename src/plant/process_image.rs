@@ -75,6 +75,13 @@ impl ProcessImage {
         }
     }
 
+    /// Takes the values of all tags from elsewhere.
+    pub fn set_all(&mut self, samples: &[Sample]) {
+        for (own, sample) in self.samples.iter_mut().zip(samples) {
+            *own = *sample;
+        }
+    }
+
     pub fn sample(&self, tag: TagId) -> Sample {
         self.samples[tag.index()]
     }
@@ -205,6 +212,8 @@ impl ProcessImage {
         let Some(stored) = stored else { return true };
         let waited = Duration::try_from(at.duration_since(stored.at)).unwrap_or_default();
         stored.quality != sample.quality
+            // Once an hour in any case: what a past instant was like need not be looked for further back.
+            || !sample.quality.is_good() && is_later_hour(stored.at, at)
             || match (stored.value, sample.value) {
                 (Some(old), Some(new)) => {
                     let changed = match tag.store {
@@ -332,6 +341,11 @@ fn effect_of(fault: Fault) -> FaultEffect {
         FaultKind::NotConnected => FaultEffect::Gone(Cause::NotConnected),
         FaultKind::BackedOff => FaultEffect::Gone(Cause::DeviceDown),
     }
+}
+
+/// Whether an hour has begun since.
+fn is_later_hour(stored: Timestamp, at: Timestamp) -> bool {
+    stored.as_second().div_euclid(3_600) < at.as_second().div_euclid(3_600)
 }
 
 #[cfg(test)]

@@ -278,6 +278,11 @@ impl Plant {
         effects
     }
 
+    /// Takes values as they are, of another time.
+    pub(super) fn set_samples(&mut self, samples: &[super::sample::Sample]) {
+        self.image.set_all(samples);
+    }
+
     /// The plant as of its last event, command or tick.
     pub fn snapshot(&self) -> Snapshot {
         let lists = self.alarm_manager.lists();

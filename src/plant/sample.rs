@@ -50,6 +50,8 @@ keyword_enum! {
         NotAuthorised = 12 => "not authorised: log in",
         /// It was stored, but the file is damaged there. Never stored.
         Unreadable = 13 => "history damaged",
+        /// The history does not keep it, see [`StorePolicy`](super::tag::StorePolicy). Never stored.
+        NotStored = 14 => "not stored",
     }
 }
 

@@ -36,6 +36,9 @@ pub enum PeriodError {
     /// Not a time.
     #[error("`{0}` is not a time: expected local 2026-11-21T06:00, or with offset 2026-11-21T06:00+07:00")]
     NotATime(String),
+    /// The instant lies in the future.
+    #[error("{0} lies in the future")]
+    InFuture(String),
     /// The period lies in the future.
     #[error("{0} has not started yet")]
     NotBegun(String),
@@ -80,6 +83,22 @@ pub fn period(
             begun(Period { name: "period".into(), from, to }, now)
         }
     }
+}
+
+/// A past instant as it was typed: like the beginning of a period, or `03:12`, the last time that it was that time of day.
+pub fn past_instant(def: &PlantDef, text: &str, now: Timestamp) -> Result<Timestamp, PeriodError> {
+    // A date is read as a time, too.
+    let time = text.parse::<civil::Time>().ok().filter(|_| !text.contains('-'));
+    let at = match time {
+        None => moment(def, text, DstFold::Second)?,
+        Some(time) => {
+            let today = now.to_zoned(def.time_zone.clone()).date();
+            let days = [Some(today), today.yesterday().ok()];
+            let times = days.into_iter().flatten().filter_map(|day| instant(&def.time_zone, day.to_datetime(time)));
+            times.filter(|at| *at <= now).max().ok_or_else(|| PeriodError::NotATime(text.into()))?
+        }
+    };
+    if at <= now { Ok(at) } else { Err(PeriodError::InFuture(text.into())) }
 }
 
 fn shift_named(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, PeriodError> {
@@ -145,6 +164,21 @@ mod tests {
     use crate::report::testing::{THREE, at, plant};
 
     const NOW: &str = "2026-11-21T09:00+07";
+
+    #[test]
+    fn an_instant_is_read_as_the_last_time_of_day() {
+        let def = plant("Asia/Bangkok", &THREE);
+        for (text, expect) in [
+            ("03:12", Ok("2026-11-21T03:12+07")),
+            ("09:00:01", Ok("2026-11-20T09:00:01+07")),
+            ("2026-11-20 22:15", Ok("2026-11-20T22:15+07")),
+            ("2026-11-20T22:15Z", Ok("2026-11-20T22:15Z")),
+            ("2026-11-21T09:01", Err(PeriodError::InFuture("2026-11-21T09:01".into()))),
+            ("soon", Err(PeriodError::NotATime("soon".into()))),
+        ] {
+            assert_eq!(past_instant(&def, text, at(NOW)), expect.map(at), "{text}");
+        }
+    }
 
     fn ask(typed: (Option<&str>, Option<&str>, Option<&str>)) -> Result<Period, PeriodError> {
         period(&plant("Asia/Bangkok", &THREE), typed.0, typed.1, typed.2, at(NOW))

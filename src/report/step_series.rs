@@ -173,7 +173,8 @@ pub fn good_value(sample: Sample) -> Option<f64> {
     sample.good_value().filter(|value| value.is_finite())
 }
 
-fn expiry(sample: Sample) -> Timestamp {
+/// When a sample is not in force any more, even without a successor.
+pub(crate) fn expiry(sample: Sample) -> Timestamp {
     sample.at.checked_add(HOLD_MAX).unwrap_or(Timestamp::MAX)
 }
 

@@ -60,9 +60,9 @@ fn the_archive_is_listed_and_verified() {
     for expect in [
         "stored    2026-03-02 13:00:00 to 2026-03-03 14:59:59",
         "7200 samples not archived yet",
-        "raw       2026-03-02 07:00:00 to 2026-03-03 14:00:00: 180000 rows",
-        "m1        2026-03-02 07:00:00 to 2026-03-03 14:00:00: 3000 rows",
-        "h1        2026-03-02 07:00:00 to 2026-03-03 14:00:00: 50 rows",
+        "raw       2026-03-02 13:00:00 to 2026-03-03 14:00:00: 180000 rows",
+        "m1        2026-03-02 13:00:00 to 2026-03-03 14:00:00: 3000 rows",
+        "h1        2026-03-02 13:00:00 to 2026-03-03 14:00:00: 50 rows",
         "may take 50 % of the disk, ",
         "next      raw/date=2026-03-02/day.parquet is deleted ",
         ": the history would have more than 50 % of the disk",

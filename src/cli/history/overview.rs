@@ -51,7 +51,9 @@ fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
         let (Some(first), Some(last)) = (files.first(), files.last()) else { continue };
         let rows: u64 = files.iter().map(|file| file.rows).sum();
         let all = bytes(files.iter().copied());
-        let span = [first.from, last.to].map(|at| Timestamp::from_microsecond(at).map_or_else(|_| "?".into(), time));
+        // The file of a day begins with the day, also of the first one.
+        let begin = extent.map_or(first.from, |(stored, _)| first.from.max(stored.as_microsecond()));
+        let span = [begin, last.to].map(|at| Timestamp::from_microsecond(at).map_or_else(|_| "?".into(), time));
         let each = all as f64 / rows.max(1) as f64;
         lines.push(format!(
             "{:9} {} to {}: {rows} rows in {} files, {}, {each:.2} bytes a row",

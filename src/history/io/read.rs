@@ -59,6 +59,7 @@ impl Store {
             Query::Values { tags, from, every, count } => {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
+            Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
             Query::Registers(_) => Err(HistoryError::Engine("registers are read by the line".to_owned())),
             Query::Journal { from, to, limit } => {
@@ -85,7 +86,7 @@ impl Store {
     /// Of each alarm the last event of every kind, oldest first: from these the plant restores what is active and
     /// what is acknowledged.
     pub fn restore(&self) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::restore(), params![ROWS_MAX + 1], alarm)
+        self.whole_list(&sql::restore(), params![ROWS_MAX + 1, utc(Timestamp::MAX)], alarm)
     }
 
     fn curves(&self, tags: &[TagId], span: series::Span, buckets: usize) -> Result<Vec<Series>, HistoryError> {
@@ -131,7 +132,7 @@ impl Store {
     }
 
     /// The rows between two instants, at most so many; the parameters after these three are `more`.
-    fn span_list<T>(
+    pub(super) fn span_list<T>(
         &self,
         sql: &str,
         (from, to, limit): (Timestamp, Timestamp, usize),
@@ -249,7 +250,7 @@ pub(super) fn chain_hash(number: Option<u64>, hash: Option<Vec<u8>>) -> Option<C
     Some(ChainHash { number: number?, hash: hash?.try_into().ok()? })
 }
 
-fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {
+pub(super) fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {
     let count = |column| row.get::<_, u32>(column).map(u64::from);
     Ok(LineMinute {
         at: time(row)?,

@@ -183,6 +183,7 @@ fn counts_a_period(query: &Query) -> bool {
         | Query::Actions { .. }
         | Query::Audit { .. }
         | Query::LineMinutes { .. }
+        | Query::Past { .. }
         | Query::Overview
         | Query::Registers(_) => false,
     }

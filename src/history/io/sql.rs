@@ -125,10 +125,10 @@ pub const SET_LAST_COMMIT: &str = "UPDATE last_commit SET number = ?, first_utc 
 pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT count(*) FROM alarm_journal)
     + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute)";
 
-/// Ends every curve: a row (time, no value, quality, epoch) for each tag whose last row since an instant has a value.
+/// Ends every curve: a row (time, no value, quality, epoch) for each tag whose last row since an instant has another quality.
 pub const END_CURVES: &str = "INSERT INTO sample
-    SELECT ?, tag, NULL, ?, ? FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= ? GROUP BY tag)
-    WHERE last < 128";
+    SELECT $1, tag, NULL, $2, $3 FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= $4 GROUP BY tag)
+    WHERE last <> $2";
 
 /// Samples in a span, of some stored numbers of tags or of all, from the table or from files as well, each in the order in
 /// which they were written.
@@ -205,12 +205,14 @@ fn raised_at(others: &str, is: &str) -> String {
     )
 }
 
-/// Of each alarm the last event of every kind, in the order in which they were written: all that its state depends on.
+/// Of each alarm the last event of every kind before an instant, in the order in which they were written: all that its state
+/// depends on.
 pub fn restore() -> String {
     let columns = EVENT_COLUMNS.join(", ");
     format!(
         "SELECT {columns} FROM alarm_journal
-         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal GROUP BY subject, message, event) ORDER BY rowid LIMIT ?"
+         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal WHERE utc < $2 GROUP BY subject, message, event)
+         ORDER BY rowid LIMIT $1"
     )
 }
 

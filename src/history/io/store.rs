@@ -28,7 +28,6 @@ use crate::{
         record::{ActionRecord, AlarmRecord, Record},
         sample::{Cause, Quality, Sample},
     },
-    report::step_series::HOLD_MAX,
 };
 
 /// An open store.
@@ -106,8 +105,8 @@ impl Store {
     /// Ends every curve at an instant: from here on the station is off.
     pub fn end_curves(&self, at: Timestamp) -> Result<(), HistoryError> {
         let Some((_, last)) = self.extent() else { return Ok(()) };
-        // A tag without a row for so long has no value any more anyway.
-        let since = last.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN);
+        // Each tag has a row in every hour.
+        let since = last.checked_sub(jiff::SignedDuration::from_hours(1)).unwrap_or(Timestamp::MIN);
         let (off, epoch) = (Quality::Bad(Cause::StationOff).code(), self.epoch.get());
         self.commit(std::iter::once(at), epoch, || {
             Ok(self.db.execute(sql::END_CURVES, params![utc(at), off, epoch, utc(since)])? > 0)

@@ -7,6 +7,7 @@ mod damage;
 mod epochs;
 mod lists;
 mod migrations;
+mod past;
 mod flips;
 mod alarm_metrics;
 mod pieces;

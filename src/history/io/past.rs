@@ -1,0 +1,100 @@
+//! The plant at a past instant.
+
+use duckdb::params;
+use jiff::Timestamp;
+
+use super::{
+    read::{ROWS_MAX, alarm, line_minute},
+    sql,
+    store::{Store, instant, utc},
+};
+use crate::{
+    history::{
+        HistoryError,
+        tiers::{HOUR, MINUTE, Tier, floor},
+    },
+    plant::{
+        def::{LineDef, TagId},
+        line_minute::LineMinute,
+        past::Past,
+        record::AlarmRecord,
+        sample::{Cause, Quality, Sample},
+        tag::TagDef,
+    },
+    report::step_series::{HOLD_MAX, expiry},
+};
+
+impl Store {
+    /// What was in force at an instant. Every tag has a row in each hour that the station ran, and a good value one in
+    /// [`HOLD_MAX`]: few tags need the whole hour.
+    pub(super) fn past(&self, at: Timestamp, now: Timestamp) -> Result<Past, HistoryError> {
+        self.refuse_unknown(at, now)?;
+        let after = at.checked_add(jiff::SignedDuration::from_micros(1)).unwrap_or(at);
+        let mut found: Vec<Option<Sample>> = vec![None; self.def.tags.len()];
+        let stored: Vec<TagId> = self.def.tags.iter().filter(|tag| tag.is_stored()).map(|tag| tag.id).collect();
+        self.latest(&stored, at, (at, after), &mut found)?;
+        let missing: Vec<TagId> = stored.into_iter().filter(|tag| found[tag.index()].is_none()).collect();
+        let hour = instant(floor(at.as_microsecond(), HOUR)).unwrap_or(at);
+        let held = at.checked_sub(HOLD_MAX).unwrap_or(hour);
+        if hour < held && !missing.is_empty() {
+            self.latest(&missing, at, (hour, held), &mut found)?;
+        }
+        // A station that ends writes a row for each tag.
+        let off = found.iter().flatten().filter(|sample| sample.quality == Quality::Bad(Cause::StationOff));
+        let off = off.map(|sample| sample.at).max().unwrap_or(Timestamp::MIN);
+        let ran = found.iter().flatten().any(|sample| off < sample.at);
+        let in_force = |(tag, sample): (&TagDef, Option<Sample>)| match sample {
+            _ if !tag.is_stored() => Sample::bad(Cause::NotStored, at),
+            Some(sample) if sample.at <= off => Sample::bad(Cause::StationOff, off),
+            Some(sample) if sample.quality.is_good() && expiry(sample) <= at => {
+                Sample::bad(Cause::StationOff, sample.at)
+            }
+            Some(sample) => sample,
+            None if ran => Sample::bad(Cause::NotStored, at),
+            None => Sample::bad(Cause::StationOff, at),
+        };
+        let samples = self.def.tags.iter().zip(found).map(in_force).collect();
+        Ok(Past { at, samples, events: self.events_until(after)?, minutes: self.minutes_at(at)? })
+    }
+
+    /// An instant that the samples do not reach.
+    fn refuse_unknown(&self, at: Timestamp, now: Timestamp) -> Result<(), HistoryError> {
+        let deleted = self.deleted_until(Tier::Raw)?.unwrap_or(Timestamp::MIN);
+        let first = self.extent().map(|(first, _)| first.max(deleted));
+        match first {
+            Some(first) if first <= at && at <= now => Ok(()),
+            Some(first) => Err(HistoryError::NotKept { at, first, last: now }),
+            // Nothing is stored yet: nothing is known.
+            None => Ok(()),
+        }
+    }
+
+    /// The latest sample of each tag until an instant, of those that matter in a span.
+    fn latest(
+        &self,
+        tags: &[TagId],
+        at: Timestamp,
+        (from, to): (Timestamp, Timestamp),
+        found: &mut [Option<Sample>],
+    ) -> Result<(), HistoryError> {
+        self.each_sample(tags, from, to, |place, sample| {
+            if sample.at <= at {
+                found[tags[place].index()] = Some(sample);
+            }
+        })?;
+        Ok(())
+    }
+
+    fn minutes_at(&self, at: Timestamp) -> Result<Vec<Option<LineMinute>>, HistoryError> {
+        let end = instant(at.as_microsecond().saturating_add(MINUTE)).unwrap_or(at);
+        let minute = |line: &LineDef| {
+            let found = self.span_list(sql::LINE_MINUTES, (at, end, 1), params![line.name], line_minute)?;
+            Ok(found.into_iter().next())
+        };
+        self.def.lines.iter().map(minute).collect()
+    }
+
+    fn events_until(&self, end: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        self.whole_list(&sql::restore(), params![ROWS_MAX + 1, utc(end)], alarm)
+    }
+}
