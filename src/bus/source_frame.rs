@@ -69,7 +69,10 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::Crc { .. } | Fault::Lrc { .. } | Fault::NotHex(_) | Fault::Truncated { .. } => {
             "check parity and baud rate, wires A and B, terminators at both ends and noise; check for a duplicate address"
         }
-        Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
+        Fault::WrongUnit { .. } => {
+            "another unit answered: check the unit address of the device, for a gateway that changes it, and for a second master"
+        }
+        Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
             "response to another request: increase the timeout of the line (c), check for a second master or a duplicate address"
         }
         Fault::OutOfSync => {

@@ -168,13 +168,13 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
         let serials = USUAL.map(|(baud, parity)| Serial { baud, parity, ..serial });
         let serials = serials.into_iter().filter(|serial| args.port.fits(*serial)).collect();
         return match first_answer(&line, (unit, unit), serials).await? {
-            Some((unit, serial, words)) => {
+            Ok((unit, serial, words)) => {
                 let serial = serial.unwrap_or(serial_of(&line));
                 say(&format!("unit {unit} answers at {serial}: {words}"));
                 Ok((with_serial(line, serial), unit))
             }
-            None => Err(CliError::Failed(format!(
-                "{}: unit {unit} answers at none of the usual settings. In the order of likelihood:\n\
+            Err(came) => Err(CliError::Failed(format!(
+                "{}: unit {unit} answers at none of the usual settings{came}. In the order of likelihood:\n\
                  another unit address (`sightglass scan {0}`), A and B exchanged, the device without power or not set to \
                  Modbus RTU,\nno common ground or termination, another master on the line.\n\
                  `--baud` and `--parity` together open the line without trying",
@@ -185,34 +185,42 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
     if let Some(unit) = args.unit {
         return Ok((line, unit));
     }
+    let mut came = String::new();
     for range in USUAL_UNITS {
         if !line.transport.units().contains(&range.0) {
             continue;
         }
-        if let Some((unit, _, words)) = first_answer(&line, range, Vec::new()).await? {
-            say(&format!("unit {unit} answers: {words}"));
-            return Ok((line, unit));
+        match first_answer(&line, range, Vec::new()).await? {
+            Ok((unit, _, words)) => {
+                say(&format!("unit {unit} answers: {words}"));
+                return Ok((line, unit));
+            }
+            Err(other) if came.is_empty() => came = other,
+            Err(_) => {}
         }
     }
     Err(CliError::Failed(format!(
-        "{}: the connection opens, but units 0 to 16 and 255 do not answer. In the order of likelihood:\n\
+        "{}: the connection opens, but units 0 to 16 and 255 do not answer{came}. In the order of likelihood:\n\
          another unit address (`sightglass scan {0}`, then `--unit`), no device behind the gateway or not powered,\n\
          another protocol on this TCP port",
         port_of(&line)
     )))
 }
 
-/// The first unit that answers, with the settings that it answers at, and what it has said.
+/// The first unit that answers, with the settings that it answers at, and what it has said; `Err` with what came in place
+/// of an answer, `, something is there: …`, or empty.
 async fn first_answer(
     line: &LineDef,
     (first, last): (u8, u8),
     serials: Vec<Serial>,
-) -> Result<Option<(u8, Option<Serial>, String)>, CliError> {
+) -> Result<Result<(u8, Option<Serial>, String), String>, CliError> {
     let scan = Diagnostic::Scan(Scan { first, last, serials, timeout: line.timeout.min(TRIAL) });
     let run = tools::search(line, scan, |run| answer(run).is_some()).await?;
     match &run.state {
         DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
-        DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => Ok(answer(&run)),
+        DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => {
+            Ok(answer(&run).ok_or_else(|| trace(&run).map_or(String::new(), |trace| format!(", {trace}"))))
+        }
     }
 }
 
@@ -226,6 +234,21 @@ fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
         | Finding::Object { .. }
         | Finding::Values { .. }
         | Finding::Failed { .. }
+        | Finding::Written(_)
+        | Finding::Verdict(_) => None,
+    })
+}
+
+/// What came that was no answer.
+fn trace(run: &DiagnosticRun) -> Option<String> {
+    run.findings.iter().find_map(|finding| match finding {
+        Finding::Unit { words, certain: false, .. } => Some(words.clone()),
+        Finding::Failed { fault, .. } => Some(fault.to_string()),
+        Finding::Unit { certain: true, .. }
+        | Finding::Exchange(_)
+        | Finding::Bytes { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. }
         | Finding::Written(_)
         | Finding::Verdict(_) => None,
     })

@@ -158,7 +158,7 @@ pub enum Fault {
         expected: u16,
     },
     /// Another unit answered.
-    #[error("{}", t!("response from unit {got}, expected unit {asked}", got = .got, asked = .asked))]
+    #[error("{}", t!("unit {got} answered in place of unit {asked}", got = .got, asked = .asked))]
     WrongUnit {
         /// Unit in the answer.
         got: u8,

@@ -1,15 +1,35 @@
 //! What to check next where nothing was read yet, in the order of likelihood.
 
 use super::Registers;
-use crate::plant::{def::Transport, event::FaultKind};
+use crate::plant::{
+    def::Transport,
+    event::{Fault, FaultKind},
+};
 use crate::ui::tabs::prelude::*;
 
 /// Lines of advice, while no register of the unit was ever read; none once something was, or nothing is known yet.
-pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<&'static str> {
+pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<String> {
     let fault = tab.last.as_ref().and_then(|last| last.parts.first()?.words.as_ref().err().copied());
     let Some(fault) = fault.filter(|_| tab.cells.is_blank()) else { return Vec::new() };
     let serial = matches!(cx.def().lines[tab.line.index()].transport, Transport::Serial { .. });
-    let mut lines = match fault.kind() {
+    let mut lines: Vec<String> = of_fault(fault, serial).into_iter().map(str::to_owned).collect();
+    if let Fault::WrongUnit { got, .. } = fault {
+        lines.insert(0, t!("the device has unit address {got}: U, then {got}", got));
+    }
+    if cx.snapshot.lines[tab.line.index()].counters.echoes && !lines.is_empty() {
+        lines.insert(0, t!("local echo: the adapter gives back what it sends (removed from answers)").to_owned());
+    }
+    lines
+}
+
+fn of_fault(fault: Fault, serial: bool) -> Vec<&'static str> {
+    if let Fault::WrongUnit { .. } = fault {
+        return vec![
+            t!("a gateway that gives every answer an address of its own"),
+            t!("another master on the line, whose answers come in between"),
+        ];
+    }
+    match fault.kind() {
         FaultKind::Timeout if serial => vec![
             t!("another unit address: U; or a scan of all: tab Bus"),
             t!("another baud rate or parity: quit, and open without --baud and --parity"),
@@ -41,10 +61,6 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<&'static str> {
         | FaultKind::OutOfSync
         | FaultKind::NotANumber
         | FaultKind::NotConnected
-        | FaultKind::BackedOff => return Vec::new(),
-    };
-    if cx.snapshot.lines[tab.line.index()].counters.echoes {
-        lines.insert(0, t!("local echo: the adapter gives back what it sends (removed from answers)"));
+        | FaultKind::BackedOff => Vec::new(),
     }
-    lines
 }

@@ -328,6 +328,9 @@ fn where_nothing_answers_the_tab_says_what_to_check() {
     assert!(shown.contains("another unit address") && shown.contains("response timeout"), "{shown}");
     let shown = silent(&mut bench, Fault::Exception(ExceptionCode(0x0B)));
     assert!(shown.contains("the gateway answers"), "{shown}");
+    let shown = silent(&mut bench, Fault::WrongUnit { got: 9, asked: 1 });
+    let expect = ["unit 9 answered in place of unit 1", "the device has unit address 9"];
+    assert!(expect.iter().all(|words| shown.contains(words)), "{shown}");
     bench.answer(1, Some);
     assert!(!silent(&mut bench, Fault::Timeout).contains("likelihood"), "it has answered before");
 }

@@ -66,11 +66,12 @@ pub(super) fn of_device(
             t!("check baud rate, parity, termination and shield of the line").to_owned()
         }
         Fault::Exception(code) => names::advice(code.0).to_owned(),
-        Fault::WrongUnit { .. }
-        | Fault::WrongFunction { .. }
-        | Fault::WrongLength { .. }
-        | Fault::WrongEcho
-        | Fault::OutOfSync => t!("check for a second master or a duplicate unit address").to_owned(),
+        Fault::WrongUnit { got, .. } => {
+            t!("is its unit address {got}? Else check for a second master, or a gateway that changes the address", got)
+        }
+        Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho | Fault::OutOfSync => {
+            t!("check for a second master or a duplicate unit address").to_owned()
+        }
         Fault::NotANumber | Fault::NotConnected | Fault::BackedOff => String::new(),
     };
     worries.push(t!("{fault} at {when}: {advice}", fault, when, advice).trim_end_matches(": ").to_owned());
