@@ -5,6 +5,7 @@ pub mod retention;
 pub mod series;
 pub mod alarm_state;
 pub mod words;
+pub mod backup;
 pub mod io;
 
 use std::{path::PathBuf, time::Duration};
@@ -287,6 +288,9 @@ pub enum HistoryError {
     /// No store is open: not yet, not any more, or none could be opened.
     #[error("the history is not open")]
     NotOpen,
+    /// What was asked cannot be done as things are, and why.
+    #[error("{0}")]
+    Refused(String),
     /// The answer was not ready in the time that a query may take.
     #[error("no result within {seconds} s; choose a shorter period")]
     TooLong {
@@ -308,6 +312,7 @@ impl HistoryError {
             | HistoryError::NotKept { .. }
             | HistoryError::EmptyPeriod
             | HistoryError::NotOpen
+            | HistoryError::Refused(_)
             | HistoryError::TooLong { .. } => self.to_string(),
         }
     }

@@ -50,7 +50,7 @@ const GRACE: Duration = Duration::from_secs(5 * 60);
 /// What the name of a file ends with until it is whole.
 const UNFINISHED: &str = ".new";
 /// The dictionary of tags.
-const TAGS: &str = "tag.parquet";
+pub(super) const TAGS: &str = "tag.parquet";
 
 /// What is to be done next.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -287,7 +287,7 @@ pub(super) fn overlapping(files: &[ArchiveFile], span: &Range<i64>) -> Vec<Archi
 }
 
 /// The folder of the archive of a database.
-fn folder(db: &Path) -> PathBuf {
+pub(super) fn folder(db: &Path) -> PathBuf {
     db.with_extension("archive")
 }
 

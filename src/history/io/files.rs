@@ -76,6 +76,54 @@ impl Opening {
     }
 }
 
+/// A history that no other process has, and none opens while this lives: to put another one in its place.
+#[derive(Debug)]
+pub struct Exclusive {
+    guard: PathBuf,
+    _files: Vec<File>,
+}
+
+impl Exclusive {
+    /// Keeps others from opening it; this process may have it open. [`HistoryError::Locked`] while another opens it.
+    pub fn hold(db: &Path) -> Result<Exclusive, HistoryError> {
+        let guard = with_suffix(db, ".opening");
+        let wrong = |error: std::io::Error| HistoryError::Engine(format!("{}: {error}", guard.display()));
+        let file = File::options().write(true).create(true).truncate(false).open(&guard).map_err(wrong)?;
+        match file.try_lock() {
+            Ok(()) => Ok(Exclusive { guard, _files: vec![file] }),
+            Err(TryLockError::WouldBlock) => Err(locked(db, "another process, which is just starting".into())),
+            Err(TryLockError::Error(error)) => Err(wrong(error)),
+        }
+    }
+
+    /// The same, also for a database that cannot be opened any more. This process must not have it open: its own locks
+    /// would go. [`HistoryError::Locked`] while another process has it.
+    pub fn take(db: &Path) -> Result<Exclusive, HistoryError> {
+        let mut held = Exclusive::hold(db)?;
+        let wrong = |error: std::io::Error| HistoryError::Engine(format!("{}: {error}", db.display()));
+        match File::options().read(true).write(true).open(db) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(wrong(error)),
+            Ok(file) => {
+                // As DuckDB locks it.
+                rustix::fs::fcntl_lock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive)
+                    .map_err(|_| locked(db, "another process: stop its station first".into()))?;
+                held._files.push(file);
+            }
+        }
+        Ok(held)
+    }
+}
+
+impl Drop for Exclusive {
+    /// A count of opens that never ended stays.
+    fn drop(&mut self) {
+        if fs::metadata(&self.guard).is_ok_and(|there| there.len() == 0) {
+            let _ = fs::remove_file(&self.guard);
+        }
+    }
+}
+
 impl Drop for Opening {
     /// The open came to an orderly end, good or not.
     fn drop(&mut self) {
@@ -86,7 +134,7 @@ impl Drop for Opening {
 }
 
 /// The logs that DuckDB keeps beside a database: the ordinary one and those of a checkpoint under way.
-const LOGS: [&str; 3] = [".wal", ".wal.checkpoint", ".wal.recovery"];
+pub const LOGS: [&str; 3] = [".wal", ".wal.checkpoint", ".wal.recovery"];
 
 /// What is set aside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

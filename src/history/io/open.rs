@@ -9,7 +9,7 @@ use super::{
     alarm_metrics::Recent,
     files::{self, Failure, Opening, Part},
     last::{self, LastCommit, Noted},
-    sql,
+    restore, sql,
     store::{Store, after, engine},
 };
 use crate::{
@@ -87,6 +87,9 @@ impl Store {
     ) -> Result<Opened<T>, HistoryError> {
         files::refuse_foreign(path)?;
         let opening = Opening::begin(path)?;
+        if let Some(before) = restore::finish(path)? {
+            tracing::warn!(before = %before.display(), "a restore that was interrupted is finished");
+        }
         let noted = last::read(path);
         // An empty file is what is left of a creation that failed: nothing is in it, and it is not damaged.
         let fresh = files::size(path) == 0;
@@ -146,6 +149,7 @@ impl Store {
     /// Opens the store of a station that is not running, to report from it. Never creates or changes a file.
     /// [`HistoryError::Missing`] if there is none, [`HistoryError::Locked`] if a station has it.
     pub fn open_read_only(path: &Path, def: &Arc<PlantDef>) -> Result<Store, HistoryError> {
+        restore::refuse_unfinished(path)?;
         if !path.is_file() {
             return Err(HistoryError::Missing { path: path.display().to_string() });
         }
@@ -163,6 +167,18 @@ impl Store {
         store.ids = ids(def, &store.dictionary().map_err(engine)?);
         store.read_last_commit().map_err(engine)?;
         store.ended = store.extent().and_then(|(_, last)| after(last));
+        Ok(store)
+    }
+
+    /// Opens a database that no station writes, whatever its plant is, to see what is in it.
+    pub(super) fn peek(path: &Path) -> Result<Store, HistoryError> {
+        let db = connect(path, AccessMode::ReadOnly).map_err(engine)?;
+        let store = Store::around(db, path, &Arc::default());
+        let version = store.version().map_err(engine)?;
+        if sql::MIGRATIONS.len() < version as usize {
+            return Err(other_schema(path, version));
+        }
+        store.read_last_commit().map_err(engine)?;
         Ok(store)
     }
 

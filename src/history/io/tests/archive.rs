@@ -10,10 +10,10 @@ use crate::{
     report::ShiftReport,
 };
 
-const HOUR_S: i64 = HOUR / 1_000_000;
+pub(super) const HOUR_S: i64 = HOUR / 1_000_000;
 
 /// A sample every few seconds on average, of three tags, with gaps, bad values and rows of one instant.
-fn rows(hours: i64) -> Vec<Record> {
+pub(super) fn rows(hours: i64) -> Vec<Record> {
     let mut seed = 7u64;
     let mut random = move |below: i64| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -38,14 +38,14 @@ fn rows(hours: i64) -> Vec<Record> {
     rows
 }
 
-fn filled(db: &Path, rows: &[Record]) -> Store {
+pub(super) fn filled(db: &Path, rows: &[Record]) -> Store {
     let store = open(db, 0);
     rows.chunks(500).for_each(|rows| store.append(rows).unwrap());
     store
 }
 
 /// Does all that is due at an hour.
-fn archive_all(store: &Store, hour: i64) -> Vec<Job> {
+pub(super) fn archive_all(store: &Store, hour: i64) -> Vec<Job> {
     let due = || store.archive_due(sec(hour * HOUR_S + 600), Timestamp::MIN).unwrap();
     let work = |job: &Job| store.archive(job, &mut |_| Ok(())).unwrap();
     std::iter::from_fn(|| due().inspect(work)).collect()
@@ -83,7 +83,7 @@ fn report(store: &Store, from: i64, to: i64) -> ShiftReport {
 }
 
 /// Asks both stores the same, and expects the same.
-fn assert_same(archived: &Store, plain: &Store, hours: i64, what: &str) {
+pub(super) fn assert_same(archived: &Store, plain: &Store, hours: i64, what: &str) {
     let tags = [0, 1, 2].map(TagId).to_vec();
     let end = hours * HOUR_S;
     for (from, to, buckets) in [
@@ -139,7 +139,7 @@ fn archived_hours_answer_as_before() {
 }
 
 /// What is stored, however it lies: samples in order, with their quality.
-fn content(store: &Store) -> Vec<(u16, Sample)> {
+pub(super) fn content(store: &Store) -> Vec<(u16, Sample)> {
     let mut all = Vec::new();
     store.each_stored(sec(-1_000), sec(1_000_000), |tag, sample| all.push((tag, sample))).unwrap();
     all.sort_by_key(|(tag, sample)| (*tag, sample.at));

@@ -3,6 +3,7 @@
 
 mod absent;
 mod archive;
+mod backup;
 mod damage;
 mod epochs;
 mod lists;

@@ -1,0 +1,48 @@
+//! The database into a new file, as it is at one instant, while others go on writing it.
+
+use std::path::Path;
+
+use super::{
+    archive::quoted,
+    files,
+    store::{Store, engine},
+};
+use crate::history::HistoryError;
+
+/// The name of the new file in SQL.
+const COPY: &str = "copy_of_history";
+/// The tables that are copied.
+const TABLES: &str =
+    "SELECT table_name FROM duckdb_tables() WHERE database_name = current_database() AND NOT temporary";
+
+impl Store {
+    /// Copies all tables into a new file and compares them, in one transaction. The copy has no free blocks.
+    pub(super) fn copy_database(&self, to: &Path) -> Result<(), HistoryError> {
+        files::remove(to);
+        self.db.execute_batch(&format!("ATTACH {} AS {COPY}", quoted(to))).map_err(engine)?;
+        let compared = self.transaction(|| {
+            let own: String = self.db.query_row("SELECT current_database()", [], |row| row.get(0))?;
+            self.db.execute_batch(&format!("COPY FROM DATABASE \"{own}\" TO {COPY}"))?;
+            let mut tables = self.db.prepare(TABLES)?;
+            let tables = tables.query_map([], |row| row.get::<_, String>(0))?.collect::<duckdb::Result<Vec<_>>>()?;
+            let sum = |table: &str| {
+                let sql = format!("SELECT count(*), sum(hash(row_of))::VARCHAR FROM {table} row_of");
+                self.db.query_row(&sql, [], |row| Ok((row.get::<_, u64>(0)?, row.get::<_, Option<String>>(1)?)))
+            };
+            let mut differing = Vec::new();
+            for table in tables {
+                if sum(&format!("\"{own}\".{table}"))? != sum(&format!("{COPY}.{table}"))? {
+                    differing.push(table);
+                }
+            }
+            Ok(differing)
+        });
+        // The log of the copy goes into its file.
+        let detached = self.db.execute_batch(&format!("DETACH {COPY}")).map_err(engine);
+        match compared.and_then(|differing| detached.map(|()| differing))?.as_slice() {
+            [] if files::has_log(to) => Err(HistoryError::Engine("the copy of the database was not completed".into())),
+            [] => Ok(()),
+            tables => Err(HistoryError::Engine(format!("the copy of the database differs: {}", tables.join(", ")))),
+        }
+    }
+}
