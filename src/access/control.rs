@@ -1,5 +1,6 @@
 //! The access-control state machine: takes the requests of terminals and returns what is permitted. Rights are decided here only.
 
+mod backup;
 mod commands;
 mod login;
 mod audit_entries;
@@ -88,6 +89,8 @@ pub enum Effect {
     Stop,
     /// Reload the plant file; the reply is sent when that is done.
     Reload(u64),
+    /// Write a backup into this folder, then call [`AccessControl::on_backed_up`].
+    Backup(u64, String),
     /// This terminal may not stay.
     HangUp(u32, String),
 }
@@ -118,6 +121,8 @@ pub struct AccessControl {
     next: Option<(Asker, Change)>,
     /// A last login is not saved yet.
     unsaved: bool,
+    /// The entries of backups that are being written.
+    backups: BTreeMap<u64, ActionRecord>,
 }
 
 impl AccessControl {
@@ -263,6 +268,7 @@ impl AccessControl {
                 let new = Some(clean(&sha256).into());
                 self.record_and_reply(asker, "export", &file, new, at)
             }
+            SessionRequest::Backup { folder } => self.begin_backup(asker, folder, at),
             SessionRequest::Stop => {
                 let mut effects = self.record_and_reply(asker, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
@@ -284,12 +290,12 @@ impl AccessControl {
         }
     }
 
-    /// Stopping the station or reloading its plant file needs no login of those who can do so with the means of the operating
-    /// system (its init system, for one), whatever role they have here without a password. Who logged in acts as that user.
+    /// Stopping the station, reloading its plant file or a backup need no login of those who can do so with the means of the
+    /// operating system (its init system, for one), whatever role they have here without a password. Who logged in acts as that user.
     fn could_anyway(&self, terminal: u32, request: &SessionRequest) -> bool {
         let without_login = |session: &&SessionState| (session.who.is_none() || session.trusted) && !session.peer.own;
         let session = self.sessions.get(&terminal).filter(without_login);
-        matches!(request, SessionRequest::Stop | SessionRequest::Reload)
+        matches!(request, SessionRequest::Stop | SessionRequest::Reload | SessionRequest::Backup { .. })
             && session.is_some_and(|session| self.is_host(&session.peer))
     }
 

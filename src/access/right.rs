@@ -19,7 +19,7 @@ pub enum Right {
     Engineer,
     /// Add, change and remove users.
     ManageUsers,
-    /// End the station, or give it another plant file.
+    /// End the station, give it another plant file, or have it write a backup.
     Station,
 }
 
@@ -118,7 +118,7 @@ pub fn needs_for_request(request: &SessionRequest) -> Option<Role> {
         | SessionRequest::DeleteUser { .. }
         | SessionRequest::ResetPassword { .. } => Right::ManageUsers,
         SessionRequest::Exported { .. } => Right::Export,
-        SessionRequest::Stop | SessionRequest::Reload => Right::Station,
+        SessionRequest::Backup { .. } | SessionRequest::Stop | SessionRequest::Reload => Right::Station,
     };
     Some(right.role())
 }
@@ -194,6 +194,7 @@ mod tests {
             SessionRequest::Disable { user: user.clone(), disabled: true },
             SessionRequest::DeleteUser { user: user.clone() },
             SessionRequest::ResetPassword { user: user.clone(), password },
+            SessionRequest::Backup { folder: user.clone() },
             SessionRequest::Stop,
             SessionRequest::Reload,
         ];

@@ -97,6 +97,11 @@ pub enum SessionRequest {
         /// Its SHA-256, hexadecimal.
         sha256: String,
     },
+    /// Write a backup of the history.
+    Backup {
+        /// The folder that it goes to, absolute.
+        folder: String,
+    },
     /// End the station.
     Stop,
     /// Reload the plant file; on error keep the running configuration.

@@ -74,7 +74,8 @@ impl Backup {
             [] => String::new(),
             missing => format!("; missing or damaged in the archive itself: {}", missing.join(", ")),
         };
-        format!("{until}, {} files, {} bytes{missing}", self.files.len(), self.bytes())
+        let mib = self.bytes() as f64 / f64::from(1 << 20);
+        format!("{until}, {} files, {mib:.1} MiB{missing}", self.files.len())
     }
 }
 

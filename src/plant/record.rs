@@ -169,10 +169,19 @@ pub const WRITE_REQUESTED: &str = "write requested";
 
 /// The word on record for a seal over the entries of the audit log.
 pub const SEAL_LOG: &str = "seal audit log";
+/// A backup of the history: permitted, then done or failed.
+pub const BACKUP: &str = "back up history";
+/// A backup took the place of the history.
+pub const RESTORE: &str = "restore history";
+/// Samples came from a file.
+pub const IMPORT: &str = "import samples";
 
 /// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
-pub const NOT_PROCESS_ACTIONS: [&str; 31] = [
+pub const NOT_PROCESS_ACTIONS: [&str; 34] = [
+    BACKUP,
+    RESTORE,
+    IMPORT,
     WRITE_REQUESTED,
     SEAL_LOG,
     "attach",

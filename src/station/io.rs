@@ -10,12 +10,15 @@ use tokio::{
 use crate::{
     access::{
         AccessControl, Peer, Users,
-        io::{audit_log::Opened, own_user, recorder, users, users_beside},
+        io::{
+            audit_log::{self, Opened},
+            own_user, recorder, users, users_beside,
+        },
     },
     bus::io::{clock::Clock, transport::Connector},
     history::{
         HistoryError,
-        io::{QueryRequest, thread as history},
+        io::{BackupRequest, QueryRequest, thread as history},
     },
     plant::{
         Plant, PlantDef,
@@ -113,6 +116,7 @@ fn begin(
     let mut history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
+    let backups = (history.backups.clone(), audit_log::beside(&path));
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
     let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
     let mut audit_queue = AuditQueue::new(&recorder);
@@ -127,7 +131,7 @@ fn begin(
     let past = Some(Past::new(history.restored.take(), from_journal));
     let persistence =
         Persistence { records: Some(records), store, past, audit: Some(audit_queue), sets: Some(sets), observer };
-    let threads = Threads { queries, history: Some(history), audit_writer: Some(recorder.join) };
+    let threads = Threads { queries, backups, history: Some(history), audit_writer: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
 }
 
@@ -153,15 +157,18 @@ pub fn start_transient(
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
+    let (backups, _) = mpsc::channel(1);
     let persistence =
         Persistence { records: None, store, past: None, audit: None, sets: None, observer: Some(observer) };
-    let threads = Threads { queries, history: None, audit_writer: None };
+    let threads = Threads { queries, backups: (backups, PathBuf::new()), history: None, audit_writer: None };
     assemble(def, clock, connectors, plant, None, persistence, threads, None)
 }
 
 /// What runs beside the tasks.
 struct Threads {
     queries: mpsc::Sender<(u32, QueryRequest)>,
+    /// To the history, and the file of the audit log.
+    backups: (mpsc::Sender<BackupRequest>, PathBuf),
     history: Option<history::Handle>,
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
 }
@@ -178,7 +185,7 @@ fn assemble(
     threads: Threads,
     guarded: Option<(AccessControl, PathBuf)>,
 ) -> Station {
-    let Threads { queries, history, audit_writer } = threads;
+    let Threads { queries, backups: (backups, audit_log), history, audit_writer } = threads;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
@@ -217,7 +224,8 @@ fn assemble(
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
-    let outputs = Outputs { commands: commands.clone(), queries, live, audit, lifecycle: lifecycle_sender };
+    let outputs =
+        Outputs { commands: commands.clone(), queries, live, backups, audit_log, audit, lifecycle: lifecycle_sender };
     let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(

@@ -24,7 +24,10 @@ use super::{
 use crate::{
     access::{AccessControl, Durability, Effect, Peer, SessionStatus},
     bus::io::{clock::Clock, live_reads::LiveRequest},
-    history::{Answer, HistoryError, Query, io::QueryRequest},
+    history::{
+        Answer, HistoryError, Query,
+        io::{BackupRequest, QueryRequest},
+    },
     plant::{Snapshot, command::CommandStatus},
 };
 
@@ -66,6 +69,10 @@ pub struct Outputs {
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// Live reads, to each line.
     pub live: Vec<mpsc::Sender<LiveRequest>>,
+    /// Backups, to the history.
+    pub backups: mpsc::Sender<BackupRequest>,
+    /// The file of the audit log.
+    pub audit_log: PathBuf,
     /// To the audit log.
     pub audit: mpsc::Sender<AuditMessage>,
     /// To the owner of the station.
@@ -124,6 +131,8 @@ pub struct SessionServer {
     tickets: BTreeMap<u64, oneshot::Sender<Result<Durability, String>>>,
     /// Reloads whose outcome is awaited, with their tickets.
     reloads: JoinSet<(u64, Result<(), String>)>,
+    /// The same of backups.
+    backups: JoinSet<(u64, Result<String, String>)>,
     last_ticket: u64,
     jobs: BlockingJobs,
     /// Actions that did not reach the audit log, not reported yet.
@@ -140,6 +149,7 @@ impl SessionServer {
             terminals: BTreeMap::new(),
             tickets: BTreeMap::new(),
             reloads: JoinSet::new(),
+            backups: JoinSet::new(),
             last_ticket: 0,
             jobs: BlockingJobs::new(users),
             lost: 0,
@@ -172,6 +182,10 @@ impl SessionServer {
                     self.apply_effects(effects);
                 }
                 Some(Ok((ticket, answer))) = self.reloads.join_next() => self.reply(ticket, answer, Record::Sent),
+                Some(Ok((ticket, done))) = self.backups.join_next() => {
+                    let effects = self.access.on_backed_up(ticket, done, self.clock.now());
+                    self.apply_effects(effects);
+                }
                 Some((terminal, request)) = requests.recv() => self.on_session_message(terminal, request),
                 _ = tick.tick() => {
                     let gone: Vec<u32> =
@@ -298,6 +312,7 @@ impl SessionServer {
                     self.reloads.spawn(async move { (ticket, answer.await.unwrap_or_else(|_| ended())) });
                     self.send_lifecycle(LifecycleRequest::Reload(reply));
                 }
+                Effect::Backup(ticket, folder) => self.back_up(ticket, folder),
                 Effect::HangUp(terminal, why) => {
                     // The audit log holds it, in bounded rate; attempts without end must not fill this one.
                     tracing::debug!(terminal, why, "a terminal was disconnected");
@@ -313,6 +328,17 @@ impl SessionServer {
         for (ticket, answer) in answers {
             self.reply(ticket, answer, record);
         }
+    }
+
+    fn back_up(&mut self, ticket: u64, folder: String) {
+        let (reply, answer) = oneshot::channel();
+        let request = BackupRequest { to: folder.into(), audit_log: self.outputs.audit_log.clone(), reply };
+        // Refused by dropping the reply.
+        let _ = self.outputs.backups.try_send(request);
+        self.backups.spawn(async move {
+            let done = answer.await.unwrap_or(Err(HistoryError::NotOpen));
+            (ticket, done.map(|backup| backup.summary()).map_err(|error| error.to_string()))
+        });
     }
 
     fn reply(&mut self, ticket: u64, answer: Result<(), String>, record: Record) {

@@ -49,6 +49,7 @@ fn no_argument_acts_on_the_terminal_by_any_command() {
         "profiles",
         "report",
         "export",
+        "history",
         "alarms",
         "decode",
         "scan",

@@ -239,6 +239,7 @@ fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
         SessionRequest::DeleteUser { .. } => ("delete user", SUPERVISOR),
         SessionRequest::ResetPassword { .. } => ("reset password", SUPERVISOR),
         SessionRequest::Exported { .. } => ("export", [LOG_IN, NOT_VIEWER, DONE, DONE, LOCKED, CHANGE]),
+        SessionRequest::Backup { .. } => ("back up history", HOST),
         SessionRequest::Stop => ("stop station", HOST),
         SessionRequest::Reload => ("reload", HOST),
     }
@@ -262,6 +263,7 @@ fn requests() -> Vec<SessionRequest> {
         SessionRequest::ResetPassword { user: user("paul"), password: other() },
         SessionRequest::DeleteUser { user: user("paul") },
         SessionRequest::Exported { file: user("shift.csv"), sha256: user("00") },
+        SessionRequest::Backup { folder: user(crate::support::sockets().join("backup").to_str().unwrap()) },
         SessionRequest::Reload,
         SessionRequest::Stop,
     ]

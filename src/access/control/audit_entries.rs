@@ -10,7 +10,11 @@ use super::{
 };
 use crate::{
     access::{SessionRequest, user},
-    plant::{record::ActionRecord, time::elapsed, visible::is_control_or_bidi},
+    plant::{
+        record::{ActionRecord, BACKUP},
+        time::elapsed,
+        visible::is_control_or_bidi,
+    },
 };
 
 /// Most characters of a text that a user can put into the audit log.
@@ -109,6 +113,7 @@ pub(super) fn words(request: &SessionRequest) -> (&'static str, Arc<str>) {
         SessionRequest::DeleteUser { user } => ("delete user", name(user)),
         SessionRequest::ResetPassword { user, .. } => ("reset password", name(user)),
         SessionRequest::Exported { file, .. } => ("export", clean(file).into()),
+        SessionRequest::Backup { folder } => (BACKUP, clean(folder).into()),
         SessionRequest::Stop => ("stop station", "".into()),
         SessionRequest::Reload => ("reload", "".into()),
     }

@@ -63,6 +63,7 @@ impl AccessControl {
             | SessionRequest::Unlock(_)
             | SessionRequest::Active
             | SessionRequest::Exported { .. }
+            | SessionRequest::Backup { .. }
             | SessionRequest::Stop
             | SessionRequest::Reload => return Vec::new(),
         };

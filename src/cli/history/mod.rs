@@ -1,12 +1,19 @@
 //! `sightglass history`: what is stored, and what can be done with it as a whole.
 
+mod backup;
 mod overview;
+mod restore;
 mod verify;
 
 use std::sync::Arc;
 
+use jiff::Timestamp;
+
 use super::{CliError, StationArgs, client, load, source::Source};
-use crate::plant::PlantDef;
+use crate::{
+    access::io::{audit_log::AuditLog, own_user},
+    plant::{PlantDef, record::ActionRecord},
+};
 
 /// Arguments of `history`.
 #[derive(Debug, clap::Args)]
@@ -30,6 +37,10 @@ pub struct Args {
 enum Command {
     /// Read every file of the archive and compare it with the manifest: exit code 1 if one is missing or was changed
     Verify(verify::Args),
+    /// Write a backup of database, archive and audit log, while the station runs or without it
+    Backup(backup::Args),
+    /// Put a backup in the place of the history, which is set aside; not while the station runs
+    Restore(restore::Args),
 }
 
 /// Which history.
@@ -58,8 +69,17 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let Args { command, plant, json, login, station } = args;
     match command {
         Some(Command::Verify(args)) => verify::main(&args),
+        Some(Command::Backup(args)) => backup::main(&args),
+        Some(Command::Restore(args)) => restore::main(&args),
         None => overview::main(&Place { plant: plant.unwrap_or_default(), login, station }, json),
     }
+}
+
+/// Puts what was done to a history without its station on record.
+fn record(log: &mut AuditLog, action: &str, target: &str, outcome: &str, at: Timestamp) -> Result<(), CliError> {
+    let entry = ActionRecord::new(at, own_user(), action, target, outcome);
+    let entry = ActionRecord { from: "command line".into(), ..entry };
+    log.append(&mut [entry]).map_err(CliError::io("the audit log cannot be written"))
 }
 
 /// `12.3 MiB`.

@@ -1,12 +1,19 @@
 //! When the archive is worked on: one job at a time, on a connection of its own, while the writer goes on.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
 
 use duckdb::InterruptHandle;
 use jiff::Timestamp;
 use tokio::task::{JoinHandle, spawn_blocking};
 
 use super::{
+    BackupRequest,
     archive::Job,
     reader::stop,
     samples::is_damage,
@@ -25,6 +32,8 @@ pub enum Looked {
     Did(Job),
     /// Nothing was due; this is missing of the archive.
     Idle(Option<String>),
+    /// A backup was written, or not: who asked for it knows.
+    BackedUp,
 }
 
 type Done = Result<Looked, (Option<Job>, HistoryError)>;
@@ -32,6 +41,10 @@ type Done = Result<Looked, (Option<Job>, HistoryError)>;
 /// Works on the archive of one store after the other.
 pub struct Archiver {
     running: Option<(JoinHandle<Done>, Arc<InterruptHandle>)>,
+    /// A backup that begins next: the archive is not worked on while it is copied.
+    backup: Option<BackupRequest>,
+    /// A backup that is being written ends.
+    stopped: Arc<AtomicBool>,
     /// Commits until the next look: a start is not the time for it.
     wait: u32,
     commit_every: Duration,
@@ -46,6 +59,8 @@ impl Archiver {
     pub fn new(commit_every: Duration) -> Archiver {
         Archiver {
             running: None,
+            backup: None,
+            stopped: Arc::default(),
             wait: commits(LOOK_EVERY, commit_every),
             commit_every,
             after: Timestamp::MIN,
@@ -56,7 +71,13 @@ impl Archiver {
     /// Begins the next job if it is time, on a connection of its own to the store.
     pub fn begin(&mut self, store: Option<&Store>, now: Timestamp) {
         self.wait = self.wait.saturating_sub(1);
-        if self.running.is_some() || self.wait > 0 {
+        if self.running.is_some() {
+            return;
+        }
+        if let Some(request) = self.backup.take() {
+            return self.begin_backup(store, request, now);
+        }
+        if self.wait > 0 {
             return;
         }
         let Some(Ok(store)) = store.map(Store::try_clone) else { return };
@@ -74,6 +95,37 @@ impl Archiver {
         self.running = Some((spawn_blocking(work), interrupt));
     }
 
+    /// Has a backup written with the next commit; one at a time.
+    pub fn back_up(&mut self, request: BackupRequest) {
+        if let Some(earlier) = self.backup.replace(request) {
+            let why = "another backup was asked for before this one began".to_owned();
+            // Who has left needs no answer.
+            let _ = earlier.reply.send(Err(HistoryError::Refused(why)));
+        }
+    }
+
+    fn begin_backup(&mut self, store: Option<&Store>, request: BackupRequest, now: Timestamp) {
+        let BackupRequest { to, audit_log, reply } = request;
+        let store = match store.ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
+            Ok(store) => store,
+            // Who has left needs no answer.
+            Err(error) => return drop(reply.send(Err(error))),
+        };
+        let (interrupt, stopped) = (store.interrupt_handle(), Arc::clone(&self.stopped));
+        let work = move || {
+            let mut step = |_| if stopped.load(Ordering::Relaxed) { Err(HistoryError::NotOpen) } else { Ok(()) };
+            let written = store.back_up(&to, Some(&audit_log), now, &mut step);
+            match &written {
+                Ok(backup) => tracing::info!(to = %to.display(), what = backup.summary(), "backed up"),
+                Err(error) => tracing::error!(?error, to = %to.display(), "not backed up"),
+            }
+            // Who has left needs no answer.
+            let _ = reply.send(written);
+            Ok(Looked::BackedUp)
+        };
+        self.running = Some((spawn_blocking(work), interrupt));
+    }
+
     /// Waits for the end of a look, for ever without one. Returns what came of it, or why the archive stands still.
     pub async fn ended(&mut self) -> Result<Looked, HistoryError> {
         let Some((work, _)) = &mut self.running else { return std::future::pending().await };
@@ -85,6 +137,7 @@ impl Archiver {
                 (Duration::ZERO, Ok(Looked::Did(job)))
             }
             Ok(Ok(Looked::Idle(missing))) => (LOOK_EVERY, Ok(Looked::Idle(missing))),
+            Ok(Ok(Looked::BackedUp)) => (Duration::ZERO, Ok(Looked::BackedUp)),
             Ok(Err((Some(Job::Hour(hour)), error))) if is_damage(&error) => {
                 self.after = instant(hour + HOUR).unwrap_or(Timestamp::MAX);
                 self.skipped = Some(error.clone());
@@ -105,6 +158,7 @@ impl Archiver {
 
     /// Ends what is running: a station that stops does not wait for it, and the next one does it again.
     pub async fn stop(mut self) {
+        self.stopped.store(true, Ordering::Relaxed);
         if let Some((work, interrupt)) = &mut self.running {
             stop(work, || interrupt.interrupt()).await;
         }

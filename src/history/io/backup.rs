@@ -288,10 +288,16 @@ fn sweep(folder: &Path, files: &[BackupFile]) {
     remove_empty_folders(folder);
 }
 
-/// The name of a file that is not of a backup.
+/// The name of a file or folder that is not of a backup.
 fn foreign(folder: &Path) -> Option<String> {
-    let names = all_files(folder).into_iter().filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
-    names.into_iter().find(|name| !is_of_backup(name))
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let is_foreign = |path: &PathBuf| match path.is_dir() {
+        true => *path != folder.join(ARCHIVE),
+        false => !is_of_backup(&name(path)),
+    };
+    // What else lies in the folder may be a whole disk: it is not searched.
+    let archive = || all_files(&folder.join(ARCHIVE)).into_iter().find(|path| !is_of_backup(&name(path)));
+    entries(folder).into_iter().find(is_foreign).or_else(archive).map(|path| name(&path))
 }
 
 /// What the disk says of a file of the backup.

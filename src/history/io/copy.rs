@@ -19,7 +19,7 @@ impl Store {
     /// Copies all tables into a new file and compares them, in one transaction. The copy has no free blocks.
     pub(super) fn copy_database(&self, to: &Path) -> Result<(), HistoryError> {
         files::remove(to);
-        self.db.execute_batch(&format!("ATTACH {} AS {COPY}", quoted(to))).map_err(engine)?;
+        self.db.execute_batch(&format!("ATTACH {} AS {COPY} (READ_WRITE)", quoted(to))).map_err(engine)?;
         let compared = self.transaction(|| {
             let own: String = self.db.query_row("SELECT current_database()", [], |row| row.get(0))?;
             self.db.execute_batch(&format!("COPY FROM DATABASE \"{own}\" TO {COPY}"))?;

@@ -1,8 +1,10 @@
 //! The edge of the history: DuckDB, its files, the thread that writes and the one that answers queries.
 
+use std::path::PathBuf;
+
 use tokio::sync::oneshot;
 
-use super::{Answer, HistoryError, Query};
+use super::{Answer, HistoryError, Query, backup::Backup};
 
 /// A query on its way to the history, with the place for its answer.
 /// A dropped answer means: the store has gone.
@@ -12,6 +14,17 @@ pub struct QueryRequest {
     pub query: Query,
     /// Where the answer goes.
     pub reply: oneshot::Sender<Result<Answer, HistoryError>>,
+}
+
+/// A backup that is asked of a running station.
+#[derive(Debug)]
+pub struct BackupRequest {
+    /// The folder that it goes to.
+    pub to: PathBuf,
+    /// The audit log, which is part of it.
+    pub audit_log: PathBuf,
+    /// Where the answer goes.
+    pub reply: oneshot::Sender<Result<Backup, HistoryError>>,
 }
 
 pub mod alarm_file;

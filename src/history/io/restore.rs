@@ -141,7 +141,7 @@ pub fn commit(db: &Path) -> Result<(), HistoryError> {
     renamed.map_err(|error| failed(&ready, &error))
 }
 
-/// Puts in place what was restored, also after an interruption; nobody else may have the history. Returns where the history
+/// Puts in place what was restored, also after an interruption; no other process may have the history. Returns where the history
 /// before it is; `None` where nothing was to be done.
 pub fn finish(db: &Path) -> Result<Option<PathBuf>, HistoryError> {
     finish_in_steps(db, &mut |_| Ok(()))

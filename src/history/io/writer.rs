@@ -251,6 +251,7 @@ impl Writer {
     pub fn archived(&mut self, looked: Result<Looked, HistoryError>) {
         match looked {
             Ok(Looked::Did(_)) => self.unarchived = None,
+            Ok(Looked::BackedUp) => {}
             Ok(Looked::Idle(missing)) => (self.missing, self.unarchived) = (missing, None),
             Err(error) => self.unarchived = Some(format!("it is not archived: {}", error.words())),
         }

@@ -85,6 +85,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("src/cli/decode.rs", &["files", "terminal"]),
     ("src/cli/demo.rs", &["tasks", "files", "clock", "process"]),
     ("src/cli/drill.rs", &["channels", "tasks", "process"]),
+    ("src/cli/history/backup.rs", &["clock"]),
+    ("src/cli/history/restore.rs", &["files", "clock"]),
     ("src/cli/init.rs", &["clock", "process"]),
     ("src/cli/log.rs", &["files", "terminal", "process"]),
     ("src/cli/menu.rs", &["files", "terminal", "network"]),

