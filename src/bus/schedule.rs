@@ -16,7 +16,7 @@ mod model;
 #[cfg(test)]
 mod tests;
 
-pub use budget::{Budget, WRITE_SHARE};
+pub use budget::{Budget, LIVE_SHARE, WRITE_SHARE};
 pub use device::FAILURES_MAX;
 pub use overload::{Demand, FACTOR_MAX, Load};
 pub use poll::{PollInfo, Served};

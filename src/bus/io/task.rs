@@ -27,7 +27,7 @@ use crate::{
         diagnostics::Job,
         line_stats::{LineStats, Plan},
         plan::{self, Block, RangeBisection, UnreadableRanges},
-        schedule::{Budget, Load, Next, Schedule, WRITE_SHARE},
+        schedule::{Budget, LIVE_SHARE, Load, Next, Schedule, WRITE_SHARE},
     },
     plant::{
         PlantDef,
@@ -62,6 +62,7 @@ pub async fn run(
         unreadable,
         bisection: RangeBisection::default(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
+        live_budget: Budget::new(LIVE_SHARE, clock.now()),
         unconfirmed: Vec::new(),
         under_way: Vec::new(),
         memory: Memory::new(def.line(line), clock).expect(&blocks),
@@ -131,6 +132,8 @@ struct Task<'a> {
     bisection: RangeBisection,
     /// The share of the line's time that writes may take from polls.
     budget: Budget,
+    /// The same of live reads.
+    live_budget: Budget,
     /// Counters and outstanding replies, from one opening to the next.
     memory: Memory,
     /// Writes whose fate is not known yet.
@@ -253,12 +256,17 @@ impl Task<'_> {
 
     /// Nothing is due: drops unsolicited bytes until something is.
     async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Result<(), LinkExit> {
+        let (clock, live_from) = (self.clock, self.live_from());
+        let live = async {
+            clock.sleep_until(live_from).await;
+            self.live.due(clock).await;
+        };
         let request = tokio::select! {
             // What comes at one moment is taken in this order, so that two runs of a drill give the same result.
             biased;
             _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
             request = self.requests.recv() => request?,
-            () = self.live.due(self.clock) => return Ok(()),
+            () = live => return Ok(()),
             ended = link.listen() => return ended.map_err(LinkExit::from),
             () = self.clock.sleep_until(until) => return Ok(()),
         };

@@ -8,6 +8,8 @@ use jiff::Timestamp;
 
 /// Share of the line's time for writes, while polls are due.
 pub const WRITE_SHARE: f64 = 0.2;
+/// Share of the line's time for live reads, beside polls.
+pub const LIVE_SHARE: f64 = 0.2;
 /// Share of the line's time for requests to devices that do not answer, all of them together.
 pub const PROBE_SHARE: f64 = 0.05;
 /// What may be spent at once after a quiet time: some sixteen writes with their reading back at 9600 baud, or one timeout.

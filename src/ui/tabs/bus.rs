@@ -1,4 +1,5 @@
-//! Tab 6: the line explains itself: how it does, its read plan, its frames, and tests of it. Four pages.
+//! Tab 6: the line explains itself: how it does, its read plan, its frames,
+//! tests of it, and the registers of its devices, live. Five pages.
 
 mod frames;
 mod keys;
@@ -19,6 +20,7 @@ use std::path::PathBuf;
 pub use window::Window;
 
 use self::keys::{Action, table};
+use super::registers::Registers;
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{event::LineState, line_minute::LineMinute, line_report::LineReport, snapshot::LineStatus},
@@ -28,6 +30,7 @@ use crate::{
         widgets::line_trend::{self, line_trend},
     },
 };
+use registers::below;
 use test::Tried;
 
 /// The day of a line grows by the minute.
@@ -47,10 +50,17 @@ pub enum Page {
     Frames,
     /// Tests of the line.
     Test,
+    /// The registers of a device, live; on a bench a tab of its own.
+    Registers,
 }
 
 impl Page {
-    const ALL: [Page; 4] = [Page::Line, Page::Plan, Page::Frames, Page::Test];
+    const ALL: [Page; 5] = [Page::Line, Page::Plan, Page::Frames, Page::Test, Page::Registers];
+
+    /// Those that there are here.
+    fn offered(cx: &ViewContext) -> &'static [Page] {
+        if cx.def().is_bench() { &Page::ALL[..4] } else { &Page::ALL }
+    }
 
     fn title(self) -> &'static str {
         match self {
@@ -58,6 +68,7 @@ impl Page {
             Page::Plan => t!("Plan"),
             Page::Frames => t!("Frames"),
             Page::Test => t!("Test"),
+            Page::Registers => t!("Registers"),
         }
     }
 }
@@ -75,11 +86,12 @@ pub struct Bus {
     pub(super) test: test::Bench,
     /// How the line did over the last day, and the query for it.
     minutes: Answered<Vec<LineMinute>>,
-    asked: u32,
+    /// The last page, which counts the queries of all.
+    registers: Registers,
 }
 
 impl TabView for Bus {
-    fn new(_snapshot: &Snapshot) -> Bus {
+    fn new(snapshot: &Snapshot) -> Bus {
         Bus {
             line: LineId(0),
             page: Page::Line,
@@ -88,19 +100,23 @@ impl TabView for Bus {
             frames: frames::Ring::default(),
             test: test::Bench::default(),
             minutes: Answered::default(),
-            asked: 0,
+            registers: Registers::within(snapshot, Tab::Bus),
         }
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let action = find(&table(self.page), event);
+        if self.page == Page::Registers && self.registers.takes(cx, event) {
+            return self.registers.on_key(&below(cx), event);
+        }
+        let action = find(&table(cx, self.page), event);
         let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
         self.frames.dismiss();
         match action {
             Action::Turn(by) => {
-                self.page = Page::ALL[around(self.page as usize, by, Page::ALL.len())];
+                let pages = Page::offered(cx);
+                self.show(cx, &at, pages[around(self.page as usize, by, pages.len())]);
             }
-            Action::Show(page) => self.page = page,
+            Action::Show(page) => self.show(cx, &at, page),
             Action::NextLine => self.choose_line(cx, 1),
             Action::Move(motion) => self.scroll(cx, &at, motion),
             Action::Open => return self.open(cx, &at),
@@ -122,7 +138,13 @@ impl TabView for Bus {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut hints = hints(&table(self.page));
+        if self.page == Page::Registers && self.registers.has_graph() {
+            return self.registers.hints(&below(cx));
+        }
+        let mut hints = hints(&table(cx, self.page));
+        if self.page == Page::Registers {
+            hints.extend(self.registers.hints(&below(cx)));
+        }
         if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
             for hint in hints.iter_mut().filter(|hint| hint.label == t!("stop")) {
                 hint.label.clear();
@@ -136,6 +158,12 @@ impl TabView for Bus {
 
     fn back(&mut self, cx: &ViewContext) -> bool {
         self.frames.dismiss();
+        if self.page == Page::Registers {
+            if !self.registers.back(cx) {
+                self.page = Page::Line;
+            }
+            return true;
+        }
         Place::of(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
     }
 
@@ -143,7 +171,7 @@ impl TabView for Bus {
         match (self.page, Place::of(cx, self.line)) {
             (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
             (Page::Frames, Some(_)) => self.frames.drawn_rows(),
-            (Page::Line | Page::Plan | Page::Frames | Page::Test, _) => Rows::default(),
+            (Page::Line | Page::Plan | Page::Frames | Page::Test | Page::Registers, _) => Rows::default(),
         }
     }
 
@@ -151,18 +179,25 @@ impl TabView for Bus {
         if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
-        if self.page != Page::Line {
-            return Vec::new();
+        match self.page {
+            Page::Plan | Page::Frames | Page::Test => return Vec::new(),
+            Page::Registers => return self.registers.on_snapshot(&below(cx)),
+            Page::Line => {}
         }
-        let (number, query) = ((Tab::Bus, &mut self.asked), line_trend::query(self.line, cx.now));
+        let (number, query) = ((Tab::Bus, &mut self.registers.number), line_trend::query(self.line, cx.now));
         self.minutes.query.ask(cx, number, ASK_EVERY, PATIENCE, query).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.minutes.query.awaits(number)
+        self.minutes.query.awaits(number) || self.registers.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        if self.registers.awaits(number) {
+            let next = self.registers.on_answer(&below(cx), number, answer);
+            // Nothing is read where nothing is seen; the page asks when it is shown.
+            return if self.page == Page::Registers { next } else { self.registers.rest() };
+        }
         self.minutes.on_answer(cx, number, &answer);
         Vec::new()
     }
@@ -171,7 +206,10 @@ impl TabView for Bus {
         self.frames.on_request_done(answer)
     }
 
-    fn on_text(&mut self, _cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+    fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        if self.page == Page::Registers {
+            return self.registers.on_text(&below(cx), text);
+        }
         self.frames.set_filter(text).map(|()| Vec::new())
     }
 
@@ -198,12 +236,17 @@ impl TabView for Bus {
             Page::Plan => self.plan.view(cx, &at, &mut page),
             Page::Frames => self.frames.view(cx, &at, &mut page),
             Page::Test => self.test.view(cx, &at, &mut page),
+            Page::Registers => {
+                let cx = below(cx);
+                self.registers.view(&cx, frame, cx.area);
+            }
         }
     }
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        Page::ALL.iter().map(|page| (page.title(), crate::ui::keys::chords_of(&table(*page)))).collect()
+        let chords = |page: &Page| (page.title(), keys::chords(*page));
+        Page::ALL.iter().map(chords).collect()
     }
 }
 
@@ -231,6 +274,9 @@ impl Bus {
         self.frames.forget();
         self.test.first = None;
         self.minutes = Answered::default();
+        if let Some(at) = Place::of(cx, self.line) {
+            self.show(cx, &at, self.page);
+        }
     }
 
     fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion) {
@@ -241,6 +287,8 @@ impl Bus {
             (Page::Plan, _) => self.plan.scroll(at, motion, room),
             (Page::Frames, _) => self.frames.scroll(cx, at, motion, room),
             (Page::Test, _) => self.test.scroll(cx, at, motion),
+            // It scrolls by its own keys.
+            (Page::Registers, _) => {}
         }
     }
 
@@ -250,14 +298,15 @@ impl Bus {
             Page::Plan => self.plan.open(at).into_iter().collect(),
             Page::Frames => self.frames.open(at).into_iter().collect(),
             Page::Test => self.test.open(cx, at, self.test.selected()),
+            Page::Registers => Vec::new(),
         }
     }
 
     /// The pages, and the line with its state.
     fn heading(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
         let mut x = 1;
-        for page in Page::ALL {
-            let shown = page == self.page;
+        for page in Page::offered(cx) {
+            let shown = *page == self.page;
             let text = if shown { format!("‹{}›", page.title()) } else { format!(" {} ", page.title()) };
             x = canvas.text(x, 0, &text, if shown { cx.theme.focus() } else { cx.theme.dim() });
         }

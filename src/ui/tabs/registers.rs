@@ -1,5 +1,6 @@
 //! The registers of a unit, live: every table from any address, each word as all that it may mean.
 //!
+//! It is the tab of a bench, and a page of the tab Bus in a plant, where it only reads.
 //! The tab asks the line for what is on the screen; each answer brings the next question, due one period later.
 
 mod advice;
@@ -11,6 +12,7 @@ mod layout;
 mod likely;
 mod list;
 mod names;
+mod page;
 mod recognise;
 mod save;
 mod unit;
@@ -24,6 +26,8 @@ mod tests;
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+#[cfg(test)]
+pub use self::page::chords_of_page;
 pub use self::watch::start::{Start, parse_all as parse_watched};
 use self::{
     cells::Cells,
@@ -33,6 +37,7 @@ use self::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
+    access::right::needs_for_question,
     plant::{
         live::{AddressSpan, LiveRead, LiveReading, ReplyTimes, TABLES},
         tag::{ByteOrder, Table},
@@ -41,6 +46,7 @@ use crate::{
     ui::{
         Effect,
         keys::{find, hints},
+        rights,
     },
 };
 
@@ -60,6 +66,8 @@ enum Base {
 /// State of this tab.
 #[derive(Debug)]
 pub struct Registers {
+    /// Where it is shown: what it asks is answered there.
+    tab: Tab,
     line: LineId,
     unit: u8,
     table: Table,
@@ -81,7 +89,8 @@ pub struct Registers {
     said: Option<UiAction>,
     /// Number and steady time of the read on its way, and what it reads.
     on_way: Option<(u32, Timestamp, AddressSpan)>,
-    number: u32,
+    /// Of the last query of the tab.
+    pub(super) number: u32,
     relearn: bool,
     last: Option<LiveReading>,
     replies: ReplyTimes,
@@ -113,6 +122,7 @@ impl TabView for Registers {
     fn new(snapshot: &Snapshot) -> Registers {
         let device = snapshot.def.devices.first();
         Registers {
+            tab: Tab::Registers,
             line: device.map_or(LineId(0), |device| device.line),
             unit: device.map_or(1, |device| device.unit),
             table: Table::Holding,
@@ -149,12 +159,12 @@ impl TabView for Registers {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         if self.watch.has_graph() {
-            return match find(&keys::log(), event) {
+            return match find(&keys::log(cx), event) {
                 Some(_) if !self.watch.is_shown_log() => self.toggle_log(cx),
                 Some(_) | None => self.graph_key(cx, event),
             };
         }
-        let Some(action) = find(&table(), event) else { return Vec::new() };
+        let Some(action) = find(&table(cx), event) else { return Vec::new() };
         match action {
             Action::Move(motion) => self.scroll(cx, motion),
             Action::Table(by) => {
@@ -205,15 +215,15 @@ impl TabView for Registers {
         self.read_now(cx)
     }
 
-    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         if self.watch.is_shown_log() {
             return hints(&watch::graph::keys());
         }
         if self.watch.has_graph() {
             let back = Hint::new("Esc", t!("back"), t!("back to the registers"));
-            return hints(&watch::graph::keys()).into_iter().chain(hints(&keys::log())).chain([back]).collect();
+            return hints(&watch::graph::keys()).into_iter().chain(hints(&keys::log(cx))).chain([back]).collect();
         }
-        hints(&table())
+        hints(&table(cx))
     }
 
     fn back(&mut self, _cx: &ViewContext) -> bool {
@@ -330,8 +340,10 @@ impl TabView for Registers {
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
         let graph = crate::ui::keys::chords_of(&watch::graph::keys()).into_iter();
-        let graph = graph.chain(crate::ui::keys::chords_of(&keys::log())).collect();
-        vec![("registers", crate::ui::keys::chords_of(&table())), ("graph", graph)]
+        let log = keys::KEYS.iter().copied().filter(|key| key.action == Action::Log).collect::<Vec<_>>();
+        let graph = graph.chain(crate::ui::keys::chords_of(&log)).collect();
+        let all = [&motions!("", Action::Move), keys::KEYS].concat();
+        vec![("registers", crate::ui::keys::chords_of(&all)), ("graph", graph)]
     }
 }
 
@@ -357,10 +369,14 @@ impl Registers {
         let span = self.span(cx);
         let relearn = std::mem::take(&mut self.relearn);
         let spans = std::iter::once(span).chain(self.watched_spans(span)).collect();
-        let read = LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn };
+        let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
+        if let Some(why) = rights::lacks(cx, needs_for_question(&query)) {
+            self.trouble = Some(why);
+            return Vec::new();
+        }
         self.number = self.number.wrapping_add(1);
         self.on_way = Some((self.number, cx.steady(), span));
-        vec![UiAction::query(Tab::Registers, self.number, Query::Registers(read))]
+        vec![UiAction::query(self.tab, self.number, query)]
     }
 }
 

@@ -1,5 +1,7 @@
 //! Live reads: one request a turn, when the line has nothing else to do or polls have had their share.
 
+use jiff::Timestamp;
+
 use super::{
     LinkExit, Task,
     poll::{Answer, read_in_sync},
@@ -15,13 +17,21 @@ use crate::{
         def::DeviceId,
         live::AddressSpan,
         tag::{Poll, PollClass},
+        time::elapsed,
     },
 };
 
 impl Task<'_> {
     pub(super) fn is_turn_of_live_read(&mut self, next: Next) -> bool {
         let idle = !matches!(next, Next::Run(_));
-        (idle || POLLS_BETWEEN <= self.polls_since_step) && self.live.begin(self.clock)
+        let share = self.live_from() <= self.clock.now();
+        share && (idle || POLLS_BETWEEN <= self.polls_since_step) && self.live.begin(self.clock)
+    }
+
+    /// From when on a live read may have the line: a request to a silent unit holds up the polls that become due meanwhile,
+    /// so it has its share also of idle time, unless there are no polls.
+    pub(super) fn live_from(&self) -> Timestamp {
+        if self.blocks.is_empty() { Timestamp::MIN } else { self.live_budget.allows_from() }
     }
 
     /// One request of the live read that is due, and its answer after the last.
@@ -32,8 +42,10 @@ impl Task<'_> {
             let unit = request.read.unit;
             let own = self.def.devices.iter().find(|device| device.line == self.line && device.unit == unit);
             let block = block_of(own.map_or(DeviceId(0), |device| device.id), unit, span);
-            let mut cured = None;
+            let (mut cured, started) = (None, self.clock.now());
             let read = self.requests.unless_stopped(read_in_sync(&self.blocks, link, &block, &mut cured)).await;
+            let ended = self.clock.now();
+            self.live_budget.spent(elapsed(started, ended), ended);
             let words = match read {
                 Some(Ok(Answer::Words(words))) => Ok(words),
                 Some(Ok(Answer::Bits(bits))) => Ok(bits.into_iter().map(u16::from).collect()),

@@ -105,3 +105,26 @@ async fn a_late_answer_is_never_taken_for_a_later_read() {
     }
     assert_eq!(words(&ask(&mut line, read(4_300, 2)).await), [4_300, 4_301], "in sync again");
 }
+
+#[tokio::test(start_paused = true)]
+async fn reads_of_a_silent_unit_leave_the_polls_their_time() {
+    for mode in Mode::ALL {
+        let mut line = line(plant(mode));
+        line.plug(mode, |_, message| if message[0] == 77 { SlaveAction::Silent } else { SlaveAction::Answer });
+        let end = tokio::time::Instant::now() + 60_000 * MS;
+        let mut polled = 0;
+        while tokio::time::Instant::now() < end {
+            let (reply, mut answer) = oneshot::channel();
+            let read = LiveRead { unit: 77, ..read(0, 10) };
+            line.live.send(LiveRequest { read, reply }).await.expect("the line runs");
+            loop {
+                tokio::select! {
+                    _ = &mut answer => break,
+                    event = line.events.recv() => polled += u32::from(matches!(event, Some(Event::Read { .. }))),
+                }
+            }
+        }
+        // Two units with three blocks a second each: 360.
+        assert!(300 <= polled, "{mode:?}: {polled}");
+    }
+}

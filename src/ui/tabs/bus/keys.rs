@@ -64,7 +64,6 @@ const TEST_KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "start", "start the selected test", Action::Open).needs(Role::Technician),
     Key::new(char('t'), "", "enter bytes and send them", Action::Try(Tried::Bytes)),
     Key::new(char('f'), "", "build a request from its fields", Action::Try(Tried::Request)),
-    Key::new(char('b'), "", "browse registers", Action::Try(Tried::Registers)),
     Key::new(char('l'), "", "loopback", Action::Try(Tried::Loopback)),
     Key::new(char('i'), "", "identify a device", Action::Try(Tried::Identify)),
     Key::new(char('s'), "", "scan for units", Action::Try(Tried::Scan)),
@@ -72,13 +71,36 @@ const TEST_KEYS: &[Key<Action>] = &[
     Key::new(char('x'), "stop", "stop the running test", Action::Stop).needs(Role::Technician),
 ];
 
+/// The key of the last page, which a bench does not have.
+const REGISTERS_KEY: Key<Action> =
+    Key::new(char('R'), "", "page Registers: those of the device, live", Action::Show(Page::Registers));
+
+/// The keys of a page here.
+pub(super) fn table(cx: &ViewContext, page: Page) -> Vec<Key<Action>> {
+    let mut keys = all(page);
+    keys.retain(|key| key.action != REGISTERS_KEY.action || Page::offered(cx).contains(&Page::Registers));
+    keys
+}
+
+/// The chords of a page, for the test that no key means two things.
+#[cfg(test)]
+pub(super) fn chords(page: Page) -> Vec<crate::ui::keys::Chord> {
+    let chords = crate::ui::keys::chords_of(&all(page)).into_iter();
+    if page != Page::Registers {
+        return chords.collect();
+    }
+    chords.chain(super::super::registers::chords_of_page()).collect()
+}
+
 /// The keys of a page: those of every page first.
-pub(super) fn table(page: Page) -> Vec<Key<Action>> {
+fn all(page: Page) -> Vec<Key<Action>> {
     let (moves, own) = match page {
         Page::Line => (motions!("scroll", Action::Move), LINE_KEYS),
         Page::Plan => (motions!("select", Action::Move), PLAN_KEYS),
         Page::Frames => (motions!("select", Action::Move), FRAMES_KEYS),
         Page::Test => (motions!("select", Action::Move), TEST_KEYS),
+        // Its other keys are those of the registers: the arrows choose the table.
+        Page::Registers => return [&KEYS[2..], &[REGISTERS_KEY]].concat(),
     };
-    [KEYS, &moves, own].concat()
+    [KEYS, &[REGISTERS_KEY], &moves, own].concat()
 }

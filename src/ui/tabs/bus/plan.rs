@@ -12,7 +12,7 @@ use crate::{
     plant::{
         admission::Verdict,
         line_report::{LineReport, PollReport},
-        tag::Poll,
+        tag::{Poll, Table},
     },
 };
 
@@ -35,6 +35,11 @@ impl Plan {
     pub fn drawn_rows(&self, at: &Place) -> Rows {
         let polls = at.report.map_or(&[][..], |report| &report.polls);
         Rows::of(polls.iter().map(|poll| &poll.tags), self.selected)
+    }
+
+    /// Device, table and first address of the selected block.
+    pub fn place(&self, at: &Place) -> Option<(DeviceId, Table, u16)> {
+        at.report?.polls.get(self.selected).map(|poll| (poll.device, poll.table, poll.address))
     }
 
     /// The tags of the selected block.

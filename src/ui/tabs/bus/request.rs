@@ -75,10 +75,6 @@ impl Form {
                 let function = choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec());
                 vec![unit, function, text(t!("address"), "40001"), text(t!("count"), "1")]
             }
-            Tried::Registers => {
-                let tables = TABLES.map(|table| names::function(table.read_fc()).unwrap_or_default().to_owned());
-                vec![unit, choice(t!("table"), tables.to_vec()), text(t!("address"), "40001"), text(t!("count"), "16")]
-            }
             Tried::Loopback => vec![unit, text(t!("times"), "10")],
             Tried::Identify => vec![unit],
             Tried::Scan => {
@@ -156,11 +152,7 @@ impl Form {
             return Err(t!("the text was cut; Ctrl-U clears a field").to_owned());
         }
         let diagnostic = self.build(at.settings)?.0;
-        let mut acts = vec![test::start(&at, diagnostic.clone())?];
-        if self.tried == Tried::Registers {
-            acts.extend(test::registers(self.line, &diagnostic));
-        }
-        Ok(acts)
+        Ok(vec![test::start(&at, diagnostic)?])
     }
 
     fn text(&self, n: usize) -> String {
@@ -188,13 +180,6 @@ impl Form {
                 let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
                 let words = request_text(&message, framing)?;
                 (Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), words)
-            }
-            Tried::Registers => {
-                let (unit, table) = (unit(0)?, TABLES[self.chosen(1)]);
-                let address = address(&self.text(2), table)?;
-                let count = to_u16(number(&self.text(3), t!("count"), 1..=if table.is_bits() { 2_000 } else { 125 })?);
-                let words = request_text(&read(unit, table, address, count), framing)?;
-                (Diagnostic::Read { unit, table, address, count }, words)
             }
             Tried::Loopback => {
                 let (unit, count) = (unit(0)?, to_u16(number(&self.text(1), t!("times"), 1..=1_000)?));
@@ -280,7 +265,6 @@ impl Form {
     fn title(&self) -> &'static str {
         match self.tried {
             Tried::Bytes | Tried::Request => t!("request by fields"),
-            Tried::Registers => t!("browse registers"),
             Tried::Loopback => t!("loopback"),
             Tried::Identify => t!("identify a device"),
             Tried::Scan => t!("scan for units"),
@@ -289,11 +273,6 @@ impl Form {
 }
 
 const TABLES: [Table; 4] = [Table::Holding, Table::Input, Table::Coil, Table::Discrete];
-
-fn read(unit: u8, table: Table, address: u16, count: u16) -> Vec<u8> {
-    let ([a, b], [c, d]) = (address.to_be_bytes(), count.to_be_bytes());
-    vec![unit, table.read_fc(), a, b, c, d]
-}
 
 /// The request in words, and its bytes; `Err` with what no device can take.
 fn request_text(message: &[u8], framing: Framing) -> Result<Vec<String>, String> {

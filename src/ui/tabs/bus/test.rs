@@ -8,7 +8,6 @@ pub use send::Send;
 use super::{
     Place, Window,
     frames::{broken, bytes_text},
-    registers::Registers,
     request::Form,
     results,
     rows::{self, Row, plain},
@@ -37,8 +36,6 @@ pub enum Tried {
     Bytes,
     /// A request by its fields.
     Request,
-    /// Registers of a device.
-    Registers,
     /// Diagnostics 08/00.
     Loopback,
     /// Device identification.
@@ -48,8 +45,7 @@ pub enum Tried {
 }
 
 impl Tried {
-    const ALL: [Tried; 6] =
-        [Tried::Bytes, Tried::Request, Tried::Registers, Tried::Loopback, Tried::Identify, Tried::Scan];
+    const ALL: [Tried; 5] = [Tried::Bytes, Tried::Request, Tried::Loopback, Tried::Identify, Tried::Scan];
 
     /// Its key, its name and what it is for.
     fn words(self) -> [&'static str; 3] {
@@ -57,9 +53,6 @@ impl Tried {
             Tried::Bytes => ["t", t!("type bytes"), t!("hex of a request, decoded as you type; its check is added")],
             Tried::Request => {
                 ["f", t!("request by fields"), t!("unit, function, address (41003 or 0x03EA), count or value")]
-            }
-            Tried::Registers => {
-                ["b", t!("browse registers"), t!("hex, numbers, 32 bits and float in all four byte orders")]
             }
             Tried::Loopback => ["l", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
             Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
@@ -99,7 +92,7 @@ impl Bench {
                 bare: self.bare,
                 problem: None,
             }),
-            Tried::Request | Tried::Registers | Tried::Loopback | Tried::Identify | Tried::Scan => {
+            Tried::Request | Tried::Loopback | Tried::Identify | Tried::Scan => {
                 let last = self.form.take_if(|form| form.is(at.id, tried));
                 Window::Form(last.unwrap_or_else(|| Form::new(cx, at, tried)))
             }
@@ -243,9 +236,4 @@ pub fn again(at: &Place) -> Vec<UiAction> {
 /// Stops the test at work.
 pub fn stop(at: &Place) -> Vec<UiAction> {
     if at.is_testing() { vec![UiAction::Command(CommandKind::StopTest(at.id))] } else { Vec::new() }
-}
-
-/// The window of the registers that were read.
-pub fn registers(line: LineId, diagnostic: &Diagnostic) -> Option<UiAction> {
-    Registers::new(line, diagnostic).map(|registers| Window::Registers(registers).open())
 }

@@ -7,18 +7,18 @@ use std::{sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::{
-    access::{Durability, SessionRequest},
+    access::{Durability, SessionRequest, SessionStatus},
     bus::frame::with_crc,
     history::{Answer, Query},
     plant::{
         command::{CommandId, CommandKind},
         def::{Framing, LineId, Serial},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
-        event::{ExceptionCode, Fault, LineState},
+        event::{Fault, LineState},
         line_minute::LineMinute,
+        live::{LivePart, LiveReading},
         ne107::Reason,
         snapshot::DeviceState,
-        tag::Table,
         traffic::Exchange,
     },
     ui::{
@@ -52,21 +52,6 @@ fn run(
     let started = now() - jiff::SignedDuration::from_secs(8);
     let words = "unit 17, function 3 / 0x03 at 9600 8E1".to_owned();
     Arc::new(DiagnosticRun { id, by: "tech1".into(), diagnostic, started, done, total, now: words, state, findings })
-}
-
-fn read_of_three() -> Arc<DiagnosticRun> {
-    let diagnostic = Diagnostic::Read { unit: 1, table: Table::Holding, address: 1_002, count: 3 };
-    let exchange = Exchange {
-        at: now(),
-        framing: Framing::Rtu,
-        request: with_crc(&[1, 3, 3, 0xEA, 0, 3]).into(),
-        answer: with_crc(&[1, 3, 6, 0x42, 0xC8, 0, 0, 0xFF, 0xFE]).into(),
-        outcome: Ok(()),
-        reply: Some(Duration::from_micros(12_300)),
-        tries: 1,
-    };
-    let values = Finding::Values { table: Table::Holding, address: 1_002, words: vec![0x42C8, 0, 0xFFFE] };
-    run(diagnostic, DiagnosticState::Done, 1, 1, vec![Finding::Exchange(Arc::new(exchange)), values])
 }
 
 #[test]
@@ -224,7 +209,7 @@ fn a_request_is_built_of_fields_with_either_kind_of_address() {
 fn a_closed_line_says_so_instead_of_sending() {
     let mut fixture = Fixture::traffic();
     fixture.line.state = LineState::Disconnected;
-    for keys in ["Tt01 03 00 00 00 01⏎", "Tl⏎", "Ti⏎", "Tb⏎", "Ts⏎"] {
+    for keys in ["Tt01 03 00 00 00 01⏎", "Tl⏎", "Ti⏎", "Ts⏎"] {
         let mut model = bus(&fixture, Theme::FULL, "");
         assert_eq!(sent_kind(&type_keys(&mut model, keys)), None, "{keys}");
         let shown = screen(&mut model, 80, 24);
@@ -305,25 +290,39 @@ fn loopback_and_identification_are_described() {
 }
 
 #[test]
-fn registers_are_browsed_in_all_four_orders() {
-    let mut fixture = Fixture::traffic();
-    let clear = "\u{8}".repeat(6);
-    let mut model = bus(&fixture, Theme::FULL, &format!("Tb↓↓{clear}41003↓{clear}3"));
-    let effects = type_keys(&mut model, "⏎");
-    let run = read_of_three();
-    assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, run.diagnostic.clone())));
-    fixture.line.test = Some(run);
-    update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    insta::assert_snapshot!("window_registers", screen(&mut model, 80, 24));
-    let effects = type_keys(&mut model, "↓r");
-    assert!(sent_kind(&effects).is_some() && matches!(model.modal, Some(Modal::Bus(_))), "read again, still open");
-    let mut refused = (*read_of_three()).clone();
-    refused.findings.pop();
-    refused.findings.push(Finding::Failed { what: "unit 1".to_owned(), fault: Fault::Exception(ExceptionCode(2)) });
-    fixture.line.test = Some(Arc::new(refused));
-    update(&mut model, Msg::Snapshot(fixture.snapshot()));
-    let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("---- is exception 02, illegal data address"), "{shown}");
+fn registers_of_the_device_are_read_live() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
+    let effects = type_keys(&mut model, "R");
+    let asked = |effects: Vec<Effect>| {
+        effects.into_iter().find_map(|effect| match effect {
+            Effect::Query(id, Query::Registers(read)) => Some((id, read)),
+            _ => None,
+        })
+    };
+    let (id, read) = asked(effects).expect("it is asked for");
+    assert_eq!((id.tab, read.line, read.unit, read.not_before), (Tab::Bus, L1, 1, None));
+    let effects = type_keys(&mut model, "j41003⏎");
+    let (id, read) = asked(effects).expect("another window");
+    let span = read.spans[0];
+    let part = LivePart { at: now(), span, words: Ok((0..span.count).map(|n| 700 + n).collect()) };
+    let reading = LiveReading { began: now(), parts: vec![part], requests: 1, ..LiveReading::default() };
+    let next = asked(update(&mut model, Msg::Answer(id, Ok(Answer::Registers(reading)))));
+    assert!(next.is_some_and(|(_, read)| read.not_before.is_some()), "again, a period later");
+    for (width, height) in [(80, 24), (120, 40)] {
+        insta::assert_snapshot!(format!("registers_{width}x{height}"), screen(&mut model, width, height));
+    }
+    assert!(asked(type_keys(&mut model, "w")).is_none() && model.modal.is_none(), "nothing is written here");
+    type_keys(&mut model, "T");
+    assert!(screen(&mut model, 80, 24).contains("‹Test›"));
+}
+
+#[test]
+fn registers_are_not_read_without_the_right() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
+    model.session = Arc::new(SessionStatus { who: None, ..SessionStatus::clone(&model.session) });
+    let effects = type_keys(&mut model, "R");
+    assert!(!effects.iter().any(|effect| matches!(effect, Effect::Query(_, Query::Registers(_)))), "{effects:?}");
+    assert!(screen(&mut model, 80, 24).contains("needs Technician"));
 }
 
 #[test]
@@ -331,7 +330,7 @@ fn no_size_breaks_a_page_or_a_window() {
     let mut fixture = Fixture::traffic_trouble();
     let scan = Scan { first: 1, last: 9, serials: vec![], timeout: Duration::from_millis(100) };
     fixture.line.test = Some(run(Diagnostic::Scan(scan), DiagnosticState::Running, 3, 9, Vec::new()));
-    for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "Tb⏎", "Ts"] {
+    for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "R", "Ts"] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         for (width, height) in [(60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)] {
             assert!(screen(&mut model, width, height).lines().count() <= usize::from(height));
@@ -341,13 +340,8 @@ fn no_size_breaks_a_page_or_a_window() {
 
 #[test]
 fn windows_on_the_smallest_screen_say_what_they_cut() {
-    let mut fixture = Fixture::traffic();
-    fixture.line.test = Some(read_of_three());
-    let clear = "\u{8}".repeat(6);
-    let registers = format!("Tb↓↓{clear}41003↓{clear}3⏎");
-    for (name, keys) in
-        [("registers", registers.as_str()), ("request", "Tf"), ("scan", "Ts"), ("send", "Tt01 03 03 EA 00 01")]
-    {
+    let fixture = Fixture::traffic();
+    for (name, keys) in [("request", "Tf"), ("scan", "Ts"), ("send", "Tt01 03 03 EA 00 01")] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         insta::assert_snapshot!(format!("small_{name}"), screen(&mut model, 60, 16));
     }

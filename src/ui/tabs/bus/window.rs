@@ -5,7 +5,6 @@ use ratatui::Frame as Screen;
 use super::{
     frames::{broken, bytes_text},
     line::short_ms,
-    registers::Registers,
     request::Form,
     rows::{self, Row, plain},
     test::Send,
@@ -33,8 +32,6 @@ pub enum Window {
     Send(Send),
     /// A test with its fields.
     Form(Form),
-    /// Registers of a device.
-    Registers(Registers),
 }
 
 impl Window {
@@ -49,7 +46,6 @@ impl Window {
             Window::Text(text) => text.on_key(event),
             Window::Send(send) => send.on_key(cx, &mut tabs.bus.test, event),
             Window::Form(form) => form.on_key(cx, &mut tabs.bus.test, event),
-            Window::Registers(registers) => registers.on_key(cx, event),
         }
     }
 
@@ -68,7 +64,7 @@ impl Window {
         match self {
             Window::Send(send) => send.on_paste(text),
             Window::Form(form) => form.on_paste(text),
-            Window::Text(_) | Window::Registers(_) => {}
+            Window::Text(_) => {}
         }
     }
 
@@ -82,7 +78,6 @@ impl Window {
             Window::Form(_) => {
                 vec![hint("↑↓", t!("field")), hint("←→", t!("choose")), hint("⏎", t!("start")), close]
             }
-            Window::Registers(_) => vec![hint("↑↓", t!("move")), hint("r", t!("read again")), close],
         }
     }
 
@@ -92,7 +87,6 @@ impl Window {
             Window::Text(text) => text.view(cx, screen, body),
             Window::Send(send) => send.view(cx, screen, body),
             Window::Form(form) => form.view(cx, screen, body),
-            Window::Registers(registers) => registers.view(cx, screen, body),
         }
     }
 }

@@ -51,7 +51,7 @@ pub enum Action {
     Writes,
 }
 
-const KEYS: &[Key<Action>] = &[
+pub(super) const KEYS: &[Key<Action>] = &[
     Key::new(
         code(KeyCode::Right),
         "table",
@@ -98,12 +98,47 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('r'), "", "ask again for what the unit has refused", Action::Relearn),
 ];
 
-/// All keys.
-pub(super) fn table() -> Vec<Key<Action>> {
-    [&motions!("", Action::Move), KEYS].concat()
+/// All keys; where a plant file says what may be written and taken away, those that read.
+pub(in crate::ui::tabs) fn table(cx: &ViewContext) -> Vec<Key<Action>> {
+    if cx.def().is_bench() { [&motions!("", Action::Move), KEYS].concat() } else { of_plant() }
+}
+
+/// The keys that read.
+pub(super) fn of_plant() -> Vec<Key<Action>> {
+    let keys = [&motions!("", Action::Move), KEYS].concat();
+    keys.into_iter().filter(|key| key.action.only_reads()).collect()
 }
 
 /// The key of the log, which the graph has too.
-pub(super) fn log() -> Vec<Key<Action>> {
-    KEYS.iter().copied().filter(|key| key.action == Action::Log).collect()
+pub(super) fn log(cx: &ViewContext) -> Vec<Key<Action>> {
+    table(cx).into_iter().filter(|key| key.action == Action::Log).collect()
+}
+
+impl Action {
+    fn only_reads(self) -> bool {
+        match self {
+            Action::Move(_)
+            | Action::Table(_)
+            | Action::GoTo
+            | Action::Find
+            | Action::Unit
+            | Action::Order
+            | Action::Base
+            | Action::Pause
+            | Action::Faster
+            | Action::Slower
+            | Action::Relearn
+            | Action::Graph
+            | Action::Watch
+            | Action::Name => true,
+            Action::Names
+            | Action::Load
+            | Action::Save
+            | Action::Log
+            | Action::Write
+            | Action::Add(_)
+            | Action::Undo
+            | Action::Writes => false,
+        }
+    }
 }

@@ -62,7 +62,8 @@ impl Recognition {
 impl Registers {
     /// The next question of the signatures, when the window has had its first value and none is on its way.
     pub(super) fn recognise(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if self.reads == 0 || self.paused || cx.def().lines.is_empty() {
+        // A plant file says what its devices are.
+        if self.reads == 0 || self.paused || cx.def().lines.is_empty() || !cx.def().is_bench() {
             return Vec::new();
         }
         if matches!(self.recognition, Recognition::Waiting) {
@@ -83,7 +84,7 @@ impl Registers {
         self.number = self.number.wrapping_add(1);
         *on_way = Some((self.number, now));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
-        vec![UiAction::query(Tab::Registers, self.number, Query::Registers(read))]
+        vec![UiAction::query(self.tab, self.number, Query::Registers(read))]
     }
 
     /// Takes what a signature has asked. What could not be read does not fit.

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Asking, Recognition, Registers, cells::Cells};
+use super::{Asking, Recognition, Registers, cells::Cells, page::names_of};
 use crate::ui::tabs::prelude::*;
 
 impl Registers {
@@ -19,13 +19,13 @@ impl Registers {
         let (least, most) = (units.start(), units.end());
         let wrong = || t!("found `{text}`, expected {least} to {most}", text, least, most);
         let unit = text.parse().ok().filter(|unit| units.contains(unit)).ok_or_else(wrong)?;
-        self.show_unit(unit);
+        self.show_unit(cx, unit);
         Ok(())
     }
 
     /// Nothing that was read of one unit is shown of another, and each has names of its own.
-    fn show_unit(&mut self, unit: u8) {
-        let names = self.names_of.remove(&unit).unwrap_or_default();
+    pub(super) fn show_unit(&mut self, cx: &ViewContext, unit: u8) {
+        let names = self.names_of.remove(&unit).unwrap_or_else(|| names_of(cx.snapshot, self.line, unit));
         self.names_of.insert(self.unit, std::mem::replace(&mut self.names, names));
         (self.unit, self.reads) = (unit, 0);
         (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());

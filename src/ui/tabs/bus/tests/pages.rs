@@ -61,9 +61,14 @@ fn every_page_in_seven_bits_tells_what_is_wrong() {
 #[test]
 fn pages_are_turned_by_arrows_and_letters() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
-    for (keys, page) in
-        [("", "‹Line›"), ("→", "‹Plan›"), ("→→", "‹Test›"), ("→", "‹Line›"), ("←", "‹Test›"), ("F", "‹Frames›")]
-    {
+    for (keys, page) in [
+        ("", "‹Line›"),
+        ("→", "‹Plan›"),
+        ("→→", "‹Test›"),
+        ("→", "‹Registers›"),
+        ("L←", "‹Registers›"),
+        ("F", "‹Frames›"),
+    ] {
         type_keys(&mut model, keys);
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains(page), "{keys}: {page}\n{shown}");
