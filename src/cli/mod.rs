@@ -107,7 +107,7 @@ enum Command {
     Report(report::Args),
     /// Write stored values of tags at a fixed interval as CSV
     Export(export::Args),
-    /// Show what the history holds and where: spans, files, sizes, gaps; and verify, back up, restore it
+    /// Show what the history holds and where: spans, files, sizes, gaps; verify, compact, back up, restore it, import samples
     History(history::Args),
     /// Show alarm performance in a shift or period: rates, floods, chattering, stale, against their targets
     Alarms(alarms::Args),

@@ -6,6 +6,7 @@ pub mod series;
 pub mod alarm_state;
 pub mod words;
 pub mod backup;
+pub mod import;
 pub mod io;
 
 use std::{path::PathBuf, time::Duration};
@@ -14,6 +15,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use self::{
+    import::Import,
     retention::{Deletion, Disk},
     tiers::Tier,
 };
@@ -167,6 +169,8 @@ pub struct Overview {
     pub deleted_until: Option<Timestamp>,
     /// What is deleted next, and when.
     pub next_deletion: Option<Deletion>,
+    /// What was imported.
+    pub imports: Vec<Import>,
     /// Its files, oldest first.
     pub files: Vec<ArchiveFile>,
 }

@@ -321,11 +321,8 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
     for request in [SessionRequest::Reload, SessionRequest::Stop] {
         assert_eq!(stranger.request(request).await, Err(LOG_IN.to_owned()));
         let line = guarded.entries().pop().unwrap();
-        assert_eq!(
-            (&*line.who, &*line.outcome),
-            ("not logged in (stranger)", "refused: log in first"),
-            "sent once it is there"
-        );
+        let expect = ("not logged in (stranger)", "refused: log in first");
+        assert_eq!((&*line.who, &*line.outcome), expect, "sent once it is there");
     }
     drop(stranger);
     guarded.end().await;

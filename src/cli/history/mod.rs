@@ -1,11 +1,13 @@
 //! `sightglass history`: what is stored, and what can be done with it as a whole.
 
 mod backup;
+mod compact;
+mod import;
 mod overview;
 mod restore;
 mod verify;
 
-use std::sync::Arc;
+use std::{io::ErrorKind, path::Path, sync::Arc};
 
 use jiff::Timestamp;
 
@@ -37,6 +39,10 @@ pub struct Args {
 enum Command {
     /// Read every file of the archive and compare it with the manifest: exit code 1 if one is missing or was changed
     Verify(verify::Args),
+    /// Archive what is due now and shrink the database file; not while the station runs
+    Compact(compact::Args),
+    /// Fill gaps with the samples of a CSV file, marked as imported; not while the station runs
+    Import(import::Args),
     /// Write a backup of database, archive and audit log, while the station runs or without it
     Backup(backup::Args),
     /// Put a backup in the place of the history, which is set aside; not while the station runs
@@ -69,9 +75,22 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let Args { command, plant, json, login, station } = args;
     match command {
         Some(Command::Verify(args)) => verify::main(&args),
+        Some(Command::Compact(args)) => compact::main(&args),
+        Some(Command::Import(args)) => import::main(&args),
         Some(Command::Backup(args)) => backup::main(&args),
         Some(Command::Restore(args)) => restore::main(&args),
         None => overview::main(&Place { plant: plant.unwrap_or_default(), login, station }, json),
+    }
+}
+
+/// The audit log, which a running station holds as well.
+fn open_log(log: &Path) -> Result<AuditLog, CliError> {
+    match AuditLog::open(log) {
+        Ok((log, _)) => Ok(log),
+        Err(error) if error.kind() == ErrorKind::WouldBlock => {
+            Err(CliError::Failed(format!("{error}: stop its station first")))
+        }
+        Err(error) => Err(CliError::Io { what: log.display().to_string(), error }),
     }
 }
 

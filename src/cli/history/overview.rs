@@ -37,7 +37,7 @@ pub async fn ask(place: &Place, def: &Arc<PlantDef>) -> Result<Overview, CliErro
 
 /// One fact a line.
 fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
-    let Overview { database, database_bytes, samples, extent, folder, files, .. } = overview;
+    let Overview { database, database_bytes, samples, extent, folder, files, imports, .. } = overview;
     let time = |at: Timestamp| local(at, def);
     let stored =
         extent.map_or_else(|| "nothing yet".to_owned(), |(from, to)| format!("{} to {}", time(from), time(to)));
@@ -64,6 +64,10 @@ fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
             size(all)
         ));
     }
+    lines.extend(imports.iter().map(|import| {
+        let [at, from, to] = [import.at, import.from, import.to].map(time);
+        format!("imported  {from} to {to}: {} rows of {}, on {at}", import.rows, import.file)
+    }));
     lines.extend(of_room(overview, &time));
     for pair in files.iter().filter(|file| file.tier == Tier::Raw).collect::<Vec<_>>().windows(2) {
         if pair[0].to < pair[1].from

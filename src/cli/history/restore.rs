@@ -1,15 +1,12 @@
 //! `sightglass history restore PLANT DIR`: a backup in the place of the history, which is set aside.
 
-use std::{
-    io::ErrorKind,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
 
-use super::{Place, record};
+use super::{Place, open_log, record};
 use crate::{
-    access::io::audit_log::{self, AuditLog},
+    access::io::audit_log,
     cli::{CliError, run, say},
     history::{
         backup::AUDIT_LOG,
@@ -45,7 +42,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     let log = audit_log::beside(&db);
     // The log goes on, and says so; where it is not the one of the backup, that of the backup takes its place.
     let is_kept = log.exists() && audit_log::verify(&log, &sound.chain_hashes).is_ok();
-    let present = if log.exists() { Some(open(&log)?) } else { None };
+    let present = if log.exists() { Some(open_log(&log)?) } else { None };
     let mut also = if is_kept { Vec::new() } else { vec![audit_log::head_of(&log)] };
     if !is_kept && !sound.backup.files.iter().any(|file| file.path == AUDIT_LOG) {
         also.push(log.clone());
@@ -60,7 +57,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     }
     restore::commit(&db)?;
     restore::finish(&db)?;
-    let mut log = kept.map_or_else(|| open(&log), Ok)?;
+    let mut log = kept.map_or_else(|| open_log(&log), Ok)?;
     record(&mut log, RESTORE, &target, &outcome("done"), now)?;
     say(&format!(
         "restored {}: {what}{}",
@@ -75,15 +72,4 @@ pub fn main(args: &Args) -> Result<(), CliError> {
 
 fn set_aside(aside: &Path) -> String {
     format!("; the history before it is in {}", aside.display())
-}
-
-/// The audit log, which a running station holds as well.
-fn open(log: &Path) -> Result<AuditLog, CliError> {
-    match AuditLog::open(log) {
-        Ok((log, _)) => Ok(log),
-        Err(error) if error.kind() == ErrorKind::WouldBlock => {
-            Err(CliError::Failed(format!("{error}: stop its station first")))
-        }
-        Err(error) => Err(CliError::Io { what: log.display().to_string(), error }),
-    }
 }

@@ -121,6 +121,7 @@ impl Store {
             rule: self.def.history,
             deleted_until: self.deleted_until(Tier::Raw)?,
             next_deletion: self.next_deletion(&files, now),
+            imports: self.imports()?,
             files,
         })
     }

@@ -42,6 +42,8 @@ pub mod aggregates;
 mod copy;
 pub mod backup;
 pub mod restore;
+mod import;
+pub mod compact;
 pub mod report;
 pub mod alarm_metrics;
 pub mod chain;

@@ -7,6 +7,7 @@ use jiff::Timestamp;
 
 use super::{
     alarm_metrics::Recent,
+    compact,
     files::{self, Failure, Opening, Part},
     last::{self, LastCommit, Noted},
     restore, sql,
@@ -90,6 +91,7 @@ impl Store {
         if let Some(before) = restore::finish(path)? {
             tracing::warn!(before = %before.display(), "a restore that was interrupted is finished");
         }
+        files::remove(&with_suffix(path, compact::UNFINISHED));
         let noted = last::read(path);
         // An empty file is what is left of a creation that failed: nothing is in it, and it is not damaged.
         let fresh = files::size(path) == 0;

@@ -22,9 +22,11 @@ use crate::{
 ///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
 ///
+/// Samples of a file have the epoch [`IMPORTED`], and `import` has a row for each file.
+///
 /// `archive` is the manifest of the files in the archive, see there; `watched` are windows of ten minutes, by their number
 /// since 1970, in which archived samples lie; `deleted` are the files that the rules of the plant have deleted.
-pub const MIGRATIONS: [&str; 10] = [
+pub const MIGRATIONS: [&str; 11] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -88,7 +90,19 @@ CREATE TABLE watched (ten_minutes BIGINT NOT NULL);
     "
 CREATE TABLE deleted (tier VARCHAR NOT NULL, path VARCHAR NOT NULL, until_utc TIMESTAMP NOT NULL);
 ",
+    "
+CREATE TABLE import (
+    utc TIMESTAMP NOT NULL, file VARCHAR NOT NULL, from_utc TIMESTAMP NOT NULL, to_utc TIMESTAMP NOT NULL,
+    rows UBIGINT NOT NULL);
+",
 ];
+
+/// The epoch of samples that no station recorded.
+pub const IMPORTED: u16 = u16::MAX;
+/// Enters an import.
+pub const ENTER_IMPORT: &str = "INSERT INTO import VALUES (?, ?, ?, ?, ?)";
+/// What was imported.
+pub const IMPORTS: &str = "SELECT utc, file, from_utc, to_utc, rows FROM import ORDER BY rowid";
 
 /// Columns of an alarm event, in the order that it is read.
 pub const EVENT_COLUMNS: [&str; 12] = [
@@ -167,11 +181,12 @@ pub const WATCHED_BY_LINES: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 F
             WHERE ten_minutes >= epoch_us($1) // 600000000 AND ten_minutes < (epoch_us($2) + 599999999) // 600000000)
     ORDER BY 1 LIMIT $3";
 
-/// The same by the samples, which are far more rows.
+/// The same by the samples, which are far more rows; not by those that were imported.
 pub const WATCHED_BY_SAMPLES: &str =
-    "SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample WHERE utc >= $1 AND utc < $2 ORDER BY 1 LIMIT $3";
-/// A row if there is any sample in a span.
-pub const ANY_SAMPLE: &str = "SELECT 1 FROM sample WHERE utc >= ? AND utc < ? LIMIT 1";
+    "SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample WHERE utc >= $1 AND utc < $2
+        AND epoch IS DISTINCT FROM 65535 ORDER BY 1 LIMIT $3";
+/// A row if there is any sample in a span that a station recorded.
+pub const ANY_SAMPLE: &str = "SELECT 1 FROM sample WHERE utc >= ? AND utc < ? AND epoch IS DISTINCT FROM 65535 LIMIT 1";
 
 /// The order of a list, and its limit.
 pub const NEWEST: &str = "ORDER BY utc DESC, rowid DESC LIMIT ?";
@@ -270,7 +285,7 @@ pub const ENTER_DELETED: &str = "INSERT INTO deleted VALUES (?, ?, ?)";
 pub const DELETED_UNTIL: &str = "SELECT max(until_utc) FROM deleted WHERE tier = ?";
 /// The windows of ten minutes in which samples lie that are about to be archived.
 pub const ENTER_WATCHED: &str = "INSERT INTO watched SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample
-    WHERE utc >= $1 AND utc < $2 AND epoch_us(utc) // 600000000 NOT IN (FROM watched)";
+    WHERE utc >= $1 AND utc < $2 AND epoch IS DISTINCT FROM 65535 AND epoch_us(utc) // 600000000 NOT IN (FROM watched)";
 /// Deletes the samples of a span.
 pub const DELETE_SAMPLES: &str = "DELETE FROM sample WHERE utc >= ? AND utc < ?";
 /// Widens what is known to be stored.

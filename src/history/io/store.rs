@@ -197,7 +197,7 @@ impl Store {
 
     /// Stores what `work` appends, all of it or nothing, as the next commit; `stored` are the instants in it, `epoch` is
     /// the last one. Without any row (`false`) there is no commit.
-    fn commit(
+    pub(super) fn commit(
         &self,
         stored: impl Iterator<Item = Timestamp>,
         epoch: u16,

@@ -4,12 +4,14 @@
 mod absent;
 mod archive;
 mod backup;
+mod compact;
 mod damage;
 mod epochs;
 mod lists;
 mod migrations;
 mod past;
 mod flips;
+mod import;
 mod alarm_metrics;
 mod pieces;
 mod reading;

@@ -1,0 +1,109 @@
+//! Files of other programs: what is read of them, what is refused, and what is left out.
+
+use super::*;
+use crate::{
+    plant::data_type::DataType,
+    report::testing::{THREE, at, plant, sec},
+};
+
+const NOW: &str = "2026-11-23T12:00:00Z";
+
+fn read(text: &str) -> Result<Rows, Vec<String>> {
+    let mut def = plant("Europe/Berlin", &THREE);
+    def.tags[1].labels = vec![(0, "OFF".into()), (1, "ON".into())];
+    def.tags[2].point.kind = DataType::U16;
+    parse(&def, text.as_bytes(), Timestamp::UNIX_EPOCH, at(NOW))
+}
+
+fn names() -> [String; 3] {
+    let def = plant("Europe/Berlin", &THREE);
+    [0, 1, 2].map(|place: usize| def.tags[place].name.clone())
+}
+
+#[test]
+fn rows_are_read_whatever_their_order_and_marks() {
+    let [pv, sv, _] = names();
+    let expect = [(TagId(0), vec![Sample::good(1.5, at("2026-11-21T05:00Z"))])];
+    for text in [
+        format!("tag,time,value\n{pv},2026-11-21T06:00:00,1.5\n"),
+        format!("\u{feff}Time;Value;Tag\r\n2026-11-21 06:00;1,5;{pv}\r\n"),
+        format!("time_utc,time_local,tag,value,quality\n2026-11-21T05:00:00.0004Z,x,{pv},1.5,good\n"),
+        format!("value,quality,tag,time\n1.5,,{pv},2026-11-21T07:00+02:00\n"),
+    ] {
+        assert_eq!(read(&text), Ok(Rows::from(expect.clone())), "{text}");
+    }
+    let text = format!(
+        "tag,time,value,quality\n{sv},2026-11-21T05:00:01Z,on,uncertain: stale\n{sv},2026-11-21T05:00Z,,bad: response timeout"
+    );
+    let first = Sample::bad(Cause::Timeout, at("2026-11-21T05:00Z"));
+    let second = Sample::good(1.0, at("2026-11-21T05:00:01Z")).uncertain(Cause::Stale);
+    assert_eq!(read(&text), Ok(Rows::from([(TagId(1), vec![first, second])])));
+}
+
+#[test]
+fn what_is_wrong_is_said_with_line_and_expectation() {
+    let [pv, sv, run] = names();
+    for (rows, expect) in [
+        ("X,2026-11-21T05:00Z,1".to_owned(), "line 2: found the tag `X`, which "),
+        (format!("{pv},soon,1"), "line 2: found the time `soon`, expected 2026-"),
+        (format!("{pv},2026-10-25T02:30:00,1"), "which was twice or never"),
+        (format!("{pv},2026-03-29T02:30:00,1"), "which was twice or never"),
+        (format!("{pv},2026-11-23T12:00:01Z,1"), "expected one from 1970-01-01T00:00:00Z to 2026-11-23T12:00:00Z"),
+        (format!("{pv},1969-12-31T23:59:59Z,1"), "expected one from 1970"),
+        (format!("{pv},2026-11-21T05:00Z,high"), "found `high`, expected a number"),
+        (format!("{pv},2026-11-21T05:00Z,NaN"), "found `NaN`, expected a number"),
+        (format!("{pv},2026-11-21T05:00Z,"), "found ``, expected a number"),
+        (format!("{sv},2026-11-21T05:00Z,7"), "found `7`, expected OFF, ON"),
+        (format!("{run},2026-11-21T05:00Z,99999999"), "expected a number that its type can hold"),
+        (format!("{pv},2026-11-21T05:00Z,1\n{pv},2026-11-21T05:00Z,2"), "found two rows of 2026-11-21T05:00:00Z"),
+        (format!("{pv},2026-11-21T05:00Z"), "found record with 2 fields"),
+    ] {
+        let problems = read(&format!("tag,time,value\n{rows}\n")).unwrap_err();
+        assert!(problems[0].contains(expect), "{problems:?}, expected {expect}");
+    }
+    for (header, expect) in [
+        ("tag,value", "found no column time_utc or utc"),
+        ("tag,time,value,price", "found the column `price`, expected time_utc"),
+        ("time,value", "found no column `tag`"),
+        ("tag,time,value", "found no row behind the header"),
+    ] {
+        let problems = read(header).unwrap_err();
+        assert!(problems[0].contains(expect), "{problems:?}");
+    }
+    for (rest, expect) in [
+        ("1,worse,", "found the quality `worse`"),
+        ("1,bad: stale,", "which is bad: expected none"),
+        ("1,good,furlong", "found the unit `furlong`, expected "),
+        ("1,bad: not stored,", "found the quality `bad: not stored`"),
+    ] {
+        let text = format!("tag,time,value,quality,unit\n{pv},2026-11-21T05:00Z,{rest}");
+        assert!(read(&text).unwrap_err()[0].contains(expect), "{rest}");
+    }
+    let many = format!("tag,time,value\n{}", "X,soon,1\n".repeat(25));
+    let problems = read(&many).unwrap_err();
+    assert_eq!((problems.len(), problems[10].as_str()), (11, "and 15 more"));
+}
+
+#[test]
+fn only_rows_without_a_value_in_force_are_accepted() {
+    let hold = HOLD_MAX.as_secs() as i64;
+    let row = |second: i64| Sample::good(second as f64, sec(second));
+    let decide = |stored: &[Sample], seconds: &[i64]| -> Vec<i64> {
+        let mut filler = Filler::new(seconds.iter().copied().map(row).collect());
+        stored.iter().for_each(|sample| filler.stored(*sample));
+        filler.end().iter().map(|sample| sample.at.as_second()).collect()
+    };
+    let off = Sample::bad(Cause::StationOff, sec(100));
+    for (stored, seconds, expect) in [
+        (vec![], vec![1, 2], vec![1, 2]),
+        (vec![row(10)], vec![9, 10, 11, 9 + hold, 10 + hold], vec![9, 10 + hold]),
+        (vec![row(90), off, row(200)], vec![95, 100, 101, 199, 200, 201], vec![101, 199]),
+        (vec![row(10), row(10)], vec![10, 12], vec![]),
+    ] {
+        assert_eq!(decide(&stored, &seconds), expect, "{seconds:?} beside {stored:?}");
+        let again: Vec<Sample> = expect.iter().copied().map(row).collect();
+        let mut all = [stored, again].concat();
+        all.sort_by_key(|sample| sample.at);
+        assert_eq!(decide(&all, &seconds), Vec::<i64>::new(), "once more");
+    }
+}

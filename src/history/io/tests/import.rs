@@ -1,0 +1,101 @@
+//! Samples from files: they fill gaps, are archived like any other, and are known as what they are.
+
+use std::collections::BTreeMap;
+
+use super::{
+    archive::{HOUR_S, archive_all, content, rows},
+    *,
+};
+use crate::history::{import::Rows, tiers::in_milliseconds};
+
+/// The samples of records, by tag.
+fn by_tag(records: &[Record]) -> Rows {
+    let mut rows: Rows = BTreeMap::new();
+    for record in records {
+        if let Record::Sample(tag, sample) = record {
+            rows.entry(*tag).or_default().push(Sample { at: in_milliseconds(sample.at), ..*sample });
+        }
+    }
+    // A file has one row for each instant of a tag.
+    rows.values_mut().for_each(|rows| rows.dedup_by_key(|sample| sample.at));
+    rows
+}
+
+fn overview(store: &Store) -> crate::history::Overview {
+    match store.answer(&Query::Overview, sec(60 * HOUR_S)).unwrap() {
+        Answer::Overview(overview) => *overview,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn an_imported_day_is_as_if_it_had_been_recorded() {
+    let ((_one, db), (_two, plain)) = (folder(), folder());
+    let (store, plain) = (open(&db, 0), open(&plain, 0));
+    // A station that recorded before and after the day that is missing.
+    let shifted = |hours: i64| good(PV, hours * HOUR_S, 1.0);
+    let around: Vec<Record> = vec![shifted(-3), shifted(40), good(SV, 41 * HOUR_S, 2.0)];
+    store.append(&around).unwrap();
+    plain.append(&around).unwrap();
+    archive_all(&store, 60);
+    let day = by_tag(&rows(26));
+    for (tag, samples) in &day {
+        let records: Vec<Record> = samples.iter().map(|sample| Record::Sample(*tag, *sample)).collect();
+        plain.append(&records).unwrap();
+    }
+    let import = store.import(day.clone(), "logger.csv", sec(60 * HOUR_S)).unwrap().unwrap();
+    assert_eq!(import.rows as usize, day.values().map(Vec::len).sum::<usize>());
+    assert!(content(&store) == content(&plain), "before it is archived");
+    assert_eq!(store.import(day.clone(), "logger.csv", sec(60 * HOUR_S)).unwrap(), None, "the second time");
+    archive_all(&store, 60);
+    assert_eq!(overview(&store).samples, 0);
+    assert!(content(&store) == content(&plain), "archived");
+    assert_eq!(store.import(day, "other.csv", sec(60 * HOUR_S)).unwrap(), None, "out of the archive too");
+    assert_eq!(overview(&store).imports, std::slice::from_ref(&import));
+    for (from, to, buckets) in [(0, 26 * HOUR_S, 26), (5 * HOUR_S, 5 * HOUR_S + 600, 60)] {
+        let [got, expect] = [&store, &plain].map(|store| series(store, PV, from, to, buckets));
+        let ends =
+            |series: &Series| series.buckets.iter().map(|b| b.map(|b| (b.min, b.max, b.last))).collect::<Vec<_>>();
+        assert_eq!(ends(&got), ends(&expect));
+    }
+    // The mark is in the files of the archive, for whoever reads them; and the clock was not set.
+    let files = store.files(Some((crate::history::tiers::Tier::Raw, 0..26 * HOUR_S * 1_000_000))).unwrap();
+    let sql = format!("SELECT count(*) FROM {} WHERE epoch = {}", store.parquet(&files), sql::IMPORTED);
+    let marked: u64 = store.db.query_row(&sql, [], |row| row.get(0)).unwrap();
+    assert_eq!((marked, store.epoch()), (import.rows, 0));
+}
+
+#[test]
+fn what_was_recorded_is_not_changed_by_a_file() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&(0..100).map(|n| good(PV, 10 * n, n as f64)).collect::<Vec<_>>()).unwrap();
+    let before = content(&store);
+    // One in between, one at the same instant, one before, and one after the last value ends.
+    let file: Vec<Record> = [5, 10, -1, 1_200].map(|at| good(PV, at, -7.0)).into();
+    let mut file = by_tag(&file);
+    file.values_mut().for_each(|rows| rows.sort_by_key(|sample| sample.at));
+    assert_eq!(store.import(file, "x.csv", sec(5_000)).unwrap().unwrap().rows, 2);
+    let after = content(&store);
+    let recorded: Vec<_> = after.iter().filter(|(_, sample)| sample.value != Some(-7.0)).copied().collect();
+    assert!(recorded == before);
+    assert_eq!(after.len(), before.len() + 2);
+}
+
+#[test]
+fn an_import_is_no_time_at_which_alarms_were_watched() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let file: Vec<Record> = (0..2 * HOUR_S / 60).map(|n| good(PV, 60 * n, 1.0)).collect();
+    store.import(by_tag(&file), "x.csv", sec(5 * HOUR_S)).unwrap().unwrap();
+    let watched = |store: &Store| {
+        let period = Period { name: "p".into(), from: sec(0), to: sec(2 * HOUR_S) };
+        match store.answer(&Query::Report { period }, sec(3 * HOUR_S)).unwrap() {
+            Answer::Report(report) => report.alarm_metrics.watched,
+            other => panic!("{other:?}"),
+        }
+    };
+    let hot = watched(&store);
+    archive_all(&store, 5);
+    assert_eq!((hot, watched(&store)), (Duration::ZERO, Duration::ZERO));
+}
