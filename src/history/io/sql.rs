@@ -346,14 +346,9 @@ pub fn added(tier: Tier, file: &str, span: &Range<i64>) -> String {
     )
 }
 
-/// The order of rows in files.
-pub const HOUR_BY_HOUR: &str = "ORDER BY time_bucket(INTERVAL 1 HOUR, utc), tag, utc";
-
-/// An hour of files that overlap.
-pub fn hour_of(tier: Tier, files: &str, hour: &Range<i64>) -> String {
-    let columns = columns(tier);
-    let last = if tier == Tier::Raw { ", epoch" } else { "" };
-    format!("(SELECT {columns} FROM {files} WHERE {} ORDER BY tag, utc{last})", within(hour))
+/// An hour of files of samples that overlap.
+pub fn hour_of(files: &str, hour: &Range<i64>) -> String {
+    format!("(SELECT {} FROM {files} WHERE {} ORDER BY tag, utc, epoch)", columns(Tier::Raw), within(hour))
 }
 
 /// Rows of files in a span.

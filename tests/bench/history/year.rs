@@ -147,6 +147,16 @@ fn ask(store: &Store, days: i64, raw_days: i64) {
             println!("trend of {name}, {pens} tags: first {first:.0}, p50 {half:.0}, p95 {most:.0} ms");
         }
     }
+    let mut times: Vec<f64> = (0..ASKED)
+        .map(|_| {
+            let at = at(LAST_DAY + DAY - 3_600 - random(raw_days * DAY - 3_600));
+            let began = Instant::now();
+            store.answer(&Query::Past { at }, self::at(LAST_DAY + DAY)).expect("answered");
+            began.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    println!("past instant, all tags: p50 {:.0}, p95 {:.0} ms", times[ASKED / 2], times[ASKED * 95 / 100]);
     for (name, from, to) in [
         ("shift", LAST_DAY - DAY + 6 * 3_600, LAST_DAY - DAY + 14 * 3_600),
         ("month", LAST_DAY - 29 * DAY, LAST_DAY + DAY),

@@ -118,7 +118,8 @@ impl Store {
         for file in replaced {
             let within = formed.start.max(file.from)..formed.end.min(file.to);
             let others = replace(tier, &self.parquet(std::slice::from_ref(file)), &within);
-            written.extend(self.write_file(tier, file.from..file.to, &others, sql::HOUR_BY_HOUR)?);
+            let others = self.sorted(tier, &others)?;
+            written.extend(self.write_file(tier, file.from..file.to, &others, "")?);
         }
         let hour = formed.start..formed.start + HOUR;
         if overlapping(replaced, &hour).is_empty() {
