@@ -94,6 +94,7 @@ pub fn needs_for_question(query: &Query) -> Role {
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
         | Query::Past { .. }
+        | Query::Unarchived { .. }
         | Query::Overview
         | Query::Report { .. } => Right::Look,
         Query::Audit { .. } => Right::ManageUsers,

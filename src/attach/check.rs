@@ -123,7 +123,11 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
         Query::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
             Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
         }
-        Query::Report { .. } | Query::AlarmMetrics { .. } | Query::Past { .. } | Query::Overview => Ok(()),
+        Query::Report { .. }
+        | Query::AlarmMetrics { .. }
+        | Query::Past { .. }
+        | Query::Unarchived { .. }
+        | Query::Overview => Ok(()),
         Query::Registers(read) => {
             read.check()?;
             line(def, read.line)

@@ -1,4 +1,5 @@
-//! `sightglass export`: stored values of chosen tags at a fixed interval, with their quality, as CSV.
+//! `sightglass export`: stored values of chosen tags with their quality: at a fixed interval as CSV, or every sample as CSV or
+//! Parquet.
 
 use std::{
     collections::{BTreeSet, HashMap},
@@ -11,8 +12,12 @@ use jiff::Timestamp;
 
 use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
-    history::{Answer, Query},
-    plant::{PlantDef, def::TagId, time::elapsed, time::instant_of_grid},
+    history::{Answer, Query, io::tables::Format},
+    plant::{
+        PlantDef,
+        def::{CsvDialect, TagId},
+        time::{elapsed, instant_of_grid},
+    },
     report::{
         export,
         figures::{self, TagDescription},
@@ -24,10 +29,13 @@ use super::{
     CliError, in_runtime,
     source::{CsvArgs, HistoryArgs, Source, unexpected},
     span,
+    sql::HistoryTables,
 };
 
 /// Rows of one file.
 const ROWS_MAX: u128 = 2_000_000;
+/// The longest time that samples may be written for.
+const RAW_TIME_MAX: Duration = Duration::from_secs(6 * 3_600);
 /// Values of one file: they are all in memory before the first is written.
 const VALUES_MAX: u128 = 20_000_000;
 
@@ -42,6 +50,12 @@ pub struct Args {
     /// Time between two rows
     #[arg(long, value_name = "TIME", default_value = "10s", value_parser = span)]
     every: Duration,
+    /// Every stored sample instead, a row each: hour by hour, each hour by tag where it is archived
+    #[arg(long, conflicts_with = "every")]
+    raw: bool,
+    /// With --raw: csv or parquet
+    #[arg(long, value_name = "FORMAT", default_value = "csv", value_parser = ["csv", "parquet"])]
+    format: String,
     /// File to write, `-` for standard output
     #[arg(long, value_name = "FILE", default_value = "-")]
     out: PathBuf,
@@ -60,6 +74,16 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     args.history.refuse_own_file(&def, &args.out)?;
     let (source, period) = args.history.open(&def).await?;
     let to = period.to.min(source.now());
+    if args.raw {
+        let csv = args.csv.dialect(&def);
+        let sql = raw(&def, &tags, (period.from, to), csv);
+        let format = if args.format == "parquet" { Format::Parquet } else { Format::Csv(csv) };
+        let tables = HistoryTables::load(&def, &source).await?;
+        return tables.export(&source, &sql, format, &args.out, RAW_TIME_MAX).await;
+    }
+    if args.format != "csv" {
+        return Err(CliError::Usage("--format parquet needs --raw: found values at an interval".to_owned()));
+    }
     let rows = rows(period.from, to, args.every, tags.len())?;
     let latest = latest(&source, &def, &tags, period.from, to).await?;
     let mut columns = Vec::new();
@@ -79,6 +103,21 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     }
     let bytes = export::export_csv(&def, period.from, args.every, &columns, args.csv.dialect(&def));
     source.export(&args.out, &bytes).await
+}
+
+/// The stored samples of some tags in a span, with the local time of the plant.
+fn raw(def: &PlantDef, tags: &[TagId], (from, to): (Timestamp, Timestamp), csv: CsvDialect) -> String {
+    let quoted = |text: &str| format!("'{}'", text.replace('\'', "''"));
+    let names: Vec<String> = tags.iter().map(|tag| quoted(&def.tag(*tag).name)).collect();
+    let zone = quoted(def.time_zone.iana_name().unwrap_or("UTC"));
+    let value = if csv.decimal == ',' { "replace(value::VARCHAR, '.', ',') AS value" } else { "value" };
+    format!(
+        "SELECT utc, timezone({zone}, timezone('UTC', utc)) AS local, tag, {value}, unit, quality FROM sample
+         WHERE utc >= make_timestamp({}) AND utc < make_timestamp({}) AND tag IN ({})",
+        from.as_microsecond(),
+        to.as_microsecond(),
+        names.join(", ")
+    )
 }
 
 /// The latest good values of the tags that hold unit and decimals of others.

@@ -27,7 +27,9 @@ mod report;
 mod run;
 mod sim;
 mod source;
+mod sql;
 mod status;
+mod times;
 mod tools;
 mod systemd_unit;
 
@@ -39,6 +41,7 @@ use std::{
 
 use clap::{Parser, Subcommand};
 
+use self::times::{span, speed};
 use crate::{
     access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile, ui,
 };
@@ -107,6 +110,8 @@ enum Command {
     Report(report::Args),
     /// Write stored values of tags at a fixed interval as CSV
     Export(export::Args),
+    /// Answer a SELECT over samples, minutes, hours, alarms and actions of the history
+    Sql(sql::Args),
     /// Show what the history holds and where: spans, files, sizes, gaps; verify, compact, back up, restore it, import samples
     History(history::Args),
     /// Show alarm performance in a shift or period: rates, floods, chattering, stale, against their targets
@@ -258,6 +263,7 @@ fn carry_out(args: Args) -> Result<(), CliError> {
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Export(args)) => export::main(args),
+        Some(Command::Sql(args)) => sql::main(args),
         Some(Command::History(args)) => history::main(args),
         Some(Command::Alarms(args)) => alarms::main(args),
         Some(Command::Decode(args)) => decode::main(args),
@@ -307,6 +313,11 @@ fn put_out(bytes: &[u8]) -> std::io::Result<()> {
     out.write_all(bytes)
 }
 
+/// Writes a file that may be large to standard output.
+fn put_out_file(path: &Path) -> std::io::Result<()> {
+    std::io::copy(&mut std::fs::File::open(path)?, &mut std::io::stdout()).map(drop)
+}
+
 /// A runtime for the tasks of a station: two workers are plenty, and the terminal stays quick.
 fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
     tokio::runtime::Builder::new_multi_thread()
@@ -324,24 +335,9 @@ fn in_runtime<T>(work: impl Future<Output = Result<T, CliError>>) -> Result<T, C
     done
 }
 
-/// A span as people write it: `10m`, `1h 30m`, `500ms`.
-fn span(text: &str) -> Result<std::time::Duration, String> {
-    let span: jiff::SignedDuration =
-        text.parse().map_err(|_| format!("found `{text}`, expected a time like 10m or 8h"))?;
-    std::time::Duration::try_from(span).map_err(|_| format!("found `{text}`, expected a time above zero"))
-}
-
 /// Local time of the plant.
 fn local(at: jiff::Timestamp, def: &crate::plant::PlantDef) -> String {
     at.to_zoned(def.time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S").to_string()
-}
-
-/// A factor of time, at least one.
-fn speed(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(speed) if (1.0..=1000.0).contains(&speed) => Ok(speed),
-        Ok(_) | Err(_) => Err(format!("found `{text}`, expected a number from 1 to 1000")),
-    }
 }
 
 fn load(plant: &str, station: &StationArgs) -> Result<crate::plant::PlantDef, CliError> {
@@ -379,14 +375,5 @@ mod tests {
     #[test]
     fn the_arguments_are_well_formed() {
         Args::command().debug_assert();
-    }
-
-    #[test]
-    fn spans_and_speeds_are_checked() {
-        assert_eq!(span("10m"), Ok(std::time::Duration::from_secs(600)));
-        assert!(span("ten").is_err_and(|error| error.contains("found `ten`, expected")));
-        assert!(span("-5s").is_err());
-        assert_eq!(speed("60"), Ok(60.0));
-        assert!(speed("0").is_err());
     }
 }

@@ -12,15 +12,15 @@ use crate::{
     access::{SessionRequest, audit_log::sha256},
     history::{
         Answer, HistoryError, Query,
-        io::{QueryRequest, store::Store},
+        io::{QueryRequest, archive::sync_and_hash, store::Store},
     },
     plant::{PlantDef, def::CsvDialect},
-    profile::io::atomic::write_for_user,
+    profile::io::atomic::{copy_for_user, write_for_user},
     report::{Period, period_parser},
     station::Session,
 };
 
-use super::{CliError, StationArgs, client, load, own_files, put_out, run, say};
+use super::{CliError, StationArgs, client, load, own_files, put_out, put_out_file, run, say};
 
 /// The plant, the period and the login of a command that reads the history.
 #[derive(Debug, clap::Args)]
@@ -133,19 +133,33 @@ impl Source {
     /// Writes a file with what the history holds, `-` to standard output. The station has it recorded before anything is
     /// written, or refuses: an export needs a right.
     pub async fn export(&self, path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-        if let Source::Station(session) = self {
-            let (file, sha256) = (path.display().to_string(), sha256(bytes));
-            let exported = format!("exported to {file}");
-            let durability =
-                session.request(SessionRequest::Exported { file, sha256 }).await.map_err(CliError::Failed)?;
-            client::warn_not_recorded(&exported, durability);
-        }
+        self.record_export(path, sha256(bytes)).await?;
         let failed = CliError::io(format!("cannot write {}", path.display()));
         if path.as_os_str() == "-" {
             return put_out(bytes).map_err(failed);
         }
         write_for_user(path, bytes).map_err(failed)?;
         say(&path.display().to_string());
+        Ok(())
+    }
+
+    /// The same with a file that may be too large for the memory.
+    pub async fn export_file(&self, path: &Path, from: &Path) -> Result<(), CliError> {
+        let (_, sha256) = sync_and_hash(from).map_err(CliError::io(format!("cannot read {}", from.display())))?;
+        self.record_export(path, sha256).await?;
+        let failed = CliError::io(format!("cannot write {}", path.display()));
+        match path.as_os_str() == "-" {
+            true => put_out_file(from).map_err(failed),
+            false => copy_for_user(from, path).map_err(failed),
+        }
+    }
+
+    async fn record_export(&self, path: &Path, sha256: String) -> Result<(), CliError> {
+        let Source::Station(session) = self else { return Ok(()) };
+        let file = path.display().to_string();
+        let exported = format!("exported to {file}");
+        let durability = session.request(SessionRequest::Exported { file, sha256 }).await.map_err(CliError::Failed)?;
+        client::warn_not_recorded(&exported, durability);
         Ok(())
     }
 }

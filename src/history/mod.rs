@@ -27,6 +27,7 @@ use crate::{
         live::{LiveRead, LiveReading},
         past::Past,
         record::{ActionRecord, AlarmRecord},
+        sample::Sample,
     },
     report::{Period, ShiftReport, step_series::HeldValue},
 };
@@ -119,6 +120,13 @@ pub enum Query {
     },
     /// What is stored, and where.
     Overview,
+    /// Samples that are not archived yet.
+    Unarchived {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+    },
     /// Registers of a unit as they are now: the line answers it, not the history.
     Registers(LiveRead),
 }
@@ -142,6 +150,8 @@ pub enum Answer {
     Values(Vec<Vec<Option<HeldValue>>>),
     /// What is known of the instant.
     Past(Box<Past>),
+    /// Samples in order of time.
+    Unarchived(Vec<(TagId, Sample)>),
     /// What is stored.
     Overview(Box<Overview>),
     /// What the unit holds.
@@ -157,6 +167,8 @@ pub struct Overview {
     pub database_bytes: u64,
     /// Samples in it: those that are not archived yet.
     pub samples: u64,
+    /// The first of them.
+    pub oldest: Option<Timestamp>,
     /// The first and last instant stored, in the database or in the archive.
     pub extent: Option<(Timestamp, Timestamp)>,
     /// The folder of the archive.
@@ -286,6 +298,9 @@ pub enum HistoryError {
         /// Where they end.
         last: Timestamp,
     },
+    /// SQL that cannot be answered, in the words of the engine.
+    #[error("{0}")]
+    Sql(String),
     /// The query makes no sense: empty or negative span.
     #[error("empty period")]
     EmptyPeriod,
@@ -314,6 +329,7 @@ impl HistoryError {
             | HistoryError::TooManyRows { .. }
             | HistoryError::OtherSchema { .. }
             | HistoryError::NotKept { .. }
+            | HistoryError::Sql(_)
             | HistoryError::EmptyPeriod
             | HistoryError::NotOpen
             | HistoryError::Refused(_)

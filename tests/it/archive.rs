@@ -21,7 +21,7 @@ const START: &str = "2026-03-02T06:00:00Z";
 const SECONDS: i64 = 26 * 3_600;
 
 /// A closed history of the tank, archived up to its last hour.
-fn archived(path: &Path, parquet: ParquetVersion) {
+pub fn archived(path: &Path, parquet: ParquetVersion) {
     let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
     let def = Arc::new(PlantDef { history: HistoryDef { parquet, ..def.history }, ..PlantDef::clone(&def) });
     let start: Timestamp = START.parse().unwrap();

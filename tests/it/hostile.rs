@@ -50,6 +50,7 @@ fn no_argument_acts_on_the_terminal_by_any_command() {
         "report",
         "export",
         "history",
+        "sql",
         "alarms",
         "decode",
         "scan",

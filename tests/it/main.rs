@@ -33,6 +33,7 @@
 
 mod architecture;
 mod archive;
+mod sql;
 mod attach;
 mod capture;
 mod commands;

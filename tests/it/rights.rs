@@ -334,14 +334,11 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
 fn of_question(query: &Query) -> Row {
     match query {
         Query::Series { .. } => look("", "-VTSL-"),
-        Query::Journal { .. } => look("", "-VTSL-"),
-        Query::Actions { .. } => look("", "-VTSL-"),
-        Query::LineMinutes { .. } => look("", "-VTSL-"),
-        Query::Values { .. } => look("", "-VTSL-"),
+        Query::Journal { .. } | Query::Actions { .. } => look("", "-VTSL-"),
+        Query::LineMinutes { .. } | Query::Values { .. } => look("", "-VTSL-"),
         Query::AlarmMetrics { .. } => look("", "-VTSL-"),
         Query::Report { .. } => look("", "-VTSL-"),
-        Query::Past { .. } => look("", "-VTSL-"),
-        Query::Overview => look("", "-VTSL-"),
+        Query::Past { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
@@ -365,6 +362,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::AlarmMetrics { from, to },
         Query::Report { period: Period { name: "period".into(), from, to } },
         Query::Past { at: to },
+        Query::Unarchived { from, to },
         Query::Overview,
         Query::Audit { from, to, words, by, action, limit },
         Query::Registers(registers(def)),

@@ -110,11 +110,14 @@ impl Store {
 
     /// What is stored, and where.
     pub(super) fn overview(&self, now: Timestamp) -> Result<Overview, HistoryError> {
+        // Of a connection that was cloned before the last commit.
+        self.read_last_commit().map_err(engine)?;
         let files = self.files(None)?;
         Ok(Overview {
             database: self.path.clone(),
             database_bytes: self.file_bytes(),
             samples: self.db.query_row(sql::COUNT_SAMPLES, [], |row| row.get(0)).map_err(engine)?,
+            oldest: self.oldest_in_table()?.and_then(instant),
             extent: self.extent(),
             folder: self.archive_folder(),
             disk: files::disk(&self.path),
@@ -171,7 +174,7 @@ impl Store {
         fs::create_dir_all(last.parent().unwrap_or(&folder)).map_err(|error| wrong(&new, &error))?;
         let to = quoted(&new);
         self.db
-            .execute_batch(&format!("COPY ({rows} {order}) TO {to} ({})", sql::parquet(self.def.history.parquet)))
+            .execute_batch(&format!("COPY ({rows} {order}) TO {to} ({})", sql::parquet(tier, self.def.history.parquet)))
             .map_err(engine)?;
         let sum = |from: &str| {
             let sql = format!("SELECT count(*), sum(hash({}))::VARCHAR FROM {from}", sql::columns(tier));
@@ -204,8 +207,11 @@ impl Store {
     fn write_tags(&self) -> Result<(), HistoryError> {
         let path = self.archive_folder().join(TAGS);
         let new = with_suffix(&path, UNFINISHED);
-        let copy =
-            format!("COPY (FROM tag ORDER BY id) TO {} ({})", quoted(&new), sql::parquet(self.def.history.parquet));
+        let copy = format!(
+            "COPY (FROM tag ORDER BY id) TO {} ({})",
+            quoted(&new),
+            sql::parquet(Tier::Raw, self.def.history.parquet)
+        );
         self.db.execute_batch(&copy).map_err(engine)?;
         sync_and_hash(&new)
             .and_then(|_| fs::rename(&new, &path))

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use super::{
     read::{ROWS_MAX, alarm, line_minute},
     sql,
-    store::{Store, instant, utc},
+    store::{Store, engine, instant, utc},
 };
 use crate::{
     history::{
@@ -59,6 +59,7 @@ impl Store {
 
     /// An instant that the samples do not reach.
     fn refuse_unknown(&self, at: Timestamp, now: Timestamp) -> Result<(), HistoryError> {
+        self.read_last_commit().map_err(engine)?;
         let deleted = self.deleted_until(Tier::Raw)?.unwrap_or(Timestamp::MIN);
         let first = self.extent().map(|(first, _)| first.max(deleted));
         match first {

@@ -60,6 +60,7 @@ impl Store {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
             Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
+            Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
             Query::Registers(_) => Err(HistoryError::Engine("registers are read by the line".to_owned())),
             Query::Journal { from, to, limit } => {

@@ -184,6 +184,7 @@ fn counts_a_period(query: &Query) -> bool {
         | Query::Audit { .. }
         | Query::LineMinutes { .. }
         | Query::Past { .. }
+        | Query::Unarchived { .. }
         | Query::Overview
         | Query::Registers(_) => false,
     }

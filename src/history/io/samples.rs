@@ -1,6 +1,8 @@
 //! Stored samples of many tags, read once, piece by piece in order of time: the memory that a query needs does not
 //! grow with its period.
 
+use std::collections::HashMap;
+
 use duckdb::{
     arrow::{
         array::{Array, AsArray, StructArray},
@@ -12,7 +14,7 @@ use jiff::Timestamp;
 
 use super::{
     archive::overlapping,
-    read::within,
+    read::{check_span, within},
     sql,
     store::{Store, engine, instant, utc},
 };
@@ -34,6 +36,8 @@ const SCANNED_ROWS: f64 = 3e6;
 /// least, in microseconds.
 const GAP_PARTS: i64 = 500;
 const GAP_MIN: i64 = 60_000_000;
+/// Samples that are handed out at once.
+pub const UNARCHIVED_MAX: u64 = 50_000;
 /// How a tag is asked for that the file does not know, and one that was not asked for.
 const NONE: u32 = u32::MAX;
 
@@ -188,6 +192,22 @@ impl Store {
         Ok(gaps)
     }
 
+    /// The samples of this plant's tags that are not archived, in a span.
+    pub(super) fn unarchived(&self, from: Timestamp, to: Timestamp) -> Result<Vec<(TagId, Sample)>, HistoryError> {
+        check_span(from, to)?;
+        let row = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
+        let params = params![utc(from), utc(to), UNARCHIVED_MAX + 1];
+        let rows: Vec<(i64, u16, Option<f64>, u8)> = self.list(sql::UNARCHIVED, params, row)?;
+        within(rows.len() as u64, UNARCHIVED_MAX)?;
+        let tags: HashMap<u16, TagId> =
+            self.def.tags.iter().filter_map(|tag| Some((self.id(tag.id)?, tag.id))).collect();
+        let sample = |(micros, tag, value, quality)| {
+            let row = Row { micros, value, place: 0, quality };
+            Some((*tags.get(&tag)?, row.sample()?.1))
+        };
+        Ok(rows.into_iter().filter_map(sample).collect())
+    }
+
     /// Whether one of these files was replaced by another while it was read.
     fn are_replaced(&self, files: &[ArchiveFile]) -> Result<bool, HistoryError> {
         let known = self.files(None)?;
@@ -267,7 +287,7 @@ impl Store {
     }
 
     /// When the oldest sample was stored that is not archived; microseconds.
-    fn oldest_in_table(&self) -> Result<Option<i64>, HistoryError> {
+    pub(super) fn oldest_in_table(&self) -> Result<Option<i64>, HistoryError> {
         self.db.query_row(sql::OLDEST_IN_TABLE, [], |row| row.get(0)).map_err(engine)
     }
 

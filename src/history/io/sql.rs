@@ -165,6 +165,9 @@ pub fn of_tags(list: Option<&[String]>) -> String {
 pub const ROWS_ABOUT: &str =
     "SELECT estimated_size + (SELECT coalesce(sum(rows), 0) FROM archive WHERE tier = 'raw')::BIGINT
     FROM duckdb_tables() WHERE table_name = 'sample'";
+/// Samples of the table in a span.
+pub const UNARCHIVED: &str = "SELECT epoch_us(utc), tag, value, quality FROM sample WHERE utc >= $1 AND utc < $2
+    ORDER BY utc, rowid LIMIT $3";
 /// When the oldest sample of the table was stored.
 pub const OLDEST_IN_TABLE: &str = "SELECT min(utc) FROM sample";
 /// When the first sample in the file was stored.
@@ -262,9 +265,10 @@ pub const LINE_MINUTES: &str = "SELECT * FROM (
         utilisation, reply_p99_ms, reply_max_ms
     FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";
 
-/// How files of the archive are written.
-pub fn parquet(version: ParquetVersion) -> String {
-    format!("FORMAT parquet, PARQUET_VERSION {}, COMPRESSION zstd, ROW_GROUP_SIZE 122880", version.word())
+/// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows.
+pub fn parquet(tier: Tier, version: ParquetVersion) -> String {
+    let group = if tier == Tier::Raw { 122_880 } else { 20_480 };
+    format!("FORMAT parquet, PARQUET_VERSION {}, COMPRESSION zstd, ROW_GROUP_SIZE {group}", version.word())
 }
 
 /// When the oldest sample was stored that is not archived, from an instant on.

@@ -51,6 +51,17 @@ pub fn write_for_user(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_atomic(path, bytes, 0o640)
 }
 
+/// The same with the bytes of another file.
+pub fn copy_for_user(from: &Path, path: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder(path))?;
+    let new = beside(path);
+    let copied = fs::copy(from, &new).and_then(|_| File::open(&new)?.sync_all()).and_then(|()| fs::rename(&new, path));
+    // After a rename there is nothing left to remove.
+    let _ = fs::remove_file(&new);
+    copied?;
+    sync_folder(path)
+}
+
 /// A file that was not there before, whole or not at all; an error where one of its name is there.
 pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::create_dir_all(folder(path))?;

@@ -206,6 +206,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
             | Query::AlarmMetrics { .. }
             | Query::Values { .. }
             | Query::Past { .. }
+            | Query::Unarchived { .. }
             | Query::Overview
             | Query::Registers(_) => continue,
         };

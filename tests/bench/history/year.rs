@@ -95,9 +95,10 @@ fn copy_days(archive: &Path, days: i64, raw_days: i64) {
             std::fs::create_dir_all(&to).expect("a folder");
             db.execute_batch(&format!(
                 "COPY (SELECT * REPLACE (utc - INTERVAL {back} DAY AS utc) FROM read_parquet('{}/day.parquet', hive_partitioning = false))
-                 TO '{}/day.parquet' (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE 122880)",
+                 TO '{}/day.parquet' (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE {})",
                 from.display(),
-                to.display()
+                to.display(),
+                if tier == "raw" { 122_880 } else { 20_480 }
             ))
             .expect("copied");
         }

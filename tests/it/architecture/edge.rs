@@ -102,6 +102,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("src/cli/run.rs", &["channels", "tasks", "files", "process"]),
     ("src/cli/sim.rs", &["files", "clock", "network"]),
     ("src/cli/source.rs", &["channels", "clock"]),
+    ("src/cli/sql.rs", &["tasks", "files", "clock", "process"]),
     ("src/cli/systemd_unit.rs", &["process"]),
     ("src/cli/tools/mod.rs", &["tasks", "files", "terminal", "clock", "process"]),
     ("src/cli/tools/network.rs", &["tasks", "process", "network"]),

@@ -15,6 +15,7 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
         | Query::Past { .. }
+        | Query::Unarchived { .. }
         | Query::Overview
         | Query::Registers(_) => "other",
     };

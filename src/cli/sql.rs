@@ -1,0 +1,322 @@
+//! `sightglass sql`: SELECT over the history, read only, in an engine of this process.
+
+use std::{
+    fs,
+    os::unix::fs::DirBuilderExt,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use jiff::Timestamp;
+
+use super::{
+    CliError, StationArgs, client, in_runtime, load, own_files, run, say, say_error,
+    source::{Source, unexpected},
+    span,
+};
+use crate::{
+    history::{
+        Answer, HistoryError, Overview, Query,
+        io::tables::{Format, Row, Tables},
+    },
+    plant::{
+        PlantDef,
+        def::{CsvDialect, TagId},
+        record::{ActionRecord, AlarmRecord},
+        sample::Sample,
+    },
+    ui::widgets::text::width as width_of,
+};
+
+/// Rows of a table on the screen.
+const SHOWN_MAX: usize = 1_000;
+/// Rows of a list that are asked for at a time.
+const PAGE: usize = 10_000;
+/// The longest piece of samples that is asked for at a time.
+const PIECE_MAX: Duration = Duration::from_secs(7 * 86_400);
+/// How long it may work without a word.
+const SILENT: Duration = Duration::from_millis(500);
+
+const VIEWS: &str = "\
+Views (times are UTC):
+  sample   utc, tag, value, unit, quality ('good', 'uncertain: …', 'bad: …')
+  m1, h1   minutes and hours of what is archived: utc (begin), tag, min, max, mean, first, last, gain, good_ms, n, unit
+  alarm    utc, subject, message, priority, event, value, limit_value, by_whom, reason
+  action   utc, by_whom, from_where, action, target, old_value, new_value, outcome, note
+
+Example: sightglass sql tank \"SELECT tag, avg(mean) FROM h1 WHERE utc > '2026-11-01' GROUP BY tag\"";
+
+/// Arguments of `sql`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = VIEWS)]
+pub struct Args {
+    /// A plant file, or the name of a shipped plant
+    plant: String,
+    /// One SELECT, in the SQL of DuckDB
+    sql: String,
+    /// Print CSV
+    #[arg(long, conflicts_with_all = ["json", "parquet"])]
+    csv: bool,
+    /// Print JSON: an array of objects
+    #[arg(long, conflicts_with = "parquet")]
+    json: bool,
+    /// Write a Parquet file
+    #[arg(long, value_name = "FILE")]
+    parquet: Option<PathBuf>,
+    /// The longest time that it may take
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = span)]
+    timeout: Duration,
+    #[command(flatten)]
+    login: client::Login,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+/// Answers a SELECT.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let def = Arc::new(load(&args.plant, &args.station)?);
+    if let Some(file) = &args.parquet {
+        own_files::refuse(file, &run::history_file(&def, &args.station))?;
+    }
+    in_runtime(async {
+        let source = Source::open(&def, &args.station, &args.login).await?;
+        let tables = HistoryTables::load(&def, &source).await?;
+        tables.tables.check(&args.sql).map_err(refused)?;
+        let format = match (args.csv, args.json, &args.parquet) {
+            (true, _, _) => Some(Format::Csv(CsvDialect::default())),
+            (_, true, _) => Some(Format::Json),
+            (_, _, Some(_)) => Some(Format::Parquet),
+            (false, false, None) => None,
+        };
+        match format {
+            None => {
+                let (names, rows) =
+                    work(tables.tables, args.timeout, move |tables| tables.rows(&args.sql, SHOWN_MAX + 1)).await?;
+                as_table(names, rows).iter().for_each(|line| say(line));
+                Ok(())
+            }
+            Some(format) => {
+                let to = args.parquet.as_deref().unwrap_or(Path::new("-"));
+                tables.export(&source, &args.sql, format, to, args.timeout).await
+            }
+        }
+    })
+}
+
+/// The tables of a history, and the folder that their engine works in, which goes with them.
+pub struct HistoryTables {
+    tables: Tables,
+    folder: WorkFolder,
+}
+
+impl HistoryTables {
+    /// Reads what is not archived; the archive is read when it is asked.
+    pub async fn load(def: &PlantDef, source: &Source) -> Result<HistoryTables, CliError> {
+        let folder = WorkFolder::new()?;
+        loop {
+            let overview = overview(source).await?;
+            let tables = Tables::new(def, &overview, &folder.0)?;
+            tables.add_alarms(journal(source).await?)?;
+            tables.add_actions(actions(source).await?)?;
+            unarchived(source, &overview, |samples| tables.add_samples(def, samples)).await?;
+            // An hour that was archived meanwhile would be missing or double.
+            if self::overview(source).await?.files == overview.files {
+                return Ok(HistoryTables { tables, folder });
+            }
+        }
+    }
+
+    /// Writes the result of a SELECT to a file, `-` to standard output.
+    pub async fn export(
+        self,
+        source: &Source,
+        sql: &str,
+        format: Format,
+        to: &Path,
+        timeout: Duration,
+    ) -> Result<(), CliError> {
+        let (file, sql) = (self.folder.0.join("result"), sql.to_owned());
+        let written = file.clone();
+        let rows = work(self.tables, timeout, move |tables| tables.write(&sql, &written, format)).await?;
+        source.export_file(to, &file).await?;
+        if to.as_os_str() != "-" {
+            say(&format!("{}: {rows} rows", to.display()));
+        }
+        Ok(())
+    }
+}
+
+/// Lets the engine work until it is done, its time is over, or Ctrl-C.
+async fn work<T: Send + 'static>(
+    tables: Tables,
+    limit: Duration,
+    work: impl FnOnce(&Tables) -> Result<T, HistoryError> + Send + 'static,
+) -> Result<T, CliError> {
+    let (interrupt, began) = (tables.interrupt_handle(), Instant::now());
+    let mut working = tokio::task::spawn_blocking(move || work(&tables));
+    let mut ticks = tokio::time::interval(SILENT);
+    let mut ended = None;
+    loop {
+        tokio::select! {
+            done = &mut working => {
+                return match ended {
+                    Some(why) => Err(CliError::Failed(why)),
+                    None => done.map_err(|panic| CliError::Failed(panic.to_string()))?.map_err(refused),
+                };
+            }
+            _ = tokio::signal::ctrl_c() => ended = Some("cancelled".to_owned()),
+            _ = ticks.tick() => {
+                if limit < began.elapsed() {
+                    let (most, hint) = (limit.as_secs_f64(), "ask for less, or use m1 or h1, or a longer --timeout");
+                    ended = Some(format!("no result within {most} s: {hint}"));
+                } else if SILENT < began.elapsed() && began.elapsed().as_millis() % 5_000 < SILENT.as_millis() {
+                    say_error(&format!("working for {} s, Ctrl-C cancels", began.elapsed().as_secs()));
+                }
+            }
+        }
+        if ended.is_some() {
+            interrupt.interrupt();
+        }
+    }
+}
+
+/// Errors in the SQL are errors of the arguments.
+fn refused(error: HistoryError) -> CliError {
+    match error {
+        HistoryError::Sql(words) => CliError::Usage(words),
+        other => CliError::History(other),
+    }
+}
+
+async fn overview(source: &Source) -> Result<Overview, CliError> {
+    match source.query(Query::Overview).await? {
+        Answer::Overview(overview) => Ok(*overview),
+        _ => Err(unexpected()),
+    }
+}
+
+/// Hands over the samples that are not archived, piece by piece.
+async fn unarchived(
+    source: &Source,
+    overview: &Overview,
+    mut each: impl FnMut(Vec<(TagId, Sample)>) -> Result<(), HistoryError>,
+) -> Result<(), CliError> {
+    let end = source.now().checked_add(Duration::from_secs(1)).unwrap_or(Timestamp::MAX);
+    let (mut from, mut span) = (overview.oldest.unwrap_or(end), Duration::from_secs(600));
+    while from < end {
+        let to = from.checked_add(span).unwrap_or(end).min(end);
+        match source.query(Query::Unarchived { from, to }).await {
+            Ok(Answer::Unarchived(samples)) => {
+                span = if samples.len() < PAGE { (span * 4).min(PIECE_MAX) } else { span };
+                each(samples)?;
+                from = to;
+            }
+            Ok(_) => return Err(unexpected()),
+            Err(CliError::History(HistoryError::TooManyRows { .. })) if Duration::from_millis(1) < span => span /= 4,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+async fn journal(source: &Source) -> Result<Vec<AlarmRecord>, CliError> {
+    let (mut all, mut to) = (Vec::new(), end(source));
+    loop {
+        let query = Query::Journal { from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
+        let Answer::Journal(page) = source.query(query).await? else { return Err(unexpected()) };
+        let Some(next) = add_page(&mut all, page, |event| event.at) else { return Ok(all) };
+        to = next;
+    }
+}
+
+async fn actions(source: &Source) -> Result<Vec<ActionRecord>, CliError> {
+    let (mut all, mut to) = (Vec::new(), end(source));
+    loop {
+        let query = Query::Actions { from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
+        let Answer::Actions(page) = source.query(query).await? else { return Err(unexpected()) };
+        let Some(next) = add_page(&mut all, page, |action| action.at) else { return Ok(all) };
+        to = next;
+    }
+}
+
+fn end(source: &Source) -> Timestamp {
+    source.now().checked_add(Duration::from_secs(3_600)).unwrap_or(Timestamp::MAX)
+}
+
+/// Adds a page of a list that comes newest first. Returns where the next one ends: what happened at the oldest instant of a
+/// full page comes again, whole.
+fn add_page<T>(all: &mut Vec<T>, mut page: Vec<T>, at: fn(&T) -> Timestamp) -> Option<Timestamp> {
+    let oldest = page.last().map(at).filter(|_| PAGE <= page.len());
+    let next = oldest.and_then(|oldest| oldest.checked_add(Duration::from_micros(1)).ok());
+    if let Some(oldest) = oldest.filter(|oldest| page.first().map(at) != Some(*oldest)) {
+        page.retain(|row| at(row) != oldest);
+        all.extend(page);
+        return next;
+    }
+    all.extend(page);
+    None
+}
+
+/// A folder that is removed with this.
+struct WorkFolder(PathBuf);
+
+impl WorkFolder {
+    fn new() -> Result<WorkFolder, CliError> {
+        let path = std::env::temp_dir().join(format!("sightglass-{}", std::process::id()));
+        let made = fs::DirBuilder::new().mode(0o700).create(&path);
+        made.map_err(CliError::io(format!("cannot create {}", path.display())))?;
+        Ok(WorkFolder(path))
+    }
+}
+
+impl Drop for WorkFolder {
+    fn drop(&mut self) {
+        if let Err(error) = fs::remove_dir_all(&self.0) {
+            say_error(&format!("{} is not removed: {error}", self.0.display()));
+        }
+    }
+}
+
+/// Columns side by side.
+fn as_table(names: Vec<String>, mut rows: Vec<Row>) -> Vec<String> {
+    let more = SHOWN_MAX < rows.len();
+    rows.truncate(SHOWN_MAX);
+    let count = rows.len();
+    let cells: Vec<Vec<String>> = std::iter::once(names)
+        .chain(rows.into_iter().map(|row| row.into_iter().map(|cell| cell.unwrap_or_else(|| "–".into())).collect()))
+        .collect();
+    let columns = cells[0].len();
+    let width = |column: usize| cells.iter().map(|row| width_of(&row[column])).max().unwrap_or(0);
+    let widths: Vec<u16> = (0..columns).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cell =
+            |(cell, width): (&String, &u16)| format!("{cell}{}", " ".repeat(usize::from(width - width_of(cell))));
+        row.iter().zip(&widths).map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
+    };
+    let mut lines: Vec<String> = cells.iter().map(line).collect();
+    lines.push(match more {
+        true => format!("the first {count} rows; --csv, --json and --parquet give all"),
+        false => format!("{count} rows"),
+    });
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_of_a_list_make_the_whole_list() {
+        let at = |row: &i64| Timestamp::from_second(*row).expect("in range");
+        // 25,000 rows, newest first, several of one instant.
+        let rows: Vec<i64> = (0..25_000).rev().map(|row| row / 7).collect();
+        let (mut all, mut to) = (Vec::new(), Timestamp::MAX);
+        loop {
+            let page = rows.iter().copied().filter(|row| at(row) < to).take(PAGE).collect();
+            let Some(next) = add_page(&mut all, page, at) else { break };
+            to = next;
+        }
+        assert_eq!(all, rows);
+    }
+}

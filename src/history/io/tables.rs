@@ -1,0 +1,215 @@
+//! The history as tables for SQL of others: an engine of its own in this process, that reads the files of the archive and a
+//! copy of what is not archived yet. It cannot reach any other file, and what it is asked cannot reach the station.
+//!
+//! | view | columns |
+//! |---|---|
+//! | `sample` | `utc`, `tag`, `value`, `unit`, `quality` (`good`, `uncertain: …`, `bad: …`) |
+//! | `m1`, `h1` | `utc` (begin), `tag`, `min`, `max`, `mean` (over good time), `first`, `last`, `gain` (of a counter), `good_ms`, `n` (samples), `unit`: of what is archived |
+//! | `alarm` | `utc`, `subject`, `message`, `priority` (1–4), `event`, `value`, `limit_value`, `by_whom`, `reason` |
+//! | `action` | `utc`, `by_whom`, `from_where`, `action`, `target`, `old_value`, `new_value`, `outcome`, `note` |
+
+use std::{path::Path, sync::Arc};
+
+use duckdb::{Connection, InterruptHandle, params};
+
+use super::{
+    archive::quoted,
+    store::{engine, utc},
+};
+use crate::{
+    history::{ArchiveFile, HistoryError, Overview, tiers::Tier},
+    plant::{
+        PlantDef,
+        def::{CsvDialect, TagId},
+        record::{ActionRecord, AlarmRecord},
+        sample::{Quality, Sample},
+    },
+};
+
+/// Of the engine; what does not fit is kept in its folder.
+const MEMORY: &str = "256MB";
+
+/// An engine with the tables.
+pub struct Tables {
+    db: Connection,
+}
+
+/// A row as texts; `None` where it is NULL.
+pub type Row = Vec<Option<String>>;
+
+/// How a result is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// With a header.
+    Csv(CsvDialect),
+    /// One array of objects.
+    Json,
+    /// Version 1.
+    Parquet,
+}
+
+impl Tables {
+    /// Empty tables. `folder` is for what does not fit into memory, and for results.
+    pub fn new(def: &PlantDef, overview: &Overview, folder: &Path) -> Result<Tables, HistoryError> {
+        let db = Connection::open_in_memory().map_err(engine)?;
+        let tables = Tables { db };
+        let archive = format!("{}/", overview.folder.display());
+        tables.run(&format!(
+            "SET memory_limit = '{MEMORY}'; SET threads = 2; SET temp_directory = {folder};
+             SET autoinstall_known_extensions = false; SET autoload_known_extensions = false;
+             SET allowed_directories = [{archive}, {folder}]; SET enable_external_access = false;
+             SET lock_configuration = true;
+             CREATE TABLE tags (id USMALLINT, name VARCHAR, unit VARCHAR);
+             CREATE TABLE qualities (code UTINYINT, quality VARCHAR);
+             CREATE TABLE unarchived (utc TIMESTAMP, tag VARCHAR, value DOUBLE, quality UTINYINT);
+             CREATE TABLE alarm (utc TIMESTAMP, subject VARCHAR, message VARCHAR, priority UTINYINT, event VARCHAR,
+                value DOUBLE, limit_value DOUBLE, by_whom VARCHAR, reason VARCHAR);
+             CREATE TABLE action (utc TIMESTAMP, by_whom VARCHAR, from_where VARCHAR, action VARCHAR, target VARCHAR,
+                old_value VARCHAR, new_value VARCHAR, outcome VARCHAR, note VARCHAR);",
+            folder = quoted(&folder.join("")),
+            archive = quoted(Path::new(&archive)),
+        ))?;
+        tables.fill(
+            "qualities",
+            (0..=u8::MAX).filter_map(|code| Some((code, Quality::from_code(code)?))),
+            |to, (code, quality)| to.append_row(params![code, quality.word()]),
+        )?;
+        let dictionary = overview.folder.join("tag.parquet");
+        if dictionary.is_file() {
+            tables
+                .run(&format!("INSERT INTO tags SELECT id, name, unit FROM read_parquet({})", quoted(&dictionary)))?;
+        }
+        // Tags that were never archived have no number.
+        tables.fill("tags", def.tags.iter(), |to, tag| to.append_row(params![None::<u16>, tag.name, tag.unit]))?;
+        tables.run(&views(overview))?;
+        Ok(tables)
+    }
+
+    /// Adds samples that are not archived.
+    pub fn add_samples(&self, def: &PlantDef, samples: Vec<(TagId, Sample)>) -> Result<(), HistoryError> {
+        self.fill("unarchived", samples.into_iter(), |to, (tag, Sample { at, value, quality })| {
+            to.append_row(params![utc(at), def.tag(tag).name, value, quality.code()])
+        })
+    }
+
+    /// Adds events of alarms.
+    pub fn add_alarms(&self, events: Vec<AlarmRecord>) -> Result<(), HistoryError> {
+        self.fill("alarm", events.into_iter(), |to, event| {
+            let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, .. } = event;
+            let (priority, event) = (priority.number(), event.word());
+            to.append_row(params![utc(at), subject, message, priority, event, value, limit, by, reason])
+        })
+    }
+
+    /// Adds operator actions.
+    pub fn add_actions(&self, actions: Vec<ActionRecord>) -> Result<(), HistoryError> {
+        self.fill("action", actions.into_iter(), |to, action| {
+            let ActionRecord { at, by, from, action, target, old, new, outcome, note, .. } = action;
+            to.append_row(params![utc(at), by, from, action, target, old, new, outcome, note])
+        })
+    }
+
+    /// Ends what is running, from any thread.
+    pub fn interrupt_handle(&self) -> Arc<InterruptHandle> {
+        self.db.interrupt_handle()
+    }
+
+    /// Refuses what is not one SELECT. The message is that of the engine, with the place.
+    pub fn check(&self, sql: &str) -> Result<(), HistoryError> {
+        let parsed: String = self
+            .db
+            .query_row("SELECT json_serialize_sql(?::VARCHAR)::VARCHAR", params![sql], |row| row.get(0))
+            .map_err(|error| HistoryError::Sql(error.to_string()))?;
+        let parsed: serde_json::Value = serde_json::from_str(&parsed).unwrap_or_default();
+        let statements = parsed["statements"].as_array().map_or(0, Vec::len);
+        match (parsed["error"].as_bool(), statements) {
+            // Names and types are checked, nothing is read.
+            (Some(false), 1) => self.db.prepare(sql).map(drop).map_err(|error| HistoryError::Sql(error.to_string())),
+            (Some(true), _) if parsed["error_type"] == "not implemented" => {
+                Err(HistoryError::Sql("the history is read only: expected one SELECT".to_owned()))
+            }
+            (Some(false), count) => Err(HistoryError::Sql(format!("found {count} statements, expected one SELECT"))),
+            (Some(true) | None, _) => {
+                let why = parsed["error_message"].as_str().unwrap_or("cannot be read");
+                let at = parsed["position"].as_str().map_or_else(String::new, |at| format!(" (at character {at})"));
+                Err(HistoryError::Sql(format!("{why}{at}")))
+            }
+        }
+    }
+
+    /// Writes the result of a SELECT into a file of the engine's folder. Returns its rows.
+    pub fn write(&self, sql: &str, file: &Path, format: Format) -> Result<u64, HistoryError> {
+        let options = match format {
+            Format::Csv(csv) => format!("FORMAT csv, HEADER true, DELIMITER '{}'", csv.separator),
+            Format::Json => "FORMAT json, ARRAY true".to_owned(),
+            Format::Parquet => "FORMAT parquet, PARQUET_VERSION v1, COMPRESSION zstd".to_owned(),
+        };
+        let copy = format!("COPY (FROM ({sql}\n)) TO {} ({options})", quoted(file));
+        let rows = self.db.execute(&copy, []).map_err(|error| HistoryError::Sql(error.to_string()))?;
+        Ok(rows as u64)
+    }
+
+    /// The names of the columns and at most so many rows of a SELECT.
+    pub fn rows(&self, sql: &str, limit: usize) -> Result<(Vec<String>, Vec<Row>), HistoryError> {
+        let wrong = |error: duckdb::Error| HistoryError::Sql(error.to_string());
+        let texts = format!("SELECT COLUMNS(*)::VARCHAR FROM ({sql}\n) LIMIT {limit}");
+        let mut statement = self.db.prepare(&texts).map_err(wrong)?;
+        let mut rows = statement.query([]).map_err(wrong)?;
+        let mut all = Vec::new();
+        let names = rows.as_ref().map(|statement| statement.column_names()).unwrap_or_default();
+        while let Some(row) = rows.next().map_err(wrong)? {
+            all.push((0..names.len()).map(|column| row.get(column)).collect::<duckdb::Result<_>>().map_err(wrong)?);
+        }
+        Ok((names, all))
+    }
+
+    fn run(&self, sql: &str) -> Result<(), HistoryError> {
+        self.db.execute_batch(sql).map_err(engine)
+    }
+
+    fn fill<T>(
+        &self,
+        table: &str,
+        rows: impl Iterator<Item = T>,
+        mut append: impl FnMut(&mut duckdb::Appender, T) -> duckdb::Result<()>,
+    ) -> Result<(), HistoryError> {
+        let mut appender = self.db.appender(table).map_err(engine)?;
+        for row in rows {
+            append(&mut appender, row).map_err(engine)?;
+        }
+        appender.flush().map_err(engine)
+    }
+}
+
+fn views(overview: &Overview) -> String {
+    let of = |tier: Tier| overview.files.iter().filter(move |file| file.tier == tier);
+    let read = |tier: Tier| {
+        let path = |file: &ArchiveFile| quoted(&overview.folder.join(&file.path));
+        let paths: Vec<String> = of(tier).map(path).collect();
+        (!paths.is_empty()).then(|| format!("read_parquet([{}], hive_partitioning = false)", paths.join(", ")))
+    };
+    let archived = read(Tier::Raw).map(|files| {
+        format!("SELECT f.utc, t.name AS tag, f.value, f.quality FROM {files} f JOIN tags t ON t.id = f.tag UNION ALL ")
+    });
+    let units = "(SELECT name, any_value(unit) AS unit FROM tags GROUP BY name)";
+    let mut sql = format!(
+        "CREATE VIEW sample AS SELECT s.utc, s.tag, s.value, u.unit, q.quality
+         FROM ({}SELECT utc, tag, value, quality FROM unarchived) s
+         JOIN qualities q ON q.code = s.quality JOIN {units} u ON u.name = s.tag;",
+        archived.unwrap_or_default()
+    );
+    for tier in [Tier::Minute, Tier::Hour] {
+        let word = tier.word();
+        let columns = "f.utc, t.name AS tag, f.min, f.max, f.mean, f.first, f.last, f.gain, f.good_ms, f.n, t.unit";
+        sql += &match read(tier) {
+            Some(files) => {
+                format!("CREATE VIEW {word} AS SELECT {columns} FROM {files} f JOIN tags t ON t.id = f.tag;")
+            }
+            None => format!(
+                "CREATE TABLE {word} (utc TIMESTAMP, tag VARCHAR, min DOUBLE, max DOUBLE, mean DOUBLE, first DOUBLE,
+                    last DOUBLE, gain DOUBLE, good_ms UINTEGER, n UINTEGER, unit VARCHAR);"
+            ),
+        };
+    }
+    sql
+}

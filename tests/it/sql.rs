@@ -1,0 +1,83 @@
+//! SQL over the history, and raw samples as files: what others get is what is stored, and nothing else can be reached.
+
+use std::path::Path;
+
+use sightglass::plant::def::ParquetVersion;
+
+use crate::{
+    archive::archived,
+    support::{folder, sightglass},
+};
+
+/// Exit code and output of a command on a history.
+fn run(history: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let output =
+        sightglass().args(&args[..1]).arg("tank").args(&args[1..]).arg("--history").arg(history).output().unwrap();
+    (output.status.code(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
+}
+
+#[test]
+fn sql_reads_archive_and_database_as_one() {
+    let folder = folder();
+    let history = folder.path().join("tank.duckdb");
+    archived(&history, ParquetVersion::V1);
+    let sql = |args: &[&str]| run(&history, &[&["sql"], args].concat());
+    // 26 hours of one sample a second of two tags; the last hour is not archived.
+    let by_tag = "SELECT tag, count(*) AS n, sum(value)::DECIMAL(12, 1) AS sum, unit, quality FROM sample
+        GROUP BY ALL ORDER BY tag";
+    let sum = (0..93_600).map(|second| (second % 1_000) as f64 / 10.0).sum::<f64>();
+    let csv = format!("tag,n,sum,unit,quality\nTIC-1.PV,93600,{sum:.1},°C,good\nTIC-1.SV,93600,6552000.0,°C,good\n");
+    assert_eq!(sql(&[by_tag, "--csv"]), (Some(0), csv));
+    let (code, text) =
+        sql(&["SELECT tag, count(*) AS n, sum(n)::INTEGER AS samples FROM m1 GROUP BY tag ORDER BY tag"]);
+    let table = "tag       n     samples\nTIC-1.PV  1500  90000\nTIC-1.SV  1500  90000\n2 rows\n";
+    assert_eq!((code, text.as_str()), (Some(0), table));
+    let (code, text) = sql(&["SELECT max(mean) AS most FROM h1", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((code, json[0]["most"].as_f64()), (Some(0), Some(70.0)));
+    for (refused, expect) in [
+        ("COPY (SELECT 1) TO '/tmp/x.csv'", "expected one SELECT"),
+        ("SELECT 1; DROP TABLE tags", "expected one SELECT"),
+        ("SELECT 1; SELECT 2", "found 2 statements, expected one SELECT"),
+        ("SET enable_external_access = true", "expected one SELECT"),
+        ("SELECT 1) TO '/tmp/x' (FORMAT csv); --", "syntax error at or near \")\" (at character 8)"),
+        ("SELECT * FROM read_csv('/etc/passwd')", "Cannot access file \"/etc/passwd\""),
+        ("SELECT * FROM '/etc/hostname'", "does not exist"),
+        ("SELECT foo FROM sample", "LINE 1: SELECT foo FROM sample"),
+    ] {
+        let (code, text) = sql(&[refused]);
+        assert_eq!(code, Some(2), "{refused}: {text}");
+        assert!(text.contains(expect), "{refused}: {text}");
+    }
+    let (code, text) =
+        sql(&["SELECT sum(a.range) FROM range(9000000000) a, range(9000000000) b", "--timeout", "200ms"]);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("no result within 0.2 s: ask for less"), "{text}");
+}
+
+#[test]
+fn raw_samples_are_exported_whole() {
+    let folder = folder();
+    let history = folder.path().join("tank.duckdb");
+    archived(&history, ParquetVersion::V2);
+    let out = folder.path().join("samples");
+    let export = |format: &str| {
+        let args =
+            ["export", "--raw", "--from", "2026-03-03T11:59:58", "--to", "2026-03-03T14:00:02", "--tags", "TIC-1.PV"];
+        run(&history, &[&args[..], &["--format", format, "--out", out.to_str().unwrap()]].concat())
+    };
+    let (code, text) = export("csv");
+    assert_eq!(code, Some(0), "{text}");
+    let text = std::fs::read_to_string(&out).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines.remove(0), "utc,local,tag,value,unit,quality");
+    lines.sort_unstable();
+    assert_eq!(lines.len(), 7_204);
+    assert_eq!(lines[0], "2026-03-03 04:59:58,2026-03-03 11:59:58,TIC-1.PV,79.8,°C,good");
+    assert_eq!(lines[7_203], "2026-03-03 07:00:01,2026-03-03 14:00:01,TIC-1.PV,0.1,°C,good");
+    assert_eq!(export("parquet").0, Some(0));
+    let bytes = std::fs::read(&out).unwrap();
+    assert_eq!((&bytes[..4], &bytes[bytes.len() - 4..]), (&b"PAR1"[..], &b"PAR1"[..]));
+    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert!(left.iter().all(|name| !name.to_string_lossy().ends_with(".new")), "{left:?}");
+}
