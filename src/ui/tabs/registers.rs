@@ -80,6 +80,8 @@ pub struct Registers {
     paused: bool,
     cells: Cells,
     names: Names,
+    /// What the plant file calls the registers of this unit.
+    names_of_plant: Names,
     /// Names of the units that were shown before.
     names_of: BTreeMap<u8, Names>,
     recognition: Recognition,
@@ -134,6 +136,7 @@ impl TabView for Registers {
             paused: false,
             cells: Cells::default(),
             names: Names::default(),
+            names_of_plant: Names::default(),
             names_of: BTreeMap::new(),
             recognition: Recognition::default(),
             profiles: OwnProfiles::default(),
@@ -239,6 +242,7 @@ impl TabView for Registers {
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.writing.follow(cx, self.line);
+        self.name_by_plant(cx.snapshot);
         let mut actions = self.watch_time(cx);
         self.follow_graph(cx);
         let now = cx.steady();

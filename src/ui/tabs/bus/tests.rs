@@ -1,13 +1,14 @@
 //! The bus tab in the whole terminal: what a technician sees and what the keys do.
 
 mod pages;
+mod registers;
 
 use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use crate::{
-    access::{Durability, SessionRequest, SessionStatus},
+    access::{Durability, SessionRequest},
     bus::frame::with_crc,
     history::{Answer, Query},
     plant::{
@@ -16,7 +17,6 @@ use crate::{
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
         event::{Fault, LineState},
         line_minute::LineMinute,
-        live::{LivePart, LiveReading},
         ne107::Reason,
         snapshot::DeviceState,
         traffic::Exchange,
@@ -287,42 +287,6 @@ fn loopback_and_identification_are_described() {
     let object = Finding::Object { name: "VendorName".to_owned(), text: "FUJI".to_owned() };
     fixture.line.test = Some(run(Diagnostic::Identify { unit: 1 }, DiagnosticState::Done, 1, 1, vec![object]));
     assert!(screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24).contains("VendorName           FUJI"));
-}
-
-#[test]
-fn registers_of_the_device_are_read_live() {
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
-    let effects = type_keys(&mut model, "R");
-    let asked = |effects: Vec<Effect>| {
-        effects.into_iter().find_map(|effect| match effect {
-            Effect::Query(id, Query::Registers(read)) => Some((id, read)),
-            _ => None,
-        })
-    };
-    let (id, read) = asked(effects).expect("it is asked for");
-    assert_eq!((id.tab, read.line, read.unit, read.not_before), (Tab::Bus, L1, 1, None));
-    let effects = type_keys(&mut model, "j41003⏎");
-    let (id, read) = asked(effects).expect("another window");
-    let span = read.spans[0];
-    let part = LivePart { at: now(), span, words: Ok((0..span.count).map(|n| 700 + n).collect()) };
-    let reading = LiveReading { began: now(), parts: vec![part], requests: 1, ..LiveReading::default() };
-    let next = asked(update(&mut model, Msg::Answer(id, Ok(Answer::Registers(reading)))));
-    assert!(next.is_some_and(|(_, read)| read.not_before.is_some()), "again, a period later");
-    for (width, height) in [(80, 24), (120, 40)] {
-        insta::assert_snapshot!(format!("registers_{width}x{height}"), screen(&mut model, width, height));
-    }
-    assert!(asked(type_keys(&mut model, "w")).is_none() && model.modal.is_none(), "nothing is written here");
-    type_keys(&mut model, "T");
-    assert!(screen(&mut model, 80, 24).contains("‹Test›"));
-}
-
-#[test]
-fn registers_are_not_read_without_the_right() {
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
-    model.session = Arc::new(SessionStatus { who: None, ..SessionStatus::clone(&model.session) });
-    let effects = type_keys(&mut model, "R");
-    assert!(!effects.iter().any(|effect| matches!(effect, Effect::Query(_, Query::Registers(_)))), "{effects:?}");
-    assert!(screen(&mut model, 80, 24).contains("needs Technician"));
 }
 
 #[test]

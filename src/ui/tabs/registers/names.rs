@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use crate::{
     bus::interpret,
-    plant::tag::{ByteOrder, DataType, Point, Table},
+    plant::tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
+    t,
 };
 
 /// A register, or some that stand together, with a name: `value = raw · scale + offset`.
@@ -48,6 +49,17 @@ impl Named {
             name: name.to_owned(),
             labels: Vec::new(),
         }
+    }
+
+    /// A tag, with its decimals and unit. Where the device has not said where its point is, the number is shown as it came,
+    /// and says so.
+    pub fn of_tag(tag: &TagDef, scaling: Option<(u8, String)>) -> Named {
+        let point = tag.point;
+        let plain = Named::new(point.table, point.address, point.kind, point.order, &tag.short);
+        let Some((decimals, unit)) = scaling else { return Named { unit: t!("raw").to_owned(), ..plain } };
+        let point = if let Decimals::From(_) = tag.decimals { 0.1f64.powi(i32::from(decimals)) } else { 1.0 };
+        let labels = tag.labels.clone();
+        Named { scale: tag.scale * point, offset: tag.offset, decimals, unit, labels, ..plain }
     }
 
     /// Registers or bits that it takes.

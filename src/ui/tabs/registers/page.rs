@@ -1,10 +1,6 @@
 //! The registers as a page of the tab Bus, of a unit that the plant file knows.
 
-use super::{
-    Registers,
-    keys::table,
-    names::{Named, Names},
-};
+use super::{Registers, keys::table, names::Named};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::tag::{Decimals, Table, TagDef},
@@ -20,9 +16,7 @@ pub fn chords_of_page() -> Vec<crate::ui::keys::Chord> {
 impl Registers {
     /// As a page of another tab.
     pub fn within(snapshot: &Snapshot, tab: Tab) -> Registers {
-        let mut registers = Registers { tab, ..Registers::new(snapshot) };
-        registers.names = names_of(snapshot, registers.line, registers.unit);
-        registers
+        Registers { tab, ..Registers::new(snapshot) }
     }
 
     /// The registers of this unit, from `place` on; what is shown of it already stays.
@@ -38,6 +32,27 @@ impl Registers {
             self.line = line;
         }
         self.show_unit(cx, unit);
+    }
+
+    /// Calls the registers what the plant file calls them, with the scaling that the device announces now; a name that was
+    /// given by hand stays.
+    pub(super) fn name_by_plant(&mut self, snapshot: &Snapshot) {
+        let (line, unit) = (self.line, self.unit);
+        let of_unit = |tag: &&TagDef| {
+            let device = snapshot.def.device(tag.device);
+            (device.line, device.unit) == (line, unit) && tag.point.field.is_none() && tag.calculation.is_none()
+        };
+        let before = std::mem::take(&mut self.names_of_plant);
+        for tag in snapshot.def.tags.iter().filter(of_unit) {
+            let named = Named::of_tag(tag, scaling(snapshot, tag));
+            let (table, address) = (named.table, named.address);
+            let held = self.names.get(table, address);
+            if held == before.get(table, address) && held != Some(&named) {
+                self.names.put(named.clone());
+                self.watch.restart((table, address));
+            }
+            self.names_of_plant.put(named);
+        }
     }
 
     /// The line whose registers are shown.
@@ -62,24 +77,48 @@ impl Registers {
     }
 }
 
-/// What the plant file calls the registers of a unit.
-pub(super) fn names_of(snapshot: &Snapshot, line: LineId, unit: u8) -> Names {
-    let of_unit = |tag: &&TagDef| {
-        let device = snapshot.def.device(tag.device);
-        (device.line, device.unit) == (line, unit) && tag.point.field.is_none() && tag.calculation.is_none()
+/// Decimals and unit of a tag now; `None` while the device has not said them.
+fn scaling(snapshot: &Snapshot, tag: &TagDef) -> Option<(u8, String)> {
+    let value = |of| snapshot.sample(of).good_value();
+    let decimals = match tag.decimals {
+        Decimals::Fixed(decimals) => decimals,
+        Decimals::From(_) => tag.scaling_decimals(value)?,
     };
-    let mut names = Names::default();
-    for tag in snapshot.def.tags.iter().filter(of_unit) {
-        let (point, decimals) = (tag.point, snapshot.decimals[tag.id.index()]);
-        let scaling = if let Decimals::From(_) = tag.decimals { 0.1f64.powi(i32::from(decimals)) } else { 1.0 };
-        names.put(Named {
-            scale: tag.scale * scaling,
-            offset: tag.offset,
-            decimals,
-            unit: snapshot.unit(tag.id).to_owned(),
-            labels: tag.labels.clone(),
-            ..Named::new(point.table, point.address, point.kind, point.order, &tag.short)
-        });
+    Some((decimals, tag.unit_by(value)?.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        plant::{
+            PlantDef,
+            sample::{Cause, Sample},
+        },
+        ui::fixture::{Fixture, now},
+    };
+
+    #[test]
+    fn a_value_is_raw_until_the_device_says_its_decimals() {
+        let mut snapshot = Snapshot::clone(&Fixture::traffic().snapshot());
+        let mut def = PlantDef::clone(&snapshot.def);
+        let (first, source) = (def.tags[0].point, TagId(1));
+        (def.tags[0].decimals, def.tags[0].scale) = (Decimals::From(source), 1.0);
+        snapshot.def = Arc::new(def);
+        let mut registers = Registers::within(&snapshot, Tab::Bus);
+        let steps = [(Sample::bad(Cause::NotRead, now()), "700 raw"), (Sample::good(1.0, now()), "70.0 °C")];
+        for (decimals, expect) in steps {
+            snapshot.samples[source.index()] = decimals;
+            registers.name_by_plant(&snapshot);
+            let named = registers.names.get(first.table, first.address).expect("a name").clone();
+            assert_eq!(named.text(&[700]).as_deref(), Some(expect));
+        }
+        let by_hand =
+            Named { unit: "K".into(), ..registers.names.get(first.table, first.address).expect("one").clone() };
+        registers.names.put(by_hand.clone());
+        registers.name_by_plant(&snapshot);
+        assert_eq!(registers.names.get(first.table, first.address), Some(&by_hand), "a name by hand stays");
     }
-    names
 }

@@ -10,7 +10,7 @@ use crate::{
     plant::{
         PlantDef,
         live::{AddressSpan, LiveRead, LiveReading},
-        tag::{Decimals, TagDef},
+        tag::TagDef,
     },
 };
 
@@ -116,15 +116,7 @@ impl Registers {
     }
 
     fn named(&self, def: &PlantDef, tag: &TagDef) -> Named {
-        let point = tag.point;
-        let plain = Named::new(point.table, point.address, point.kind, point.order, &tag.short);
         let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
-        let Some((decimals, unit)) = recognise::scaling(def, tag, &words) else {
-            // Where the device has not said where its point is, the number is shown as it came, and says so.
-            return Named { unit: t!("raw").to_owned(), ..plain };
-        };
-        let point = if let Decimals::From(_) = tag.decimals { 0.1f64.powi(i32::from(decimals)) } else { 1.0 };
-        let labels = tag.labels.clone();
-        Named { scale: tag.scale * point, offset: tag.offset, decimals, unit, labels, ..plain }
+        Named::of_tag(tag, recognise::scaling(def, tag, &words))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Asking, Recognition, Registers, cells::Cells, page::names_of};
+use super::{Asking, Recognition, Registers, cells::Cells, names::Names};
 use crate::ui::tabs::prelude::*;
 
 impl Registers {
@@ -25,11 +25,13 @@ impl Registers {
 
     /// Nothing that was read of one unit is shown of another, and each has names of its own.
     pub(super) fn show_unit(&mut self, cx: &ViewContext, unit: u8) {
-        let names = self.names_of.remove(&unit).unwrap_or_else(|| names_of(cx.snapshot, self.line, unit));
+        let names = self.names_of.remove(&unit).unwrap_or_default();
         self.names_of.insert(self.unit, std::mem::replace(&mut self.names, names));
         (self.unit, self.reads) = (unit, 0);
         (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
         self.watch.clear();
+        self.names_of_plant = Names::default();
+        self.name_by_plant(cx.snapshot);
     }
 
     /// Units that can answer on the line.

@@ -90,6 +90,11 @@ impl WatchList {
         *self = WatchList::default();
     }
 
+    /// Values of another type or scale are no values of this one.
+    pub fn restart(&mut self, at: (Table, u16)) {
+        self.items.iter_mut().filter(|item| item.at == at).for_each(|item| *item = Watched::new(at));
+    }
+
     /// A write to the log failed: what it would have held is missing from there on.
     pub fn on_lost(&mut self, why: &str) {
         if self.log.take().is_some() {
@@ -173,8 +178,7 @@ impl Registers {
         }
         let named = named(text, self.unnamed())?;
         self.names.put(named);
-        // Values of another type are no values of this one.
-        self.watch.items.iter_mut().filter(|item| item.at == at).for_each(|item| *item = Watched::new(at));
+        self.watch.restart(at);
         Ok(())
     }
 
