@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
+use duckdb::AccessMode;
+
 use super::{
     archive::quoted,
     files,
+    open::connect,
     store::{Store, engine},
 };
 use crate::history::HistoryError;
@@ -37,12 +40,21 @@ impl Store {
             }
             Ok(differing)
         });
-        // The log of the copy goes into its file.
         let detached = self.db.execute_batch(&format!("DETACH {COPY}")).map_err(engine);
         match compared.and_then(|differing| detached.map(|()| differing))?.as_slice() {
-            [] if files::has_log(to) => Err(HistoryError::Engine("the copy of the database was not completed".into())),
-            [] => Ok(()),
+            [] => finish_log(to),
             tables => Err(HistoryError::Engine(format!("the copy of the database differs: {}", tables.join(", ")))),
         }
+    }
+}
+
+/// Writes the log of a copy into its file: it stays behind where queries had all the memory when the copy was closed.
+fn finish_log(copy: &Path) -> Result<(), HistoryError> {
+    if files::has_log(copy) {
+        connect(copy, AccessMode::ReadWrite).and_then(|db| db.execute_batch("CHECKPOINT")).map_err(engine)?;
+    }
+    match files::has_log(copy) {
+        false => Ok(()),
+        true => Err(HistoryError::Engine("the copy of the database was not completed".into())),
     }
 }

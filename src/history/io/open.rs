@@ -284,7 +284,7 @@ const MEMORY: &str = "64MB";
 
 /// One thread, little memory, nothing from the network; and no bit packing, with which some data make a checkpoint fail
 /// (duckdb/duckdb#22823).
-fn connect(path: &Path, mode: AccessMode) -> duckdb::Result<Connection> {
+pub(super) fn connect(path: &Path, mode: AccessMode) -> duckdb::Result<Connection> {
     let temporary = with_suffix(path, ".tmp");
     let config = Config::default()
         .access_mode(mode)?

@@ -1,5 +1,5 @@
 //! What queries cost the recording: 1,000 tags that change every second, written by the station's own threads, while a
-//! shift report and a day's trends are asked without pause.
+//! shift report and a day's trends are asked and backups written without pause.
 //!
 //! `cargo bench --bench history -- load [SECONDS] [HOURS]`: for so many seconds (10) over a history of so many hours (2).
 
@@ -19,7 +19,7 @@ use sightglass::{
     bus::io::clock::Clock,
     history::{
         Answer, Query,
-        io::{QueryRequest, store::Store, thread as history},
+        io::{BackupRequest, QueryRequest, store::Store, thread as history},
     },
     plant::{PlantDef, def::TagId, record::Record, sample::Sample},
     report::Period,
@@ -96,6 +96,11 @@ fn run(path: &Path, seconds: i64, hours: i64) {
             let (handle, counts) = (&handle, &counts);
             scope.spawn(move || (name, ask(handle, &query, counts)))
         });
+        let to = path.with_extension("backup");
+        let backups = scope.spawn({
+            let (handle, counts) = (&handle, &counts);
+            move || ("backup", back_up(handle, &to, counts))
+        });
         let watcher = scope.spawn(|| commits(&handle, clock, &counts));
         for _ in 0..seconds {
             thread::sleep(Duration::from_secs(1));
@@ -106,6 +111,7 @@ fn run(path: &Path, seconds: i64, hours: i64) {
         }
         counts.stop.store(true, Ordering::Relaxed);
         times = watcher.join().expect("times");
+        asked.push(backups.join().expect("backups"));
         asked.extend(askers.into_iter().map(|asker| asker.join().expect("answers")));
     });
     let status = handle.status.borrow().clone();
@@ -179,6 +185,20 @@ fn ask(handle: &history::Handle, query: &Query, counts: &Counts) -> (Vec<Duratio
             Ok(_) => failed.push("another answer".to_owned()),
             Err(error) => failed.push(error.to_string()),
         }
+        times.push(began.elapsed());
+    }
+    (times, failed)
+}
+
+/// Writes backups to one folder without pause.
+fn back_up(handle: &history::Handle, to: &Path, counts: &Counts) -> (Vec<Duration>, Vec<String>) {
+    let (mut times, mut failed) = (Vec::new(), Vec::new());
+    while !counts.stop.load(Ordering::Relaxed) {
+        let (reply, answer) = oneshot::channel();
+        let began = Instant::now();
+        let request = BackupRequest { to: to.to_owned(), audit_log: to.join("none"), reply };
+        handle.backups.blocking_send(request).expect("asked");
+        failed.extend(answer.blocking_recv().expect("answered").err().map(|error| error.to_string()));
         times.push(began.elapsed());
     }
     (times, failed)
