@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `architecture` | the laws: the line of modules, the io edge, sizes, style of tests, words |
 //! | `archive` | closed hours as files: what `sightglass history` says of them, and what polars reads |
+//! | `backup` | backups and restores by command, beside a station and on a full disk |
 //! | `attach` | the station's socket: equal snapshots at both ends, stuck and hostile terminals, reconnecting |
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
@@ -35,6 +36,7 @@ mod architecture;
 mod archive;
 mod sql;
 mod attach;
+mod backup;
 mod capture;
 mod commands;
 mod devices;

@@ -1,0 +1,98 @@
+//! Backups as a person makes them: beside a station that records, and in its place.
+
+use std::{fs, path::Path, process::Command};
+
+use crate::support::{Process, folder, sightglass, simulated_tank, sockets};
+
+/// A home for one station and the commands that speak to it.
+struct Home {
+    folder: tempfile::TempDir,
+    sockets: std::path::PathBuf,
+}
+
+impl Home {
+    fn command(&self) -> Command {
+        let mut command = sightglass();
+        command.env("XDG_STATE_HOME", self.folder.path()).env("XDG_RUNTIME_DIR", &self.sockets);
+        command.env_remove("STATE_DIRECTORY");
+        command
+    }
+
+    /// Exit code and all that is said.
+    fn history(&self, action: &str, folder: &Path) -> (Option<i32>, String) {
+        self.said(self.command().args(["history", action, "tank"]).arg(folder))
+    }
+
+    fn said(&self, command: &mut Command) -> (Option<i32>, String) {
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
+    }
+}
+
+#[test]
+fn a_backup_of_a_running_station_is_restored() {
+    let home = Home { folder: folder(), sockets: sockets() };
+    let (_devices, port) = simulated_tank();
+    let line = format!("L1={port}");
+    let mut station = Process::start(home.command().args(["run", "tank", "--port", &line]));
+    station.wait_for("(unit 2): responding");
+    let to = home.folder.path().join("backup");
+    let (code, said) = home.history("backup", &to);
+    assert!(code == Some(0) && said.starts_with("backed up to "), "{said}");
+    let (code, said) = home.history("restore", &to);
+    assert!(code == Some(3) && said.contains("in use by another process: stop its station first"), "{said}");
+    let (code, said) = home.said(home.command().args(["history", "compact", "tank"]));
+    assert!(code == Some(3) && said.contains("is in use by"), "{said}");
+    let (code, said) = home.said(home.command().args(["stop", "tank"]));
+    assert_eq!((code, station.end()), (Some(0), Some(0)), "{said}");
+    let (code, said) = home.history("restore", &to);
+    assert!(code == Some(0) && said.contains("; the history before it is in "), "{said}");
+    // The station goes on, and completes its history from the audit log.
+    let mut station = Process::start(home.command().args(["run", "tank", "--port", &line, "--for", "3s"]));
+    assert_eq!(station.end(), Some(0));
+    let (code, said) = home.said(home.command().args(["audit", "verify", "tank"]));
+    assert_eq!(code, Some(0), "{said}");
+    let log = fs::read_to_string(home.folder.path().join("sightglass/tank.audit.jsonl")).unwrap();
+    let outcomes = |action: &str| -> Vec<String> {
+        let entries = log.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+        let of_action = entries.filter(|entry| entry["action"] == action);
+        of_action.map(|entry| entry["outcome"].as_str().unwrap().split(':').next().unwrap().to_owned()).collect()
+    };
+    assert_eq!(outcomes("back up history"), ["permitted", "done"]);
+    assert_eq!(outcomes("restore history"), ["begun", "done"]);
+    let (_, said) = home.said(home.command().args(["history", "tank"]));
+    assert!(said.contains("stored    "), "{said}");
+}
+
+#[test]
+fn a_full_disk_is_said_and_nothing_is_left_on_it() {
+    let Some(disk) = crate::support::SmallDisk::mount() else { return };
+    let home = folder();
+    let path = home.path().join("tank.duckdb");
+    let history = |command: &[&str]| {
+        let mut words = sightglass();
+        let output = words.arg("history").args(command).arg("--history").arg(&path).output().unwrap();
+        (output.status.code(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
+    };
+    let rows: String = (0..2_000)
+        .map(|n| format!("TIC-1.PV,2026-11-20T{:02}:{:02}:00Z,{n}\n", n / 60 % 24, n % 60))
+        .take(1_440)
+        .collect();
+    let file = home.path().join("day.csv");
+    fs::write(&file, format!("tag,time,value\n{rows}")).unwrap();
+    let (code, said) = history(&["import", "tank", file.to_str().unwrap()]);
+    assert!(code == Some(0) && said.contains("imported 1440 rows"), "{said}");
+    disk.fill();
+    let to = disk.path().join("backup");
+    let (code, said) = history(&["backup", "tank", to.to_str().unwrap()]);
+    assert!(code == Some(1) && said.contains("MiB free, expected"), "{said}");
+    assert!(!to.exists());
+    disk.free();
+    disk.protect();
+    let (code, said) = history(&["backup", "tank", to.to_str().unwrap()]);
+    disk.unprotect();
+    assert!(code == Some(1) && said.contains("Read-only file system"), "{said}");
+    assert!(!to.exists());
+    let (code, said) = history(&["backup", "tank", to.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{said}");
+}
