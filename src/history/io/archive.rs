@@ -200,6 +200,8 @@ impl Store {
             if let Err(error) = fs::remove_file(self.archive_folder().join(&file.path)) {
                 tracing::warn!(%error, path = file.path, "a file of the archive that was replaced is not removed");
             }
+            // Only an empty folder can be removed.
+            let _ = self.archive_folder().join(&file.path).parent().map(fs::remove_dir);
         }
     }
 

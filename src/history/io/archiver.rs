@@ -19,7 +19,7 @@ use super::{
     samples::is_damage,
     store::{Store, instant},
 };
-use crate::history::{HistoryError, tiers::HOUR};
+use crate::history::{HistoryError, retention::Why, tiers::HOUR};
 
 /// Real time between two looks at what is due.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
@@ -134,7 +134,7 @@ impl Archiver {
         let (again, looked) = match done {
             Ok(Ok(Looked::Did(job))) => {
                 tracing::info!(?job, "archived");
-                (Duration::ZERO, Ok(Looked::Did(job)))
+                (pause(&job), Ok(Looked::Did(job)))
             }
             Ok(Ok(Looked::Idle(missing))) => (LOOK_EVERY, Ok(Looked::Idle(missing))),
             Ok(Ok(Looked::BackedUp)) => (Duration::ZERO, Ok(Looked::BackedUp)),
@@ -162,6 +162,15 @@ impl Archiver {
         if let Some((work, interrupt)) = &mut self.running {
             stop(work, || interrupt.interrupt()).await;
         }
+    }
+}
+
+/// Until the next look. A full disk may have another cause, and the alarm has told of it: an operator has time to free the
+/// disk before all that may go is gone.
+fn pause(job: &Job) -> Duration {
+    match job {
+        Job::Delete(deletion) if deletion.why == Why::DiskFull => LOOK_EVERY,
+        Job::Delete(_) | Job::Hour(_) | Job::Merge(..) => Duration::ZERO,
     }
 }
 
