@@ -165,7 +165,7 @@ impl Archiver {
     }
 }
 
-/// Until the next look. A full disk may have another cause, and the alarm has told of it: an operator has time to free the
+/// Until the next look. A full disk may have another cause, and an alarm stands: an operator has time to free the
 /// disk before all that may go is gone.
 fn pause(job: &Job) -> Duration {
     match job {
