@@ -4,6 +4,7 @@ pub mod tiers;
 pub mod retention;
 pub mod series;
 pub mod alarm_state;
+mod engine_error;
 pub mod words;
 pub mod backup;
 pub mod import;

@@ -1,28 +1,14 @@
 //! What an operator reads of a failure: its cause in plain words. Those of the engine and of the system are for the log.
 
-/// What stands in the way, by the words of the engine or of the system: the first that is found counts.
-const CAUSES: [(&str, &str); 12] = [
-    ("No space left", "the disk is full"),
-    ("Disk quota exceeded", "the disk quota is exhausted"),
-    ("Read-only file system", "the disk is read-only"),
-    ("Permission denied", "no permission for its files"),
-    ("Too many open files", "too many files are open"),
-    ("Input/output error", "the disk reports a read or write error"),
-    ("No such file", "its folder or file is missing"),
-    ("Out of Memory", "not enough memory"),
-    ("Cannot allocate memory", "not enough memory"),
-    ("checksum", "a damaged block, its checksum is wrong"),
-    ("INTERRUPT", "interrupted"),
-    ("invalidated", "the database has stopped after an error"),
-];
+use super::engine_error;
 
 /// Longest words for an operator, characters.
 const CHARS_MAX: usize = 160;
 
 /// The cause of a failure in one short line.
 pub fn plain(message: &str) -> String {
-    if let Some((_, words)) = CAUSES.iter().find(|(cause, _)| message.contains(cause)) {
-        return (*words).to_owned();
+    if let Some(label) = engine_error::label(message) {
+        return label.to_owned();
     }
     // DuckDB puts the kind of the error before it, and advice and stack traces behind it.
     let line = message.lines().next().unwrap_or_default().trim();

@@ -12,7 +12,7 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
-    samples::{Wanted, is_damage_of_file},
+    samples::Wanted,
     sql,
     store::{Store, engine, instant, utc},
 };
@@ -89,7 +89,7 @@ impl Store {
         for file in self.files(Some((tier, from.as_microsecond()..to.as_microsecond())))? {
             let read = self.read_aggregates(&file, &wanted, (from, to), each);
             if let Err(error) = &read
-                && is_damage_of_file(error)
+                && error.is_damage_of_file()
             {
                 // The query is answered once more, from what lies beneath.
                 if self.is_known(&file)? {

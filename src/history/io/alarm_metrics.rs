@@ -7,7 +7,6 @@ use jiff::Timestamp;
 
 use super::{
     read::{ROWS_MAX, alarm, check_span, within},
-    samples::is_damage,
     sql,
     store::{Store, engine, instant, utc},
 };
@@ -90,7 +89,7 @@ impl Store {
         if last - first - watched.len() as i64 >= LOOKED_INTO_MAX {
             match list(sql::WATCHED_BY_SAMPLES) {
                 // Then not all at once.
-                Err(error) if is_damage(&error) => {}
+                Err(error) if error.is_damage() => {}
                 windows => {
                     watched.extend(windows?);
                     return Ok(watched);
@@ -113,7 +112,7 @@ impl Store {
         match self.list(sql::ANY_SAMPLE, params, |row| row.get::<_, i32>(0)) {
             Ok(rows) => Ok(!rows.is_empty()),
             // What cannot be read was stored all the same.
-            Err(error) if is_damage(&error) => Ok(true),
+            Err(error) if error.is_damage() => Ok(true),
             Err(error) => Err(error),
         }
     }

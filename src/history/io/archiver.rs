@@ -16,7 +16,6 @@ use super::{
     BackupRequest,
     archive::Job,
     reader::stop,
-    samples::is_damage,
     store::{Store, instant},
 };
 use crate::history::{HistoryError, retention::Why, tiers::HOUR};
@@ -138,7 +137,7 @@ impl Archiver {
             }
             Ok(Ok(Looked::Idle(missing))) => (LOOK_EVERY, Ok(Looked::Idle(missing))),
             Ok(Ok(Looked::BackedUp)) => (Duration::ZERO, Ok(Looked::BackedUp)),
-            Ok(Err((Some(Job::Hour(hour)), error))) if is_damage(&error) => {
+            Ok(Err((Some(Job::Hour(hour)), error))) if error.is_damage() => {
                 self.after = instant(hour + HOUR).unwrap_or(Timestamp::MAX);
                 self.skipped = Some(error.clone());
                 (Duration::ZERO, Err(error))

@@ -12,7 +12,7 @@ use std::{
 use jiff::{Timestamp, tz::TimeZone};
 
 use crate::{
-    history::{HistoryError, retention::Disk},
+    history::{HistoryError, engine_error, retention::Disk},
     plant::def::HistoryDef,
     profile::io::atomic::with_suffix,
 };
@@ -224,31 +224,13 @@ pub enum Failure {
 /// Reads DuckDB's message. What is not known to be an obstacle is taken as damage: nothing is lost by setting files
 /// aside, and recording goes on.
 pub fn diagnose(db: &Path, message: &str) -> Failure {
-    const OBSTACLES: [&str; 11] = [
-        "Permission denied",
-        "No such file",
-        "Is a directory",
-        "No space left",
-        "Read-only file system",
-        "Too many open files",
-        "Input/output error",
-        "Out of Memory",
-        "newer version",
-        "newer DuckDB",
-        "in read-only mode",
-    ];
-    if message.contains("Could not set lock") {
+    if engine_error::is_locked(message) {
         return Failure::Obstacle(locked(db, holder(message)));
     }
-    match OBSTACLES.iter().any(|words| message.contains(words)) {
+    match engine_error::is_obstacle(message) {
         true => Failure::Obstacle(HistoryError::Engine(message.to_owned())),
         false => Failure::Damaged(first_line(message)),
     }
-}
-
-/// Whether a message of damage is certainly about the database, not about its log.
-pub fn is_of_database(message: &str) -> bool {
-    message.contains("Corrupt database file") && !message.contains("WAL")
 }
 
 /// DuckDB appends advice and stack traces; the first line says what happened.
@@ -321,7 +303,11 @@ mod tests {
 
     #[test]
     fn a_full_or_forbidden_disk_is_not_taken_for_damage() {
-        for message in ["IO Error: Cannot open file \"x\": Permission denied", "IO Error: No space left on device"] {
+        for message in [
+            "IO Error: Cannot open file \"x\": Permission denied",
+            "IO Error: No space left on device",
+            "IO Error: Could not write file \"x\": Disk quota exceeded",
+        ] {
             let expect = Failure::Obstacle(HistoryError::Engine(message.into()));
             assert_eq!(diagnose(Path::new("x"), message), expect);
         }

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     history::{
-        HistoryError,
+        HistoryError, engine_error,
         words::{joined, plain},
     },
     plant::{
@@ -127,7 +127,7 @@ impl Store {
         let mut opened = try_open();
         for part in [Part::Log, Part::Everything] {
             let Err(Failure::Damaged(why)) = &opened else { break };
-            if part == Part::Everything || files::has_log(path) && !files::is_of_database(why) {
+            if part == Part::Everything || files::has_log(path) && !engine_error::is_of_database(why) {
                 set_aside(part, why)?;
                 opened = try_open();
             }

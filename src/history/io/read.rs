@@ -6,7 +6,6 @@ use duckdb::{Row, params};
 use jiff::Timestamp;
 
 use super::{
-    samples::is_damage,
     sql,
     store::{Store, engine, instant, utc},
 };
@@ -44,7 +43,7 @@ impl Store {
             answer = self.look_up(query, now);
         }
         if let Err(error) = &answer
-            && is_damage(error)
+            && error.is_damage()
         {
             self.unreadable.replace(Some(format!("it cannot be read: {}", error.words())));
         }

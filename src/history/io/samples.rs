@@ -68,7 +68,7 @@ struct Sources {
 
 impl Sources {
     fn are_damaged(&self, error: &HistoryError) -> bool {
-        is_damage(error) || !self.files.is_empty() && is_damage_of_file(error)
+        error.is_damage() || !self.files.is_empty() && error.is_damage_of_file()
     }
 }
 
@@ -331,15 +331,4 @@ fn push(batch: &StructArray, wanted: &Wanted, rows: &mut Vec<Row>) -> Option<()>
         }
     }
     Some(())
-}
-
-/// A block of the file cannot be read; what lies in other blocks can.
-pub(super) fn is_damage(error: &HistoryError) -> bool {
-    matches!(error, HistoryError::Engine(words) if words.contains("checksum") || words.contains("Corrupt"))
-}
-
-/// A file of the archive cannot be read. Its damage has many names; what else can fail has few.
-pub(super) fn is_damage_of_file(error: &HistoryError) -> bool {
-    const OTHERS: [&str; 5] = ["INTERRUPT", "Interrupted", "Out of Memory", "Too many open files", "FATAL"];
-    matches!(error, HistoryError::Engine(words) if !OTHERS.iter().any(|other| words.contains(other)))
 }

@@ -181,7 +181,7 @@ impl Writer {
             Some(store) => match store.append(&self.pending) {
                 Ok(()) => self.stored(now),
                 Err(error) => {
-                    if is_fatal(&error) {
+                    if error.is_fatal() {
                         self.close();
                     }
                     self.fail(&error);
@@ -292,7 +292,7 @@ impl Writer {
         match store.checkpoint() {
             Ok(()) => (self.unchecked, self.commits) = (None, 0),
             // A query stood in the way: with the next commit again, and said only when that goes on for long.
-            Err(error) if is_of_questions(&error) && self.commits < 2 * CHECKPOINT_EVERY => {}
+            Err(error) if error.is_of_queries() && self.commits < 2 * CHECKPOINT_EVERY => {}
             Err(error) => {
                 let words = Some(format!("its log grows: {}", error.words()));
                 if self.unchecked != words {
@@ -344,16 +344,6 @@ fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
     });
     pending.drain(..excess);
     lost
-}
-
-/// A checkpoint failed because queries are answered at the same time: they read, or have all the memory.
-fn is_of_questions(error: &HistoryError) -> bool {
-    let busy = |words: &str| words.contains("Cannot CHECKPOINT") || words.contains("Out of Memory");
-    matches!(error, HistoryError::Engine(words) if busy(words) && !is_fatal(error))
-}
-
-fn is_fatal(error: &HistoryError) -> bool {
-    matches!(error, HistoryError::Engine(words) if words.contains("FATAL") || words.contains("invalidated"))
 }
 
 #[cfg(test)]
