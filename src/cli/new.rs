@@ -156,8 +156,8 @@ async fn look(line: &LineDef, known: &[Arc<PlantDef>]) -> Result<Option<(Vec<Fou
         if units.len() < UNITS_MANY {
             scan::describe(finding).iter().for_each(|words| say(&format!("  {words}")));
         }
-        if let Finding::Unit { unit, words, certain: true, .. } = finding {
-            units.push((*unit, words.starts_with("register ")));
+        if let Finding::Unit { unit, register, certain: true, .. } = finding {
+            units.push((*unit, register.is_some()));
         }
     }
     let names: Vec<String> = units.iter().map(|(unit, _)| unit.to_string()).collect();

@@ -226,7 +226,7 @@ async fn first_answer(
 
 fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
     run.findings.iter().find_map(|finding| match finding {
-        Finding::Unit { unit, serial, words, certain: true } => Some((*unit, *serial, words.clone())),
+        Finding::Unit { unit, serial, words, certain: true, .. } => Some((*unit, *serial, words.clone())),
         // Corrupt bytes at one of the settings fit nothing.
         Finding::Unit { certain: false, .. }
         | Finding::Exchange(_)
@@ -288,7 +288,7 @@ mod tests {
         );
         let found = |certain| {
             let words = "register 0 = 77".to_owned();
-            let findings = vec![Finding::Unit { unit: 3, serial: None, words, certain }];
+            let findings = vec![Finding::Unit { unit: 3, serial: None, words, register: Some(77), certain }];
             answer(&DiagnosticRun { findings, ..job.run().clone() }).map(|(unit, ..)| unit)
         };
         assert_eq!((found(true), found(false)), (Some(3), None));

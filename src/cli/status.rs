@@ -50,7 +50,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let snapshot = session.snapshots.borrow().clone();
         match args.json {
             true => say(&format!("{:#}", in_json(&snapshot))),
-            false => in_words(&snapshot).iter().for_each(|line| say(line)),
+            false => in_words(&snapshot, true).iter().for_each(|line| say(line)),
         }
         Ok(())
     })
@@ -73,7 +73,7 @@ async fn past(args: &Args, plant: &str, at: &str) -> Result<(), CliError> {
     }
     let now = source.now().duration_since(at).as_secs();
     say(&format!("PAST     {} h {:02} min {:02} s ago", now / 3_600, now / 60 % 60, now % 60));
-    in_words(&snapshot).iter().filter(|line| !line.starts_with("history ")).for_each(|line| say(line));
+    in_words(&snapshot, false).iter().for_each(|line| say(line));
     for (line, minute) in def.lines.iter().zip(&past.minutes) {
         let Some(minute) = minute else { continue };
         let LineMinute { requests, ok, timeouts, corrupt, exceptions, .. } = minute;
@@ -85,8 +85,8 @@ async fn past(args: &Args, plant: &str, at: &str) -> Result<(), CliError> {
     Ok(())
 }
 
-/// One fact a line: plant, lines, devices, alarms, history, tags.
-fn in_words(snapshot: &Snapshot) -> Vec<String> {
+/// One fact a line: plant, lines, devices, alarms, history (of a running station), tags.
+fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
     let def = &snapshot.def;
     let time = local(snapshot.at, def);
     let mut lines = vec![format!("plant    {} ({}) at {time}", def.title, def.name)];
@@ -101,12 +101,15 @@ fn in_words(snapshot: &Snapshot) -> Vec<String> {
     if snapshot.alarms.is_empty() {
         lines.push("alarm    none".to_owned());
     }
-    let trouble = snapshot.history.words().unwrap_or_else(|| "good".into());
-    let epoch = match snapshot.history.epoch {
-        0 => String::new(),
-        times => format!(", epoch {times}"),
-    };
-    lines.push(format!("history  {trouble}, {} rows, {} lost{epoch}", snapshot.history.rows, snapshot.history.lost));
+    if with_history {
+        let trouble = snapshot.history.words().unwrap_or_else(|| "good".into());
+        let epoch = match snapshot.history.epoch {
+            0 => String::new(),
+            times => format!(", epoch {times}"),
+        };
+        let (rows, lost) = (snapshot.history.rows, snapshot.history.lost);
+        lines.push(format!("history  {trouble}, {rows} rows, {lost} lost{epoch}"));
+    }
     lines.extend(snapshot.suppressed.iter().map(|alarm| format!("suppressed {}", suppressed_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
         lines.push("tag      values are shown after a login: --user NAME".to_owned());
@@ -240,7 +243,7 @@ mod tests {
         let pv = found["tags"].as_array().and_then(|tags| tags.iter().find(|tag| tag["name"] == "TIC-1.PV"));
         let pv = pv.expect("the tag is there");
         assert_eq!((&pv["value"], &pv["quality"]), (&Value::Null, &json!("bad")));
-        let words = in_words(&snapshot);
+        let words = in_words(&snapshot, true);
         assert!(words.iter().any(|line| line.starts_with("tag      TIC-1.PV") && line.contains("----")), "{words:?}");
         assert!(words.contains(&"alarm    none".to_owned()));
     }

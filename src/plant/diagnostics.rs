@@ -250,6 +250,8 @@ pub enum Finding {
         serial: Option<Serial>,
         /// What it answered: `register 0 = 123`, `exception 02, illegal data address`.
         words: String,
+        /// Register 0, where it could be read.
+        register: Option<u16>,
         /// A whole frame came; else only corrupt bytes, which may be a unit with other settings.
         certain: bool,
     },

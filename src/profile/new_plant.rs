@@ -277,22 +277,37 @@ pub fn left_out(def: &PlantDef, kept: &[TagDef]) -> Vec<String> {
     rest.map(|tag| tag.short.clone()).collect()
 }
 
+/// Why an alarm is suggested.
+#[derive(Clone, Copy)]
+enum Suggestion {
+    /// A fault word is more than 0.
+    Fault,
+    /// The upper end of a measured range.
+    High,
+    /// The lower end.
+    Low,
+}
+
 /// Alarms that a profile suggests for these of its tags: a fault word that is not 0, and the ends of a measured range.
 pub fn suggested_alarms(device: &str, tags: &[TagDef]) -> Vec<NewAlarm> {
     let faults = tags.iter().filter_map(|tag| tag.quality_from.map(|(fault, _)| fault));
     let faults: Vec<TagId> = faults.collect();
-    let alarm = |tag: &TagDef, condition, limit, deadband, reason| {
+    let alarm = |tag: &TagDef, kind: Suggestion, limit, deadband, reason| {
         let words = if tag.label.is_empty() { &tag.short } else { &tag.label };
-        let message = if condition == "fault" { words.clone() } else { format!("{words} {condition}") };
-        let condition = if condition == "low" { "low" } else { "high" };
+        let (condition, message) = match kind {
+            Suggestion::Fault => ("high", words.clone()),
+            Suggestion::High => ("high", format!("{words} high")),
+            Suggestion::Low => ("low", format!("{words} low")),
+        };
         let cause = tag.bit_labels.iter().map(|(_, label)| label.as_str()).collect::<Vec<_>>().join(", or ");
         NewAlarm { tag: format!("{device}.{}", tag.short), condition, limit, deadband, message, reason, cause }
     };
     tags.iter()
         .filter(|tag| tag.access == Access::Read && tag.labels.is_empty() && !tag.is_text())
         .flat_map(|tag| {
-            let fault =
-                faults.contains(&tag.id).then(|| alarm(tag, "fault", 0.5, 0.25, "The word is 0 while all is well"));
+            let fault = faults
+                .contains(&tag.id)
+                .then(|| alarm(tag, Suggestion::Fault, 0.5, 0.25, "The word is 0 while all is well"));
             // An output cannot leave 0 to 100 %.
             let limits = match (tag.min, tag.max) {
                 (Some(Bound::Fixed(min)), Some(Bound::Fixed(max)))
@@ -300,8 +315,8 @@ pub fn suggested_alarms(device: &str, tags: &[TagDef]) -> Vec<NewAlarm> {
                 {
                     let reason = "The end of the range that the profile gives";
                     let deadband = (max - min) / 100.0;
-                    let low = (min != 0.0).then(|| alarm(tag, "low", min, deadband, reason));
-                    [Some(alarm(tag, "high", max, deadband, reason)), low]
+                    let low = (min != 0.0).then(|| alarm(tag, Suggestion::Low, min, deadband, reason));
+                    [Some(alarm(tag, Suggestion::High, max, deadband, reason)), low]
                 }
                 _ => [None, None],
             };

@@ -35,11 +35,16 @@ fn units_of(scan: &Scan) -> u32 {
 impl Job {
     pub(super) fn add_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
         let Ask::Message(request) = &step.ask else { return };
+        let mut register = None;
         let words = match answer {
             // A broadcast has no response.
             Ok(answer) if answer.is_empty() => return,
             Ok(answer) => match answer.get(3..5) {
-                Some([high, low]) => format!("register 0 = {}", u16::from_be_bytes([*high, *low])),
+                Some([high, low]) => {
+                    let word = u16::from_be_bytes([*high, *low]);
+                    register = Some(word);
+                    format!("register 0 = {word}")
+                }
                 _ => "answers".into(),
             },
             Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => fault.to_string(),
@@ -47,7 +52,7 @@ impl Job {
             Err(fault) if fault.is_corrupt() => return self.corrupt_units.push((request[0], step.serial, fault)),
             Err(_) => return,
         };
-        self.found(Finding::Unit { unit: request[0], serial: step.serial, words, certain: true });
+        self.found(Finding::Unit { unit: request[0], serial: step.serial, words, register, certain: true });
     }
 
     /// A few corrupt responses may be units; more of them with the same settings come from another sender.
@@ -60,6 +65,7 @@ impl Job {
                     unit: *unit,
                     serial: *serial,
                     words: format!("something is there: {fault}"),
+                    register: None,
                     certain: false,
                 };
                 same.iter().for_each(|trace| self.found(unit(trace)));

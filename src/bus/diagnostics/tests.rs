@@ -56,11 +56,11 @@ fn a_scan_finds_who_answers_and_who_refuses() {
         .findings
         .iter()
         .filter_map(|finding| match finding {
-            Finding::Unit { unit, words, .. } => Some((*unit, words.as_str())),
+            Finding::Unit { unit, words, register, .. } => Some((*unit, words.as_str(), *register)),
             _ => None,
         })
         .collect();
-    assert_eq!(units, [(3, "register 0 = 77"), (17, "exception 02, illegal data address")]);
+    assert_eq!(units, [(3, "register 0 = 77", Some(77)), (17, "exception 02, illegal data address", None)]);
     assert_eq!(verdict(&found), "2 answers");
 }
 

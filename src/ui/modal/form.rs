@@ -116,8 +116,8 @@ impl Form {
             What::Text(line) | What::Secret(line) if line.missed() => {
                 Some(t!("the text was cut; Ctrl-U clears the line").to_owned())
             }
-            What::Text(line) if line.text().trim().is_empty() => Some(type_words(field.label)),
-            What::Secret(line) if line.text().is_empty() => Some(type_words(field.label)),
+            What::Text(line) if line.text().trim().is_empty() => Some(required(field.label)),
+            What::Secret(line) if line.text().is_empty() => Some(required(field.label)),
             What::Text(_) | What::Secret(_) | What::Role(_) => None,
         };
         let (n, why) = self.fields.iter().enumerate().find_map(|(n, field)| Some((n, lacks(field)?)))?;
@@ -230,10 +230,9 @@ impl fmt::Debug for Field {
     }
 }
 
-/// `type the name`, `type your password again`.
-fn type_words(label: &str) -> String {
-    let the = if label.starts_with("your ") { "" } else { t!("the ") };
-    t!("type {the}{label}", the, label)
+/// `required: password`. Without an article, so that it stays right with every label and in every language.
+fn required(label: &str) -> String {
+    t!("required: {label}", label)
 }
 
 #[cfg(test)]
@@ -273,7 +272,7 @@ mod tests {
         form.paste("two\nlines");
         assert!(form.lacking().is_some_and(|why| why.contains("the text was cut")));
         form.forget();
-        assert_eq!(form.lacking().as_deref(), Some("type the password"));
+        assert_eq!(form.lacking().as_deref(), Some("required: password"));
         assert_eq!(form.name(0), "anna");
     }
 }

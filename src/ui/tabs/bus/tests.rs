@@ -231,7 +231,13 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     let mut fixture = Fixture::traffic();
     fixture.line.state = LineState::Testing;
     let even = Serial { parity: crate::plant::def::Parity::Even, ..Serial::USUAL };
-    let found = Finding::Unit { unit: 3, serial: Some(even), words: "register 0 = 77".to_owned(), certain: true };
+    let found = Finding::Unit {
+        unit: 3,
+        serial: Some(even),
+        words: "register 0 = 77".to_owned(),
+        register: Some(77),
+        certain: true,
+    };
     fixture.line.test = Some(run(diagnostic.clone(), DiagnosticState::Running, 40, 7_904, vec![found]));
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("scan_at_work", screen(&mut model, 80, 24));

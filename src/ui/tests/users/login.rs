@@ -63,7 +63,7 @@ fn the_first_supervisor_types_his_password_twice() {
     check("anna⏎correct horse battery⏎correct horse battery⏎", Ok("correct horse battery"));
     check("anna⏎correct horse battery⏎correct horse batteri⏎", Err("the two passwords differ"));
     check("anna⏎short⏎short⏎", Err("5 characters; at least 15"));
-    check("⏎correct horse battery⏎correct horse battery⏎", Err("type the name"));
+    check("⏎correct horse battery⏎correct horse battery⏎", Err("required: name"));
 }
 
 #[test]
