@@ -34,10 +34,6 @@ pub const SILENT: AlarmId = AlarmId(1);
 /// The plant.
 pub fn plant() -> PlantDef {
     let device = |id: DeviceId, name: &str, unit| DeviceDef {
-        id,
-        name: name.into(),
-        title: String::new(),
-        line: LineId(0),
         unit,
         profile: "fixture".into(),
         model: "FIXTURE".into(),
@@ -48,13 +44,7 @@ pub fn plant() -> PlantDef {
             gap_registers_max: 8,
             ..Limits::STANDARD
         },
-        functions: Vec::new(),
-        gap: Duration::ZERO,
-        write_gap: Duration::ZERO,
-        faceplate: None,
-        actions: Vec::new(),
-        program: None,
-        signature: Vec::new(),
+        ..DeviceDef::new(id, name, LineId(0))
     };
     let alarm = |id: AlarmId, subject, condition, on_delay| AlarmDef {
         on_delay,
