@@ -50,7 +50,7 @@ pub struct Handshake {
 
 /// Where a terminal is, as it says itself; it follows the handshake of a terminal.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Place {
+pub struct TerminalOrigin {
     /// `pts/3`; `None` for a script.
     pub tty: Option<String>,
     /// The address that its SSH connection comes from.
@@ -191,7 +191,7 @@ pub fn decode<T: DeserializeOwned>(bytes: &[u8], expected: &'static str) -> Resu
 }
 
 /// Where the terminal is that has sent this first message.
-pub fn client_handshake(bytes: &[u8]) -> Result<Place, ProtocolError> {
+pub fn client_handshake(bytes: &[u8]) -> Result<TerminalOrigin, ProtocolError> {
     let (handshake, rest) = parse_handshake(bytes, "handshake of a terminal")?;
     if let Some(why) = other_version((&handshake.version, handshake.protocol), (VERSION, PROTOCOL)) {
         return Err(ProtocolError::OtherVersion(why));
@@ -233,11 +233,11 @@ fn other_version(terminal: (&str, u32), station: (&str, u32)) -> Option<String> 
     })
 }
 
-impl Place {
+impl TerminalOrigin {
     /// With no word longer than a station takes.
-    pub fn short(self) -> Place {
+    pub fn short(self) -> TerminalOrigin {
         let short = |text: Option<String>| text.map(|text| word(&text));
-        Place { tty: short(self.tty), ssh: short(self.ssh), term: short(self.term) }
+        TerminalOrigin { tty: short(self.tty), ssh: short(self.ssh), term: short(self.term) }
     }
 
     /// `pts/3 from 10.0.0.5, user panel, process 123`: what the terminal says, without what could disturb a screen, and

@@ -110,7 +110,7 @@ async fn demonstrate(
     let (port, _judging) = trainer.spawn();
     let drilled = port.status.clone();
     let result = if args.headless {
-        let places: Vec<_> = simulated.places().iter().map(ToString::to_string).collect();
+        let places: Vec<_> = simulated.endpoints().iter().map(ToString::to_string).collect();
         say(&format!("{}: simulated on {}", def.title, places.join(", ")));
         let drill = scenario.as_ref().map(|scenario| scenario.duration);
         headless(session, clock, args.duration.or(drill), args).await

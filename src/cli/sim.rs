@@ -5,7 +5,7 @@ use std::{net::SocketAddr, path::PathBuf};
 use crate::{
     bus::io::clock::Clock,
     plant::{PlantDef, def::LineId},
-    sim::io::{Mode, Place, Service, serve},
+    sim::io::{Endpoint, Mode, Service, serve},
 };
 
 use super::{CliError, StationArgs, demo::simulation_error, load, log, run, runtime, say, speed};
@@ -67,9 +67,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     runtime()?.block_on(async {
         let clock = Clock::starting_at(jiff::Timestamp::now(), args.speed);
         let serving = serve(&def, clock, &services).await.map_err(simulation_error)?;
-        let port = serving.places().first().and_then(Place::path);
+        let port = serving.endpoints().first().and_then(Endpoint::path);
         let link = args.link.zip(port).map(|(link, port)| Link::make(link, port)).transpose()?;
-        for ((line, service), place) in def.lines.iter().zip(&services).zip(serving.places()) {
+        for ((line, service), place) in def.lines.iter().zip(&services).zip(serving.endpoints()) {
             let linked = link.as_ref().filter(|_| line.id == LineId(0)).map(|link| link.0.display().to_string());
             let which = if def.lines.len() == 1 { String::new() } else { format!(", line {},", line.name) };
             let place = linked.unwrap_or_else(|| place.to_string());

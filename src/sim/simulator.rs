@@ -27,12 +27,12 @@ pub const BROADCAST: u8 = 0;
 pub struct Simulator {
     rig: Option<Rig>,
     models: Models,
-    places: BTreeMap<(LineId, u8), Place>,
+    responders: BTreeMap<(LineId, u8), Responder>,
 }
 
 /// What answers at an address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
+enum Responder {
     Controller,
     Plc,
     Model(usize),
@@ -51,29 +51,29 @@ impl Simulator {
             Some(other) => return Err(UnknownSimulation(other.to_owned())),
             None => None,
         };
-        let (mut modelled, mut places) = (Vec::new(), BTreeMap::new());
+        let (mut modelled, mut responders) = (Vec::new(), BTreeMap::new());
         // The broadcast address of a serial line is no device.
         let is_broadcast = |device: &&DeviceDef| {
             device.unit == BROADCAST && def.line(device.line).transport.framing() != Framing::Mbap
         };
         for device in def.devices.iter().filter(|device| !is_broadcast(device)) {
-            let place = match rig::part(def, device.id) {
-                Some(Part::Controller) => Place::Controller,
-                Some(Part::Plc) => Place::Plc,
+            let responder = match rig::part(def, device.id) {
+                Some(Part::Controller) => Responder::Controller,
+                Some(Part::Plc) => Responder::Plc,
                 None => {
                     modelled.push(device.id);
-                    Place::Model(modelled.len() - 1)
+                    Responder::Model(modelled.len() - 1)
                 }
             };
-            places.insert((device.line, device.unit), place);
+            responders.insert((device.line, device.unit), responder);
         }
-        Ok(Simulator { rig, models: Models::new(def, &modelled), places })
+        Ok(Simulator { rig, models: Models::new(def, &modelled), responders })
     }
 
     /// A tank rig alone, at the addresses of the thesis: controller 1 and PLC 2 of the first line.
     pub fn tank(rig: Rig) -> Simulator {
-        let places = BTreeMap::from([((LineId(0), 1), Place::Controller), ((LineId(0), 2), Place::Plc)]);
-        Simulator { rig: Some(rig), models: Models::default(), places }
+        let responders = BTreeMap::from([((LineId(0), 1), Responder::Controller), ((LineId(0), 2), Responder::Plc)]);
+        Simulator { rig: Some(rig), models: Models::default(), responders }
     }
 
     /// Lets plant time pass for everything.
@@ -86,12 +86,12 @@ impl Simulator {
 
     /// Every unit by its line.
     pub fn addresses(&self) -> impl Iterator<Item = (LineId, u8)> + '_ {
-        self.places.keys().copied()
+        self.responders.keys().copied()
     }
 
     /// The units of a line.
     pub fn units(&self, line: LineId) -> Vec<u8> {
-        self.places.range((line, u8::MIN)..=(line, u8::MAX)).map(|((_, unit), _)| *unit).collect()
+        self.responders.range((line, u8::MIN)..=(line, u8::MAX)).map(|((_, unit), _)| *unit).collect()
     }
 
     /// Answers a request. `None`: no such unit, a broadcast (which all units of the line obey), an empty request.
@@ -106,7 +106,7 @@ impl Simulator {
 
     /// Whether the address means every unit of the line: 0, unless a device of Modbus TCP has it for its own.
     pub fn is_broadcast(&self, line: LineId, unit: u8) -> bool {
-        unit == BROADCAST && !self.places.contains_key(&(line, unit))
+        unit == BROADCAST && !self.responders.contains_key(&(line, unit))
     }
 
     /// Every unit of a line that receives a broadcast executes it. There is no response.
@@ -144,10 +144,10 @@ impl Simulator {
 
     /// The time that a unit takes between a request and its answer.
     pub fn reply_delay(&self, line: LineId, unit: u8) -> Duration {
-        match self.places.get(&(line, unit)) {
-            Some(Place::Controller) => rig::PXR_DELAY,
-            Some(Place::Plc) => rig::DL06_DELAY,
-            Some(Place::Model(place)) => self.models.reply_delay(*place),
+        match self.responders.get(&(line, unit)) {
+            Some(Responder::Controller) => rig::PXR_DELAY,
+            Some(Responder::Plc) => rig::DL06_DELAY,
+            Some(Responder::Model(index)) => self.models.reply_delay(*index),
             None => Duration::ZERO,
         }
     }
@@ -159,7 +159,7 @@ impl Simulator {
 
     /// Whether a unit is the controller of the tank rig.
     pub fn is_controller(&self, line: LineId, unit: u8) -> bool {
-        self.places.get(&(line, unit)) == Some(&Place::Controller)
+        self.responders.get(&(line, unit)) == Some(&Responder::Controller)
     }
 
     /// The tank rig, if the plant has one.
@@ -192,10 +192,10 @@ impl Simulator {
     }
 
     fn unit(&mut self, line: LineId, unit: u8) -> Option<&mut dyn Unit> {
-        match self.places.get(&(line, unit))? {
-            Place::Controller => self.rig.as_mut().map(|rig| rig.controller() as &mut dyn Unit),
-            Place::Plc => self.rig.as_mut().map(|rig| rig.plc() as &mut dyn Unit),
-            Place::Model(place) => self.models.unit(*place).map(|slave: &mut Slave<Model>| slave as &mut dyn Unit),
+        match self.responders.get(&(line, unit))? {
+            Responder::Controller => self.rig.as_mut().map(|rig| rig.controller() as &mut dyn Unit),
+            Responder::Plc => self.rig.as_mut().map(|rig| rig.plc() as &mut dyn Unit),
+            Responder::Model(index) => self.models.unit(*index).map(|slave: &mut Slave<Model>| slave as &mut dyn Unit),
         }
     }
 }

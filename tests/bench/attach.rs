@@ -21,7 +21,7 @@ use sightglass::{
     access::{Durability, SessionRequest, SessionStatus},
     attach::{
         io::{connect::connect, serve::listen},
-        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, Place},
+        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, TerminalOrigin},
     },
     plant::{
         Plant, PlantDef,
@@ -84,7 +84,7 @@ async fn viewer(path: &Path) {
 /// Reads whatever comes and says how much that was, each second.
 fn terminal(path: &Path) {
     let mut stream = UnixStream::connect(path).unwrap();
-    let handshake = protocol::encode(&(Handshake::current(), Place::default()), HANDSHAKE_BYTES_MAX);
+    let handshake = protocol::encode(&(Handshake::current(), TerminalOrigin::default()), HANDSHAKE_BYTES_MAX);
     stream.write_all(&handshake.unwrap()).unwrap();
     let mut total = 0;
     let mut bytes = vec![0; 1 << 20];

@@ -18,8 +18,8 @@ use sightglass::{
             serve::{ListenError, listen},
         },
         protocol::{
-            self, ClientMessage, HANDSHAKE_BYTES_MAX, Handshake, LENGTH_BYTES, Place, REQUEST_BYTES_MAX,
-            SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+            self, ClientMessage, HANDSHAKE_BYTES_MAX, Handshake, LENGTH_BYTES, REQUEST_BYTES_MAX,
+            SERVER_MESSAGE_BYTES_MAX, ServerMessage, TerminalOrigin,
         },
     },
     history::{HistoryError, Query, io::QueryRequest},
@@ -46,7 +46,7 @@ mod socket;
 mod strangers;
 
 /// No terminal waits so long for anything here, in virtual time.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// A station without a plant behind it: its snapshots are what a test says.
 struct Stand {
@@ -124,7 +124,7 @@ impl Stand {
     }
 
     async fn until_present(&mut self, count: usize) {
-        let reached = tokio::time::timeout(PATIENCE, self.present.wait_for(|present| *present == count)).await.is_ok();
+        let reached = tokio::time::timeout(TIMEOUT, self.present.wait_for(|present| *present == count)).await.is_ok();
         assert!(reached, "there are {} terminals, not {count}", *self.present.borrow());
     }
 
@@ -156,7 +156,7 @@ fn answer(request: Request, commands: &watch::Sender<Arc<Snapshot>>) {
 
 /// Waits, in virtual time, until the terminal sees it so.
 async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool) {
-    let reached = tokio::time::timeout(PATIENCE, session.snapshots.wait_for(|snapshot| so(snapshot))).await;
+    let reached = tokio::time::timeout(TIMEOUT, session.snapshots.wait_for(|snapshot| so(snapshot))).await;
     assert!(reached.is_ok_and(|reached| reached.is_ok()), "never: {what}");
 }
 
@@ -165,7 +165,7 @@ async fn sees(session: &mut Session, value: f64) {
 }
 
 async fn until_status(session: &mut Session, what: &str, so: impl Fn(&SessionStatus) -> bool) {
-    let reached = tokio::time::timeout(PATIENCE, session.status.wait_for(|status| so(status))).await;
+    let reached = tokio::time::timeout(TIMEOUT, session.status.wait_for(|status| so(status))).await;
     assert!(reached.is_ok_and(|reached| reached.is_ok()), "never: {what}");
 }
 
@@ -181,7 +181,7 @@ fn of(session: &Session, number: u32) -> Option<Outcome> {
 }
 
 fn handshake() -> Vec<u8> {
-    protocol::encode(&(Handshake::current(), Place::default()), HANDSHAKE_BYTES_MAX).unwrap()
+    protocol::encode(&(Handshake::current(), TerminalOrigin::default()), HANDSHAKE_BYTES_MAX).unwrap()
 }
 
 fn asked(asked: &ClientMessage) -> Vec<u8> {
@@ -191,7 +191,7 @@ fn asked(asked: &ClientMessage) -> Vec<u8> {
 /// Everything until the station closes; it does close, or the test fails.
 async fn until_closed(stream: &mut UnixStream) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let closed = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut bytes)).await;
+    let closed = tokio::time::timeout(TIMEOUT, stream.read_to_end(&mut bytes)).await;
     assert!(closed.is_ok(), "the station never closed");
     bytes
 }

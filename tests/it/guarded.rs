@@ -24,7 +24,7 @@ use sightglass::{
         snapshot::DeviceState,
     },
     profile::{self, Search},
-    sim::io::{Mode, Place, Service, Serving, serve},
+    sim::io::{Endpoint, Mode, Service, Serving, serve},
     station::{
         Request, Session,
         io::{Options, Station, start_guarded},
@@ -37,7 +37,7 @@ use tokio::{
     task::JoinHandle,
 };
 
-use crate::support::{PATIENCE, folder};
+use crate::support::{TIMEOUT, folder};
 
 /// Plant seconds a second, so that no test waits for a lockout.
 const SPEED: f64 = 20.0;
@@ -70,7 +70,7 @@ impl Guarded {
         let clock = Clock::starting_at(jiff::Timestamp::now(), SPEED);
         let service = Service { mode: Mode::Tcp, ..Service::of(&def.lines[0]) };
         let simulated = serve(&def, clock, &[service]).await.unwrap();
-        let Place::Address(device) = simulated.places()[0] else { panic!("not served over TCP") };
+        let Endpoint::Address(device) = simulated.endpoints()[0] else { panic!("not served over TCP") };
         let (tap, port) = Tap::open(device).await;
         def.lines[0].transport = Transport::tcp("127.0.0.1", port);
         let def = Arc::new(def);
@@ -105,7 +105,7 @@ impl Guarded {
         let mut session = self.anonymous().await;
         login(&session, user, PASSWORD).await.unwrap();
         let there = session.status.wait_for(|status| status.who.as_ref().is_some_and(|who| &*who.user == user));
-        tokio::time::timeout(PATIENCE, there).await.unwrap().unwrap();
+        tokio::time::timeout(TIMEOUT, there).await.unwrap().unwrap();
         session
     }
 
@@ -163,7 +163,7 @@ impl Guarded {
     /// Waits until the audit log holds such a line behind the first `after`.
     pub async fn written(&self, after: usize, what: &str, is: impl Fn(&Entry) -> bool) -> Entry {
         let mut truth = self.truth.clone();
-        let end = tokio::time::Instant::now() + PATIENCE;
+        let end = tokio::time::Instant::now() + TIMEOUT;
         loop {
             let entries = self.entries();
             if let Some(entry) = entries.iter().skip(after).find(|entry| is(entry)) {
@@ -219,7 +219,7 @@ pub async fn until(
     what: &str,
     so: impl FnMut(&Arc<Snapshot>) -> bool,
 ) -> Arc<Snapshot> {
-    match tokio::time::timeout(PATIENCE, snapshots.wait_for(so)).await {
+    match tokio::time::timeout(TIMEOUT, snapshots.wait_for(so)).await {
         Ok(Ok(snapshot)) => return snapshot.clone(),
         Ok(Err(_)) => {}
         Err(_) => {}

@@ -18,7 +18,8 @@ use crate::{
         assembly::Assembly,
         command_id_map::{CommandIdMap, GONE},
         protocol::{
-            self, ClientMessage, HandshakeReply, Place, REQUEST_BYTES_MAX, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+            self, ClientMessage, HandshakeReply, REQUEST_BYTES_MAX, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+            TerminalOrigin,
         },
     },
     history::{Answer, HistoryError, io::QueryRequest},
@@ -54,7 +55,7 @@ impl Waiting {
 /// Sole owner of the socket of a terminal.
 pub struct ClientTask {
     path: PathBuf,
-    place: Place,
+    place: TerminalOrigin,
     id_map: CommandIdMap,
     /// The plant as the station has it; what is published may differ by own commands.
     assembly: Assembly,
@@ -76,7 +77,7 @@ impl ClientTask {
     /// A task that has published the first snapshot.
     pub fn new(
         path: PathBuf,
-        place: Place,
+        place: TerminalOrigin,
         id_map: CommandIdMap,
         assembly: Assembly,
         publish: watch::Sender<Arc<Snapshot>>,
@@ -337,7 +338,8 @@ mod tests {
         let (publish, _snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
         let (status_sender, _standing) = watch::channel(Arc::new(SessionStatus::default()));
         let (id_map, assembly) = (CommandIdMap::new(1, 1), Assembly::new(fixture::shared()));
-        let mut task = ClientTask::new(PathBuf::new(), Place::default(), id_map, assembly, publish, status_sender);
+        let mut task =
+            ClientTask::new(PathBuf::new(), TerminalOrigin::default(), id_map, assembly, publish, status_sender);
         let (near, mut far) = UnixStream::pair().unwrap();
         let (read, write) = near.into_split();
         let (asks, mut requests) = mpsc::channel(4);

@@ -26,7 +26,8 @@ use crate::{
         assembly::{Assembly, OtherPlant},
         command_id_map::CommandIdMap,
         protocol::{
-            self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, Place, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+            self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+            TerminalOrigin,
         },
     },
     station::Session,
@@ -88,7 +89,7 @@ pub async fn connect(path: &Path) -> Result<Session, AttachError> {
 }
 
 /// Sends the handshake and waits for the reply.
-pub(super) async fn open(path: &Path, place: &Place) -> Result<Line, AttachError> {
+pub(super) async fn open(path: &Path, place: &TerminalOrigin) -> Result<Line, AttachError> {
     let no_station = |error| AttachError::NoStation { path: path.to_owned(), error };
     let opened = async {
         let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
@@ -125,10 +126,10 @@ pub(super) async fn next(read: &mut OwnedReadHalf) -> Result<ServerMessage, Wire
 }
 
 /// Where this terminal is.
-fn here() -> Place {
+fn here() -> TerminalOrigin {
     let tty = rustix::termios::ttyname(io::stdin(), Vec::new()).ok();
     let tty = tty.map(|name| name.to_string_lossy().trim_start_matches("/dev/").to_owned());
     let variable = |name: &str| std::env::var(name).ok();
     let ssh = variable("SSH_CONNECTION").and_then(|words| words.split(' ').next().map(str::to_owned));
-    Place { tty, ssh, term: variable("TERM") }.short()
+    TerminalOrigin { tty, ssh, term: variable("TERM") }.short()
 }

@@ -27,7 +27,7 @@ use crate::{
     access::Peer,
     attach::{
         callers::{Callers, makes_room},
-        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, Place, ProtocolError},
+        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, ProtocolError, TerminalOrigin},
     },
     profile::io::atomic::with_suffix,
     station::SessionAcceptor,
@@ -367,7 +367,7 @@ async fn receive_handshake(stream: UnixStream, credentials: UCred) -> HandshakeE
     HandshakeEnd { user, handshaken: Some(Ok(Handshaken { read, write, peer })) }
 }
 
-async fn read_handshake(read: &mut OwnedReadHalf) -> Result<Place, WireError> {
+async fn read_handshake(read: &mut OwnedReadHalf) -> Result<TerminalOrigin, WireError> {
     Ok(protocol::client_handshake(&wire::read(read, HANDSHAKE_BYTES_MAX).await?)?)
 }
 

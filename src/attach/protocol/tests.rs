@@ -22,8 +22,8 @@ fn body(bytes: Vec<u8>) -> Vec<u8> {
     bytes[LENGTH_BYTES..].to_vec()
 }
 
-fn place() -> Place {
-    Place { tty: Some("pts/3".into()), ssh: Some("10.0.0.5".into()), term: Some("xterm".into()) }
+fn place() -> TerminalOrigin {
+    TerminalOrigin { tty: Some("pts/3".into()), ssh: Some("10.0.0.5".into()), term: Some("xterm".into()) }
 }
 
 #[test]
@@ -69,10 +69,10 @@ fn the_place_of_a_terminal_is_one_harmless_line() {
         ("ทดสอบ", "fe80::1%eth0", "ทดสอบ from fe80::1%eth0, user panel, process 123"),
     ];
     for (tty, ssh, expected) in rows {
-        let place = Place { tty: Some(tty.into()), ssh: Some(ssh.into()), term: None };
+        let place = TerminalOrigin { tty: Some(tty.into()), ssh: Some(ssh.into()), term: None };
         assert_eq!(place.words(Some("panel"), Some(123)), expected);
     }
-    let long = Place { tty: Some("x".repeat(10_000)), ssh: Some("y".repeat(10_000)), term: None };
+    let long = TerminalOrigin { tty: Some("x".repeat(10_000)), ssh: Some("y".repeat(10_000)), term: None };
     assert_eq!(long.words(None, None).chars().count(), 64 + " from ".len() + 64);
     assert!(encode(&(Handshake::current(), long.short()), HANDSHAKE_BYTES_MAX).is_ok());
 }

@@ -25,12 +25,12 @@ impl Bank {
 /// Everything a master can reach.
 #[derive(Debug, Clone)]
 pub struct Memory {
-    /// In the order of [`PLACES`].
+    /// In the order of [`BANKS`].
     banks: [Bank; 9],
     v: Vec<u16>,
 }
 
-/// The banks by name, in the order of [`PLACES`].
+/// The banks by name, in the order of [`BANKS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Remote inputs.
@@ -54,7 +54,7 @@ pub enum Kind {
 }
 
 /// Where a bank stands: first bit address with its table, first word in V memory, length in words, writable.
-struct Place {
+struct BankLayout {
     kind: Kind,
     table: Table,
     first_bit: u16,
@@ -63,21 +63,21 @@ struct Place {
     writable: bool,
 }
 
-const fn place(kind: Kind, table: Table, first_bit: u16, first_word: u16, words: u16, writable: bool) -> Place {
-    Place { kind, table, first_bit, first_word, words, writable }
+const fn layout(kind: Kind, table: Table, first_bit: u16, first_word: u16, words: u16, writable: bool) -> BankLayout {
+    BankLayout { kind, table, first_bit, first_word, words, writable }
 }
 
 /// DL06 user manual, 3rd edition, pages 4-12 to 4-15; V memory in octal as the manual has it.
-static PLACES: [Place; 9] = [
-    place(Kind::Gx, Table::Discrete, 0, 0o40000, 128, false),
-    place(Kind::X, Table::Discrete, 2048, 0o40400, 32, false),
-    place(Kind::Sp, Table::Discrete, 3072, 0o41200, 32, false),
-    place(Kind::Gy, Table::Coil, 0, 0o40200, 128, true),
-    place(Kind::Y, Table::Coil, 2048, 0o40500, 32, true),
-    place(Kind::C, Table::Coil, 3072, 0o40600, 64, true),
-    place(Kind::S, Table::Coil, 5120, 0o41000, 64, false),
-    place(Kind::T, Table::Coil, 6144, 0o41100, 16, false),
-    place(Kind::Ct, Table::Coil, 6400, 0o41140, 8, false),
+static BANKS: [BankLayout; 9] = [
+    layout(Kind::Gx, Table::Discrete, 0, 0o40000, 128, false),
+    layout(Kind::X, Table::Discrete, 2048, 0o40400, 32, false),
+    layout(Kind::Sp, Table::Discrete, 3072, 0o41200, 32, false),
+    layout(Kind::Gy, Table::Coil, 0, 0o40200, 128, true),
+    layout(Kind::Y, Table::Coil, 2048, 0o40500, 32, true),
+    layout(Kind::C, Table::Coil, 3072, 0o40600, 64, true),
+    layout(Kind::S, Table::Coil, 5120, 0o41000, 64, false),
+    layout(Kind::T, Table::Coil, 6144, 0o41100, 16, false),
+    layout(Kind::Ct, Table::Coil, 6400, 0o41140, 8, false),
 ];
 
 /// V memory that holds words of its own, and whether it may be written. System parameters are left out on purpose.
@@ -92,7 +92,7 @@ const AREAS: &[(Range<u16>, bool)] = &[
 impl Memory {
     /// All off, all zero, but SP1, which is always on.
     pub fn new() -> Memory {
-        let banks = PLACES.each_ref().map(|place| Bank(vec![0; usize::from(place.words)]));
+        let banks = BANKS.each_ref().map(|layout| Bank(vec![0; usize::from(layout.words)]));
         let mut memory = Memory { banks, v: vec![0; 0o20000] };
         memory.bank_mut(Kind::Sp).set(1, true);
         memory
@@ -100,17 +100,17 @@ impl Memory {
 
     /// One bit by its wire address.
     pub fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode> {
-        let (place, number) = find_bit(table, address)?;
-        Ok(self.bank(place.kind).get(number))
+        let (layout, number) = find_bit(table, address)?;
+        Ok(self.bank(layout.kind).get(number))
     }
 
     /// Writes a coil by its wire address.
     pub fn write_coil(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode> {
-        let (place, number) = find_bit(Table::Coil, address)?;
-        if !place.writable {
+        let (layout, number) = find_bit(Table::Coil, address)?;
+        if !layout.writable {
             return Err(ExceptionCode::ILLEGAL_ADDRESS);
         }
-        self.bank_mut(place.kind).set(number, on);
+        self.bank_mut(layout.kind).set(number, on);
         Ok(())
     }
 
@@ -118,7 +118,7 @@ impl Memory {
     pub fn word(&self, address: u16) -> Result<u16, ExceptionCode> {
         match find_word(address)? {
             Word::Own { .. } => Ok(self.v[usize::from(address)]),
-            Word::Bits { place, index } => Ok(self.bank(place.kind).0[index]),
+            Word::Bits { layout, index } => Ok(self.bank(layout.kind).0[index]),
         }
     }
 
@@ -126,7 +126,7 @@ impl Memory {
     pub fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode> {
         match find_word(address)? {
             Word::Own { writable: true } => self.v[usize::from(address)] = value,
-            Word::Bits { place, index } if place.writable => self.bank_mut(place.kind).0[index] = value,
+            Word::Bits { layout, index } if layout.writable => self.bank_mut(layout.kind).0[index] = value,
             Word::Own { .. } | Word::Bits { .. } => return Err(ExceptionCode::ILLEGAL_ADDRESS),
         }
         Ok(())
@@ -153,22 +153,23 @@ impl Memory {
 /// What stands at a word address.
 enum Word {
     Own { writable: bool },
-    Bits { place: &'static Place, index: usize },
+    Bits { layout: &'static BankLayout, index: usize },
 }
 
-fn find_bit(table: Table, address: u16) -> Result<(&'static Place, u16), ExceptionCode> {
-    let number = |place: &Place| address.checked_sub(place.first_bit).filter(|number| *number < place.words * 16);
-    let mut places = PLACES.iter().filter(|place| place.table == table);
-    places.find_map(|place| number(place).map(|number| (place, number))).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
+fn find_bit(table: Table, address: u16) -> Result<(&'static BankLayout, u16), ExceptionCode> {
+    let number =
+        |layout: &BankLayout| address.checked_sub(layout.first_bit).filter(|number| *number < layout.words * 16);
+    let mut layouts = BANKS.iter().filter(|layout| layout.table == table);
+    layouts.find_map(|layout| number(layout).map(|number| (layout, number))).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
 }
 
 fn find_word(address: u16) -> Result<Word, ExceptionCode> {
     if let Some((_, writable)) = AREAS.iter().find(|(range, _)| range.contains(&address)) {
         return Ok(Word::Own { writable: *writable });
     }
-    let index = |place: &Place| address.checked_sub(place.first_word).filter(|index| *index < place.words);
-    let found = PLACES.iter().find_map(|place| index(place).map(|index| (place, usize::from(index))));
-    found.map(|(place, index)| Word::Bits { place, index }).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
+    let index = |layout: &BankLayout| address.checked_sub(layout.first_word).filter(|index| *index < layout.words);
+    let found = BANKS.iter().find_map(|layout| index(layout).map(|index| (layout, usize::from(index))));
+    found.map(|(layout, index)| Word::Bits { layout, index }).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
 }
 
 #[cfg(test)]
@@ -177,13 +178,17 @@ mod tests {
 
     #[test]
     fn each_bank_has_the_place_of_its_kind() {
-        assert!(PLACES.iter().enumerate().all(|(index, place)| place.kind as usize == index));
+        assert!(BANKS.iter().enumerate().all(|(index, layout)| layout.kind as usize == index));
     }
 
     #[test]
     fn bits_stand_where_the_manual_says() {
         let check = |table, address, expect| {
-            assert_eq!(find_bit(table, address).ok().map(|(place, number)| (place.kind, number)), expect, "{address}");
+            assert_eq!(
+                find_bit(table, address).ok().map(|(layout, number)| (layout.kind, number)),
+                expect,
+                "{address}"
+            );
         };
         check(Table::Coil, 2048, Some((Kind::Y, 0)));
         check(Table::Coil, 2064, Some((Kind::Y, 0o20)));

@@ -13,5 +13,5 @@ pub use line::{Wire, serve_line};
 pub use memory::in_memory;
 pub use owner::{LineHandle, Report, SimulatorHandle};
 pub use pty::{Pty, open_pty};
-pub use serving::{Mode, Place, Service, Serving, SimError, serve, serve_simulator};
+pub use serving::{Endpoint, Mode, Service, Serving, SimError, serve, serve_simulator};
 pub use tcp::{TcpFraming, serve_stream, serve_tcp};

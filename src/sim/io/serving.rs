@@ -1,4 +1,4 @@
-//! Serves every line of a simulated plant at a place of its own: a pseudo-terminal, or a TCP port.
+//! Serves every line of a simulated plant at a endpoint of its own: a pseudo-terminal, or a TCP port.
 
 use std::{
     io,
@@ -39,55 +39,55 @@ pub enum SimError {
 pub struct Serving {
     /// The simulator behind it, to inject faults.
     pub simulator: SimulatorHandle,
-    places: Vec<Place>,
+    endpoints: Vec<Endpoint>,
     tasks: Vec<JoinHandle<io::Result<()>>>,
 }
 
 /// Where a master finds a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum Endpoint {
     /// The port to open.
     Port(PathBuf),
     /// The address to connect to.
     Address(SocketAddr),
 }
 
-impl Place {
+impl Endpoint {
     /// The port, if it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
-            Place::Port(path) => Some(path),
-            Place::Address(_) => None,
+            Endpoint::Port(path) => Some(path),
+            Endpoint::Address(_) => None,
         }
     }
 }
 
 /// `/dev/pts/3` or `127.0.0.1:40001`.
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Endpoint {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Place::Port(path) => path.display().fmt(f),
-            Place::Address(address) => address.fmt(f),
+            Endpoint::Port(path) => path.display().fmt(f),
+            Endpoint::Address(address) => address.fmt(f),
         }
     }
 }
 
 impl Serving {
-    /// The place of each line, in the order of the plant.
-    pub fn places(&self) -> &[Place] {
-        &self.places
+    /// The endpoint of each line, in the order of the plant.
+    pub fn endpoints(&self) -> &[Endpoint] {
+        &self.endpoints
     }
 
-    /// Puts every line of the plant that is served onto its simulated place.
+    /// Puts every line of the plant that is served onto its simulated endpoint.
     pub fn plug_into(&self, def: &mut PlantDef) {
-        for (line, place) in def.lines.iter_mut().zip(&self.places) {
-            match (&mut line.transport, place) {
-                (Transport::Serial { port, .. }, Place::Port(path)) => *port = path.display().to_string(),
-                (Transport::Tcp { host, port, .. }, Place::Address(address)) => {
+        for (line, endpoint) in def.lines.iter_mut().zip(&self.endpoints) {
+            match (&mut line.transport, endpoint) {
+                (Transport::Serial { port, .. }, Endpoint::Port(path)) => *port = path.display().to_string(),
+                (Transport::Tcp { host, port, .. }, Endpoint::Address(address)) => {
                     (*host, *port) = (address.ip().to_string(), address.port());
                 }
                 // Served otherwise than the plant says, which is for masters of other makers.
-                (Transport::Serial { .. }, Place::Address(_)) | (Transport::Tcp { .. }, Place::Port(_)) => {}
+                (Transport::Serial { .. }, Endpoint::Address(_)) | (Transport::Tcp { .. }, Endpoint::Port(_)) => {}
             }
         }
     }
@@ -180,25 +180,25 @@ pub async fn serve_simulator(
 ) -> Result<Serving, SimError> {
     let simulator = SimulatorHandle::spawn_for(def, simulator, clock);
     // What has started is ended by dropping this if a later line cannot be served.
-    let mut serving = Serving { simulator, places: Vec::new(), tasks: Vec::new() };
+    let mut serving = Serving { simulator, endpoints: Vec::new(), tasks: Vec::new() };
     for (line, service) in services.iter().enumerate() {
-        let (place, task) = start(serving.simulator.line(LineId(to_u16(line))), *service).await?;
-        serving.places.push(place);
+        let (endpoint, task) = start(serving.simulator.line(LineId(to_u16(line))), *service).await?;
+        serving.endpoints.push(endpoint);
         serving.tasks.push(task);
     }
     Ok(serving)
 }
 
-async fn start(units: LineHandle, service: Service) -> io::Result<(Place, JoinHandle<io::Result<()>>)> {
+async fn start(units: LineHandle, service: Service) -> io::Result<(Endpoint, JoinHandle<io::Result<()>>)> {
     match service.tcp_framing() {
         TcpFraming::Line(wire) if !service.mode.is_tcp() => {
             let (pty, path) = open_pty()?;
-            Ok((Place::Port(path), tokio::spawn(serve_line(pty, units, wire, FOR_EVER))))
+            Ok((Endpoint::Port(path), tokio::spawn(serve_line(pty, units, wire, FOR_EVER))))
         }
         framing => {
             let listener = TcpListener::bind(service.address).await?;
-            let place = Place::Address(listener.local_addr()?);
-            Ok((place, tokio::spawn(serve_tcp(listener, units, framing))))
+            let endpoint = Endpoint::Address(listener.local_addr()?);
+            Ok((endpoint, tokio::spawn(serve_tcp(listener, units, framing))))
         }
     }
 }
