@@ -11,7 +11,7 @@ use sightglass::access::io::own_user;
 
 use crate::{
     pty::Terminal,
-    support::{PATIENCE, Process, folder, have, sightglass, simulated_tank, sockets},
+    support::{Process, TIMEOUT, folder, have, sightglass, simulated_tank, sockets},
 };
 
 /// What ends a terminal.
@@ -196,7 +196,7 @@ fn is_alive(process: &str) -> bool {
 
 /// Polls, because a process is only notified of the end of its own children.
 fn until(what: &str, so: impl Fn() -> bool) {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     while !so() {
         assert!(Instant::now() < end, "never: {what}");
         std::thread::sleep(Duration::from_millis(5));

@@ -50,7 +50,7 @@ use sightglass::{
 
 use crate::{
     guarded::{PASSWORD, login},
-    support::{PATIENCE, Process, folder, sightglass, simulated_tank, sockets},
+    support::{Process, TIMEOUT, folder, sightglass, simulated_tank, sockets},
 };
 
 /// Rounds, unless `SIGHTGLASS_KILLS` says how many.
@@ -228,7 +228,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
             outcome = ended.map(|status| status.outcome.clone());
             outcome.is_some()
         });
-        let ended = tokio::time::timeout(PATIENCE, ended).await;
+        let ended = tokio::time::timeout(TIMEOUT, ended).await;
         assert!(ended.is_ok_and(|ended| ended.is_ok()), "`{note}` never had an outcome");
         match outcome {
             Some(Outcome::Verified) => match kind {
@@ -316,7 +316,7 @@ async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Report
     let enough = async {
         count.wait_for(|done| actions <= *done).await.is_ok() && report.wait_for(|asked| *asked).await.is_ok()
     };
-    let enough = tokio::time::timeout(PATIENCE, enough).await;
+    let enough = tokio::time::timeout(TIMEOUT, enough).await;
     assert!(enough == Ok(true), "round {round}: nothing goes on; {:?}", station.said);
     // Another moment of whatever is under way each time.
     tokio::time::sleep(late).await;

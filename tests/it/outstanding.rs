@@ -19,7 +19,7 @@ use sightglass::{
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-use crate::support::{PATIENCE, Process, folder, sightglass, sockets};
+use crate::support::{Process, TIMEOUT, folder, sightglass, sockets};
 
 /// Rounds, unless `SIGHTGLASS_KILLS` says how many.
 const ROUNDS: u32 = 4;
@@ -151,7 +151,7 @@ async fn a_reply_to_a_killed_station_is_no_value_of_the_next() {
                 tokio::time::sleep(Duration::from_millis(5)).await;
             }
         };
-        tokio::time::timeout(PATIENCE, busy).await.expect("the device is asked");
+        tokio::time::timeout(TIMEOUT, busy).await.expect("the device is asked");
         tokio::time::sleep(REPLY * (chance >> 16 & 0xFF) / 0x100).await;
         // The last one stores all that it has read.
         let killed = round < rounds;

@@ -9,7 +9,7 @@ use std::{
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 
-use crate::support::{PATIENCE, folder, sockets};
+use crate::support::{TIMEOUT, folder, sockets};
 
 /// A screen, and the program that draws on it. Both end with the test.
 pub struct Terminal {
@@ -72,7 +72,7 @@ impl Terminal {
     }
 
     fn wait(&mut self, text: &str, there: bool) {
-        let end = Instant::now() + PATIENCE;
+        let end = Instant::now() + TIMEOUT;
         while self.parser.screen().contents().contains(text) != there {
             match self.bytes.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok(bytes) => self.take(&bytes),
@@ -97,7 +97,7 @@ impl Terminal {
 
     /// Reads to the end of the program and gives its exit code.
     pub fn end(&mut self) -> u32 {
-        let end = Instant::now() + PATIENCE;
+        let end = Instant::now() + TIMEOUT;
         loop {
             match self.bytes.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok(bytes) => self.take(&bytes),

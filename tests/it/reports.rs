@@ -15,7 +15,7 @@ use sightglass::{
     profile::{self, Search},
 };
 
-use crate::support::{PATIENCE, Process, folder, sightglass, sockets};
+use crate::support::{Process, TIMEOUT, folder, sightglass, sockets};
 
 /// The instant of the first record.
 const START: &str = "2026-03-02T06:00:00Z";
@@ -288,7 +288,7 @@ fn an_export_takes_more_tags_than_one_query_and_keeps_units() {
     let stored: Vec<&str> = running.def.tags.iter().filter(|tag| tag.is_stored()).map(|tag| &*tag.name).collect();
     assert!(64 < stored.len(), "{} tags fit into one query", stored.len());
     let from = (Timestamp::now() - SignedDuration::from_secs(5)).to_string();
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     // Until every tag has been read, its value is on disk, and the unit of the first device is known.
     let rows = loop {
         let (code, out, err) = running.run(&["export", "--from", &from, "--every", "500ms"]);

@@ -16,7 +16,7 @@ use std::{
 };
 
 /// Nothing that these tests wait for takes so long, even on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+pub const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// The program under test, where it finds no station of another test.
 pub fn sightglass() -> Command {
@@ -71,7 +71,7 @@ impl Process {
 
     /// Waits for a line with this text and gives it.
     pub fn wait_for(&mut self, text: &str) -> String {
-        let end = Instant::now() + PATIENCE;
+        let end = Instant::now() + TIMEOUT;
         loop {
             match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok(line) => {
@@ -103,7 +103,7 @@ impl Process {
     /// Waits for the end and gives the exit code (`None`: killed by a signal).
     pub fn end(&mut self) -> Option<i32> {
         // The pipes close when the process ends; that is the event to wait for.
-        let end = Instant::now() + PATIENCE;
+        let end = Instant::now() + TIMEOUT;
         loop {
             match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok(line) => self.said.push(line),

@@ -23,7 +23,7 @@ use crate::{
 /// Set for the process on the pty.
 const CHILD: &str = "SIGHTGLASS_UI_CHILD";
 /// No wait in these tests is longer.
-const PATIENCE: Duration = Duration::from_secs(30);
+const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// What runs on the pty: a terminal on a plant driven by keys: `a` panics a task, `A` spoils the snapshot.
 /// Without the variable there is nothing to run.
@@ -98,14 +98,14 @@ impl Pty {
     }
     /// Waits until the words stand on the screen, or were sent as they are.
     fn wait_for(&mut self, words: &str) {
-        let patience = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + TIMEOUT;
         loop {
             let mut screen = vt100::Parser::new(24, 80, 0);
             screen.process(&self.seen);
             if screen.screen().contents().contains(words) || String::from_utf8_lossy(&self.seen).contains(words) {
                 return;
             }
-            match self.sent.recv_timeout(patience.saturating_duration_since(Instant::now())) {
+            match self.sent.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
                 Ok(bytes) => self.seen.extend(bytes),
                 Err(_) => panic!("{words} never came; seen: {}", screen.screen().contents()),
             }
@@ -121,7 +121,7 @@ impl Pty {
     /// Waits for the end; the terminal must be as it was, and restored once.
     fn ends_restored(&mut self, words: &str) {
         self.wait_for(words);
-        while let Ok(bytes) = self.sent.recv_timeout(PATIENCE) {
+        while let Ok(bytes) = self.sent.recv_timeout(TIMEOUT) {
             self.seen.extend(bytes);
         }
         self.child.wait().expect("the child has ended");

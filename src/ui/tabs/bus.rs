@@ -35,7 +35,7 @@ use test::Tried;
 
 /// The day of a line grows by the minute.
 const ASK_EVERY: SignedDuration = SignedDuration::from_secs(60);
-const PATIENCE: SignedDuration = SignedDuration::from_secs(10);
+const TIMEOUT: SignedDuration = SignedDuration::from_secs(10);
 /// Rows of the day.
 const DAY_HEIGHT: u16 = 3;
 
@@ -185,7 +185,7 @@ impl TabView for Bus {
             Page::Line => {}
         }
         let (number, query) = ((Tab::Bus, &mut self.registers.number), line_trend::query(self.line, cx.now));
-        self.minutes.query.ask(cx, number, ASK_EVERY, PATIENCE, query).into_iter().collect()
+        self.minutes.query.ask(cx, number, ASK_EVERY, TIMEOUT, query).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {

@@ -36,7 +36,7 @@ use crate::{
 
 /// The small trend is asked for again after this time.
 const TREND_EVERY: SignedDuration = SignedDuration::from_secs(10);
-const PATIENCE: SignedDuration = SignedDuration::from_secs(30);
+const TIMEOUT: SignedDuration = SignedDuration::from_secs(30);
 /// Columns of the small trend to ask for: two dots a cell, and some to spare.
 const TREND_BUCKETS: usize = 80;
 /// What is shown.
@@ -201,7 +201,7 @@ impl TabView for Controllers {
         let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
         let query = Query::Series { tags: vec![faceplate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
         let number = (Tab::Controllers, &mut self.asked);
-        self.trend.query.ask(cx, number, TREND_EVERY, PATIENCE, query).into_iter().collect()
+        self.trend.query.ask(cx, number, TREND_EVERY, TIMEOUT, query).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {

@@ -40,7 +40,7 @@ pub const KEYS: &[Key<Action>] = &[
 
 /// The small trends are asked again after so many seconds (real time).
 const EVERY_S: f64 = 10.0;
-const PATIENCE_S: f64 = 30.0;
+const TIMEOUT_S: f64 = 30.0;
 
 /// State of this tab.
 #[derive(Debug)]
@@ -77,7 +77,7 @@ impl TabView for Mimic {
             let from = cx.now - SignedDuration::try_from(*window).ok()?;
             let buckets = usize::from(scale(cx, cx.area).place(*place).width.max(1)) * 2;
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
-            trend.query.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, PATIENCE_S), query)
+            trend.query.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
         });
         asks.collect()
     }

@@ -16,7 +16,7 @@ use crate::{
 
 /// Between two queries passes at least so many times as long as the last answer took.
 const REST: i32 = 4;
-/// An answer that was not there after so many times the patience is lost: the station answers each query, and says so
+/// An answer that was not there after so many timeouts is lost: the station answers each query, and says so
 /// where it cannot.
 const LOST: i32 = 4;
 
@@ -32,16 +32,16 @@ pub struct PeriodicQuery {
 impl PeriodicQuery {
     /// Is it time to ask: something changed, or the last query is `every` old, and the history has rested from it?
     /// While one is on its way, its answer is waited for; only where it is no longer what is wanted not longer than
-    /// `patience`, so that fast keys never pile up queries before the history.
-    pub fn due(&self, now: Timestamp, every: SignedDuration, patience: SignedDuration) -> bool {
+    /// `timeout`, so that fast keys never pile up queries before the history.
+    pub fn due(&self, now: Timestamp, every: SignedDuration, timeout: SignedDuration) -> bool {
         // A station that was started again with a clock set back must not silence the query for good; a small step back
         // is only the difference between the time of a snapshot and what was guessed before it came.
-        let set_back = |at: Timestamp| at.duration_since(now) >= patience;
+        let set_back = |at: Timestamp| at.duration_since(now) >= timeout;
         let every = every.max(self.took * REST);
         match self.on_way {
             Some((_, at)) => {
-                let patience = if self.wanted { patience } else { patience * LOST };
-                now.duration_since(at) >= patience || set_back(at)
+                let timeout = if self.wanted { timeout } else { timeout * LOST };
+                now.duration_since(at) >= timeout || set_back(at)
             }
             None => self.wanted || self.asked.is_none_or(|at| now.duration_since(at) >= every || set_back(at)),
         }
@@ -53,10 +53,10 @@ impl PeriodicQuery {
         cx: &ViewContext,
         (tab, number): (Tab, &mut u32),
         every: SignedDuration,
-        patience: SignedDuration,
+        timeout: SignedDuration,
         query: Query,
     ) -> Option<UiAction> {
-        self.due(cx.steady(), every, patience).then(|| {
+        self.due(cx.steady(), every, timeout).then(|| {
             *number = number.wrapping_add(1);
             self.asked(*number, cx.steady());
             UiAction::query(tab, *number, query)

@@ -55,7 +55,7 @@ fn table() -> Vec<Key<Action>> {
 /// How often the figures of a running shift are refreshed, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 30.0;
 /// A report over weeks may take its time.
-const PATIENCE_S: f64 = 60.0;
+const TIMEOUT_S: f64 = 60.0;
 
 /// State of this tab.
 #[derive(Debug)]
@@ -222,7 +222,7 @@ impl Reports {
         let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
         let Some(period) = self.period.clone() else { return Vec::new() };
         let number = (Tab::Reports, &mut self.number);
-        let query = self.report.query.ask(cx, number, every, real(cx, PATIENCE_S), Query::Report { period });
+        let query = self.report.query.ask(cx, number, every, real(cx, TIMEOUT_S), Query::Report { period });
         query.into_iter().collect()
     }
 

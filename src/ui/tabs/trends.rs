@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// An answer that takes longer (real time) is taken for lost.
-const PATIENCE_S: f64 = 15.0;
+const TIMEOUT_S: f64 = 15.0;
 /// The tab was out of sight if it got no snapshot for so long (real time): what happened meanwhile only the history knows.
 const UNSEEN_S: f64 = 3.0;
 /// The history may lag behind the present: it commits once a second (real time), and a commit takes up to another.

@@ -26,7 +26,7 @@ async fn hostile_connections_are_closed_and_disturb_no_other() {
         let mut stream = UnixStream::connect(stand.path()).await.unwrap();
         // It may be closed before all is sent.
         let _ = stream.write_all(&bytes).await;
-        let closed = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut Vec::new())).await;
+        let closed = tokio::time::timeout(TIMEOUT, stream.read_to_end(&mut Vec::new())).await;
         assert!(closed.is_ok(), "still open: {what}");
         stand.set(index as f64);
         sees(&mut session, index as f64).await;

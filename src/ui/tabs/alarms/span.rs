@@ -4,7 +4,7 @@ use crate::report::Period;
 use crate::ui::tabs::prelude::*;
 
 /// An answer that has not come after so long (real time) counts as lost: a query over weeks may take its time.
-const PATIENCE_S: f64 = 30.0;
+const TIMEOUT_S: f64 = 30.0;
 
 /// The query, if it is due: every `seconds` for what is still going on, once in a while for the past.
 pub fn ask(
@@ -17,7 +17,7 @@ pub fn ask(
 ) -> Option<UiAction> {
     let past = shown.is_some_and(|shown| shown.to <= cx.now);
     let every = real(cx, if past { 20.0 * seconds } else { seconds });
-    periodic.ask(cx, (Tab::Alarms, number), every, real(cx, PATIENCE_S), query)
+    periodic.ask(cx, (Tab::Alarms, number), every, real(cx, TIMEOUT_S), query)
 }
 
 /// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.

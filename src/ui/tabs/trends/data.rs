@@ -41,7 +41,7 @@ impl Trends {
 
     /// Asks what is due.
     pub(super) fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let (now, patience, view) = (cx.now, real(cx, PATIENCE_S), self.span(cx));
+        let (now, timeout, view) = (cx.now, real(cx, TIMEOUT_S), self.span(cx));
         let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);
         // A curve of wide columns does not change its shape at every update; its newest values come live.
@@ -53,7 +53,7 @@ impl Trends {
         let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
         let mut due = |periodic: &mut PeriodicQuery, every, query| {
-            acts.extend(periodic.ask(cx, (Tab::Trends, &mut self.asked), every, patience, query));
+            acts.extend(periodic.ask(cx, (Tab::Trends, &mut self.asked), every, timeout, query));
         };
         if self.values.is_none() && !group.is_empty() {
             due(&mut self.curves, often, series(&group, view.from, view.to, view.columns));

@@ -53,7 +53,7 @@ const ROWS: usize = 1_000;
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 7);
 /// How often the list is refreshed, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 10.0;
-const PATIENCE_S: f64 = 20.0;
+const TIMEOUT_S: f64 = 20.0;
 
 /// State of the list.
 #[derive(Debug, Default)]
@@ -137,7 +137,7 @@ impl Audit {
         let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
         let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
         let query = Query::Audit { from, to, words, by, action, limit: ROWS };
-        self.rows.query.ask(cx, (Tab::Users, number), real(cx, EVERY_S), real(cx, PATIENCE_S), query)
+        self.rows.query.ask(cx, (Tab::Users, number), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
     }
 
     /// The history answered query `number`; the selected entry stays selected, but at the top the newest one is.
