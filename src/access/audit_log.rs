@@ -191,7 +191,7 @@ impl Check {
     /// continues behind it from the last sound one is sound again.
     pub fn line(&mut self, bytes: &[u8]) -> Option<Entry> {
         self.line += 1;
-        match self.look_at(bytes) {
+        match self.parse_entry(bytes) {
             Ok((entry, chain_hash)) => {
                 self.last = chain_hash;
                 self.span = Some((self.span.map_or(entry.utc, |span| span.0), entry.utc));
@@ -204,7 +204,7 @@ impl Check {
         }
     }
 
-    fn look_at(&mut self, bytes: &[u8]) -> Result<(Entry, ChainHash), String> {
+    fn parse_entry(&mut self, bytes: &[u8]) -> Result<(Entry, ChainHash), String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "this is not text".to_owned())?;
         let (body, hash) =
             split(text).ok_or("the line has no hash at its end: it was cut or does not belong to an audit log")?;

@@ -16,8 +16,8 @@ impl RateLimit {
         RateLimit { burst, every, full_at: Duration::ZERO }
     }
 
-    /// Takes one event; `false` if the limit is reached.
-    pub(crate) fn take(&mut self, now: Duration) -> bool {
+    /// Counts one event; `false` if the limit is reached.
+    pub(crate) fn try_acquire(&mut self, now: Duration) -> bool {
         let after = self.full_at.max(now) + self.every;
         let permitted = after <= now + self.every * self.burst;
         if permitted {
@@ -45,9 +45,11 @@ mod tests {
     fn a_burst_passes_and_then_one_event_an_interval() {
         let seconds = Duration::from_secs;
         let mut limit = RateLimit::new(3, seconds(2));
-        let passed = (0..10).filter(|_| limit.take(seconds(100))).count();
+        let passed = (0..10).filter(|_| limit.try_acquire(seconds(100))).count();
         assert_eq!(passed, 3);
-        assert!(!limit.take(seconds(101)) && limit.take(seconds(102)) && !limit.take(seconds(102)));
+        assert!(
+            !limit.try_acquire(seconds(101)) && limit.try_acquire(seconds(102)) && !limit.try_acquire(seconds(102))
+        );
         assert!(!limit.is_full(seconds(107)) && limit.is_full(seconds(108)));
         let waits: Vec<u64> = (0..5).map(|_| limit.reserve(seconds(200)).as_secs()).collect();
         assert_eq!(waits, [0, 0, 0, 2, 4]);

@@ -62,7 +62,7 @@ impl Callers {
         let host = self.hosts.contains(&user);
         let user = self.counted_as(user, now);
         let caller = self.users.entry(user).or_default();
-        if !caller.attaches.take(now) {
+        if !caller.attaches.try_acquire(now) {
             return Err("too many terminals of this user have attached recently, wait a moment".to_owned());
         }
         if TERMINALS_OF_USER_MAX <= caller.terminals && !host {
@@ -87,7 +87,7 @@ impl Callers {
     pub fn may_log(&mut self, user: u32, now: Duration) -> bool {
         let user = self.counted_as(user, now);
         let caller = self.users.entry(user).or_default();
-        let some = caller.lines.take(now);
+        let some = caller.lines.try_acquire(now);
         if !some {
             caller.unlogged += 1;
         }

@@ -205,7 +205,7 @@ pub fn main() -> ExitCode {
         say_error(&message);
         return ExitCode::from(2);
     }
-    let result = menu::completed(std::env::args_os().collect()).and_then(|words| carry_out(parse(words)));
+    let result = menu::completed(std::env::args_os().collect()).and_then(|words| run_command(parse(words)));
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -230,13 +230,13 @@ fn parse(words: Vec<std::ffi::OsString>) -> Args {
 }
 
 /// Does what the arguments say.
-fn carry_out(args: Args) -> Result<(), CliError> {
+fn run_command(args: Args) -> Result<(), CliError> {
     match args.command {
         None => match args.plant {
             Some(plant) => run::with_terminal(&plant, &args.station).map_err(|error| mistyped(&plant, error)),
             None => match attach::main(attach::Args { plant: None }) {
                 Err(error @ CliError::NotRunning(_)) => match menu::without_station()? {
-                    Some(words) => carry_out(parse(
+                    Some(words) => run_command(parse(
                         std::iter::once("sightglass".into()).chain(words.into_iter().map(Into::into)).collect(),
                     )),
                     None => Err(error),

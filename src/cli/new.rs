@@ -99,7 +99,7 @@ async fn wizard(path: PathBuf) -> Result<(), CliError> {
     while let Some(line) = next_line(plant.lines.len()).await? {
         let name = format!("L{}", plant.lines.len() + 1);
         let line = LineDef { name, ..line };
-        let Some((found, replies)) = look(&line, &known).await? else { continue };
+        let Some((found, replies)) = find_units(&line, &known).await? else { continue };
         for unit in &found {
             suggested.extend(add_device(&mut plant, unit, &profiles).await?);
         }
@@ -142,7 +142,7 @@ async fn next_line(count: usize) -> Result<Option<LineDef>, CliError> {
 }
 
 /// Scans a line and recognises who is there; `None` where it is left out.
-async fn look(line: &LineDef, known: &[Arc<PlantDef>]) -> Result<Option<(Vec<FoundUnit>, ReplyTimes)>, CliError> {
+async fn find_units(line: &LineDef, known: &[Arc<PlantDef>]) -> Result<Option<(Vec<FoundUnit>, ReplyTimes)>, CliError> {
     let usual = if line.transport.serial().is_some() { "1-32" } else { "1-247" };
     let (first, last) = ask_until("  units to look for", usual, scan::units).await?;
     let scan = Diagnostic::Scan(Scan { first, last, serials: Vec::new(), timeout: line.timeout });

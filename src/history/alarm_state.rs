@@ -32,8 +32,8 @@ pub struct LatestEvents {
 }
 
 impl LatestEvents {
-    /// Takes the next event; the one of the same kind before it counts no more.
-    pub fn take(&mut self, event: AlarmRecord) {
+    /// The next event; the one of the same kind before it counts no more.
+    pub fn on_event(&mut self, event: AlarmRecord) {
         if let Some(old) = self.places.insert(key(&event), self.next) {
             self.events.remove(&old);
         }
@@ -97,7 +97,7 @@ pub fn parse(bytes: &[u8]) -> Result<LatestEvents, String> {
         return Err(format!("line 1 is not `{}`", HEADER.trim_end()));
     }
     for (number, line) in (2..).zip(lines) {
-        events.take(event_of(line).ok_or_else(|| format!("line {number} is not as it was written"))?);
+        events.on_event(event_of(line).ok_or_else(|| format!("line {number} is not as it was written"))?);
     }
     Ok(events)
 }

@@ -166,8 +166,8 @@ impl ActuatorTracker {
         self.since.iter_mut().flatten()
     }
 
-    /// Looks again at `at`.
-    pub fn look(&mut self, logic: &ControlLogic, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
+    /// Notes what differs at `at`, and since when.
+    pub fn update(&mut self, logic: &ControlLogic, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
         self.since.resize(logic.actuators.len(), None);
         for (actuator, since) in logic.actuators.iter().zip(&mut self.since) {
             *since = logic.differs(actuator, &sample).then(|| since.unwrap_or(at));
@@ -255,9 +255,9 @@ mod tests {
         let check = |auto: Sample, command: Sample, output: Sample, level: Sample, expect: Option<u64>| {
             let (logic, mut watch) = (logic(true), ActuatorTracker::default());
             let sample = |tag: TagId| [auto, command, output, level][tag.index()];
-            watch.look(&logic, sample, at(10));
+            watch.update(&logic, sample, at(10));
             assert_eq!(watch.disobeys(&logic, 0, at(14)), None, "it may still travel");
-            watch.look(&logic, sample, at(15));
+            watch.update(&logic, sample, at(15));
             assert_eq!(watch.disobeys(&logic, 0, at(15)).map(|span| span.as_secs()), expect);
         };
         let (on, off, high) = (good(1.0), good(0.0), good(9.0));
@@ -277,7 +277,7 @@ mod tests {
         let (logic, mut watch) = (logic(true), ActuatorTracker::default());
         for (second, output, expect) in [(0, 0.0, None), (5, 0.0, Some(5)), (6, 1.0, None), (7, 0.0, None)] {
             let sample = |tag: TagId| [good(0.0), good(1.0), good(output), good(9.0)][tag.index()];
-            watch.look(&logic, sample, at(second));
+            watch.update(&logic, sample, at(second));
             assert_eq!(watch.disobeys(&logic, 0, at(second)).map(|span| span.as_secs()), expect, "at {second} s");
         }
     }

@@ -86,8 +86,8 @@ pub struct ProgramWatch {
 }
 
 impl ProgramWatch {
-    /// Takes what is known at `at`: the position and the command, `None` where they are not good.
-    pub fn take(&mut self, def: &ProgramDef, position: Option<f64>, command: Option<f64>, at: Timestamp) {
+    /// What is known at `at`: the position and the command, `None` where they are not good.
+    pub fn observe(&mut self, def: &ProgramDef, position: Option<f64>, command: Option<f64>, at: Timestamp) {
         let since = self.at.replace(at).map_or(Duration::ZERO, |before| elapsed(before, at));
         match (position, self.position) {
             // What happens while the position is unknown is not counted, and that is remembered.
@@ -147,7 +147,7 @@ mod tests {
         let at = |second| Timestamp::from_second(second).expect("a small number");
         let mut watch = ProgramWatch::default();
         let mut check = |second, position: Option<f64>, command: f64, expect: Option<(u64, bool)>| {
-            watch.take(&def(), position, Some(command), at(second));
+            watch.observe(&def(), position, Some(command), at(second));
             let expect = expect.map(|(seconds, seen)| (Duration::from_secs(seconds), seen));
             assert_eq!(watch.elapsed(), expect, "at {second}");
         };

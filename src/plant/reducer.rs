@@ -348,7 +348,7 @@ impl Plant {
         self.image.calculate();
         let asked = self.watch_controllers();
         let image = &self.image;
-        self.watch.look(&self.def.logic, |tag| image.sample(tag), self.at);
+        self.watch.update(&self.def.logic, |tag| image.sample(tag), self.at);
         let steps = self.evaluate_alarms();
         let mut records = self.image.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));

@@ -98,8 +98,8 @@ pub enum Noticed {
 }
 
 impl TuningTracker {
-    /// Takes the samples of a device as they stand at `at`; `span` is the range of PV.
-    pub fn take(
+    /// The samples of a device as they stand at `at`; `span` is the range of PV.
+    pub fn observe(
         &mut self,
         device: &DeviceDef,
         sample: &dyn Fn(TagId) -> Sample,
@@ -206,24 +206,24 @@ mod tests {
     }
 
     /// PV, AT (`None`: not known) and P at a second.
-    fn take(watch: &mut TuningTracker, at: i64, pv: f64, tune: Option<f64>, p: f64) -> Noticed {
+    fn observe(watch: &mut TuningTracker, at: i64, pv: f64, tune: Option<f64>, p: f64) -> Noticed {
         let sample = |tag: TagId| match tag {
             PV => Sample::good(pv, second(at)),
             SV => Sample::good(70.0, second(at)),
             AT => tune.map_or(Sample::bad(Cause::Timeout, second(at)), |tune| Sample::good(tune, second(at))),
             _ => Sample::good(p, second(at)),
         };
-        watch.take(&device(), &sample, Some(100.0), second(at))
+        watch.observe(&device(), &sample, Some(100.0), second(at))
     }
 
     #[test]
     fn swings_are_counted_beside_old_and_new_parameters() {
         let mut watch = TuningTracker::default();
-        take(&mut watch, 0, 60.0, Some(0.0), 5.0);
+        observe(&mut watch, 0, 60.0, Some(0.0), 5.0);
         assert_eq!(watch.tuning, None);
         let swing = [(1, 60.0), (2, 65.0), (3, 72.0), (4, 71.9), (5, 72.4), (6, 69.0), (7, 68.0), (8, 73.0), (9, 70.0)];
         for (at, pv) in swing {
-            assert_eq!(take(&mut watch, at, pv, Some(1.0), 5.0), Noticed::Nothing);
+            assert_eq!(observe(&mut watch, at, pv, Some(1.0), 5.0), Noticed::Nothing);
         }
         let extrema = |watch: &TuningTracker| -> Vec<(f64, bool)> {
             watch
@@ -234,8 +234,8 @@ mod tests {
                 .collect()
         };
         assert_eq!(extrema(&watch), [(72.4, true), (68.0, false), (73.0, true)], "0.1 °C of noise is no extremum");
-        assert_eq!(take(&mut watch, 10, 69.0, Some(0.0), 5.0), Noticed::Ended);
-        take(&mut watch, 11, 69.0, Some(0.0), 1.2);
+        assert_eq!(observe(&mut watch, 10, 69.0, Some(0.0), 5.0), Noticed::Ended);
+        observe(&mut watch, 11, 69.0, Some(0.0), 1.2);
         let tuning = watch.tuning.expect("one has ended");
         assert!(tuning.seen && tuning.is_known());
         assert_eq!(tuning.found, [Found { tag: P, old: Some(5.0), new: Some(1.2) }]);
@@ -245,9 +245,9 @@ mod tests {
     #[test]
     fn a_silent_controller_neither_begins_nor_ends_a_tuning() {
         let mut watch = TuningTracker::default();
-        take(&mut watch, 0, 60.0, Some(1.0), 5.0);
+        observe(&mut watch, 0, 60.0, Some(1.0), 5.0);
         assert!(watch.tuning.as_ref().is_some_and(|tuning| !tuning.seen), "it was on when first read");
-        take(&mut watch, 1, 60.0, None, 5.0);
+        observe(&mut watch, 1, 60.0, None, 5.0);
         assert!(watch.tuning.as_ref().is_some_and(|tuning| tuning.ended.is_none()));
     }
 }

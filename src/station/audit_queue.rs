@@ -124,7 +124,7 @@ impl AuditQueue {
     pub fn put(&mut self, actions: Vec<ActionRecord>, events: Vec<AlarmRecord>) -> Vec<ActionRecord> {
         self.barrier.put(&actions, &events, self.disk(), self.began.elapsed());
         self.backlog.extend(actions);
-        events.into_iter().for_each(|event| self.backlog_events.take(event));
+        events.into_iter().for_each(|event| self.backlog_events.on_event(event));
         self.send_backlog()
     }
 

@@ -65,7 +65,7 @@ impl SessionState {
 
     /// Takes one request; `false` above the rate limit.
     pub fn takes_request(&mut self, at: Timestamp) -> bool {
-        self.requests.take(steady(at))
+        self.requests.try_acquire(steady(at))
     }
 
     /// The user, unless the terminal is locked.
@@ -119,7 +119,7 @@ impl Refusals {
 
     /// Counts a refusal; `true` if it gets an entry of its own.
     pub fn count(&mut self, at: Timestamp) -> bool {
-        let recorded = self.limit.take(steady(at));
+        let recorded = self.limit.try_acquire(steady(at));
         self.unrecorded += u64::from(!recorded);
         recorded
     }

@@ -180,7 +180,7 @@ impl Recorder {
                 Ok(message) => {
                     let more = queue.try_iter().take(GROUP_MAX - 1);
                     [message].into_iter().chain(more).for_each(|message| match message {
-                        Message::Batch(batch) => self.take(batch),
+                        Message::Batch(batch) => self.on_batch(batch),
                         Message::Stored(rows) => self.compare(&rows),
                     });
                 }
@@ -208,11 +208,11 @@ impl Recorder {
         self.status().last
     }
 
-    fn take(&mut self, Batch { actions, events }: Batch) {
+    fn on_batch(&mut self, Batch { actions, events }: Batch) {
         self.taken += 1;
         // The history says the same as the log.
         self.pending.extend(actions.into_iter().map(|action| Pending { action: fit(action), stored: false }));
-        self.alarms.take(events);
+        self.alarms.on_events(events);
     }
 
     /// Compares the history with the log as both were at the start, and sends it what it lacks: a station that was killed

@@ -221,7 +221,7 @@ impl Task<'_> {
                 return Err(LinkExit::Shutdown);
             }
             // Before the second is closed: the schedule, too, learns of answers that came late.
-            self.take_answers(link, schedule).await?;
+            self.receive_replies(link, schedule).await?;
             self.check_connection(link)?;
             let now = self.clock.now();
             if report_at <= now {

@@ -83,12 +83,12 @@ impl AlarmFile {
     }
 
     /// Takes events; [`AlarmFile::write`] brings them to the disk.
-    pub fn take(&mut self, events: impl IntoIterator<Item = AlarmRecord>) {
+    pub fn on_events(&mut self, events: impl IntoIterator<Item = AlarmRecord>) {
         for event in events {
             if self.file.is_some() {
                 self.unwritten.push(event.clone());
             }
-            self.events.take(event);
+            self.events.on_event(event);
         }
     }
 
@@ -171,10 +171,10 @@ mod tests {
         let path = beside(&folder.path().join("tank.duckdb"));
         assert_eq!(found(&path), Found::default(), "no file yet");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([event(1, AlarmEvent::Raised)]);
+        alarms.on_events([event(1, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         for number in 0..3_000 {
-            alarms.take([event(number, AlarmEvent::Raised), event(number, AlarmEvent::ReturnedToNormal)]);
+            alarms.on_events([event(number, AlarmEvent::Raised), event(number, AlarmEvent::ReturnedToNormal)]);
             if number % 10 == 0 {
                 alarms.write().unwrap();
             }
@@ -193,10 +193,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([event(1, AlarmEvent::Raised)]);
+        alarms.on_events([event(1, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         fs::remove_file(&path).unwrap();
-        alarms.take([event(1, AlarmEvent::Acknowledged)]);
+        alarms.on_events([event(1, AlarmEvent::Acknowledged)]);
         alarms.write().unwrap();
         let both = vec![event(1, AlarmEvent::Raised), event(1, AlarmEvent::Acknowledged)];
         assert_eq!(found(&path).events, Some(both.clone()));
@@ -210,9 +210,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("later").join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([event(1, AlarmEvent::Raised)]);
+        alarms.on_events([event(1, AlarmEvent::Raised)]);
         assert!(alarms.write().is_err());
-        alarms.take([event(1, AlarmEvent::Acknowledged)]);
+        alarms.on_events([event(1, AlarmEvent::Acknowledged)]);
         assert!(alarms.write().is_err());
         fs::create_dir(folder.path().join("later")).unwrap();
         alarms.write().unwrap();
@@ -224,7 +224,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("tank.alarms.state");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
-        alarms.take([event(1, AlarmEvent::Raised), event(2, AlarmEvent::Raised)]);
+        alarms.on_events([event(1, AlarmEvent::Raised), event(2, AlarmEvent::Raised)]);
         alarms.write().unwrap();
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("T-1", "T-7", 1)).unwrap();

@@ -63,7 +63,7 @@ impl Store {
             let events = self.events(next, to)?;
             rows += events.len() as u64;
             within(rows, EVENTS_MAX)?;
-            events.iter().for_each(|event| monitor.take(event));
+            events.iter().for_each(|event| monitor.on_event(event));
             next = to;
         }
         Ok(monitor.figures())

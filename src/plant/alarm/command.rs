@@ -149,7 +149,8 @@ impl AlarmManager {
             return Err(AlarmRefusal::OutOfService);
         }
         let record = self.record(&alarm, AlarmEvent::Shelved, note.at, None);
-        Ok(self.take(id, AlarmRecord { by: note.by.clone(), reason: Some(reason), until: Some(until), ..record }))
+        Ok(self
+            .apply_event(id, AlarmRecord { by: note.by.clone(), reason: Some(reason), until: Some(until), ..record }))
     }
 
     /// Takes an alarm out of service.
@@ -192,7 +193,7 @@ impl AlarmManager {
         note: &OperatorNote,
     ) -> AlarmRecord {
         let record = self.record(alarm, event, note.at, value);
-        self.take(alarm.id, AlarmRecord { by: note.by.clone(), reason, ..record })
+        self.apply_event(alarm.id, AlarmRecord { by: note.by.clone(), reason, ..record })
     }
 
     /// An id may come over the socket from another plant's terminal: it is checked.

@@ -162,7 +162,7 @@ impl AlarmManager {
         } else if let Some(until) = shelving.moved(at) {
             let (by, reason) = (shelving.note.by.clone(), shelving.note.reason.clone());
             let record = self.record(alarm, AlarmEvent::Shelved, at, facts.value);
-            records.push(self.take(alarm.id, AlarmRecord { by, reason, until: Some(until), ..record }));
+            records.push(self.apply_event(alarm.id, AlarmRecord { by, reason, until: Some(until), ..record }));
         }
     }
 
@@ -222,11 +222,11 @@ impl AlarmManager {
     fn event(&mut self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
         let first_out = (event == AlarmEvent::Raised).then(|| self.next_first_out(at));
         let record = self.record(alarm, event, at, value);
-        self.take(alarm.id, AlarmRecord { first_out, ..record })
+        self.apply_event(alarm.id, AlarmRecord { first_out, ..record })
     }
 
-    /// Takes an event that was just decided.
-    pub(super) fn take(&mut self, id: AlarmId, record: AlarmRecord) -> AlarmRecord {
+    /// Applies an event that was just decided.
+    pub(super) fn apply_event(&mut self, id: AlarmId, record: AlarmRecord) -> AlarmRecord {
         self.apply(id, &record);
         record
     }

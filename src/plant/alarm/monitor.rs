@@ -132,8 +132,8 @@ impl AlarmMonitor {
         }
     }
 
-    /// Takes an event.
-    pub fn take(&mut self, event: &AlarmRecord) {
+    /// Counts an event.
+    pub fn on_event(&mut self, event: &AlarmRecord) {
         self.pass(event.at);
         match event.event {
             AlarmEvent::Raised => self.raised(event),

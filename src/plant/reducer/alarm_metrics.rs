@@ -23,7 +23,7 @@ impl Plant {
         self.alarm_monitor = AlarmMonitor::running(began);
         watched.iter().for_each(|window| self.alarm_monitor.watched(*window));
         active.iter().for_each(|event| self.alarm_monitor.already(event));
-        events.iter().for_each(|event| self.alarm_monitor.take(event));
+        events.iter().for_each(|event| self.alarm_monitor.on_event(event));
         self.alarm_monitor.advance(now);
         self.alarm_metrics = self.alarm_monitor.metrics();
     }
@@ -33,7 +33,7 @@ impl Plant {
         self.alarm_monitor.advance(self.at);
         for record in records {
             match record {
-                Record::Alarm(event) => self.alarm_monitor.take(event),
+                Record::Alarm(event) => self.alarm_monitor.on_event(event),
                 Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::ClockSet => {}
             }
         }

@@ -30,12 +30,12 @@ impl Plant {
             let pv = device.faceplate.as_ref().map(|plate| self.def.tag(plate.pv));
             let limits = pv.and_then(|pv| pv.limits(|tag| sample(tag).good_value()).ok());
             let span = limits.and_then(|(min, max)| Some(max? - min?));
-            if self.tunings[device.id.index()].take(device, &sample, span, at) == Noticed::Ended {
+            if self.tunings[device.id.index()].observe(device, &sample, span, at) == Noticed::Ended {
                 asked.push((device.line, BusRequest::Refresh { device: device.id, command: None }));
             }
             if let Some(program) = &device.program {
                 let (position, command) = (sample(program.position).good_value(), sample(program.command).good_value());
-                self.programs[device.id.index()].take(program, position, command, at);
+                self.programs[device.id.index()].observe(program, position, command, at);
             }
         }
         asked

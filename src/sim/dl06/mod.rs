@@ -129,7 +129,7 @@ impl Dl06 {
     /// One scan: reads inputs, runs the programme, writes outputs and V memory. While stopped, outputs stay as written.
     pub fn scan(&mut self, at_sv: bool, readings: &Readings) {
         self.memory.bank_mut(Kind::X).set(X_AT_SV, at_sv);
-        self.take_fill();
+        self.accept_fill();
         let fill_cm = self.fill_cm();
         let c = |relay| self.memory.bank(Kind::C).get(relay);
         let (run, auto) = (c(C_RUN), c(C_AUTO));
@@ -187,7 +187,7 @@ impl Dl06 {
     }
 
     /// Takes V2004 over, within its bounds; what is not a number there is put right again.
-    fn take_fill(&mut self) {
+    fn accept_fill(&mut self) {
         let written = self.memory.word(V_FILL).ok().and_then(from_bcd);
         self.fill_dl = written.unwrap_or(self.fill_dl).clamp(FILL_DL.0, FILL_DL.2);
         self.memory.set_block(V_FILL, &[bcd(self.fill_dl)]);

@@ -148,7 +148,7 @@ impl Model {
 
     /// Writes cells of a table from a request, or refuses: nothing there takes a write, a value is cut in two, is out of
     /// its bounds, is no state of its tag, or the device is locked.
-    fn take(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
+    fn write_cells(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
         let chart = self.chart.clone();
         let span = u32::from(address)..u32::from(address) + to_u32(values.len());
         let extent =
@@ -220,7 +220,7 @@ impl Registers for Model {
         let discrete =
             |tag: &TagDef| tag.writable() && tag.point.table == Table::Discrete && tag.point.address == address;
         let table = if self.chart.tags.iter().any(discrete) { Table::Discrete } else { Table::Coil };
-        self.take(table, address, &[u16::from(on)])
+        self.write_cells(table, address, &[u16::from(on)])
     }
 
     fn word(&self, table: Table, address: u16) -> Result<u16, ExceptionCode> {
@@ -232,6 +232,6 @@ impl Registers for Model {
     }
 
     fn write_block(&mut self, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
-        self.take(Table::Holding, address, values)
+        self.write_cells(Table::Holding, address, values)
     }
 }

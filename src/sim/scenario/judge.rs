@@ -122,7 +122,7 @@ impl Judge {
         }
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             if expect.from <= at && at <= expect.until {
-                mark.take(at, expect.expectation, snapshot, actual);
+                mark.evaluate(at, expect.expectation, snapshot, actual);
             }
         }
     }
@@ -201,7 +201,7 @@ fn is(def: &PlantDef, alarm: AlarmId, step: &AlarmRecord) -> bool {
 }
 
 impl Mark {
-    fn take(&mut self, at: Duration, expectation: Expectation, snapshot: &Snapshot, actual: &ActualValues) {
+    fn evaluate(&mut self, at: Duration, expectation: Expectation, snapshot: &Snapshot, actual: &ActualValues) {
         match expectation {
             Expectation::NotGood(tag) if !snapshot.sample(tag).quality.is_good() => {
                 self.met.get_or_insert(at);

@@ -168,7 +168,7 @@ fn refused_writes_are_unrecorded_until_the_disk_is_back() {
     let (mut recorder, found) = Recorder::new(&history_file, clock(), history);
     assert_eq!(found, Found::default());
     recorder.open();
-    recorder.take(batch(&["start", "acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
+    recorder.on_batch(batch(&["start", "acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
     recorder.write();
     let status = recorder.status();
     assert_eq!((status.batches, status.waiting), (0, 1));
@@ -180,7 +180,7 @@ fn refused_writes_are_unrecorded_until_the_disk_is_back() {
         "in the history all the same"
     );
     fs::create_dir(folder.path().join("later")).unwrap();
-    recorder.take(batch(&["write"], &[]));
+    recorder.on_batch(batch(&["write"], &[]));
     recorder.write();
     assert_eq!(recorder.status().batches, 0, "the log is not opened again before its time");
     recorder.opened_at -= REOPEN;
@@ -203,7 +203,7 @@ fn a_long_fault_keeps_the_latest_actions_and_counts_the_rest() {
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
-    recorder.take(batch(&vec!["write"; PENDING_MAX + 7], &[]));
+    recorder.on_batch(batch(&vec!["write"; PENDING_MAX + 7], &[]));
     recorder.write();
     assert!(recorder.status().log.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
     fs::create_dir(folder.path().join("later")).unwrap();
@@ -225,7 +225,7 @@ fn a_long_full_disk_leaves_a_trace_in_the_log() {
     recorder.open();
     // The file stays as it is and takes nothing, so it is not opened again.
     recorder.audit_log.as_mut().unwrap().set_file(fs::File::open(&path).unwrap());
-    recorder.take(batch(&vec!["write"; PENDING_MAX + 7], &[]));
+    recorder.on_batch(batch(&vec!["write"; PENDING_MAX + 7], &[]));
     recorder.write();
     assert!(recorder.status().log.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
     recorder.audit_log.as_mut().unwrap().set_file(OpenOptions::new().append(true).open(&path).unwrap());
@@ -307,7 +307,7 @@ fn files_in_use_by_another_process_are_left_alone() {
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
-    recorder.take(batch(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
+    recorder.on_batch(batch(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
     recorder.write();
     let status = recorder.status();
     assert!(status.log.unwrap().contains(IN_USE) && status.alarms.unwrap().contains(IN_USE));

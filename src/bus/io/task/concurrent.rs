@@ -98,7 +98,7 @@ impl Task<'_> {
     }
 
     /// Takes what has come of the requests under way.
-    pub(super) async fn take_answers(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
+    pub(super) async fn receive_replies(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
         for Answered { id, answer, at, mut exchange } in link.take_ended() {
             let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
             let UnderWay { index, block, began, tries, .. } = self.under_way.swap_remove(place);
@@ -153,7 +153,7 @@ impl Task<'_> {
             if let Err(error) = waited {
                 return Err(LinkExit::from(error));
             }
-            self.take_answers(link, schedule).await?;
+            self.receive_replies(link, schedule).await?;
         }
         Ok(true)
     }

@@ -38,7 +38,7 @@ fn of_period(from: f64, until: f64) -> AlarmMonitor {
 /// The figures of 06:00 to a second after it.
 fn figures(until: f64, events: &[(f64, &str, AlarmEvent)]) -> PeriodMetrics {
     let mut monitor = of_period(0.0, until);
-    events.iter().for_each(|(second, name, kind)| monitor.take(&event(*second, name, *kind)));
+    events.iter().for_each(|(second, name, kind)| monitor.on_event(&event(*second, name, *kind)));
     monitor.figures()
 }
 
@@ -65,7 +65,7 @@ fn activations_and_empty_windows_of_the_period_count() {
     assert_eq!(got.top.iter().map(|alarm| (&*alarm.alarm.message, alarm.raised)).collect::<Vec<_>>()[0], ("first", 2));
     // A period that begins and ends within windows touches 14 of them.
     let mut monitor = of_period(-1.0, 7_200.5);
-    events.iter().for_each(|(second, name, kind)| monitor.take(&event(*second, name, *kind)));
+    events.iter().for_each(|(second, name, kind)| monitor.on_event(&event(*second, name, *kind)));
     let got = monitor.figures();
     assert_eq!((got.annunciated(), got.windows), (5, 14));
 }
@@ -74,7 +74,7 @@ fn activations_and_empty_windows_of_the_period_count() {
 fn time_in_which_no_station_ran_thins_no_figure_out() {
     let mut monitor = AlarmMonitor::of_period(at(300.0), at(86_400.0));
     [0, 1, 2].into_iter().for_each(|window| monitor.watched(START / WINDOW_S + window));
-    monitor.take(&event(400.0, "x", Raised));
+    monitor.on_event(&event(400.0, "x", Raised));
     let got = monitor.figures();
     assert_eq!((got.windows, got.watched.as_secs()), (3, 1_500));
     let mut running = AlarmMonitor::running(at(0.0));
@@ -146,8 +146,8 @@ fn memory_does_not_grow_with_the_storms_it_has_seen() {
     for day in 0..10 {
         for second in 0..2_000 {
             let name = format!("alarm {}", second % 500);
-            monitor.take(&event(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
-            monitor.take(&event(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, ReturnedToNormal));
+            monitor.on_event(&event(f64::from(day) * 86_400.0 + f64::from(second), &name, Raised));
+            monitor.on_event(&event(f64::from(day) * 86_400.0 + f64::from(second) + 0.5, &name, ReturnedToNormal));
         }
     }
     monitor.advance(at(12.0 * 86_400.0));
@@ -176,7 +176,7 @@ proptest! {
     #[test]
     fn the_screen_and_the_report_of_one_span_agree(events in events(), rest in 0.0..5_000.0f64) {
         let mut running = AlarmMonitor::running(at(0.0));
-        events.iter().for_each(|event| running.take(event));
+        events.iter().for_each(|event| running.on_event(event));
         let now = events.last().map_or(at(0.0), |event| event.at) + Duration::from_secs_f64(rest);
         // The running figures are of whole seconds.
         let now = Timestamp::from_second(second(now) + 1).expect("within the calendar");
@@ -186,7 +186,7 @@ proptest! {
         let known = metrics.day.from - LEAD;
         running.watched.iter().for_each(|window| period.watched(*window));
         events.iter().filter(|event| event.at < known).for_each(|event| period.already(event));
-        events.iter().filter(|event| known <= event.at).for_each(|event| period.take(event));
+        events.iter().filter(|event| known <= event.at).for_each(|event| period.on_event(event));
         let in_window = events.iter().filter(|event| event.event == Raised && second(now) - 600 < second(event.at));
         prop_assert_eq!(metrics.last_10_min as usize, in_window.count());
         prop_assert_eq!(&*metrics.day, &period.figures());

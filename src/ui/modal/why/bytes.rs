@@ -44,7 +44,7 @@ pub(super) fn rows(bytes: &[u8], framing: Framing, marked: Option<&Range<usize>>
 }
 
 /// The rows that matter, at most three: the first, and those with the marked bytes; what is left out is shown as `…`.
-pub(super) fn telling(rows: Vec<String>, ellipsis: &str) -> Vec<String> {
+pub(super) fn abridged(rows: Vec<String>, ellipsis: &str) -> Vec<String> {
     let marked = |row: &String| row.contains(['[', ']']);
     let first = rows.iter().position(marked).unwrap_or(0);
     let last = rows.iter().rposition(marked).unwrap_or(0).min(first + 1);
@@ -98,10 +98,10 @@ mod tests {
         let rows = |marked: &[usize]| -> Vec<String> {
             (0..5).map(|n| if marked.contains(&n) { format!("[{n}]") } else { n.to_string() }).collect()
         };
-        assert_eq!(telling(rows(&[3]), "…"), ["0…", "[3]…"]);
-        assert_eq!(telling(rows(&[1, 2]), "…"), ["0", "[1]", "[2]…"]);
-        assert_eq!(telling(rows(&[4]), "…"), ["0…", "[4]"]);
-        assert_eq!(telling(rows(&[]), "…"), ["0…"]);
-        assert_eq!(telling(vec!["0".into()], "…"), ["0"]);
+        assert_eq!(abridged(rows(&[3]), "…"), ["0…", "[3]…"]);
+        assert_eq!(abridged(rows(&[1, 2]), "…"), ["0", "[1]", "[2]…"]);
+        assert_eq!(abridged(rows(&[4]), "…"), ["0…", "[4]"]);
+        assert_eq!(abridged(rows(&[]), "…"), ["0…"]);
+        assert_eq!(abridged(vec!["0".into()], "…"), ["0"]);
     }
 }

@@ -39,7 +39,7 @@ pub(super) fn exchange_rows(
     let answer =
         dissect::dissect(&exchange.answer, Some(framing), Some(Direction::Answer), Some(request.message.as_slice()));
     let frame = |bytes: &[u8], marked: Option<&std::ops::Range<usize>>| {
-        bytes::telling(bytes::rows(bytes, framing, marked, room.saturating_sub(2)), theme.ellipsis())
+        bytes::abridged(bytes::rows(bytes, framing, marked, room.saturating_sub(2)), theme.ellipsis())
     };
     let hex = |label, text: String, style| Row { label, text: text.trim_start().to_owned(), style, wraps: false };
     for (n, text) in frame(&exchange.request, None).into_iter().enumerate() {

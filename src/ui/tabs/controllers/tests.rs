@@ -85,7 +85,7 @@ fn tuning(fixture: &Fixture, ended: bool) -> Tuning {
             tag if Some(tag) == faceplate.tune => Sample::good(f64::from(u8::from(n > 0)), at),
             tag => Sample { at, ..fixture.samples[crate::plant::def::TagId::index(tag)] },
         };
-        watch.take(device, &sample, Some(120.0), at);
+        watch.observe(device, &sample, Some(120.0), at);
         assert!(n <= last + 1);
     }
     let mut tuning = watch.tuning.expect("it is on").as_ref().clone();
