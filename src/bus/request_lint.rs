@@ -74,6 +74,17 @@ pub enum RequestError {
     Unknown(u8),
 }
 
+/// Does a request change nothing in a device? The reads, of diagnostics the echo and the counters, and of 2B the device
+/// identification, because CANopen may write (V1.1b3, 6).
+pub fn only_reads(message: &[u8]) -> bool {
+    match (message.get(1), message.get(2..)) {
+        (Some(0x08), Some([0, 0x00 | 0x02 | 0x0B..=0x12, ..])) => true,
+        (Some(0x2B), data) => data.and_then(|data| data.first()) == Some(&0x0E),
+        (Some(0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18), _) => true,
+        (Some(_) | None, _) => false,
+    }
+}
+
 /// Everything that is wrong with a request message (unit and PDU) before it is sent.
 pub fn check_request(message: &[u8], framing: Framing) -> Vec<RequestError> {
     let &[unit, function, ..] = message else { return vec![RequestError::TooShort(message.len())] };

@@ -2,7 +2,10 @@
 
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
-    bus::{ascii, dissect, frame, hex_input, request_lint::check_request},
+    bus::{
+        ascii, dissect, frame, hex_input,
+        request_lint::{check_request, only_reads},
+    },
     cli::{CliError, in_runtime, menu, prompt, say, say_error},
     plant::{
         def::Framing,
@@ -30,15 +33,6 @@ pub struct Args {
     yes: bool,
 }
 
-/// Does a request change nothing in a device? The reads, exception status, event counter and log, server identification,
-/// file record, FIFO, and of 2B the device identification, because CANopen may write (V1.1b3, 6).
-fn is_read(message: &[u8]) -> bool {
-    match message.get(1) {
-        Some(0x2B) => message.get(2) == Some(&0x0E),
-        function => matches!(function, Some(0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18)),
-    }
-}
-
 /// Sends once; an answer that is no Modbus is shown all the same.
 pub fn main(args: Args) -> Result<(), CliError> {
     let line = args.port.line()?;
@@ -64,7 +58,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         refuse(&wrong, args.force)?;
     }
     let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
-    let harmless = wrong.is_empty() && is_read(&message);
+    let harmless = wrong.is_empty() && only_reads(&message);
     if !args.yes && !harmless {
         agree(&format!("{} on {}", dissection.summary, line.transport))?;
     }

@@ -1,9 +1,10 @@
 //! Tests by their fields: a request, a loopback, an identification, a scan, registers. What is typed is checked at once.
 
 mod fields;
+mod functions;
 
-pub use fields::address;
-use fields::{all_settings, bit, number, register};
+use fields::{all_settings, number};
+use functions::FUNCTIONS;
 use std::ops::RangeInclusive;
 
 use ratatui::Frame as Screen;
@@ -18,7 +19,7 @@ use crate::{
     bus::{
         dissect::{self, Direction},
         frame::{self, hex},
-        names, request_lint,
+        request_lint,
     },
     plant::{
         def::{Framing, Parity, Serial},
@@ -57,8 +58,6 @@ enum Input {
 /// A form that makes sense: the test, and what it does in words.
 type Built = (Diagnostic, Vec<String>);
 
-/// Functions that the form offers.
-const FUNCTIONS: [u8; 8] = [3, 4, 1, 2, 6, 5, 16, 15];
 /// Baud rates and characters that a scan over all settings tries, the usual ones first.
 const BAUDS: [u32; 8] = [9_600, 19_200, 115_200, 38_400, 57_600, 4_800, 2_400, 1_200];
 const CHARACTERS: [(Parity, u8); 4] = [(Parity::None, 1), (Parity::Even, 1), (Parity::Odd, 1), (Parity::None, 2)];
@@ -73,7 +72,7 @@ impl Form {
         let fields = match tried {
             Tried::Bytes | Tried::Request => {
                 let function = choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec());
-                vec![unit, function, text(t!("address"), "40001"), text(t!("count"), "1")]
+                [vec![unit, function], functions::fields(FUNCTIONS[0], &[])].concat()
             }
             Tried::Loopback => vec![unit, text(t!("times"), "10")],
             Tried::Identify => vec![unit],
@@ -136,12 +135,9 @@ impl Form {
                 _ => {}
             },
         }
-        if let (Tried::Request, Some(function)) = (self.tried, FUNCTIONS.get(self.chosen(1))) {
-            self.fields[3].label = match function {
-                1..=4 => t!("count"),
-                5 | 6 => t!("value"),
-                _ => t!("values"),
-            };
+        if let (Tried::Request, 1, Some(function)) = (self.tried, self.at, FUNCTIONS.get(self.chosen(1))) {
+            let own = functions::fields(*function, &self.fields[2..]);
+            self.fields.splice(2.., own);
         }
     }
 
@@ -162,6 +158,14 @@ impl Form {
         }
     }
 
+    /// What a function takes of a field: of a choice its number.
+    fn entry(&self, n: usize) -> String {
+        match &self.fields[n].input {
+            Input::Text(_) => self.text(n),
+            Input::Choice(_, at) => at.to_string(),
+        }
+    }
+
     fn chosen(&self, n: usize) -> usize {
         match &self.fields[n].input {
             Input::Choice(_, at) => *at,
@@ -177,7 +181,8 @@ impl Form {
         let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(to_u8);
         Ok(match self.tried {
             Tried::Bytes | Tried::Request => {
-                let message = message(unit(0)?, FUNCTIONS[self.chosen(1)], &self.text(2), &self.text(3))?;
+                let entries: Vec<String> = (2..self.fields.len()).map(|n| self.entry(n)).collect();
+                let message = functions::message(unit(0)?, FUNCTIONS[self.chosen(1)], &entries)?;
                 let words = request_text(&message, framing)?;
                 (Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), words)
             }
@@ -272,6 +277,7 @@ impl Form {
     }
 }
 
+/// The tables, by the first digit of their Modicon numbers.
 const TABLES: [Table; 4] = [Table::Holding, Table::Input, Table::Coil, Table::Discrete];
 
 /// The request in words, and its bytes; `Err` with what no device can take.
@@ -282,33 +288,6 @@ fn request_text(message: &[u8], framing: Framing) -> Result<Vec<String>, String>
     let whole = frame::wrap(framing, TRANSACTION, message);
     let dissection = dissect::dissect(&whole, Some(framing), Some(Direction::Request), None);
     Ok(vec![dissection.summary, hex(message)])
-}
-
-/// Unit and PDU of a request.
-fn message(unit: u8, function: u8, place: &str, rest: &str) -> Result<Vec<u8>, String> {
-    let start = address(place, names::table(function))?.to_be_bytes();
-    let mut message = vec![unit, function, start[0], start[1]];
-    let each = || rest.split([' ', ',', ';']).filter(|word| !word.is_empty());
-    match function {
-        1..=4 => message.extend(to_u16(number(rest, t!("count"), 1..=2_000)?).to_be_bytes()),
-        5 => message.extend(if bit(rest)? { [0xFF, 0] } else { [0, 0] }),
-        6 => message.extend(register(rest)?.to_be_bytes()),
-        15 => {
-            let bits = each().map(bit).collect::<Result<Vec<bool>, String>>()?;
-            let byte = |part: &[bool]| part.iter().rev().fold(0u8, |byte, on| byte << 1 | u8::from(*on));
-            let bytes: Vec<u8> = bits.chunks(8).map(byte).collect();
-            message.extend(to_u16(bits.len()).to_be_bytes());
-            message.push(to_u8(bytes.len()));
-            message.extend(bytes);
-        }
-        _ => {
-            let values = each().map(register).collect::<Result<Vec<u16>, String>>()?;
-            message.extend(to_u16(values.len()).to_be_bytes());
-            message.push(to_u8(2 * values.len()));
-            message.extend(values.iter().flat_map(|value| value.to_be_bytes()));
-        }
-    }
-    Ok(message)
 }
 
 #[cfg(test)]

@@ -199,7 +199,7 @@ fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
             let lint = || request_lint::check_request(&dissection.message, framing).first().map(ToString::to_string);
             let wrong = dissection.wrong.clone().or_else(lint);
             let broadcast = dissection.message.first() == Some(&0) && framing != Framing::Mbap;
-            match (wrong, broadcast, only_reads(&dissection.message)) {
+            match (wrong, broadcast, request_lint::only_reads(&dissection.message)) {
                 (None, false, true) => None,
                 (None, true, _) => Some(t!(
                     "{summary}. Broadcast: every device executes it, none responds. Send it?",
@@ -216,15 +216,6 @@ fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
                 )),
             }
         }
-    }
-}
-
-/// Does this request change nothing in a device? Diagnostics do, all but the echo.
-fn only_reads(message: &[u8]) -> bool {
-    match message.get(1) {
-        Some(0x01..=0x04 | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18 | 0x2B) => true,
-        Some(0x08) => message.get(2..4) == Some(&[0, 0]),
-        Some(_) | None => false,
     }
 }
 

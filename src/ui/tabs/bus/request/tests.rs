@@ -1,6 +1,7 @@
 //! The forms of a request: addresses and fields become bytes.
 
-use super::*;
+use super::{fields::address, *};
+use crate::bus::names;
 
 #[test]
 fn addresses_are_read_as_manuals_write_them() {
@@ -23,16 +24,34 @@ fn addresses_are_read_as_manuals_write_them() {
 
 #[test]
 fn fields_become_the_bytes_of_the_standard() {
-    let check = |function, place: &str, rest: &str, expect: &str| {
-        let bytes = message(17, function, place, rest);
-        assert_eq!(bytes.map(|bytes| hex(&bytes)).as_deref(), Ok(expect), "{function} {place} {rest}");
+    let message = |function, entries: &[&str]| {
+        let entries: Vec<String> = entries.iter().map(|entry| (*entry).to_owned()).collect();
+        functions::message(17, function, &entries)
     };
-    // Modbus application protocol V1.1b3, sections 6.3, 6.5, 6.6, 6.11 and 6.12.
-    check(3, "40108", "3", "11 03 00 6B 00 03");
-    check(5, "00173", "on", "11 05 00 AC FF 00");
-    check(6, "40002", "3", "11 06 00 01 00 03");
-    check(6, "40002", "-2", "11 06 00 01 FF FE");
-    check(15, "00020", "1 0 1 1 0 0 1 1 1 0", "11 0F 00 13 00 0A 02 CD 01");
-    check(16, "40002", "0x000A, 0x0102", "11 10 00 01 00 02 04 00 0A 01 02");
-    assert!(message(1, 6, "40002", "65536").is_err_and(|why| why.contains("expected -32768 to 65535")));
+    // Modbus application protocol V1.1b3, sections 6.3, 6.5, 6.6, 6.8, 6.9, 6.11 to 6.13, 6.16, 6.17 and 6.21.
+    let cases: [(u8, &[&str], &str); 12] = [
+        (3, &["40108", "3"], "11 03 00 6B 00 03"),
+        (5, &["00173", "on"], "11 05 00 AC FF 00"),
+        (6, &["40002", "3"], "11 06 00 01 00 03"),
+        (6, &["40002", "-2"], "11 06 00 01 FF FE"),
+        (15, &["00020", "1 0 1 1 0 0 1 1 1 0"], "11 0F 00 13 00 0A 02 CD 01"),
+        (16, &["40002", "0x000A, 0x0102"], "11 10 00 01 00 02 04 00 0A 01 02"),
+        (22, &["40005", "0x00F2", "0x0025"], "11 16 00 04 00 F2 00 25"),
+        (23, &["40004", "6", "40015", "0xFF 0xFF 0xFF"], "11 17 00 03 00 06 00 0E 00 03 06 00 FF 00 FF 00 FF"),
+        (8, &["0", "0xA537"], "11 08 00 00 A5 37"),
+        (11, &[], "11 0B"),
+        (17, &[], "11 11"),
+        (43, &["0", "0"], "11 2B 0E 01 00"),
+    ];
+    for (function, entries, expect) in cases {
+        let bytes = message(function, entries);
+        assert_eq!(bytes.as_ref().map(|bytes| hex(bytes)).as_deref(), Ok(expect), "{function} {entries:?}");
+        let errors = bytes.map(|bytes| request_lint::check_request(&bytes, Framing::Rtu));
+        assert_eq!(errors, Ok(vec![]), "{function} {entries:?}");
+    }
+    assert!(message(6, &["40002", "65536"]).is_err_and(|why| why.contains("expected -32768 to 65535")));
+    assert!(message(3, &["40002", "126"]).is_err_and(|why| why.contains("count")));
+    for function in functions::FUNCTIONS {
+        assert!(names::function(function).is_some(), "{function}");
+    }
 }
