@@ -112,7 +112,7 @@ fn raw(def: &PlantDef, tags: &[TagId], (from, to): (Timestamp, Timestamp), csv: 
     let zone = quoted(def.time_zone.iana_name().unwrap_or("UTC"));
     let value = if csv.decimal == ',' { "replace(value::VARCHAR, '.', ',') AS value" } else { "value" };
     format!(
-        "SELECT utc, timezone({zone}, timezone('UTC', utc)) AS local, tag, {value}, unit, quality FROM sample
+        "SELECT utc, timezone({zone}, timezone('UTC', utc)) AS time_local, tag, {value}, unit, quality FROM sample
          WHERE utc >= make_timestamp({}) AND utc < make_timestamp({}) AND tag IN ({})",
         from.as_microsecond(),
         to.as_microsecond(),

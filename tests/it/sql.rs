@@ -11,8 +11,11 @@ use crate::{
 
 /// Exit code and output of a command on a history.
 fn run(history: &Path, args: &[&str]) -> (Option<i32>, String) {
-    let output =
-        sightglass().args(&args[..1]).arg("tank").args(&args[1..]).arg("--history").arg(history).output().unwrap();
+    run_at(history, &[&args[..1], &["tank"], &args[1..]].concat())
+}
+
+fn run_at(history: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let output = sightglass().args(args).arg("--history").arg(history).output().unwrap();
     (output.status.code(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
 }
 
@@ -70,11 +73,18 @@ fn raw_samples_are_exported_whole() {
     assert_eq!(code, Some(0), "{text}");
     let text = std::fs::read_to_string(&out).unwrap();
     let mut lines: Vec<&str> = text.lines().collect();
-    assert_eq!(lines.remove(0), "utc,local,tag,value,unit,quality");
+    assert_eq!(lines.remove(0), "utc,time_local,tag,value,unit,quality");
     lines.sort_unstable();
     assert_eq!(lines.len(), 7_204);
     assert_eq!(lines[0], "2026-03-03 04:59:58,2026-03-03 11:59:58,TIC-1.PV,79.8,°C,good");
     assert_eq!(lines[7_203], "2026-03-03 07:00:01,2026-03-03 14:00:01,TIC-1.PV,0.1,°C,good");
+    // A history that lacks them takes them back.
+    let other = folder.path().join("other.duckdb");
+    let def = sightglass::profile::load(Path::new("tank"), &sightglass::profile::Search::shipped()).unwrap();
+    drop(sightglass::history::io::store::Store::open(&other, &def, "2026-03-01T00:00:00Z".parse().unwrap()).unwrap());
+    let (code, text) = run_at(&other, &["history", "import", "tank", out.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("imported 7204 rows"), "{text}");
     assert_eq!(export("parquet").0, Some(0));
     let bytes = std::fs::read(&out).unwrap();
     assert_eq!((&bytes[..4], &bytes[bytes.len() - 4..]), (&b"PAR1"[..], &b"PAR1"[..]));
