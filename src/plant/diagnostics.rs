@@ -133,6 +133,13 @@ pub struct RegisterWrite {
 }
 
 impl RegisterWrite {
+    /// One holding register of unit 1 from `old` to `new`, for tests.
+    #[cfg(test)]
+    pub(crate) fn holding(address: u16, old: u16, new: u16) -> RegisterWrite {
+        let (words, expected) = (vec![new], vec![old]);
+        RegisterWrite { unit: 1, table: Table::Holding, address, words, expected, multiple: false }
+    }
+
     /// Function 5 or 6 for one, 15 or 16 for more, or where the device has only those.
     pub fn function(&self) -> u8 {
         match (self.table.is_bits(), self.words.len() == 1 && !self.multiple) {

@@ -165,14 +165,7 @@ fn a_block_with_a_hole_is_read_register_by_register() {
 
 /// Runs a write of 601 over 700 against a register; the outcome, and how often a write was sent.
 fn written(held: &std::cell::Cell<u16>, on_write: impl Fn(u16) -> Result<(), Fault>) -> (Outcome, u32) {
-    let write = RegisterWrite {
-        unit: 1,
-        table: Table::Holding,
-        address: 1_002,
-        words: vec![601],
-        expected: vec![700],
-        multiple: false,
-    };
+    let write = RegisterWrite::holding(1_002, 700, 601);
     let sent = std::cell::Cell::new(0);
     let done = run(Diagnostic::Write(write), |request| match request[1] {
         3 => Ok([&[1, 3, 2][..], &held.get().to_be_bytes()].concat()),
@@ -213,14 +206,7 @@ fn a_write_is_sent_once_and_read_back() {
         Err(Fault::Timeout)
     };
     assert_eq!(written(&held, late), (Outcome::Verified, 1), "what it holds counts, not what it said");
-    let same = RegisterWrite {
-        unit: 1,
-        table: Table::Holding,
-        address: 5,
-        words: vec![7],
-        expected: vec![7],
-        multiple: false,
-    };
+    let same = RegisterWrite::holding(5, 7, 7);
     let done = run(Diagnostic::Write(same), |request| match request[1] {
         3 => Ok(vec![1, 3, 2, 0, 7]),
         _ => Err(Fault::Timeout),

@@ -268,14 +268,7 @@ fn nothing_is_written_before_it_was_enabled_and_confirmed() {
     assert_eq!(type_keys(&mut bench.model, "601⏎⏎"), [], "Enter does not confirm");
     assert!(bench.screen(80, 24).contains("700 to 601"), "{}", bench.screen(80, 24));
     let effects = type_keys(&mut bench.model, "y");
-    let write = RegisterWrite {
-        unit: 1,
-        table: Table::Holding,
-        address: 1002,
-        words: vec![601],
-        expected: vec![700],
-        multiple: false,
-    };
+    let write = RegisterWrite::holding(1002, 700, 601);
     assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(LineId(0), Diagnostic::Write(write))));
 }
 
