@@ -71,7 +71,7 @@ pub struct HandshakeReply {
     pub def: Arc<PlantDef>,
 }
 
-/// What a terminal says.
+/// What a terminal says: what can be sent of [`crate::station::Request`], which carries reply channels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ClientMessage {
     /// A command to the plant.

@@ -29,7 +29,9 @@ pub struct Session {
     pub terminal: u32,
 }
 
-/// What a terminal asks of its station.
+/// What a terminal asks of its station, with the channel that takes the reply. `attach::ClientMessage` is what of it can be
+/// sent over a socket, where a ticket stands for the channel: two types, because a channel cannot be encoded, and a ticket
+/// means nothing without its connection.
 #[derive(Debug)]
 pub enum Request {
     /// A command to the plant. Its outcome is seen in a later snapshot, also that it was not permitted.
