@@ -23,7 +23,7 @@ pub struct Row {
     /// `at most 300`; empty if there is none.
     pub limit: String,
     /// `good`, `beyond target`, `over limit` or `insufficient data`.
-    pub verdict: &'static str,
+    pub result: &'static str,
     /// Decimals to print.
     #[serde(skip)]
     pub decimals: u8,
@@ -106,11 +106,11 @@ pub fn metrics_text(figures: &PeriodMetrics, def: &PlantDef, period: &Period) ->
         format!("{}, alarms of {}", def.title, all.period),
         format!("{} to {}: {} alarms{}{}", all.from, all.until, all.raised, quiet(figures), gaps(figures)),
         String::new(),
-        format!("{:35} {:>7}  {:12}  {:12}  {}", "measure", "figure", "target", "limit", "verdict"),
+        format!("{:35} {:>7}  {:12}  {:12}  {}", "metric", "value", "target", "limit", "result"),
     ];
     lines.extend(all.figures.iter().map(|row| {
         let value = row.value.map_or("—".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
-        format!("{:35} {value:>7}  {:12}  {:12}  {}", row.measure, row.target, row.limit, row.verdict)
+        format!("{:35} {value:>7}  {:12}  {:12}  {}", row.measure, row.target, row.limit, row.result)
     }));
     if !all.alarms.is_empty() {
         lines.push(String::new());
@@ -149,7 +149,7 @@ fn row(goal: &MetricTarget, figures: &PeriodMetrics) -> Row {
         value: figures.value(goal.measure),
         target: goal.target.to_string(),
         limit: goal.limit.map(|limit| limit.to_string()).unwrap_or_default(),
-        verdict: goal.verdict(figures).word(),
+        result: goal.verdict(figures).word(),
         decimals,
     }
 }
@@ -200,7 +200,7 @@ pub(super) mod tests {
 Water tank, alarms of morning 2026-11-21
 2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00: 24 alarms
 
-measure                              figure  target        limit         verdict
+metric                                value  target        limit         result
 alarms per day                         72.0  at most 150   at most 300   good
 alarms per hour                         3.0  at most 6     at most 12    good
 alarms per 10 min                       0.5  at most 1     at most 2     good

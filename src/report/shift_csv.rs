@@ -65,7 +65,7 @@ fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u
     }
     table.section("suppressed alarms", &["priority", "subject", "alarm", "raised", "minutes active"]);
     report.suppressed.iter().for_each(|alarm| table.row(suppressed_row(alarm, dialect)));
-    table.section("alarm metrics", &["measure", "figure", "target", "limit", "verdict"]);
+    table.section("alarm metrics", &["metric", "value", "target", "limit", "result"]);
     alarm_metrics::rows(&report.alarm_metrics).iter().for_each(|row| table.row(metric_row(row, dialect)));
     table.section("alarms to investigate", &["kind", "subject", "alarm", "raised"]);
     alarm_metrics::bad_actors(&report.alarm_metrics).iter().for_each(|alarm| table.row(bad_actor_row(alarm)));
@@ -109,7 +109,7 @@ fn metric_row(row: &Row, dialect: CsvDialect) -> Vec<String> {
         number(row.value, row.decimals, dialect),
         plain(&row.target),
         plain(&row.limit),
-        plain(row.verdict),
+        plain(row.result),
     ]
 }
 

@@ -96,12 +96,11 @@ impl Metrics {
     /// The table, and below it the bad actors unless they stand beside it.
     fn lines(&self, cx: &ViewContext, width: u16) -> Vec<(String, Style)> {
         let Some(figures) = self.figures(cx) else { return Vec::new() };
-        let head = line(cx.theme, [t!("measure"), t!("figure"), t!("target"), t!("limit"), t!("result")]);
+        let head = line(cx.theme, [t!("metric"), t!("value"), t!("target"), t!("limit"), t!("result")]);
         let mut lines = vec![(head, cx.theme.dim())];
         for (goal, row) in METRIC_TARGETS.iter().zip(alarm_metrics::rows(figures)) {
             let value = row.value.map_or("–".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
-            let text =
-                line(cx.theme, [translate(row.measure), &value, &row.target, &row.limit, translate(row.verdict)]);
+            let text = line(cx.theme, [translate(row.measure), &value, &row.target, &row.limit, translate(row.result)]);
             let style = match goal.verdict(figures) {
                 Verdict::Good => cx.theme.normal(),
                 Verdict::Beyond => cx.theme.strong(),
