@@ -143,7 +143,7 @@ fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
     assert!(swapped.fields.last().unwrap().words.starts_with("bytes swapped: A5 BA is right"));
     let asked = [1, 3, 0, 0, 0, 1];
     let answer = dissect(&with_crc(&[2, 3, 2, 0, 1]), None, None, Some(&asked));
-    assert_eq!(answer.wrong.as_deref(), Some("response from unit 2, expected unit 1"));
+    assert_eq!(answer.wrong.as_deref(), Some("unit 2 answered in place of unit 1"));
 }
 
 #[test]

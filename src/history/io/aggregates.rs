@@ -39,9 +39,8 @@ impl Store {
         mut each: impl FnMut(usize, Part),
     ) -> Result<Vec<Gap>, HistoryError> {
         let avoided = self.avoided.borrow().clone();
-        let kept: Vec<(Tier, Vec<Range<i64>>)> =
-            Tier::ALL.into_iter().map(|tier| Ok((tier, self.kept(tier, &avoided)?))).collect::<Result<_, _>>()?;
-        let kept = |tier| kept.iter().find(|(one, _)| *one == tier).map_or_else(Vec::new, |(_, spans)| spans.clone());
+        let files = self.files(None)?;
+        let kept = |tier| kept(&files, tier, &avoided);
         let mut gaps = Vec::new();
         for piece in pieces(from.as_microsecond(), to.as_microsecond(), widest, &kept) {
             let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { continue };
@@ -62,20 +61,6 @@ impl Store {
             }
         }
         Ok(gaps)
-    }
-
-    /// The spans that the files of a tier cover, sorted; without those that could not be read.
-    fn kept(&self, tier: Tier, avoided: &BTreeSet<String>) -> Result<Vec<Range<i64>>, HistoryError> {
-        let files = self.files(None)?;
-        let files = files.iter().filter(|file| file.tier == tier && !avoided.contains(&file.path));
-        let mut spans: Vec<Range<i64>> = Vec::new();
-        for file in files {
-            match spans.last_mut().filter(|last| file.from <= last.end) {
-                Some(last) => last.end = last.end.max(file.to),
-                None => spans.push(file.from..file.to),
-            }
-        }
-        Ok(spans)
     }
 
     fn each_aggregate(
@@ -121,6 +106,19 @@ impl Store {
         }
         Ok(())
     }
+}
+
+/// The spans that the files of a tier cover, sorted; without those that could not be read.
+fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>) -> Vec<Range<i64>> {
+    let files = files.iter().filter(|file| file.tier == tier && !avoided.contains(&file.path));
+    let mut spans: Vec<Range<i64>> = Vec::new();
+    for file in files {
+        match spans.last_mut().filter(|last| file.from <= last.end) {
+            Some(last) => last.end = last.end.max(file.to),
+            None => spans.push(file.from..file.to),
+        }
+    }
+    spans
 }
 
 /// Hands over the rows of a batch; `None` if its columns are not those of aggregates.
