@@ -93,6 +93,7 @@ pub fn needs_for_question(query: &Query) -> Role {
         | Query::LineMinutes { .. }
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
+        | Query::Batches { .. }
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview

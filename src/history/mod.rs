@@ -30,8 +30,11 @@ use crate::{
         record::{ActionRecord, AlarmRecord},
         sample::Sample,
     },
-    report::{Period, ShiftReport, step_series::HeldValue},
+    report::{Period, ShiftReport, batch::BatchReport, step_series::HeldValue},
 };
+
+/// Batches with figures in one answer: each is as much work as a small report.
+pub const BATCHES_MAX: usize = 100;
 
 /// What can be asked. Spans include `from` and exclude `to`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -114,6 +117,15 @@ pub enum Query {
         /// Instants.
         count: usize,
     },
+    /// The batches that ran in a span, with their figures, newest first.
+    Batches {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// At most so many.
+        limit: usize,
+    },
     /// The plant as it was at an instant.
     Past {
         /// The instant.
@@ -149,6 +161,8 @@ pub enum Answer {
     AlarmMetrics(Box<PeriodMetrics>),
     /// By tag the value in force at each instant; `None` where nothing is stored, or nothing recent enough.
     Values(Vec<Vec<Option<HeldValue>>>),
+    /// The batches.
+    Batches(Vec<BatchReport>),
     /// What is known of the instant.
     Past(Box<Past>),
     /// Samples in order of time.

@@ -30,6 +30,7 @@ impl Record {
             Record::Alarm(step) => step.move_to_utc(by),
             Record::Action(action) => move_by(&mut action.at, by),
             Record::Line(minute) => move_by(&mut minute.at, by),
+            Record::Batch(batch) => move_by(&mut batch.at, by),
             Record::ClockSet => {}
         }
     }

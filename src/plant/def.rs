@@ -9,6 +9,7 @@ use super::tag::{Table, TagDef};
 
 pub use super::{
     alarm::def::Priority,
+    batch::BatchDef,
     history_def::{HistoryDef, ParquetVersion},
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Serial, Transport},
@@ -52,6 +53,8 @@ pub struct PlantDef {
     pub mimic: MimicDef,
     /// Groups of pens for the trends tab; at least one.
     pub trends: Vec<TrendGroup>,
+    /// What its batches are, if it makes any.
+    pub batches: Vec<BatchDef>,
     /// Shifts in order of their start; may be empty (then only free periods are reported).
     pub shifts: Vec<ShiftDef>,
     /// What reports contain and where they go.
@@ -78,6 +81,7 @@ impl Default for PlantDef {
             logic: ControlLogic::default(),
             mimic: MimicDef::default(),
             trends: Vec::new(),
+            batches: Vec::new(),
             shifts: Vec::new(),
             report: ReportDef::default(),
             history: HistoryDef::default(),

@@ -97,6 +97,7 @@ pub fn plant() -> PlantDef {
         logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
+        batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
         report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: Default::default() },

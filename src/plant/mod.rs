@@ -38,6 +38,8 @@ pub(crate) mod line_minute;
 pub mod diagnostics;
 pub mod live;
 pub mod command;
+pub(crate) mod energy;
+pub mod batch;
 pub mod record;
 pub(crate) mod interlock;
 pub mod alarm;

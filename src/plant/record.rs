@@ -1,4 +1,4 @@
-//! What the plant leaves behind for the history: samples, alarm events, operator actions, minutes of lines.
+//! What the plant leaves behind for the history: samples, alarm events, operator actions, minutes of lines, batches.
 
 use std::{fmt, sync::Arc};
 
@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    batch::BatchRecord,
     def::{Priority, TagId},
     keyword::keyword_enum,
     line_minute::LineMinute,
@@ -23,6 +24,8 @@ pub enum Record {
     Action(ActionRecord),
     /// A minute of a line.
     Line(LineMinute),
+    /// A change of a batch.
+    Batch(BatchRecord),
     /// The system clock was set: what follows is of the next epoch, whatever its times say.
     ClockSet,
 }

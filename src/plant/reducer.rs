@@ -1,6 +1,7 @@
 //! The plant's reducer: event, command or tick in, effects out. The only place where the plant changes.
 
 mod alarms;
+mod batches;
 mod connection;
 mod health;
 mod alarm_metrics;
@@ -16,6 +17,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_note},
+    batch::BatchTracker,
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::CommandTracker,
     def::{LineDef, LineId, PlantDef, TagId},
@@ -76,6 +78,8 @@ pub struct Plant {
     alarm_metrics: AlarmMetrics,
     commands: CommandTracker,
     watch: ActuatorTracker,
+    /// By place in [`PlantDef::batches`].
+    batches: Vec<BatchTracker>,
     lines: Vec<LineStatus>,
     /// Earlier reports, by [`LineId`].
     watches: Vec<LineMinuteTracker>,
@@ -106,6 +110,7 @@ impl Plant {
             alarm_metrics: AlarmMetrics::default(),
             commands: CommandTracker::new(def.clone()),
             watch: ActuatorTracker::default(),
+            batches: vec![BatchTracker::default(); def.batches.len()],
             lines: vec![LineStatus::default(); def.lines.len()],
             watches: vec![LineMinuteTracker::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
@@ -352,6 +357,7 @@ impl Plant {
         let steps = self.evaluate_alarms();
         let mut records = self.image.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));
+        records.extend(self.follow_batches());
         Effects { bus: asked, records, ..Effects::default() }
     }
 }

@@ -13,6 +13,7 @@
 mod access;
 mod address;
 mod alarm;
+mod batch;
 mod condition;
 mod device;
 pub(crate) mod diagnostic;

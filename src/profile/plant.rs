@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, rc::Rc, sync::Arc, time::Duration};
 use jiff::tz::TimeZone;
 
 use super::{
-    access, alarm, device,
+    access, alarm, batch, device,
     diagnostic::{Errors, Problems},
     expr, history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
@@ -78,6 +78,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let access = access::access(file.access.as_ref().map(|table| &table.value), problems);
     let logic = interlock::logic(file, &defs, problems);
     let trends = mimic::trends(&file.trends, &defs, problems);
+    let batches = batch::batches(&file.batches, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
@@ -94,6 +95,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         logic,
         mimic,
         trends,
+        batches,
         shifts,
         report,
         history,
@@ -299,13 +301,14 @@ fn define_device<'a>(
 /// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.
 const TAGS_MAX: usize = 20_000;
 /// Most tables of each kind in a plant file.
-const MOST: [(&str, usize); 7] = [
+const MOST: [(&str, usize); 8] = [
     ("line", 64),
     ("device", 2_000),
     ("alarm", 10_000),
     ("interlock", 10_000),
     ("expect", 10_000),
     ("trend", 1_000),
+    ("batch", 100),
     ("shift", 100),
 ];
 /// Most bytes of a plant file and its profiles together.

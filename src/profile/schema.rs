@@ -32,6 +32,7 @@ toml_tables! {
         list "sequence" sequences: SequenceTable,
         opt "mimic" mimic: MimicTable,
         list "trend" trends: TrendTable,
+        list "batch" batches: BatchTable,
         list "shift" shifts: ShiftTable,
         opt "report" report: ReportTable,
         opt "history" history: HistoryTable,
@@ -160,6 +161,16 @@ toml_tables! {
     PenTable, "a pen" {
         need "tag" tag: String,
         opt "scale" scale: [f64; 2],
+    }
+
+    /// A `[[batch]]`.
+    BatchTable, "a batch" {
+        need "name" name: String,
+        need "start" start: String,
+        need "end" end: String,
+        opt "phase" phase: String,
+        opt "energy" energy: String,
+        list "tags" tags: String,
     }
 
     /// A `[[shift]]`.

@@ -4,6 +4,7 @@ pub(crate) mod shift;
 pub mod period_parser;
 pub mod step_series;
 pub(crate) mod figures;
+pub mod batch;
 pub(crate) mod alarm_metrics;
 mod csv;
 pub(crate) mod shift_csv;
@@ -117,6 +118,8 @@ pub struct ShiftReport {
     pub unreadable: Vec<Gap>,
     /// One row a tag.
     pub tags: Vec<TagFigures>,
+    /// The batches that ran in the period, newest first.
+    pub batches: Vec<batch::BatchReport>,
     /// Alarms that were active while they were suppressed, shelved or out of service.
     pub suppressed: Vec<SuppressedSummary>,
     /// Steps of alarms in the period, oldest first.

@@ -5,6 +5,7 @@ use jiff::tz::TimeZone;
 use super::{
     Gap, ReportFormat, ShiftReport, SuppressedSummary, TagFigures,
     alarm_metrics::{self, BadActor, Row},
+    batch,
     csv::{Table, floor_percent, iso, iso_millis, number, plain, shortest, text},
     raised, record_csv,
 };
@@ -55,6 +56,9 @@ fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u
         for Gap { from, to, why } in &report.unreadable {
             table.row(vec![plain(iso(zone, *from)), plain(iso(zone, *to)), text(why)]);
         }
+    }
+    if !report.batches.is_empty() {
+        batch::add_section(&mut table, &report.batches, def, dialect);
     }
     table.section("alarm counts", &["priority", "raised", "raised while suppressed"]);
     for priority in Priority::ALL {

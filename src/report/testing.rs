@@ -74,6 +74,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
         logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
+        batches: Vec::new(),
         shifts: shifts
             .iter()
             .map(|&(name, hour, minute)| ShiftDef { name: name.into(), start: time(hour, minute, 0, 0) })

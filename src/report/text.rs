@@ -114,6 +114,7 @@ mod tests {
             until: at("2026-11-21T09:00+07"),
             audit: Some(ChainHash { number: 7, hash: [0xA5; 32] }),
             unreadable: Vec::new(),
+            batches: Vec::new(),
             tags: vec![TagFigures {
                 tag: "TIC-1.PV".into(),
                 unit: "°C".into(),

@@ -226,7 +226,10 @@ impl PlantTask {
     /// Restores alarm states and metrics from the history.
     fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
-        let Restored { events, recent, chain_hashes } = past.join(restored);
+        let Restored { events, recent, chain_hashes, batches, off } = past.join(restored);
+        let off = off.map(|off| off.checked_sub(self.clock.behind_utc()).unwrap_or(off));
+        let resumed = self.plant.restore_batches(&batches, off);
+        self.dispatch(resumed);
         if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
             audit.compare(chain_hashes);
         }
@@ -321,7 +324,7 @@ impl PlantTask {
                     events.push(event.clone());
                     others.push(Record::Alarm(event));
                 }
-                Record::Sample(..) | Record::Line(_) | Record::ClockSet => others.push(record),
+                Record::Sample(..) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => others.push(record),
             }
         }
         self.send_to_audit_log(actions, events);

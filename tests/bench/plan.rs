@@ -77,6 +77,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
+        batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
         report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: CsvDialect::default() },

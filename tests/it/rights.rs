@@ -338,7 +338,7 @@ fn of_question(query: &Query) -> Row {
         Query::LineMinutes { .. } | Query::Values { .. } => look("", "-VTSL-"),
         Query::AlarmMetrics { .. } => look("", "-VTSL-"),
         Query::Report { .. } => look("", "-VTSL-"),
-        Query::Past { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
+        Query::Past { .. } | Query::Batches { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
@@ -362,6 +362,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::AlarmMetrics { from, to },
         Query::Report { period: Period { name: "period".into(), from, to } },
         Query::Past { at: to },
+        Query::Batches { from, to, limit },
         Query::Unarchived { from, to },
         Query::Overview,
         Query::Audit { from, to, words, by, action, limit },

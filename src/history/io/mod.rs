@@ -47,6 +47,7 @@ mod import;
 pub mod compact;
 pub mod report;
 pub mod alarm_metrics;
+pub mod batches;
 pub mod chain;
 pub mod writer;
 pub mod reader;

@@ -19,6 +19,7 @@ use crate::{
         words::{joined, plain},
     },
     plant::{
+        batch::BatchRecord,
         def::PlantDef,
         number::to_u32,
         record::{AlarmRecord, ChainHash},
@@ -45,6 +46,10 @@ pub struct Restored {
     pub recent: Recent,
     /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
     pub chain_hashes: Option<Vec<ChainHash>>,
+    /// The last record of the batches of each name.
+    pub batches: Vec<BatchRecord>,
+    /// When the station before this one ended.
+    pub off: Option<Timestamp>,
 }
 
 impl Store {
@@ -66,7 +71,9 @@ impl Store {
                 .chain_hashes()
                 .inspect_err(|error| tracing::warn!(%error, "not compared with the audit log"))
                 .ok();
-            Ok(Restored { events, recent, chain_hashes })
+            let batches = store.latest_batches()?;
+            let off = store.extent().map(|(_, last)| last);
+            Ok(Restored { events, recent, chain_hashes, batches, off })
         })
     }
 

@@ -58,6 +58,7 @@ impl Store {
             Query::Values { tags, from, every, count } => {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
+            Query::Batches { from, to, limit } => self.batches((*from, *to, *limit), now).map(Answer::Batches),
             Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
             Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
@@ -271,7 +272,7 @@ pub(super) fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {
     })
 }
 
-fn time(row: &Row) -> duckdb::Result<Timestamp> {
+pub(super) fn time(row: &Row) -> duckdb::Result<Timestamp> {
     let micros: i64 = row.get(0)?;
     instant(micros).ok_or(duckdb::Error::IntegralValueOutOfRange(0, i128::from(micros)))
 }
@@ -280,10 +281,10 @@ fn maybe_time(row: &Row, column: usize) -> duckdb::Result<Option<Timestamp>> {
     Ok(row.get::<_, Option<i64>>(column)?.and_then(instant))
 }
 
-fn shared(row: &Row, column: usize) -> duckdb::Result<Arc<str>> {
+pub(super) fn shared(row: &Row, column: usize) -> duckdb::Result<Arc<str>> {
     row.get::<_, String>(column).map(Arc::from)
 }
 
-fn maybe_shared(row: &Row, column: usize) -> duckdb::Result<Option<Arc<str>>> {
+pub(super) fn maybe_shared(row: &Row, column: usize) -> duckdb::Result<Option<Arc<str>>> {
     row.get::<_, Option<String>>(column).map(|text| text.map(Arc::from))
 }

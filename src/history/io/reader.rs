@@ -176,7 +176,7 @@ fn next<'a, T>(
 /// Does a figure of the answer lack what is not committed yet?
 fn counts_a_period(query: &Query) -> bool {
     match query {
-        Query::Report { .. } | Query::AlarmMetrics { .. } => true,
+        Query::Report { .. } | Query::AlarmMetrics { .. } | Query::Batches { .. } => true,
         Query::Series { .. }
         | Query::Values { .. }
         | Query::Journal { .. }

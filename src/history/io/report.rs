@@ -22,7 +22,7 @@ use crate::{
     },
     plant::{PlantDef, def::TagId, record::AlarmRecord},
     report::{
-        Period, RecordRow, ShiftReport,
+        Gap, Period, RecordRow, ShiftReport, TagFigures,
         figures::{self, Figures, TagDescription},
         step_series::ValuesAt,
     },
@@ -47,6 +47,36 @@ impl Gathered {
     }
 }
 
+/// What is gathered of some tags over a span.
+pub(super) struct GatheredTags {
+    span: (Timestamp, Timestamp),
+    of: HashMap<TagId, Gathered>,
+    latest: HashMap<TagId, f64>,
+    pub unreadable: Vec<Gap>,
+}
+
+impl GatheredTags {
+    /// The figures of some of them, each once. `events` are those of the span in order, after the raising events of the
+    /// alarms that were active at its begin.
+    pub(super) fn rows<'a>(
+        &mut self,
+        def: &PlantDef,
+        tags: &[TagId],
+        events: impl Iterator<Item = &'a AlarmRecord>,
+    ) -> Vec<TagFigures> {
+        let mut by_subject: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
+        events.for_each(|event| by_subject.entry(&event.subject).or_default().push(event));
+        let (from, until) = self.span;
+        let row = |tag: &TagId| {
+            let label = TagDescription::at(def.tag(*tag), &self.latest);
+            let events = by_subject.get(label.tag.as_str()).into_iter().flatten().copied();
+            let in_alarm = figures::time_in_alarm(events, from, until);
+            Some(self.of.get_mut(tag)?.figures.take()?.end(label, in_alarm))
+        };
+        tags.iter().filter_map(row).collect()
+    }
+}
+
 /// The controller of the record.
 struct Recorded {
     name: String,
@@ -62,7 +92,6 @@ impl Store {
         check_span(from, until)?;
         let (def, reported) = (&*self.def, reported_tags(&self.def));
         let recorded = self.recorded(from, until)?;
-        let tags = tags_to_read(def, &reported, recorded.as_ref());
         let active = self.active_at(from)?;
         let alarms = self.events(from, until)?;
         let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
@@ -70,33 +99,22 @@ impl Store {
             self.whole_list(&sql::actions(sql::OLDEST), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
         let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(chain_hash(row.get(0)?, row.get(1)?)))?;
         let audit = audit.into_iter().flatten().next();
-        let shown: HashSet<TagId> = reported.iter().copied().collect();
-        let gather = |tag: &TagId| Gathered {
-            figures: shown.contains(tag).then(|| Figures::new(from, until)),
-            latest_good: None,
-        };
-        let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
-        let unreadable = self.each_part(&tags, (from, until), Tier::Hour, |place, part| gathered[place].add(part))?;
-        let latest: HashMap<TagId, f64> =
-            tags.iter().zip(&gathered).filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?))).collect();
-        let mut gathered: HashMap<TagId, Gathered> = tags.into_iter().zip(gathered).collect();
+        let more = recorded.iter().flat_map(|recorded| [recorded.sv, recorded.pv]);
+        let mut gathered = self.gather(&reported, more, (from, until))?;
         let (record, record_of) = match recorded {
             Some(recorded) => {
                 let rows = self.record(&recorded, (from, until), now)?;
-                (rows, Some((recorded.name, TagDescription::at(def.tag(recorded.pv), &latest).unit)))
+                (rows, Some((recorded.name, TagDescription::at(def.tag(recorded.pv), &gathered.latest).unit)))
             }
             None => (Vec::new(), None),
         };
-        let mut events: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
-        active.iter().chain(&alarms).for_each(|event| events.entry(&event.subject).or_default().push(event));
-        let row = |tag: &TagId| {
-            let label = TagDescription::at(def.tag(*tag), &latest);
-            let events = events.get(label.tag.as_str()).into_iter().flatten().copied();
-            let in_alarm = figures::time_in_alarm(events, from, until);
-            Some(gathered.get_mut(tag)?.figures.take()?.end(label, in_alarm))
-        };
-        let tags = reported.iter().filter_map(row).collect();
+        let tags = gathered.rows(def, &reported, active.iter().chain(&alarms));
+        let unreadable = gathered.unreadable;
         let alarm_metrics = self.alarm_metrics(from, until, now)?;
+        let batches = match def.batches.as_slice() {
+            [] => Vec::new(),
+            [..] => self.batches((from, until, usize::MAX), now)?,
+        };
         let period = period.clone();
         Ok(ShiftReport {
             period,
@@ -104,6 +122,7 @@ impl Store {
             audit,
             unreadable,
             tags,
+            batches,
             suppressed,
             alarms,
             alarm_metrics,
@@ -111,6 +130,27 @@ impl Store {
             record,
             record_of,
         })
+    }
+
+    /// Gathers the figures of some tags over a span, and the latest good values of those that choose their units and
+    /// decimals and of `more`.
+    pub(super) fn gather(
+        &self,
+        shown: &[TagId],
+        more: impl Iterator<Item = TagId>,
+        (from, until): (Timestamp, Timestamp),
+    ) -> Result<GatheredTags, HistoryError> {
+        let tags = tags_to_read(&self.def, shown, more);
+        let shown: HashSet<TagId> = shown.iter().copied().collect();
+        let gather = |tag: &TagId| Gathered {
+            figures: shown.contains(tag).then(|| Figures::new(from, until)),
+            latest_good: None,
+        };
+        let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
+        let unreadable = self.each_part(&tags, (from, until), Tier::Hour, |place, part| gathered[place].add(part))?;
+        let latest =
+            tags.iter().zip(&gathered).filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?))).collect();
+        Ok(GatheredTags { span: (from, until), of: tags.into_iter().zip(gathered).collect(), latest, unreadable })
     }
 
     fn record(
@@ -157,10 +197,9 @@ fn reported_tags(def: &PlantDef) -> Vec<TagId> {
     tags
 }
 
-/// The tags of a report, those that choose their units and decimals, and those of the record.
-fn tags_to_read(def: &PlantDef, reported: &[TagId], recorded: Option<&Recorded>) -> Vec<TagId> {
-    let recorded = recorded.into_iter().flat_map(|recorded| [recorded.sv, recorded.pv]);
-    let mut tags: Vec<TagId> = reported.iter().copied().chain(recorded).collect();
+/// Some tags, those that choose their units and decimals, and `more`.
+fn tags_to_read(def: &PlantDef, shown: &[TagId], more: impl Iterator<Item = TagId>) -> Vec<TagId> {
+    let mut tags: Vec<TagId> = shown.iter().copied().chain(more).collect();
     let scaling_tags: Vec<TagId> = tags.iter().flat_map(|tag| figures::scaling_tags(def.tag(*tag))).collect();
     tags.extend(scaling_tags);
     tags.sort_unstable_by_key(|tag| tag.index());

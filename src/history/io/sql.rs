@@ -22,11 +22,13 @@ use crate::{
 ///
 /// `utc` of `line_minute` is the end of the minute; a line goes by its name, as everything that outlives the plant file.
 ///
+/// `batch` has the changes of batches; `place` is their order within one.
+///
 /// Samples of a file have the epoch [`IMPORTED`], and `import` has a row for each file.
 ///
 /// `archive` is the manifest of the files in the archive, see there; `watched` are windows of ten minutes, by their number
 /// since 1970, in which archived samples lie; `deleted` are the files that the rules of the plant have deleted.
-pub const MIGRATIONS: [&str; 11] = [
+pub const MIGRATIONS: [&str; 12] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -95,6 +97,11 @@ CREATE TABLE import (
     utc TIMESTAMP NOT NULL, file VARCHAR NOT NULL, from_utc TIMESTAMP NOT NULL, to_utc TIMESTAMP NOT NULL,
     rows UBIGINT NOT NULL);
 ",
+    "
+CREATE TABLE batch (
+    utc TIMESTAMP NOT NULL, name VARCHAR NOT NULL, number UINTEGER NOT NULL, place UINTEGER NOT NULL,
+    event VARCHAR NOT NULL, phase VARCHAR, epoch USMALLINT NOT NULL);
+",
 ];
 
 /// The epoch of samples that no station recorded.
@@ -137,7 +144,7 @@ pub const SET_LAST_COMMIT: &str = "UPDATE last_commit SET number = ?, first_utc 
 
 /// Rows of all tables.
 pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT count(*) FROM alarm_journal)
-    + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute)";
+    + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute) + (SELECT count(*) FROM batch)";
 
 /// Ends every curve: a row (time, no value, quality, epoch) for each tag whose last row since an instant has another quality.
 pub const END_CURVES: &str = "INSERT INTO sample
@@ -264,6 +271,17 @@ pub const LINE_MINUTES: &str = "SELECT * FROM (
     SELECT utc, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes,
         utilisation, reply_p99_ms, reply_max_ms
     FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";
+
+/// The records of the batches that ran in a span, newest batch first, of at most so many batches.
+pub const BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch JOIN (
+    SELECT name, number, first(utc ORDER BY place) AS begun, last(utc ORDER BY place) AS changed,
+        bool_or(event IN ('ended', 'found ended')) AS over
+    FROM batch GROUP BY name, number HAVING begun < $2 AND (NOT over OR $1 < changed)
+    ORDER BY begun DESC, name, number LIMIT $3) USING (name, number)
+    ORDER BY begun DESC, name, number, place";
+/// The last record of each name.
+pub const LATEST_BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch
+    QUALIFY row_number() OVER (PARTITION BY name ORDER BY number DESC, place DESC) = 1";
 
 /// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows.
 pub fn parquet(tier: Tier, version: ParquetVersion) -> String {

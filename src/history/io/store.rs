@@ -23,6 +23,7 @@ use super::{
 use crate::{
     history::{HistoryError, tiers::in_milliseconds},
     plant::{
+        batch::BatchRecord,
         def::PlantDef,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, Record},
@@ -90,7 +91,7 @@ impl Store {
         let stored = records.iter().filter_map(|record| match record {
             Record::Sample(_, sample) => Some(sample.at),
             Record::Alarm(alarm) => Some(alarm.at),
-            Record::Action(_) | Record::Line(_) | Record::ClockSet => None,
+            Record::Action(_) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => None,
         });
         let begun = records.iter().filter(|record| is_clock_set(record)).count();
         let epoch = |passed: usize| self.epoch.get().saturating_add(u16::try_from(passed).unwrap_or(u16::MAX));
@@ -256,13 +257,15 @@ impl Store {
 
     /// Appends records of one epoch.
     fn append_epoch(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
-        let (mut samples, mut alarms, mut actions, mut lines) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut samples, mut alarms, mut actions) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut lines, mut batches) = (Vec::new(), Vec::new());
         for record in records {
             match record {
                 Record::Sample(tag, sample) => samples.extend(self.id(*tag).map(|id| (id, sample))),
                 Record::Alarm(alarm) => alarms.push(alarm),
                 Record::Action(action) => actions.push(action),
                 Record::Line(minute) => lines.push(minute),
+                Record::Batch(batch) => batches.push(batch),
                 Record::ClockSet => {}
             }
         }
@@ -272,7 +275,10 @@ impl Store {
         self.append_rows("alarm_journal", alarms, |to, alarm| append_alarm(to, alarm, epoch))?;
         self.remove_unsealed(&actions)?;
         self.append_rows("operator_action", actions, |to, action| append_action(to, action, epoch))?;
-        self.append_rows("line_minute", lines, |to, minute| append_line(to, minute, epoch))
+        self.append_rows("line_minute", lines, |to, minute| append_line(to, minute, epoch))?;
+        self.append_rows("batch", batches, |to, BatchRecord { at, batch, number, place, event, phase }| {
+            to.append_row(params![utc(*at), batch, number, place, event.word(), phase, epoch])
+        })
     }
 }
 

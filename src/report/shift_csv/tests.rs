@@ -23,6 +23,7 @@ fn report() -> ShiftReport {
             to: from + Duration::from_secs(3_720),
             why: "checksum".into(),
         }],
+        batches: Vec::new(),
         tags: vec![
             TagFigures {
                 tag: "TIC-1.PV".into(),

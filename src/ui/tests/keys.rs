@@ -205,6 +205,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
             | Query::Report { .. }
             | Query::AlarmMetrics { .. }
             | Query::Values { .. }
+            | Query::Batches { .. }
             | Query::Past { .. }
             | Query::Unarchived { .. }
             | Query::Overview

@@ -147,6 +147,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         until,
         audit: full.then_some(ChainHash { number: 1_042, hash: [0xA5; 32] }),
         unreadable: Vec::new(),
+        batches: Vec::new(),
         tags: vec![
             tag("TIC-1.PV", "°C", 1, 26.8, 58.31, 72.6, Some(72.4), 41, 0.989_99),
             tag("TIC-1.MV", "%", 1, 0.0, 41.3, 100.0, Some(12.0), 0, 1.0),

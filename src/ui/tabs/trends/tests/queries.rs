@@ -14,6 +14,7 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
         | Query::Report { .. }
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
+        | Query::Batches { .. }
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview

@@ -1,0 +1,78 @@
+//! Batches with their figures.
+
+use duckdb::{Row, params};
+use jiff::Timestamp;
+
+use super::{
+    read::{ROWS_MAX, check_span, maybe_shared, shared, time, within},
+    sql,
+    store::{Store, utc},
+};
+use crate::{
+    history::{BATCHES_MAX, HistoryError},
+    plant::{
+        batch::{Batch, BatchEvent, BatchRecord, batches},
+        keyword::Keyword,
+        record::AlarmEvent,
+    },
+    report::batch::{self, BatchReport},
+};
+
+impl Store {
+    /// The batches that ran between two instants, newest first, at most so many; without figures where these are more than
+    /// [`BATCHES_MAX`].
+    pub(super) fn batches(
+        &self,
+        (from, to, limit): (Timestamp, Timestamp, usize),
+        now: Timestamp,
+    ) -> Result<Vec<BatchReport>, HistoryError> {
+        check_span(from, to)?;
+        let records = self.list(sql::BATCHES, params![utc(from), utc(to), limit as u64], record)?;
+        within(records.len() as u64, ROWS_MAX)?;
+        let batches = batches(&records, now);
+        let with_figures = batches.len() <= BATCHES_MAX;
+        let report = |batch: Batch| {
+            let until = batch.until(now);
+            match with_figures {
+                true => self.batch(batch, until),
+                false => Ok(BatchReport::new(batch, until)),
+            }
+        };
+        batches.into_iter().map(report).collect()
+    }
+
+    /// The last record of the batches of each name.
+    pub(super) fn latest_batches(&self) -> Result<Vec<BatchRecord>, HistoryError> {
+        self.list(sql::LATEST_BATCHES, &[], record)
+    }
+
+    fn batch(&self, batch: Batch, until: Timestamp) -> Result<BatchReport, HistoryError> {
+        let from = batch.from;
+        let mut report = BatchReport::new(batch, until);
+        let rule = self.def.batches.iter().find(|rule| rule.name == report.batch.name);
+        // The clock may have been set back since it began.
+        let Some(rule) = rule.filter(|_| from < until) else { return Ok(report) };
+        let (active, events) = (self.active_at(from)?, self.events(from, until)?);
+        report.alarms = Some(events.iter().filter(|event| event.event == AlarmEvent::Raised).count() as u64);
+        let mut tags = rule.tags.clone();
+        tags.extend(rule.energy.filter(|energy| !tags.contains(energy)));
+        let mut gathered = self.gather(&tags, std::iter::empty(), (from, until))?;
+        report.tags = gathered.rows(&self.def, &tags, active.iter().chain(&events));
+        let energy = rule.energy.map(|energy| self.def.tag(energy).name.as_str());
+        let energy = report.tags.iter().find(|figures| Some(figures.tag.as_str()) == energy);
+        report.energy = energy.and_then(|figures| batch::energy(figures, report.duration()));
+        report.unreadable = gathered.unreadable;
+        Ok(report)
+    }
+}
+
+fn record(row: &Row) -> duckdb::Result<BatchRecord> {
+    Ok(BatchRecord {
+        at: time(row)?,
+        batch: shared(row, 1)?,
+        number: row.get(2)?,
+        place: row.get(3)?,
+        event: BatchEvent::from_word(&row.get::<_, String>(4)?).ok_or(duckdb::Error::InvalidQuery)?,
+        phase: maybe_shared(row, 5)?,
+    })
+}

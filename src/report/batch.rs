@@ -1,0 +1,167 @@
+//! A batch with the figures of its tags, and the list of batches as CSV.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Gap, Period, TagFigures,
+    csv::{self, Table, floor_percent, iso, number, plain, text},
+};
+use crate::plant::{
+    batch::Batch,
+    def::{CsvDialect, PlantDef},
+    energy::{self, Measures},
+    time::elapsed,
+};
+
+/// A batch, what its tags did, and the alarms of its time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BatchReport {
+    /// The batch.
+    pub batch: Batch,
+    /// Until when it was computed: its end, or the time of the query.
+    pub until: Timestamp,
+    /// One row for each tag of its rule, in that order.
+    pub tags: Vec<TagFigures>,
+    /// Energy in kWh over the time in which its tag was good, and the share of that time, 0–1; `None` without such a tag or
+    /// without a good value.
+    pub energy: Option<(f64, f64)>,
+    /// Alarms that were raised in its time; `None` where there are so many batches that no figures were computed.
+    pub alarms: Option<u64>,
+    /// Where stored values could not be read: there, none is counted.
+    pub unreadable: Vec<Gap>,
+}
+
+impl BatchReport {
+    /// Without figures.
+    pub fn new(batch: Batch, until: Timestamp) -> BatchReport {
+        BatchReport { batch, until, tags: Vec::new(), energy: None, alarms: None, unreadable: Vec::new() }
+    }
+
+    /// Its time, as a period to report on.
+    pub fn period(&self) -> Period {
+        Period { name: self.batch.label(), from: self.batch.from, to: self.until }
+    }
+
+    /// How long it has lasted.
+    pub fn duration(&self) -> Duration {
+        elapsed(self.batch.from, self.until)
+    }
+}
+
+/// Energy in kWh from the figures of a power or of an energy counter over `time`, and the share of it that was good.
+pub fn energy(figures: &TagFigures, time: Duration) -> Option<(f64, f64)> {
+    let hours = time.as_secs_f64() / 3_600.0;
+    let kwh = match energy::of_unit(&figures.unit)? {
+        Measures::Power(kw) => figures.mean? * kw * hours * figures.good,
+        Measures::Energy(kwh) => figures.difference? * kwh,
+    };
+    Some((kwh, figures.good))
+}
+
+/// Columns of a batch itself.
+const HEADER: [&str; 9] =
+    ["batch", "number", "from", "to", "minutes", "state", "energy kWh", "energy good %", "alarms"];
+
+/// The list of batches: a row each, with a column for every phase and the figures of every tag.
+pub fn csv(batches: &[BatchReport], def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
+    let (mut phases, mut tags): (Vec<&str>, Vec<(&str, &str, bool)>) = (Vec::new(), Vec::new());
+    for report in batches {
+        let of_one = report.batch.phases.iter().map(|(phase, _)| &**phase);
+        of_one.for_each(|phase| {
+            if !phases.contains(&phase) {
+                phases.push(phase)
+            }
+        });
+        for tag in &report.tags {
+            match tags.iter_mut().find(|(name, ..)| *name == tag.tag) {
+                Some((_, _, counts)) => *counts |= tag.difference.is_some(),
+                None => tags.push((&tag.tag, &tag.unit, tag.difference.is_some())),
+            }
+        }
+    }
+    let mut header: Vec<String> = HEADER.map(plain).into();
+    header.push(plain("minutes unknown"));
+    header.extend(phases.iter().map(|phase| text(&format!("minutes {phase}"))));
+    for (tag, unit, counts) in &tags {
+        let of_tag = |figure: &str| text(format!("{tag} {figure} {unit}").trim());
+        let mean = if *counts { "difference" } else { "mean" };
+        header.extend(["min", mean, "max", "last"].map(of_tag));
+        header.push(text(&format!("{tag} good %")));
+    }
+    let row = |report: &BatchReport| {
+        let mut row = own_cells(report, def, dialect);
+        row.push(minutes(report.batch.unknown, dialect));
+        row.extend(phases.iter().map(|phase| {
+            let found = report.batch.phases.iter().find(|(known, _)| **known == **phase);
+            found.map_or_else(String::new, |(_, time)| minutes(*time, dialect))
+        }));
+        for (name, ..) in &tags {
+            match report.tags.iter().find(|tag| tag.tag == *name) {
+                Some(tag) => row.extend(figures(tag, dialect)),
+                None => row.extend(std::iter::repeat_n(String::new(), 5)),
+            }
+        }
+        row
+    };
+    let rows: Vec<Vec<String>> = batches.iter().map(row).collect();
+    csv::write(std::iter::once(header).chain(rows), dialect)
+}
+
+/// The batches of a period as a section of its report.
+pub(super) fn add_section(table: &mut Table, batches: &[BatchReport], def: &PlantDef, dialect: CsvDialect) {
+    table.section("batches", &[HEADER.as_slice(), &["phases, minutes"]].concat());
+    for report in batches {
+        let phase = |(name, time): &(Arc<str>, Duration)| format!("{name} {}", minutes(*time, dialect));
+        let phases: Vec<String> = report.batch.phases.iter().map(phase).collect();
+        let mut row = own_cells(report, def, dialect);
+        row.push(text(&phases.join(" | ")));
+        table.row(row);
+    }
+}
+
+fn own_cells(report: &BatchReport, def: &PlantDef, dialect: CsvDialect) -> Vec<String> {
+    let batch = &report.batch;
+    let time = |at: Timestamp| plain(iso(&def.time_zone, at));
+    let (kwh, good) = report.energy.unzip();
+    vec![
+        text(&batch.name),
+        plain(batch.number.to_string()),
+        time(batch.from),
+        batch.to.map(time).unwrap_or_default(),
+        minutes(report.duration(), dialect),
+        plain(state(batch)),
+        number(kwh, 3, dialect),
+        number(good.map(floor_percent), 1, dialect),
+        report.alarms.map(|alarms| alarms.to_string()).unwrap_or_default(),
+    ]
+}
+
+fn figures(tag: &TagFigures, dialect: CsvDialect) -> [String; 5] {
+    let value = |value: Option<f64>| number(value, tag.decimals, dialect);
+    let mean = match tag.difference {
+        Some(difference) => value(Some(difference)),
+        // One more decimal than the device has: a mean is finer than its samples.
+        None => number(tag.mean, tag.decimals.saturating_add(1), dialect),
+    };
+    let good = number(Some(floor_percent(tag.good)), 1, dialect);
+    [value(tag.min), mean, value(tag.max), value(tag.last), good]
+}
+
+fn minutes(time: Duration, dialect: CsvDialect) -> String {
+    number(Some(time.as_secs_f64() / 60.0), 1, dialect)
+}
+
+/// How a batch stands, and what of it was not seen.
+pub fn state(batch: &Batch) -> &'static str {
+    match (batch.to, batch.seen) {
+        (None, (true, _)) => "running",
+        (None, (false, _)) => "running, start not seen",
+        (Some(_), (true, true)) => "ended",
+        (Some(_), (false, true)) => "ended, start not seen",
+        (Some(_), (true, false)) => "ended, end not seen",
+        (Some(_), (false, false)) => "ended, start and end not seen",
+    }
+}
