@@ -2,6 +2,7 @@
 
 mod act;
 mod attach;
+mod batches;
 mod audit;
 mod alarms;
 mod check;
@@ -116,6 +117,8 @@ enum Command {
     History(history::Args),
     /// Show alarm performance in a shift or period: rates, floods, chattering, stale, against their targets
     Alarms(alarms::Args),
+    /// List the batches of a period: number, begin, end, phases, energy, figures
+    Batches(batches::Args),
     /// Decode a Modbus frame: every field, its checksum, and what is wrong with it
     Decode(decode::Args),
     /// Scan a line for units: addresses, baud rates, parities
@@ -266,6 +269,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Sql(args)) => sql::main(args),
         Some(Command::History(args)) => history::main(args),
         Some(Command::Alarms(args)) => alarms::main(args),
+        Some(Command::Batches(args)) => batches::main(args),
         Some(Command::Decode(args)) => decode::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),
         Some(Command::Probe(args)) => tools::probe::main(args),

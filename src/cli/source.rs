@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use tokio::sync::oneshot;
 
 use crate::{
@@ -70,6 +70,19 @@ impl HistoryArgs {
         let (shift, from, to) = (self.shift.as_deref(), self.from.as_deref(), self.to.as_deref());
         let period = period_parser::period(def, shift, from, to, source.now());
         Ok((source, period.map_err(|error| CliError::Usage(error.to_string()))?))
+    }
+}
+
+impl HistoryArgs {
+    /// The same, but without a period it is the time before now.
+    pub async fn open_latest(&self, def: &Arc<PlantDef>, time: SignedDuration) -> Result<(Source, Period), CliError> {
+        if [&self.shift, &self.from, &self.to].iter().any(|given| given.is_some()) {
+            return self.open(def).await;
+        }
+        let source = Source::open(def, &self.station, &self.login).await?;
+        let to = source.now();
+        let from = to.checked_sub(time).unwrap_or(Timestamp::MIN);
+        Ok((source, Period { name: "period".into(), from, to }))
     }
 }
 

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Gap, Period, TagFigures,
-    csv::{self, Table, floor_percent, iso, number, plain, text},
+    csv::{self, Table, floor_percent, iso, number, plain},
+    text::mean_or_difference,
 };
 use crate::plant::{
     batch::Batch,
@@ -84,12 +85,12 @@ pub fn csv(batches: &[BatchReport], def: &PlantDef, dialect: CsvDialect) -> Vec<
     }
     let mut header: Vec<String> = HEADER.map(plain).into();
     header.push(plain("minutes unknown"));
-    header.extend(phases.iter().map(|phase| text(&format!("minutes {phase}"))));
+    header.extend(phases.iter().map(|phase| csv::text(&format!("minutes {phase}"))));
     for (tag, unit, counts) in &tags {
-        let of_tag = |figure: &str| text(format!("{tag} {figure} {unit}").trim());
+        let of_tag = |figure: &str| csv::text(format!("{tag} {figure} {unit}").trim());
         let mean = if *counts { "difference" } else { "mean" };
         header.extend(["min", mean, "max", "last"].map(of_tag));
-        header.push(text(&format!("{tag} good %")));
+        header.push(csv::text(&format!("{tag} good %")));
     }
     let row = |report: &BatchReport| {
         let mut row = own_cells(report, def, dialect);
@@ -117,7 +118,7 @@ pub(super) fn add_section(table: &mut Table, batches: &[BatchReport], def: &Plan
         let phase = |(name, time): &(Arc<str>, Duration)| format!("{name} {}", minutes(*time, dialect));
         let phases: Vec<String> = report.batch.phases.iter().map(phase).collect();
         let mut row = own_cells(report, def, dialect);
-        row.push(text(&phases.join(" | ")));
+        row.push(csv::text(&phases.join(" | ")));
         table.row(row);
     }
 }
@@ -127,7 +128,7 @@ fn own_cells(report: &BatchReport, def: &PlantDef, dialect: CsvDialect) -> Vec<S
     let time = |at: Timestamp| plain(iso(&def.time_zone, at));
     let (kwh, good) = report.energy.unzip();
     vec![
-        text(&batch.name),
+        csv::text(&batch.name),
         plain(batch.number.to_string()),
         time(batch.from),
         batch.to.map(time).unwrap_or_default(),
@@ -152,6 +153,51 @@ fn figures(tag: &TagFigures, dialect: CsvDialect) -> [String; 5] {
 
 fn minutes(time: Duration, dialect: CsvDialect) -> String {
     number(Some(time.as_secs_f64() / 60.0), 1, dialect)
+}
+
+/// The list of batches as lines.
+pub fn text(batches: &[BatchReport], def: &PlantDef) -> String {
+    if batches.is_empty() {
+        return "no batch ran in this time".into();
+    }
+    let local = |at: Timestamp| at.to_zoned(def.time_zone.clone()).strftime("%F %T").to_string();
+    let minutes = |time: Duration| format!("{:.1} min", time.as_secs_f64() / 60.0);
+    let mut lines = Vec::new();
+    for report in batches {
+        let BatchReport { batch, energy, alarms, tags, .. } = report;
+        let to = batch.to.map_or_else(|| "…".into(), local);
+        let mut facts = vec![minutes(report.duration()), state(batch).into()];
+        facts.extend(energy.map(|(kwh, good)| match good < 1.0 {
+            true => format!("{kwh:.3} kWh in {:.1} % of the time", floor_percent(good)),
+            false => format!("{kwh:.3} kWh"),
+        }));
+        facts.extend(alarms.map(|alarms| format!("{alarms} alarms")));
+        lines.push(format!("{:20} {} to {to}  {}", batch.label(), local(batch.from), facts.join(", ")));
+        let mut phases: Vec<String> =
+            batch.phases.iter().map(|(name, time)| format!("{name} {}", minutes(*time))).collect();
+        if !batch.unknown.is_zero() {
+            phases.push(format!("unknown {}", minutes(batch.unknown)));
+        }
+        if !phases.is_empty() {
+            lines.push(format!("    {}", phases.join(", ")));
+        }
+        for tag in tags {
+            let value = |value: Option<f64>| {
+                value.map_or("—".into(), |value| format!("{value:.*}", usize::from(tag.decimals)))
+            };
+            let (min, max, last) = (value(tag.min), value(tag.max), value(tag.last));
+            let (mean, good) = (mean_or_difference(tag), floor_percent(tag.good));
+            let unit = &tag.unit;
+            lines.push(format!(
+                "    {:20} {min} to {max} {unit}, mean/+ {mean}, last {last}, good {good:.1} %",
+                tag.tag
+            ));
+        }
+        for Gap { from, to, why } in &report.unreadable {
+            lines.push(format!("    not readable, not counted: {} to {}: {why}", local(*from), local(*to)));
+        }
+    }
+    lines.join("\n")
 }
 
 /// How a batch stands, and what of it was not seen.

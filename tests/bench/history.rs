@@ -48,6 +48,7 @@ fn tank() -> Arc<PlantDef> {
         logic: Default::default(),
         mimic: MimicDef::default(),
         trends: Vec::new(),
+        batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
         report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: CsvDialect::default() },
