@@ -94,6 +94,8 @@ pub struct Batch {
     pub to: Option<Timestamp>,
     /// Whether begin and end were seen: else they are earlier than [`Batch::from`] and [`Batch::to`].
     pub seen: (bool, bool),
+    /// How long it has lasted: that of its phases, also where the clock was set meanwhile.
+    pub lasted: Duration,
     /// How long each phase lasted, in the order in which they first came.
     pub phases: Vec<(Arc<str>, Duration)>,
     /// How long nobody knew the phase.
@@ -123,10 +125,11 @@ fn batch(records: &[BatchRecord], now: Timestamp) -> Option<Batch> {
     let (first, last) = (records.first()?, records.last()?);
     let to = last.event.is_end().then_some(last.at);
     let mut phases: Vec<(Arc<str>, Duration)> = Vec::new();
-    let mut unknown = Duration::ZERO;
+    let (mut lasted, mut unknown) = (Duration::ZERO, Duration::ZERO);
     let ends = records.iter().skip(1).map(|next| next.at).chain(to.is_none().then_some(now));
     for (record, end) in records.iter().zip(ends) {
         let span = elapsed(record.at, end);
+        lasted += span;
         match &record.phase {
             _ if record.event == BatchEvent::Unknown => unknown += span,
             Some(phase) => match phases.iter_mut().find(|(known, _)| known == phase) {
@@ -137,7 +140,7 @@ fn batch(records: &[BatchRecord], now: Timestamp) -> Option<Batch> {
         }
     }
     let seen = (first.event == BatchEvent::Started, last.event != BatchEvent::FoundEnded);
-    Some(Batch { name: first.batch.clone(), number: first.number, from: first.at, to, seen, phases, unknown })
+    Some(Batch { name: first.batch.clone(), number: first.number, from: first.at, to, seen, lasted, phases, unknown })
 }
 
 /// Follows the batches of one rule. It says nothing before [`BatchTracker::restore`]: a number must not be given twice.

@@ -14,7 +14,6 @@ use crate::plant::{
     batch::Batch,
     def::{CsvDialect, PlantDef},
     energy::{self, Measures},
-    time::elapsed,
 };
 
 /// A batch, what its tags did, and the alarms of its time.
@@ -44,11 +43,6 @@ impl BatchReport {
     /// Its time, as a period to report on.
     pub fn period(&self) -> Period {
         Period { name: self.batch.label(), from: self.batch.from, to: self.until }
-    }
-
-    /// How long it has lasted.
-    pub fn duration(&self) -> Duration {
-        elapsed(self.batch.from, self.until)
     }
 }
 
@@ -132,7 +126,7 @@ fn own_cells(report: &BatchReport, def: &PlantDef, dialect: CsvDialect) -> Vec<S
         plain(batch.number.to_string()),
         time(batch.from),
         batch.to.map(time).unwrap_or_default(),
-        minutes(report.duration(), dialect),
+        minutes(batch.lasted, dialect),
         plain(state(batch)),
         number(kwh, 3, dialect),
         number(good.map(floor_percent), 1, dialect),
@@ -166,8 +160,8 @@ pub fn text(batches: &[BatchReport], def: &PlantDef) -> String {
     for report in batches {
         let BatchReport { batch, energy, alarms, tags, .. } = report;
         let to = batch.to.map_or_else(|| "…".into(), local);
-        let mut facts = vec![minutes(report.duration()), state(batch).into()];
-        facts.extend(energy.map(|(kwh, good)| match good < 1.0 {
+        let mut facts = vec![minutes(report.batch.lasted), state(batch).into()];
+        facts.extend(energy.map(|(kwh, good)| match floor_percent(good) < 100.0 {
             true => format!("{kwh:.3} kWh in {:.1} % of the time", floor_percent(good)),
             false => format!("{kwh:.3} kWh"),
         }));

@@ -14,6 +14,7 @@ use crate::{
         batch::{Batch, BatchEvent, BatchRecord, batches},
         keyword::Keyword,
         record::AlarmEvent,
+        time::elapsed,
     },
     report::batch::{self, BatchReport},
 };
@@ -60,7 +61,7 @@ impl Store {
         report.tags = gathered.rows(&self.def, &tags, active.iter().chain(&events));
         let energy = rule.energy.map(|energy| self.def.tag(energy).name.as_str());
         let energy = report.tags.iter().find(|figures| Some(figures.tag.as_str()) == energy);
-        report.energy = energy.and_then(|figures| batch::energy(figures, report.duration()));
+        report.energy = energy.and_then(|figures| batch::energy(figures, elapsed(from, until)));
         report.unreadable = gathered.unreadable;
         Ok(report)
     }

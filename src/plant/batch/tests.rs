@@ -159,4 +159,5 @@ fn a_clock_that_was_set_back_makes_no_negative_time() {
     records[1].at = at(50);
     let batch = &batches(&records, at(120))[0];
     assert_eq!(batch.phases, [("FILL".into(), Duration::ZERO), ("HEAT".into(), Duration::from_secs(60))]);
+    assert_eq!(batch.lasted, Duration::from_secs(60));
 }

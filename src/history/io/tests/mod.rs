@@ -4,6 +4,7 @@
 mod absent;
 mod archive;
 mod backup;
+mod batches;
 mod compact;
 mod damage;
 mod epochs;

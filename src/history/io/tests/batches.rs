@@ -1,0 +1,126 @@
+//! Batches, stored by a station that is killed now and then.
+
+use super::*;
+use crate::{
+    history::BATCHES_MAX,
+    plant::{
+        Plant,
+        batch::{BatchDef, BatchEvent, BatchRecord},
+        event::{Event, Fault},
+        expr::{Compare, Expr},
+        fixture::{self, DP, FAULT, PLC, PV, RUN, TIC},
+    },
+    report::batch::BatchReport,
+};
+
+/// The fixture, which makes a batch while it is switched on.
+fn making() -> Arc<PlantDef> {
+    let mut def = fixture::plant();
+    def.tags.iter_mut().for_each(|tag| tag.deadband = Some(0.0));
+    def.batches = vec![BatchDef {
+        name: "soup".into(),
+        start: Expr::test(RUN, Compare::Equal, 1.0),
+        end: Expr::test(RUN, Compare::Equal, 0.0),
+        phase: Some(RUN),
+        energy: None,
+        tags: vec![PV],
+    }];
+    Arc::new(def)
+}
+
+fn batches(store: &Store, from: i64, to: i64, limit: usize, now: i64) -> Vec<BatchReport> {
+    match store.answer(&Query::Batches { from: sec(from), to: sec(to), limit }, sec(now)).unwrap() {
+        Answer::Batches(batches) => batches,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A station from one second to another; its PLC is on for 40 of 60 s, and answers nothing in `silent`.
+fn station(db: &Path, def: &Arc<PlantDef>, seconds: std::ops::Range<i64>, silent: std::ops::Range<i64>) {
+    let opened = Store::open_at_start(db, def, sec(seconds.start)).unwrap();
+    let mut plant = Plant::new(def.clone(), sec(seconds.start), 1.0);
+    let store = opened.store;
+    store.append(&plant.restore_batches(&opened.read.batches, opened.read.off)).unwrap();
+    for second in seconds {
+        let at = sec(second);
+        let read = |device, values| Event::Read {
+            at,
+            device,
+            values,
+            texts: Vec::new(),
+            reply: Duration::from_millis(9),
+            exchange: None,
+        };
+        let mut records = plant.on_event(read(TIC, vec![(DP, 0.0), (FAULT, 0.0), (PV, (second % 17) as f64)])).records;
+        let on = f64::from(u8::from(second % 60 < 40));
+        let plc = match silent.contains(&second) {
+            true => Event::Failed { at, device: PLC, tags: vec![RUN], fault: Fault::NotConnected, exchange: None },
+            false => read(PLC, vec![(RUN, on)]),
+        };
+        records.extend(plant.on_event(plc).records);
+        store.append(&records).unwrap();
+    }
+}
+
+#[test]
+fn batches_survive_kills_and_have_the_figures_of_a_report() {
+    let (_folder, db) = folder();
+    let def = making();
+    // From the middle of a batch; killed in one, and off over the whole next one; then silent over an end.
+    station(&db, &def, 1_030..1_150, 0..0);
+    station(&db, &def, 1_270..1_420, 1_295..1_305);
+    let store = Store::open_read_only(&db, &def).unwrap();
+    let found = batches(&store, 0, 2_000, 50, 1_420);
+    let facts = |report: &BatchReport| {
+        let batch = &report.batch;
+        let second = |at: Timestamp| at.as_second();
+        (batch.number, second(batch.from), batch.to.map(second), batch.seen, batch.unknown.as_secs())
+    };
+    let found: Vec<_> = found.iter().rev().map(|report| (facts(report), report)).collect();
+    // PLC-1 is on in the first 40 s of each minute: 1020 to 1060, 1080 to 1120, 1140 to 1180, 1260 to 1300, 1320 to 1360.
+    let expect = [
+        (1, 1_030, Some(1_060), (false, true), 0),
+        (2, 1_080, Some(1_120), (true, true), 0),
+        // It goes on: nobody can tell that another one began in the two minutes between.
+        (3, 1_140, Some(1_305), (true, false), 1_270 - 1_150 + 1_305 - 1_295),
+        (4, 1_320, Some(1_360), (true, true), 0),
+        (5, 1_380, None, (true, true), 0),
+    ];
+    assert_eq!(found.iter().map(|(facts, _)| *facts).collect::<Vec<_>>(), expect);
+    for (_, report) in found {
+        let period = report.period();
+        let Answer::Report(all) = store.answer(&Query::Report { period }, sec(1_420)).unwrap() else { panic!() };
+        let expect = all.tags.into_iter().find(|tag| tag.tag == "TIC-1.PV");
+        assert_eq!(report.tags, expect.into_iter().collect::<Vec<_>>());
+        assert_eq!(
+            report.batch.phases.iter().map(|(_, time)| *time).sum::<Duration>() + report.batch.unknown,
+            report.batch.lasted
+        );
+        assert!(all.batches.iter().any(|of_report| of_report == report), "the report lists it as well");
+    }
+}
+
+#[test]
+fn a_span_has_the_batches_that_ran_in_it_newest_first() {
+    let (_folder, db) = folder();
+    let def = making();
+    let store = Store::open(&db, &def, sec(0)).unwrap().store;
+    let record = |number: u32, place, at, event| {
+        Record::Batch(BatchRecord { at: sec(at), batch: "soup".into(), number, place, event, phase: None })
+    };
+    let one = |number: u32| {
+        let begin = i64::from(number) * 100;
+        [record(number, 0, begin, BatchEvent::Started), record(number, 1, begin + 60, BatchEvent::Ended)]
+    };
+    let many = u32::try_from(BATCHES_MAX).unwrap() + 5;
+    store.append(&(1..=many).flat_map(one).collect::<Vec<_>>()).unwrap();
+    let numbers = |found: &[BatchReport]| found.iter().map(|report| report.batch.number).collect::<Vec<_>>();
+    let now = i64::from(many) * 100 + 99;
+    assert_eq!(numbers(&batches(&store, 250, 401, 9, now)), [4, 3, 2]);
+    assert_eq!(numbers(&batches(&store, 260, 400, 9, now)), [3], "its end is not in it, nor its begin");
+    assert_eq!(numbers(&batches(&store, 0, now, 2, now)), [many, many - 1]);
+    let figures = |limit| batches(&store, 0, now, limit, now).iter().all(|report| report.alarms.is_some());
+    assert_eq!((figures(BATCHES_MAX), figures(BATCHES_MAX + 1)), (true, false));
+    let refused = store.answer(&Query::Batches { from: sec(9), to: sec(9), limit: 1 }, sec(now));
+    assert_eq!(refused, Err(HistoryError::EmptyPeriod));
+}
