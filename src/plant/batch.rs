@@ -98,7 +98,7 @@ pub struct Batch {
     pub lasted: Duration,
     /// How long each phase lasted, in the order in which they first came.
     pub phases: Vec<(Arc<str>, Duration)>,
-    /// How long nobody knew the phase.
+    /// How long the phase was not known.
     pub unknown: Duration,
 }
 

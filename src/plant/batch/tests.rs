@@ -1,3 +1,5 @@
+//! Batches from what is read: their begin, phases and end, over failures and restarts.
+
 use super::*;
 use crate::plant::{
     expr::Compare,
@@ -116,9 +118,9 @@ fn a_late_answer_decides_nothing_and_a_lost_one_is_unknown() {
 fn what_begins_unseen_says_so() {
     // Already running when the plant is first read.
     assert_eq!(words(&follow(&mut fresh(), &[(1, Bad), (2, Good(1.0))])), ["2 1.0 found running FILL"]);
-    // Not a start: it may be any phase of a batch that nobody saw begin.
+    // Not a start: it may be any phase of a batch whose begin was not seen.
     assert_eq!(words(&follow(&mut fresh(), &[(1, Good(2.0)), (2, Good(0.0))])), [""; 0]);
-    // It began while nobody could see it.
+    // It began unseen.
     let records = follow(&mut fresh(), &[(1, Good(0.0)), (2, Bad), (3, Good(1.0))]);
     assert_eq!(words(&records), ["3 1.0 found running FILL"]);
     // The one before it ended there, too.

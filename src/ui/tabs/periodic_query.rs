@@ -10,7 +10,7 @@ use crate::{
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
     },
-    report::ShiftReport,
+    report::{ShiftReport, batch::BatchReport},
     ui::{UiAction, ViewContext},
 };
 
@@ -149,6 +149,7 @@ from_answer! {
     LineMinutes: Vec<LineMinute>;
     Report: Box<ShiftReport>;
     AlarmMetrics: Box<PeriodMetrics>;
+    Batches: Vec<BatchReport>;
 }
 
 /// Seconds of the operator as plant time, which runs faster in demonstrations.

@@ -1,6 +1,7 @@
-//! Tab 5: the report of a shift or of any period, as the CSV will have it; and the CSV.
+//! Tab 5: the report of a shift or of any period, as the CSV will have it; the batches; and the CSV.
 
 pub(super) mod period;
+mod batches;
 mod view;
 
 #[cfg(test)]
@@ -8,6 +9,7 @@ mod tests;
 
 use std::path::PathBuf;
 
+use self::batches::Batches;
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -34,6 +36,8 @@ pub enum Action {
     Refresh,
     /// Why the values of the report are what they are now.
     Why,
+    /// The list of batches.
+    Batches,
 }
 
 /// Keys of this tab.
@@ -48,8 +52,12 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('w'), "", "explain its current values", Action::Why),
 ];
 
-fn table() -> Vec<Key<Action>> {
-    [KEYS, &motions!("", Action::Move)].concat()
+/// The key of a plant that makes batches.
+const BATCHES: &[Key<Action>] = &[Key::new(char('b'), "batches", "the list of batches", Action::Batches)];
+
+fn table(cx: &ViewContext) -> Vec<Key<Action>> {
+    let batches = if cx.def().batches.is_empty() { &[] } else { BATCHES };
+    [KEYS, batches, &motions!("", Action::Move)].concat()
 }
 
 /// How often the figures of a running shift are refreshed, and when an answer counts as lost (real time).
@@ -66,6 +74,7 @@ pub struct Reports {
     follow: bool,
     /// The report of that very period.
     report: Answered<Box<ShiftReport>>,
+    batches: Batches,
     dialect: CsvDialect,
     export: Export,
     /// The CSV that waits for the station's word.
@@ -93,6 +102,7 @@ impl TabView for Reports {
             period: period::at(&snapshot.def, snapshot.at),
             follow: true,
             report: Answered::default(),
+            batches: Batches::default(),
             dialect: snapshot.def.report.csv,
             export: Export::Not,
             outgoing: None,
@@ -112,11 +122,12 @@ impl TabView for Reports {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.report.query.awaits(number)
+        self.report.query.awaits(number) || self.batches.rows.query.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.report.on_answer(cx, number, &answer);
+        self.batches.rows.on_answer(cx, number, &answer);
         self.ask(cx)
     }
 
@@ -143,21 +154,36 @@ impl TabView for Reports {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        view::draw(self, cx, frame, area);
+        match self.batches.shown {
+            true => self.batches.view(cx, frame, area, view::export_words(self, cx, &self.batches_path(cx))),
+            false => view::draw(self, cx, frame, area),
+        }
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.dismiss();
-        keys::find(&table(), event).map(|action| self.act(cx, action)).unwrap_or_default()
+        match self.batches.shown {
+            true => keys::find(&batches::keys(), event).map(|action| self.act_on_batches(cx, action)),
+            false => keys::find(&table(cx), event).map(|action| self.act(cx, action)),
+        }
+        .unwrap_or_default()
     }
 
-    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
-        keys::hints(&table())
+    fn back(&mut self, _cx: &ViewContext) -> bool {
+        std::mem::take(&mut self.batches.shown)
+    }
+
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        match self.batches.shown {
+            true => keys::hints(&batches::keys()),
+            false => keys::hints(&table(cx)),
+        }
     }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        vec![("reports", keys::chords_of(&table()))]
+        let report = [KEYS, BATCHES, &motions!("", Action::Move)].concat();
+        vec![("reports", keys::chords_of(&report)), ("batches", keys::chords_of(&batches::keys()))]
     }
 }
 
@@ -183,10 +209,31 @@ impl Reports {
                 self.export = Export::Not;
             }
             Action::Refresh => self.report.query.want(),
+            Action::Batches => (self.batches.shown, self.export) = (true, Export::Not),
             Action::Why => {
                 let rows = self.report.value.iter().flat_map(|report| &report.tags);
                 return Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()));
             }
+        }
+        self.ask(cx)
+    }
+
+    fn act_on_batches(&mut self, cx: &ViewContext, action: batches::Action) -> Vec<UiAction> {
+        match action {
+            batches::Action::Move(motion) => self.batches.select(cx, motion),
+            batches::Action::Report => {
+                if let Some(period) = self.batches.period() {
+                    self.batches.shown = false;
+                    self.show(Some(period));
+                }
+            }
+            batches::Action::Trend => return self.batches.trend(cx).into_iter().collect(),
+            batches::Action::Export => {
+                let bytes = report::batch::csv(self.batches.rows(), cx.def(), self.dialect);
+                let listed = !self.batches.rows().is_empty();
+                return self.send(listed.then(|| (self.batches_path(cx), bytes)));
+            }
+            batches::Action::Back => (self.batches.shown, self.export) = (false, Export::Not),
         }
         self.ask(cx)
     }
@@ -220,6 +267,9 @@ impl Reports {
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
         let closed = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
+        if self.batches.shown {
+            return self.batches.ask(cx, &mut self.number).into_iter().collect();
+        }
         let Some(period) = self.period.clone() else { return Vec::new() };
         let number = (Tab::Reports, &mut self.number);
         let query = self.report.query.ask(cx, number, every, real(cx, TIMEOUT_S), Query::Report { period });
@@ -228,18 +278,33 @@ impl Reports {
 
     /// Writes exactly the figures that are shown.
     fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let Some(report) = &self.report.value else {
+        let file = self
+            .report
+            .value
+            .as_ref()
+            .map(|report| (self.path(cx, report), report::FORMATS[0].render(report, cx.def(), self.dialect)));
+        self.send(file)
+    }
+
+    /// Asks the station to record a file, which is then written.
+    fn send(&mut self, file: Option<(PathBuf, Vec<u8>)>) -> Vec<UiAction> {
+        let Some((path, bytes)) = file else {
             self.export = Export::Failed(t!("nothing to export yet").to_owned());
             return Vec::new();
         };
         if self.outgoing.is_some() {
             return Vec::new();
         }
-        let bytes = report::FORMATS[0].render(report, cx.def(), self.dialect);
-        let outgoing = Outgoing { tab: Tab::Reports, path: self.path(cx, report), bytes };
+        let outgoing = Outgoing { tab: Tab::Reports, path, bytes };
         let request = outgoing.export_request();
         (self.export, self.outgoing) = (Export::Writing, Some(outgoing));
         vec![request]
+    }
+
+    /// `2026-11-24-batches.csv`: the list as it is on that day.
+    fn batches_path(&self, cx: &ViewContext) -> PathBuf {
+        let day = cx.now.to_zoned(cx.def().time_zone.clone()).date();
+        cx.def().report.folder.join(format!("{day}-batches.csv"))
     }
 
     fn path(&self, cx: &ViewContext, report: &ShiftReport) -> PathBuf {

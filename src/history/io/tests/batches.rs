@@ -81,7 +81,7 @@ fn batches_survive_kills_and_have_the_figures_of_a_report() {
     let expect = [
         (1, 1_030, Some(1_060), (false, true), 0),
         (2, 1_080, Some(1_120), (true, true), 0),
-        // It goes on: nobody can tell that another one began in the two minutes between.
+        // It goes on: that another one began in the two minutes between cannot be known.
         (3, 1_140, Some(1_305), (true, false), 1_270 - 1_150 + 1_305 - 1_295),
         (4, 1_320, Some(1_360), (true, true), 0),
         (5, 1_380, None, (true, true), 0),

@@ -9,10 +9,11 @@ use super::*;
 use crate::{
     access::{Durability, SessionRequest},
     plant::{
+        batch::Batch,
         def::Priority,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
     },
-    report::TagFigures,
+    report::{TagFigures, batch::BatchReport},
     ui::{
         Effect, Model, Msg, QueryId,
         fixture::{Fixture, now},
@@ -76,8 +77,12 @@ impl Stand {
     /// Answers what was asked; `full` with figures, else with an empty report.
     fn answer(&mut self, full: bool) {
         for (id, query) in std::mem::take(&mut self.asked) {
-            let Query::Report { period } = query else { panic!("reports ask for reports: {query:?}") };
-            self.send(Msg::Answer(id, Ok(Answer::Report(Box::new(report(period, full))))));
+            let answer = match query {
+                Query::Report { period } => Answer::Report(Box::new(report(period, full))),
+                Query::Batches { .. } => Answer::Batches(if full { batches() } else { Vec::new() }),
+                other => panic!("reports ask for reports and batches: {other:?}"),
+            };
+            self.send(Msg::Answer(id, Ok(answer)));
         }
     }
 
@@ -160,6 +165,58 @@ fn report(period: Period, full: bool) -> ShiftReport {
         record: Vec::new(),
         record_of: full.then(|| ("TIC-1".to_owned(), "°C".to_owned())),
     }
+}
+
+fn batches() -> Vec<BatchReport> {
+    let minutes = |minutes: u64| std::time::Duration::from_secs(minutes * 60);
+    let batch = |number: u32, end: Option<i64>, seen, unknown| {
+        let from = now() - SignedDuration::from_mins(i64::from(20 - number) * 40);
+        let phases = vec![("FILL".into(), minutes(6)), ("HEAT".into(), minutes(12)), ("HOLD".into(), minutes(3))];
+        let to = end.map(|end| from + SignedDuration::from_mins(end));
+        let batch = Batch { name: "hot-water".into(), number, from, to, seen, lasted: minutes(21), phases, unknown };
+        let until = to.unwrap_or(now());
+        let tags = report(Period { name: String::new(), from, to: until }, true).tags[..1].to_vec();
+        BatchReport {
+            tags,
+            energy: Some((0.263, 1.0)),
+            alarms: Some(u64::from(number % 3)),
+            ..BatchReport::new(batch, until)
+        }
+    };
+    let ended = (3..19).rev().map(|number| batch(number, Some(30), (true, number % 4 != 0), minutes(0)));
+    std::iter::once(batch(19, None, (true, true), minutes(0)))
+        .chain(ended)
+        .chain([batch(2, Some(30), (false, true), minutes(9))])
+        .collect()
+}
+
+#[test]
+fn batches_are_listed_reported_and_exported() {
+    for (name, width, height) in [("batches_at_80x24", 80, 24), ("batches_at_120x40", 120, 40)] {
+        let mut stand = Stand::new(Theme::FULL, width, height);
+        stand.press("b");
+        stand.answer(true);
+        stand.press("↓");
+        insta::assert_snapshot!(name, stand.screen());
+    }
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("b");
+    stand.answer(false);
+    assert!(stand.screen().contains("No batch ran yet."));
+    stand.press("e");
+    assert!(stand.screen().contains("not written: nothing to export yet"));
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("b");
+    stand.answer(true);
+    stand.press("↓e");
+    let (path, bytes) = stand.saved.pop().expect("written");
+    assert!(path.ends_with("2026-11-21-batches.csv"), "{path:?}");
+    assert_eq!(bytes.iter().filter(|byte| **byte == b'\n').count(), 1 + batches().len(), "a header and a row each");
+    stand.press("⏎");
+    let (_, asked) = stand.asked.last().expect("it asks for a report");
+    assert_eq!(*asked, Query::Report { period: batches()[1].period() });
+    stand.answer(true);
+    assert!(stand.screen().contains("hot-water-18"));
 }
 
 #[test]

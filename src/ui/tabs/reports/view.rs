@@ -1,6 +1,6 @@
 //! The view of the reports tab: which period, its figures, alarms and actions, and what the CSV will be.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use jiff::tz::TimeZone;
 use ratatui::text::{Line, Span};
@@ -83,15 +83,7 @@ fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden
     let separator = if dialect.separator == ';' { t!("semicolons") } else { t!("commas") };
     let decimal = if dialect.decimal == ',' { t!("decimal comma") } else { t!("decimal point") };
     let bom = if dialect.bom { t!(", BOM") } else { "" };
-    let path = reports.path(cx, report);
-    let (text, style) = match &reports.export {
-        Export::Not => (t!("e writes {display}", display = path.display()), theme.dim()),
-        Export::Writing => (t!("writing {display}", display = path.display()), theme.normal()),
-        Export::Done(path) => {
-            (t!("{pick} written {display}", pick = theme.pick("✓", t!("ok")), display = path.display()), theme.done())
-        }
-        Export::Failed(why) => (t!("not written: {why}", why), theme.trouble()),
-    };
+    let (text, style) = export_words(reports, cx, &reports.path(cx, report));
     let more = t!("   {pick} {hidden} more", pick = theme.pick("↓", t!("down")), hidden);
     let more = if hidden > 0 { more } else { String::new() };
     // The path matters most: the format is written in full where there is room.
@@ -105,6 +97,19 @@ fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden
     let kind = kinds.iter().find(|kind| fits(kind)).unwrap_or(&kinds[2]);
     row.text(1, 0, &fit(&text, end.saturating_sub(width(kind) + 2)), style);
     row.text_right(end, 0, kind, theme.dim());
+}
+
+/// How the file stands that is or would be written.
+pub fn export_words(reports: &Reports, cx: &ViewContext, path: &Path) -> (String, Style) {
+    let theme = cx.theme;
+    match &reports.export {
+        Export::Not => (t!("e writes {display}", display = path.display()), theme.dim()),
+        Export::Writing => (t!("writing {display}", display = path.display()), theme.normal()),
+        Export::Done(path) => {
+            (t!("{pick} written {display}", pick = theme.pick("✓", t!("ok")), display = path.display()), theme.done())
+        }
+        Export::Failed(why) => (t!("not written: {why}", why), theme.trouble()),
+    }
 }
 
 /// Widths of the table: tag, unit, then right-aligned figures.

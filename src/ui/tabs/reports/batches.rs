@@ -1,0 +1,189 @@
+//! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
+
+use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::batch::Batch,
+    report::{Period, TagFigures, batch::BatchReport, text::mean_or_difference},
+};
+
+/// What a key means on the list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Select another row.
+    Move(Motion),
+    /// The report of the selected one.
+    Report,
+    /// The curves of its time.
+    Trend,
+    /// Write the list as CSV.
+    Export,
+    /// The reports of shifts.
+    Back,
+}
+
+/// Keys of the list.
+const KEYS: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Enter), "report", "the whole report of its time", Action::Report),
+    Key::new(char('t'), "trend", "the curves of its time", Action::Trend),
+    Key::new(char('e'), "export", "write the list as CSV", Action::Export).needs(Role::Technician),
+    Key::new(char('b'), "shifts", "the reports of shifts", Action::Back),
+];
+
+/// All keys of the list.
+pub fn keys() -> Vec<Key<Action>> {
+    [&motions!("select", Action::Move), KEYS].concat()
+}
+
+/// Rows of one answer; the command `batches` has all of them.
+const ROWS: usize = 50;
+/// The list reaches back so far.
+const SPAN: SignedDuration = SignedDuration::from_hours(24 * 30);
+/// How often the list is refreshed, and when an answer counts as lost (real time).
+const EVERY_S: f64 = 10.0;
+const TIMEOUT_S: f64 = 20.0;
+
+/// State of the list.
+#[derive(Debug, Default)]
+pub struct Batches {
+    /// It is shown in place of a report.
+    pub shown: bool,
+    pub rows: Answered<Vec<BatchReport>>,
+    selected: Selected<String>,
+}
+
+impl Batches {
+    /// The batches that are listed, newest first.
+    pub fn rows(&self) -> &[BatchReport] {
+        self.rows.value.as_deref().unwrap_or_default()
+    }
+
+    fn labels(&self) -> impl Iterator<Item = String> + '_ {
+        self.rows().iter().map(|report| report.batch.label())
+    }
+
+    fn place(&self) -> usize {
+        self.selected.place(self.labels())
+    }
+
+    /// The period of the selected batch.
+    pub fn period(&self) -> Option<Period> {
+        self.rows().get(self.place()).map(BatchReport::period)
+    }
+
+    pub fn select(&mut self, cx: &ViewContext, motion: Motion) {
+        let (labels, room) = (self.labels().collect::<Vec<_>>(), self.room(cx, cx.area.height));
+        self.selected.on(motion, labels, room);
+    }
+
+    /// The first pen of its rule, and the middle of its time.
+    pub fn trend(&self, cx: &ViewContext) -> Option<UiAction> {
+        let report = self.rows().get(self.place())?;
+        let rule = cx.def().batches.iter().find(|rule| rule.name == report.batch.name)?;
+        let tag = *rule.tags.first().or(rule.energy.as_ref()).or(rule.phase.as_ref())?;
+        let half = report.until.duration_since(report.batch.from) / 2;
+        Some(UiAction::ShowOnTrends(tag, report.batch.from + half))
+    }
+
+    /// Asks the history when it is time to.
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
+        let to = cx.now + SignedDuration::from_secs(1);
+        let query = Query::Batches { from: to - SPAN, to, limit: ROWS };
+        self.rows.query.ask(cx, (Tab::Reports, number), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
+    }
+
+    /// Rows of the list on a tab of this height: the rest is about the selected batch.
+    fn room(&self, cx: &ViewContext, height: u16) -> usize {
+        let details = self.rows().get(self.place()).map_or(0, |report| details(cx, report).len());
+        usize::from(height).saturating_sub(details + 4).max(3)
+    }
+
+    /// Draws it, with a last row about the file.
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect, file: (String, Style)) {
+        let theme = cx.theme;
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let (columns, height) = (canvas.width(), canvas.height());
+        let x = canvas.text(1, 0, t!("Batches  "), theme.strong());
+        let words = match (&self.rows.trouble, self.rows().len()) {
+            (Some(trouble), _) => trouble.clone(),
+            (None, ROWS..) => t!("the newest {ROWS}; the command `batches` has all", ROWS),
+            (None, _) => t!("last 30 days").to_owned(),
+        };
+        let style = if self.rows.trouble.is_some() { theme.trouble() } else { theme.normal() };
+        canvas.text(x, 0, &fit(&words, columns.saturating_sub(x + 1)), style);
+        let names = [t!("batch"), t!("begin"), t!("minutes"), t!("state"), t!("kWh"), t!("alarms")];
+        canvas.text(1, 1, &fit(&draw::columns(WIDTHS, names), columns), theme.dim());
+        canvas.text(1, height.saturating_sub(1), &fit(&file.0, columns.saturating_sub(2)), file.1);
+        if self.rows().is_empty() {
+            let words = if self.rows.value.is_some() { t!("No batch ran yet.") } else { t!("collecting data") };
+            canvas.text(2, 3, words, theme.dim());
+            return;
+        }
+        let (place, room) = (self.place(), self.room(cx, height));
+        for (y, n, report) in on_screen(self.rows(), first(place, self.rows().len(), room), room) {
+            let style = if n == place { theme.focus() } else { theme.normal() };
+            canvas.text(0, y + 2, &pad(&format!(" {}", row(cx, report)), columns), style);
+        }
+        let y = to_u16(room.min(self.rows().len())) + 2;
+        for (line, text) in details(cx, &self.rows()[place]).iter().enumerate() {
+            canvas.text(1, y + 1 + to_u16(line), &fit(text, columns.saturating_sub(2)), theme.normal());
+        }
+    }
+}
+
+const WIDTHS: [i16; 6] = [15, 12, -7, 23, -8, -6];
+
+fn row(cx: &ViewContext, report: &BatchReport) -> String {
+    let batch = &report.batch;
+    let begin = moment(batch.from, cx.now, &cx.def().time_zone);
+    let kwh = report.energy.map_or("–".to_owned(), |(kwh, _)| format!("{kwh:.3}"));
+    let alarms = report.alarms.map_or("–".to_owned(), |alarms| alarms.to_string());
+    draw::columns(WIDTHS, [&batch.label(), &begin, &minutes(batch.lasted), state(batch), &kwh, &alarms])
+}
+
+/// How it stands, and what of it was not seen.
+fn state(batch: &Batch) -> &'static str {
+    match (batch.to, batch.seen) {
+        (None, (true, _)) => t!("RUNNING"),
+        (None, (false, _)) => t!("RUNNING, begin not seen"),
+        (Some(_), (true, true)) => t!("ended"),
+        (Some(_), (false, true)) => t!("ended, begin not seen"),
+        (Some(_), (true, false)) => t!("ended, end not seen"),
+        (Some(_), (false, false)) => t!("ended, not seen"),
+    }
+}
+
+/// Its end, phases and tags.
+fn details(cx: &ViewContext, report: &BatchReport) -> Vec<String> {
+    let batch = &report.batch;
+    let end = match batch.to {
+        Some(to) => t!("{name}: end {moment}", name = batch.label(), moment = moment(to, cx.now, &cx.def().time_zone)),
+        None => t!("{name}: running", name = batch.label()),
+    };
+    let phase =
+        |(name, time): &(std::sync::Arc<str>, Duration)| t!("{name} {minutes} min", name, minutes = minutes(*time));
+    let mut phases: Vec<String> = batch.phases.iter().map(phase).collect();
+    if !batch.unknown.is_zero() {
+        phases.push(t!("unknown {minutes} min", minutes = minutes(batch.unknown)));
+    }
+    let phases = wrap(&phases.join(", "), cx.area.width.saturating_sub(4));
+    let tags = report.tags.iter().map(figures);
+    std::iter::once(end).chain(phases).chain(tags).collect()
+}
+
+fn figures(tag: &TagFigures) -> String {
+    let value =
+        |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.*}", usize::from(tag.decimals)));
+    t!(
+        "{tag} {min} to {max} {unit}   mean/+ {mean}   good {good} %",
+        tag = pad(&tag.tag, 16),
+        min = pad_left(&value(tag.min), 8),
+        max = value(tag.max),
+        unit = tag.unit,
+        mean = mean_or_difference(tag).replace('—', "–"),
+        good = format!("{:.1}", (tag.good * 1_000.0).floor() / 10.0),
+    )
+}
+
+fn minutes(time: Duration) -> String {
+    format!("{:.1}", time.as_secs_f64() / 60.0)
+}
