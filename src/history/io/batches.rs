@@ -24,11 +24,11 @@ impl Store {
     /// [`BATCHES_MAX`].
     pub(super) fn batches(
         &self,
-        (from, to, limit): (Timestamp, Timestamp, usize),
+        (from, to, limit): (Timestamp, Timestamp, u64),
         now: Timestamp,
     ) -> Result<Vec<BatchReport>, HistoryError> {
         check_span(from, to)?;
-        let records = self.list(sql::BATCHES, params![utc(from), utc(to), limit as u64], record)?;
+        let records = self.list(sql::BATCHES, params![utc(from), utc(to), limit], record)?;
         within(records.len() as u64, ROWS_MAX)?;
         let batches = batches(&records, now);
         let with_figures = batches.len() <= BATCHES_MAX;

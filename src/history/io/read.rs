@@ -58,7 +58,7 @@ impl Store {
             Query::Values { tags, from, every, count } => {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
-            Query::Batches { from, to, limit } => self.batches((*from, *to, *limit), now).map(Answer::Batches),
+            Query::Batches { from, to, limit } => self.batches((*from, *to, *limit as u64), now).map(Answer::Batches),
             Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
             Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),

@@ -113,7 +113,7 @@ impl Store {
         let alarm_metrics = self.alarm_metrics(from, until, now)?;
         let batches = match def.batches.as_slice() {
             [] => Vec::new(),
-            [..] => self.batches((from, until, ROWS_MAX as usize), now)?,
+            [..] => self.batches((from, until, ROWS_MAX), now)?,
         };
         let period = period.clone();
         Ok(ShiftReport {

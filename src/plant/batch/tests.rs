@@ -10,7 +10,7 @@ use crate::plant::{
 const STEP: TagId = TagId(4);
 
 fn at(second: i64) -> Timestamp {
-    Timestamp::from_second(second).unwrap()
+    Timestamp::from_second(second).expect("a small number")
 }
 
 /// Begins with FILL (1), ends with IDLE (0); 2 is HEAT, 3 has no word.
