@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod alarms;
+mod batches;
 mod calculated;
 mod inline;
 mod interlocks;
