@@ -8,6 +8,7 @@ use super::{
     id::TagId,
     sample::{Cause, Quality, Sample},
     tag::TagDef,
+    totalizer::{Total, Totalizer},
 };
 
 /// How a value is calculated.
@@ -15,6 +16,8 @@ use super::{
 pub struct Calculation {
     /// As it is written.
     pub text: String,
+    /// What of the expression is totalled; `None` where it is the value itself.
+    pub total: Option<Total>,
     /// What that means.
     pub expr: Expr,
 }
@@ -22,20 +25,35 @@ pub struct Calculation {
 /// A calculated tag and those that it needs.
 type Inputs = (TagId, Vec<TagId>);
 
+/// A calculated tag, those that it needs, and its total if it is one.
+type Step = (TagId, Vec<TagId>, Option<Totalizer>);
+
 /// The calculated tags, each after those that it needs.
 #[derive(Debug, Clone, Default)]
 pub struct Calculator {
-    order: Vec<Inputs>,
+    order: Vec<Step>,
 }
 
 impl Calculator {
     /// Of tags without a cycle; those of a cycle are never calculated.
     pub fn new(tags: &[TagDef]) -> Calculator {
-        Calculator { order: order(tags).0 }
+        let total = |tag: TagId| tags[tag.index()].calculation.as_ref().and_then(|calculation| calculation.total);
+        let step = |(tag, inputs): Inputs| (tag, inputs, total(tag).map(Totalizer::new));
+        Calculator { order: order(tags).0.into_iter().map(step).collect() }
+    }
+
+    /// Lets every total go on from its last stored value, or from 0; gives the tags that are totals.
+    pub fn restore_totals(&mut self, stored: &[(TagId, f64)]) -> Vec<TagId> {
+        let totals = self.order.iter_mut().filter_map(|(tag, _, total)| {
+            let value = stored.iter().find(|(stored, _)| stored == tag).map_or(0.0, |(_, value)| *value);
+            total.as_mut()?.restore(value);
+            Some(*tag)
+        });
+        totals.collect()
     }
 
     /// The new samples of all tags that need a `touched` one, themselves or through others.
-    pub fn changed(&self, def: &PlantDef, touched: &[TagId], samples: &[Sample]) -> Vec<(TagId, Sample)> {
+    pub fn changed(&mut self, def: &PlantDef, touched: &[TagId], samples: &[Sample]) -> Vec<(TagId, Sample)> {
         if self.order.is_empty() || touched.is_empty() {
             return Vec::new();
         }
@@ -43,12 +61,13 @@ impl Calculator {
         let mut is_changed = vec![false; samples.len()];
         touched.iter().for_each(|tag| is_changed[tag.index()] = true);
         let mut changed = Vec::new();
-        for (tag, inputs) in &self.order {
+        for (tag, inputs, total) in &mut self.order {
             let is_due = inputs.iter().any(|input| is_changed[input.index()]) || is_changed[tag.index()];
             if let Some(calculation) = def.tag(*tag).calculation.as_ref().filter(|_| is_due) {
                 let at = samples[tag.index()].at;
                 let sample =
                     calculate(&calculation.expr, inputs, |of| samples[of.index()], Sample::bad(Cause::NotRead, at));
+                let sample = total.as_mut().map_or(sample, |total| total.add(sample));
                 (samples[tag.index()], is_changed[tag.index()]) = (sample, true);
                 changed.push((*tag, sample));
             }
@@ -147,7 +166,10 @@ mod tests {
         let exprs = [arithmetic(deviation, Operator::Add, deviation), arithmetic(PV, Operator::Subtract, SV)];
         for (id, expr) in [double, deviation].into_iter().zip(exprs) {
             let tag = TagDef { id, ..def.tags[PV.index()].clone() };
-            def.tags.push(TagDef { calculation: Some(Arc::new(Calculation { text: String::new(), expr })), ..tag });
+            def.tags.push(TagDef {
+                calculation: Some(Arc::new(Calculation { text: String::new(), total: None, expr })),
+                ..tag
+            });
         }
         (def, double, deviation)
     }
@@ -155,7 +177,7 @@ mod tests {
     #[test]
     fn a_calculated_tag_follows_its_inputs_in_their_order() {
         let (def, double, deviation) = plant();
-        let calculator = Calculator::new(&def.tags);
+        let mut calculator = Calculator::new(&def.tags);
         let mut samples = vec![Sample::bad(Cause::NotRead, at(0)); def.tags.len()];
         (samples[PV.index()], samples[SV.index()]) = (Sample::good(72.5, at(3)), Sample::good(70.0, at(2)));
         let expect = [(deviation, Sample::good(2.5, at(3))), (double, Sample::good(5.0, at(3)))];
@@ -188,7 +210,8 @@ mod tests {
         let (mut def, double, deviation) = plant();
         assert_eq!(order(&def.tags).1, None);
         let expr = arithmetic(double, Operator::Add, PV);
-        def.tags[deviation.index()].calculation = Some(Arc::new(Calculation { text: String::new(), expr }));
+        def.tags[deviation.index()].calculation =
+            Some(Arc::new(Calculation { text: String::new(), total: None, expr }));
         assert_eq!(order(&def.tags).1, Some(vec![double, deviation]));
     }
 }

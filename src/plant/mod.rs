@@ -49,6 +49,7 @@ pub mod restore;
 pub mod station;
 pub mod snapshot;
 pub mod past;
+pub(crate) mod totalizer;
 pub(crate) mod calculation;
 pub(crate) mod clock_step;
 pub(crate) mod process_image;

@@ -175,11 +175,16 @@ impl ProcessImage {
 
     /// Calculates the tags of which an input was set since records were last taken, each after its inputs.
     pub fn calculate(&mut self) {
-        let calculator = std::mem::take(&mut self.calculator);
+        let mut calculator = std::mem::take(&mut self.calculator);
         for (tag, sample) in calculator.changed(&self.def, &self.touched, &self.samples) {
             self.set(tag, sample);
         }
         self.calculator = calculator;
+    }
+
+    /// Lets every total go on from its last stored value, or from 0.
+    pub fn restore_totals(&mut self, stored: &[(TagId, f64)]) {
+        self.touched.extend(self.calculator.restore_totals(stored));
     }
 
     /// The records due at `at`: changes beyond the deadband, changes of quality, and unchanged values at their interval, so

@@ -140,6 +140,11 @@ impl TagDef {
             in_sets: false,
         }
     }
+    /// Is it the total of an expression?
+    pub fn is_total(&self) -> bool {
+        self.calculation.as_ref().is_some_and(|calculation| calculation.total.is_some())
+    }
+
     /// Is it stored in the history?
     pub fn is_stored(&self) -> bool {
         self.store != StorePolicy::Never

@@ -8,7 +8,9 @@ use super::{
 };
 use crate::plant::{
     expr::{Compare, Expr, Function, Operator},
+    keyword::Keyword,
     tag::TagDef,
+    totalizer::Total,
 };
 
 /// Parentheses inside each other, and `not` before `not`: more than anybody can read.
@@ -25,7 +27,7 @@ const COMPARES: [(&str, Compare); 6] = [
 
 /// The condition that is written in a string. `None` after the problem was added.
 pub(super) fn expr(words: &At<String>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
-    let expr = near(words, None, defs, problems)?;
+    let expr = read(words, None, defs, problems, |reader| reader.any())?;
     if matches!(expr, Expr::Number(_) | Expr::Tag(_) | Expr::Arithmetic(..) | Expr::Call(..)) {
         problems.add(words.at, "this is a number, not a condition").label("expected `=`, `!=`, `<`, `<=`, `>` or `>=`");
         return None;
@@ -33,8 +35,24 @@ pub(super) fn expr(words: &At<String>, defs: &Defs, problems: &mut Problems) -> 
     Some(expr)
 }
 
-/// The expression that is written in a string; the tags of `device` may be named without it.
-pub(super) fn near(words: &At<String>, device: Option<&str>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
+/// What a calculated tag is: an expression, or a total of one. The tags of `device` may be named without it.
+pub(super) fn calculated(
+    words: &At<String>,
+    device: Option<&str>,
+    defs: &Defs,
+    problems: &mut Problems,
+) -> Option<(Option<Total>, Expr)> {
+    read(words, device, defs, problems, |reader| reader.total())
+}
+
+/// All that is written in a string.
+fn read<T>(
+    words: &At<String>,
+    device: Option<&str>,
+    defs: &Defs,
+    problems: &mut Problems,
+    what: impl FnOnce(&mut Reader) -> Option<T>,
+) -> Option<T> {
     let text = words.value.as_str();
     let (starts, tokens): (Vec<usize>, Vec<At<&str>>) = tokens(text)
         .into_iter()
@@ -42,9 +60,9 @@ pub(super) fn near(words: &At<String>, device: Option<&str>, defs: &Defs, proble
         .unzip();
     let mut reader =
         Reader { text, starts, tokens, next: 0, depth: 0, calls: 0, end: words.at, device, defs, problems };
-    let expr = reader.any()?;
+    let found = what(&mut reader)?;
     match reader.peek() {
-        None => Some(expr),
+        None => Some(found),
         Some(token) => {
             let (at, word) = (token.at, token.value);
             reader
@@ -112,6 +130,18 @@ impl<'a> Reader<'a, '_> {
         let found = self.peek().is_some_and(|token| token.value == word);
         self.next += usize::from(found);
         found
+    }
+
+    /// `integral(…)`, or an expression.
+    fn total(&mut self) -> Option<(Option<Total>, Expr)> {
+        let name = self.peek().map_or("", |token| token.value);
+        let opens = self.tokens.get(1).is_some_and(|next| next.value == "(");
+        let Some(total) = Total::from_word(name).filter(|_| opens) else { return Some((None, self.any()?)) };
+        let name = self.take()?;
+        self.next += 1;
+        let of = self.nested(Self::any)?;
+        self.close(name.at)?;
+        Some((Some(total), of))
     }
 
     fn any(&mut self) -> Option<Expr> {
@@ -211,9 +241,14 @@ impl<'a> Reader<'a, '_> {
     }
 
     fn call(&mut self, name: At<&'a str>) -> Option<Expr> {
+        if Total::from_word(name.value).is_some() {
+            let message = format!("`{}` cannot be part of an expression", name.value);
+            self.problems.add(name.at, message).label("expected a calculated tag of its own, and its name here");
+            return None;
+        }
         let Some(function) = Function::ALL.into_iter().find(|function| function.word() == name.value) else {
             let problem = self.problems.add(name.at, format!("unknown function `{}`", name.value));
-            let known = Function::ALL.map(Function::word);
+            let known = [Function::ALL.map(Function::word).as_slice(), &Total::ALL.map(Total::word)].concat();
             problem.label(format!("expected one of {}", known.join(", "))).suggest(name.value, known);
             return None;
         };

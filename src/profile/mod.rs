@@ -14,6 +14,7 @@ mod access;
 mod address;
 mod alarm;
 mod batch;
+mod calculated;
 mod condition;
 mod device;
 pub(crate) mod diagnostic;

@@ -1,13 +1,13 @@
 //! A plant file and the profiles it names become one `PlantDef`. Pure: the texts come from outside.
 
-use std::{collections::BTreeMap, rc::Rc, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, rc::Rc, time::Duration};
 
 use jiff::tz::TimeZone;
 
 use super::{
-    access, alarm, batch, device,
+    access, alarm, batch, calculated, device,
     diagnostic::{Errors, Problems},
-    expr, history, interlock, line, lint, mimic,
+    history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
     program, reader,
     reader::{At, Node, Raw, Written, text},
@@ -17,11 +17,10 @@ use super::{
     tag::{self, DeviceContext},
 };
 use crate::plant::{
-    calculation,
     def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, PlantDef, TagId},
     number::to_u16,
     poll_class,
-    tag::{Access, Calculation, PollClass, TagDef},
+    tag::{Access, PollClass, TagDef},
 };
 
 /// A text and the name the user knows it by.
@@ -70,7 +69,12 @@ fn is_of_size(raw: &Raw, problems: &mut Problems) -> bool {
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> Option<PlantDef> {
     let lines = line::lines(&file.lines, problems);
     let Devices { devices, mut tags, names, classes, exprs } = devices(file, &lines, library, problems)?;
-    calculate(exprs, &mut tags, Defs { names: &names, lines: &lines, devices: &devices, tags: &[] }, problems);
+    calculated::calculate(
+        exprs,
+        &mut tags,
+        Defs { names: &names, lines: &lines, devices: &devices, tags: &[] },
+        problems,
+    );
     let defs = Defs { names: &names, lines: &lines, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
     lint::lint(&file.alarms, problems);
@@ -103,26 +107,6 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         devices,
         tags,
     })
-}
-
-/// Reads what the calculated tags are, when all tags are known.
-fn calculate(exprs: Vec<(TagId, At<String>)>, tags: &mut [TagDef], defs: Defs, problems: &mut Problems) {
-    let mut found = Vec::new();
-    for (id, words) in &exprs {
-        // A name of a device has no dot.
-        let device = tags[id.index()].name.split_once('.').map(|(device, _)| device);
-        let expr = expr::near(words, device, &Defs { tags: &*tags, ..defs }, problems);
-        found.extend(expr.map(|expr| (*id, Calculation { text: words.value.clone(), expr })));
-    }
-    for (id, calculation) in found {
-        tags[id.index()].calculation = Some(Arc::new(calculation));
-    }
-    let Some(cycle) = calculation::order(tags).1 else { return };
-    let at = exprs.iter().find(|(id, _)| cycle.first() == Some(id)).map(|(_, words)| words.at);
-    let names: Vec<&str> = cycle.iter().chain(cycle.first()).map(|id| tags[id.index()].name.as_str()).collect();
-    if let Some(at) = at {
-        problems.add(at, "a calculated tag needs itself").label(names.join(" → "));
-    }
 }
 
 fn time_zone(name: &Option<At<String>>, problems: &mut Problems) -> TimeZone {

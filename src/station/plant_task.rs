@@ -103,6 +103,10 @@ impl PlantTask {
         mut messages: mpsc::Receiver<AuditMessage>,
     ) {
         self.file_sets(SetWork::Read);
+        if self.persistence.past.is_none() {
+            // There is no history that they could go on from.
+            self.plant.restore_totals(&[]);
+        }
         if self.persistence.past.as_ref().is_some_and(|past| past.from_journal) {
             // Events wait in their queue; the lines are polled meanwhile.
             self.await_history(past::WAIT_MAX).await;
@@ -226,8 +230,9 @@ impl PlantTask {
     /// Restores alarm states and metrics from the history.
     fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
-        let Restored { events, recent, chain_hashes, batches, off } = past.join(restored);
+        let Restored { events, recent, chain_hashes, batches, totals, off } = past.join(restored);
         let off = off.map(|off| off.checked_sub(self.clock.behind_utc()).unwrap_or(off));
+        self.plant.restore_totals(&totals);
         let resumed = self.plant.restore_batches(&batches, off);
         self.dispatch(resumed);
         if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {

@@ -20,7 +20,7 @@ use crate::{
     },
     plant::{
         batch::BatchRecord,
-        def::PlantDef,
+        def::{PlantDef, TagId},
         number::to_u32,
         record::{AlarmRecord, ChainHash},
     },
@@ -48,6 +48,8 @@ pub struct Restored {
     pub chain_hashes: Option<Vec<ChainHash>>,
     /// The last record of the batches of each name.
     pub batches: Vec<BatchRecord>,
+    /// The last values of the tags that are totals.
+    pub totals: Vec<(TagId, f64)>,
     /// When the station before this one ended.
     pub off: Option<Timestamp>,
 }
@@ -73,7 +75,8 @@ impl Store {
                 .ok();
             let batches = store.latest_batches()?;
             let off = store.extent().map(|(_, last)| last);
-            Ok(Restored { events, recent, chain_hashes, batches, off })
+            let totals = store.last_totals()?;
+            Ok(Restored { events, recent, chain_hashes, batches, totals, off })
         })
     }
 

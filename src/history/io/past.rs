@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use super::{
     read::{ROWS_MAX, alarm, line_minute},
     sql,
-    store::{Store, engine, instant, utc},
+    store::{Store, after, engine, instant, utc},
 };
 use crate::{
     history::{
@@ -23,6 +23,9 @@ use crate::{
     },
     report::step_series::{HOLD_MAX, expiry},
 };
+
+/// A total that has had no value for so many days of records begins at 0.
+const TOTALS_DAYS: i64 = 32;
 
 impl Store {
     /// What was in force at an instant. Every tag has a row in each hour that the station ran, and a good value one in
@@ -68,6 +71,27 @@ impl Store {
             // Nothing is stored yet: nothing is known.
             None => Ok(()),
         }
+    }
+
+    /// The last values of the tags that are totals, of those that have one in the last [`TOTALS_DAYS`]. A good one has a row
+    /// an hour; but it may have had none in the runs of the station that came last.
+    pub(super) fn last_totals(&self) -> Result<Vec<(TagId, f64)>, HistoryError> {
+        let Some((_, last)) = self.extent() else { return Ok(Vec::new()) };
+        let mut missing: Vec<TagId> = self.def.tags.iter().filter(|tag| tag.is_total()).map(|tag| tag.id).collect();
+        let (mut found, mut end) = (Vec::new(), after(last).unwrap_or(last));
+        for hours in [2, 48, TOTALS_DAYS * 24] {
+            let begin = last.checked_sub(jiff::SignedDuration::from_hours(hours)).unwrap_or(Timestamp::MIN);
+            if missing.is_empty() {
+                break;
+            }
+            let mut values = vec![None; missing.len()];
+            self.each_sample(&missing, begin, end, |place, sample| values[place] = sample.value.or(values[place]))?;
+            let of_each = missing.iter().zip(values);
+            found.extend(of_each.filter_map(|(tag, value)| Some((*tag, value?))));
+            missing.retain(|tag| found.iter().all(|(known, _)| known != tag));
+            end = begin;
+        }
+        Ok(found)
     }
 
     /// The latest sample of each tag until an instant, of those that matter in a span.

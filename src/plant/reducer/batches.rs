@@ -1,11 +1,16 @@
-//! The batches in the reducer: each rule is followed with every change of the plant.
+//! Batches and totals in the reducer: each rule is followed with every change of the plant, and goes on after a restart.
 
 use jiff::Timestamp;
 
 use super::Plant;
-use crate::plant::{batch::BatchRecord, record::Record};
+use crate::plant::{batch::BatchRecord, id::TagId, record::Record};
 
 impl Plant {
+    /// Lets the totals go on from their last stored values, or from 0. Without a call of this they have no value.
+    pub fn restore_totals(&mut self, stored: &[(TagId, f64)]) {
+        self.image.restore_totals(stored);
+    }
+
     /// Goes on with the batches of the station before this one, which ended at `off`: `latest` are the last records of each
     /// name. Without a call of this no batch is recorded.
     pub fn restore_batches(&mut self, latest: &[BatchRecord], off: Option<Timestamp>) -> Vec<Record> {

@@ -1,6 +1,7 @@
 //! Calculated tags of plant files.
 
 use super::*;
+use crate::plant::totalizer::Total;
 
 #[test]
 fn errors_of_a_calculated_tag_are_shown_at_their_place() {
@@ -14,6 +15,16 @@ fn errors_of_a_calculated_tag_are_shown_at_their_place() {
         let calculation = tag.calculation.as_ref().expect("it is calculated");
         assert_eq!((calculation.inputs(), tag.is_stored()), (vec![def.tag_named("D1.T").expect("it is there")], true));
     }
+    for (words, total, counter) in [
+        ("integral(T - 5)", Total::Integral, ""),
+        ("on_time(T > 5 and T < 9)", Total::OnTime, ""),
+        ("starts(D1.MODE = on)", Total::Starts, "\ncounter = false"),
+    ] {
+        let def = with(&format!("expr = '{words}'{counter}")).unwrap_or_else(|errors| panic!("{words}: {errors}"));
+        let tag = def.tag(def.tag_named("D1.DEV").expect("it is there"));
+        assert_eq!(tag.calculation.as_ref().map(|calculation| calculation.total), Some(Some(total)));
+        assert_eq!(tag.counter, Some(counter.is_empty()), "a report gives its difference");
+    }
     for (keys, expect) in [
         ("expr = 'T -'", "a tag is missing"),
         ("expr = 'T - Q'", "unknown tag `Q` in D1"),
@@ -21,6 +32,13 @@ fn errors_of_a_calculated_tag_are_shown_at_their_place() {
         ("expr = 'maxi(T)'", "did you mean `max`?"),
         ("expr = 'abs(T, T)'", "abs is of one number"),
         ("expr = 'max(T'", "a parenthesis is not closed"),
+        ("expr = 'integral(T) / 2'", "`/` is one too many"),
+        ("expr = '2 * integral(T)'", "`integral` cannot be part of an expression"),
+        ("expr = 'max(on_time(T), 5)'", "`on_time` cannot be part of an expression"),
+        ("expr = 'integral(T, T)'", "a parenthesis is not closed"),
+        ("expr = 'integral()'", "a tag is missing"),
+        ("expr = 'integrals(T)'", "did you mean `integral`?"),
+        ("expr = 'starts(T > 5)'\nstore = \"never\"", "a total that is not stored"),
         ("expr = 'T 5'", "`5` is one too many"),
         ("expr = 'DEV + T'", "D1.DEV → D1.DEV"),
         ("expr = 'T'\naddress = 7", "`address` is for what is read from a device"),

@@ -1,0 +1,54 @@
+//! Totals go on over restarts of the station.
+
+use super::*;
+use crate::plant::{
+    Plant,
+    event::Event,
+    expr::{Compare, Expr},
+    fixture::{self, PLC, RUN},
+    tag::Calculation,
+    totalizer::Total,
+};
+
+/// The fixture with the hours of its PLC, stored at every change.
+fn def() -> (Arc<PlantDef>, TagId) {
+    let mut def = fixture::plant();
+    let id = TagId(u16::try_from(def.tags.len()).unwrap());
+    let expr = Expr::test(RUN, Compare::Equal, 1.0);
+    let calculation = Calculation { text: String::new(), total: Some(Total::OnTime), expr };
+    let tag = def.tags[RUN.index()].clone();
+    let tag = crate::plant::tag::TagDef { id, name: "PLC-1.HOURS".into(), ..tag };
+    def.tags.push(crate::plant::tag::TagDef { calculation: Some(Arc::new(calculation)), deadband: Some(0.0), ..tag });
+    (Arc::new(def), id)
+}
+
+/// A station that reads the PLC as running each minute; its total at the end.
+fn station(db: &Path, minutes: std::ops::Range<i64>, restores: bool) -> Sample {
+    let (def, hours) = def();
+    let opened = Store::open_at_start(db, &def, sec(minutes.start * 60)).unwrap();
+    let mut plant = Plant::new(def, sec(minutes.start * 60), 1.0);
+    for minute in minutes {
+        let (at, values, texts, reply) = (sec(minute * 60), vec![(RUN, 1.0)], Vec::new(), Duration::ZERO);
+        opened
+            .store
+            .append(&plant.on_event(Event::Read { at, device: PLC, values, texts, reply, exchange: None }).records)
+            .unwrap();
+        if restores {
+            plant.restore_totals(&opened.read.totals);
+        }
+    }
+    let sample = plant.snapshot().samples[hours.index()];
+    // Sums of hours are exact to some digits only.
+    Sample { value: sample.value.map(|value| (value * 1e9).round() / 1e9), ..sample }
+}
+
+#[test]
+fn a_total_goes_on_over_restarts_and_runs_that_did_not_know_it() {
+    let (_folder, db) = folder();
+    assert_eq!(station(&db, 0..61, true), Sample::good(1.0, sec(3_600)), "it begins at 0");
+    assert_eq!(station(&db, 100..131, true), Sample::good(1.5, sec(7_800)), "the time off is not counted");
+    // A station that ended before it had read its history; then one that comes three days later.
+    let unknown = station(&db, 200..500, false);
+    assert_eq!(unknown, Sample::bad(Cause::NotRead, unknown.at));
+    assert_eq!(station(&db, 4_320..4_381, true), Sample::good(2.5, sec(4_380 * 60)));
+}
