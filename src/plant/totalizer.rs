@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_total_has_no_value_before_it_is_restored_and_goes_on_from_there() {
+    fn a_total_goes_on_from_what_was_restored() {
         let mut totalizer = Totalizer::new(Total::OnTime);
         totalizer.add(good(0, 1.0));
         assert_eq!(totalizer.add(good(3_600, 1.0)), Sample::bad(Cause::NotRead, at(3_600)));
