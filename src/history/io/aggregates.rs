@@ -71,32 +71,50 @@ impl Store {
         each: &mut impl FnMut(usize, Part),
     ) -> Result<(), HistoryError> {
         let wanted = self.wanted(tags);
-        for file in self.files(Some((tier, from.as_microsecond()..to.as_microsecond())))? {
-            let read = self.read_aggregates(&file, &wanted, (from, to), each);
-            if let Err(error) = &read
+        let files = self.files(Some((tier, from.as_microsecond()..to.as_microsecond())))?;
+        let read = self.read_aggregates(&files, &wanted, (from, to), each);
+        if let Err(error) = &read
+            && error.is_damage_of_file()
+        {
+            self.avoid_damaged(&files, &wanted, (from, to))?;
+            // The query is answered once more, from what lies beneath.
+            self.changed.set(true);
+        }
+        read
+    }
+
+    /// Finds the files that cannot be read: the engine need not say which of several it was.
+    fn avoid_damaged(
+        &self,
+        files: &[ArchiveFile],
+        wanted: &Wanted,
+        span: (Timestamp, Timestamp),
+    ) -> Result<(), HistoryError> {
+        for file in files {
+            if let Err(error) = self.read_aggregates(std::slice::from_ref(file), wanted, span, &mut |_, _| {})
                 && error.is_damage_of_file()
+                && self.is_known(file)?
             {
-                // The query is answered once more, from what lies beneath.
-                if self.is_known(&file)? {
-                    tracing::error!(?error, path = file.path, "a file of the archive cannot be read");
-                    self.unreadable.replace(Some(format!("{} cannot be read: {}", file.path, error.words())));
-                    self.avoided.borrow_mut().insert(file.path);
-                }
-                self.changed.set(true);
+                tracing::error!(?error, path = file.path, "a file of the archive cannot be read");
+                self.unreadable.replace(Some(format!("{} cannot be read: {}", file.path, error.words())));
+                self.avoided.borrow_mut().insert(file.path.clone());
             }
-            read?;
         }
         Ok(())
     }
 
+    /// In one statement: one for each file took twice as long (measured).
     fn read_aggregates(
         &self,
-        file: &ArchiveFile,
+        files: &[ArchiveFile],
         wanted: &Wanted,
         (from, to): (Timestamp, Timestamp),
         each: &mut impl FnMut(usize, Part),
     ) -> Result<(), HistoryError> {
-        let sql = sql::aggregates(&self.parquet(std::slice::from_ref(file)), &wanted.tags);
+        if files.is_empty() {
+            return Ok(());
+        }
+        let sql = sql::aggregates(&self.parquet(files), &wanted.tags);
         let mut statement = self.db.prepare(&sql).map_err(engine)?;
         // By `step`, see `samples`.
         let _ = statement.stream_arrow(params![utc(from), utc(to)]).map_err(engine)?;

