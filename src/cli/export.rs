@@ -27,6 +27,7 @@ use crate::{
 
 use super::{
     CliError, in_runtime,
+    progress::Progress,
     source::{CsvArgs, HistoryArgs, Source, unexpected},
     span,
     sql::HistoryTables,
@@ -86,6 +87,7 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     }
     let rows = rows(period.from, to, args.every, tags.len())?;
     let latest = latest(&source, &def, &tags, period.from, to).await?;
+    let (mut progress, mut done) = (Progress::new((rows * tags.len()) as u64), 0);
     let mut columns = Vec::new();
     for group in tags.chunks(SERIES_MAX) {
         let label = |tag: &TagId| TagDescription::at(def.tag(*tag), &latest);
@@ -99,8 +101,11 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
             for (column, values) in columns[begin..].iter_mut().zip(values(source.query(query).await?)?) {
                 column.values.extend(values);
             }
+            done += (count * group.len()) as u64;
+            progress.at(done);
         }
     }
+    drop(progress);
     let bytes = export::export_csv(&def, period.from, args.every, &columns, args.csv.dialect(&def));
     source.export(&args.out, &bytes).await
 }

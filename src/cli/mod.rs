@@ -23,6 +23,7 @@ mod open_log;
 mod own_files;
 mod paths;
 mod profiles;
+mod progress;
 mod prompt;
 mod report;
 mod run;

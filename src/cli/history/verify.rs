@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{Place, overview};
 use crate::{
-    cli::{CliError, in_runtime, say},
+    cli::{CliError, in_runtime, progress::Progress, say},
     history::{ArchiveFile, io::archive::sync_and_hash},
 };
 
@@ -19,11 +19,14 @@ pub struct Args {
 pub fn main(args: &Args) -> Result<(), CliError> {
     let def = args.place.load()?;
     let overview = in_runtime(overview::ask(&args.place, &def))?;
-    let wrong: Vec<String> = overview
-        .files
-        .iter()
-        .filter_map(|file| Some(format!("{}: {}", file.path, trouble(&overview.folder, file)?)))
-        .collect();
+    let mut progress = Progress::new(overview.files.iter().map(|file| file.bytes).sum());
+    let (mut wrong, mut done) = (Vec::new(), 0);
+    for file in &overview.files {
+        wrong.extend(trouble(&overview.folder, file).map(|trouble| format!("{}: {trouble}", file.path)));
+        done += file.bytes;
+        progress.at(done);
+    }
+    drop(progress);
     wrong.iter().for_each(|wrong| say(wrong));
     match wrong.len() {
         0 => {

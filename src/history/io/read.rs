@@ -203,7 +203,7 @@ pub(super) fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryEr
 }
 
 pub(super) fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
-    if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max }) }
+    if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max, fits: None }) }
 }
 
 pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {

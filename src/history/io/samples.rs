@@ -272,7 +272,9 @@ impl Store {
         let (from, to) = (from.as_microsecond().max(first), to.as_microsecond().min(last));
         let share = (to - from).max(0) as f64 / (last - first).max(1) as f64;
         let tags = tags as f64 / self.ids.len().max(1) as f64;
-        within(to_u64((self.rows_about()? as f64 * share * tags.min(1.0)).ceil()), max)
+        let rows = to_u64((self.rows_about()? as f64 * share * tags.min(1.0)).ceil());
+        let fits = to_u64(((to - from) as f64 / 1e6 * max as f64 / rows.max(1) as f64).floor());
+        if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max, fits: Some(fits) }) }
     }
 
     /// The rows up to an instant and the microseconds that they lie in, about; `None` if that is not known.

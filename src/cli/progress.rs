@@ -1,0 +1,65 @@
+//! How far a long work has come.
+
+use std::{
+    io::{IsTerminal, Write, stderr},
+    time::{Duration, Instant},
+};
+
+/// Nothing is said of what is done by then.
+const SILENT: Duration = Duration::from_millis(500);
+/// Between two lines where the output is no terminal.
+const EVERY: Duration = Duration::from_secs(5);
+
+/// Says on standard error what share is done: on a terminal in one line that changes and goes at the end.
+pub struct Progress {
+    total: u64,
+    terminal: bool,
+    next: Instant,
+    shown: bool,
+}
+
+impl Progress {
+    /// Of so many rows or bytes.
+    pub fn new(total: u64) -> Progress {
+        Progress { total, terminal: stderr().is_terminal(), next: Instant::now() + SILENT, shown: false }
+    }
+
+    /// So many are done.
+    pub fn at(&mut self, done: u64) {
+        let now = Instant::now();
+        if now < self.next {
+            return;
+        }
+        self.next = now + if self.terminal { SILENT } else { EVERY };
+        let words = format!("{} % done, Ctrl-C cancels", percent(done, self.total));
+        self.shown = self.terminal;
+        let _ = match self.terminal {
+            true => write!(stderr(), "\r\x1b[K{words}").and_then(|()| stderr().flush()),
+            false => writeln!(stderr(), "sightglass: {words}"),
+        };
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.shown {
+            let _ = write!(stderr(), "\r\x1b[K");
+        }
+    }
+}
+
+/// Never 100 before all is done.
+fn percent(done: u64, total: u64) -> u64 {
+    u64::try_from(u128::from(done) * 100 / u128::from(total.max(1))).map_or(100, |percent| percent.min(100))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_cut_and_not_rounded() {
+        let shares = [(0, 3), (2, 3), (999, 1_000), (3, 3), (4, 3), (u64::MAX, u64::MAX), (0, 0)];
+        assert_eq!(shares.map(|(done, total)| percent(done, total)), [0, 66, 99, 100, 100, 100, 0]);
+    }
+}
