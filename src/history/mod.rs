@@ -36,6 +36,9 @@ use crate::{
 /// Batches with figures in one answer: each is as much work as a small report.
 pub const BATCHES_MAX: usize = 100;
 
+/// Real time for one query.
+pub const QUERY_TIME_MAX: Duration = Duration::from_secs(20);
+
 /// What can be asked. Spans include `from` and exclude `to`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Query {

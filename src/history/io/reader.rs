@@ -23,7 +23,7 @@ use tokio::{
 use super::{QueryRequest, store::Store};
 use crate::{
     bus::io::clock::Clock,
-    history::{Answer, HistoryError, Query},
+    history::{Answer, HistoryError, QUERY_TIME_MAX, Query},
 };
 
 /// Queries that are answered at a time; the others wait.
@@ -32,8 +32,6 @@ pub const QUESTIONS_MAX: usize = 3;
 pub const QUESTIONS_OF_ONE_MAX: usize = QUESTIONS_MAX - 1;
 /// Queries that wait here; those behind them wait in the queue, which refuses when it is full.
 const WAITING_MAX: usize = 64;
-/// Real time for one query.
-pub const TIME_MAX: Duration = Duration::from_secs(20);
 /// How long a query waits for the commit of what is pending.
 const COMMIT_MAX: Duration = Duration::from_secs(2);
 /// Real time between two attempts to interrupt: one that comes between two statements has no effect.
@@ -126,7 +124,7 @@ impl Reader {
                 work.insert(spawn_blocking(move || (answer(&store, &query, now), store.unreadable.take()))).await
             };
             let ended = tokio::select! {
-                answered = timeout(TIME_MAX, answered) => answered.map_err(|_| HistoryError::TooLong { seconds: TIME_MAX.as_secs() }),
+                answered = timeout(QUERY_TIME_MAX, answered) => answered.map_err(|_| HistoryError::TooLong { seconds: QUERY_TIME_MAX.as_secs() }),
                 () = reply.closed() => Err(HistoryError::NotOpen),
                 _ = opened.changed() => Err(HistoryError::NotOpen),
             };

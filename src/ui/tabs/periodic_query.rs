@@ -4,16 +4,19 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::Tab;
 use crate::{
-    history::{Answer, HistoryError, Query, Series},
+    history::{Answer, HistoryError, QUERY_TIME_MAX, Query, Series},
     plant::{
         alarm::PeriodMetrics,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
     },
     report::{ShiftReport, batch::BatchReport},
+    t,
     ui::{UiAction, ViewContext},
 };
 
+/// Seconds of waiting that an operator notices.
+const NOTICED_S: f64 = 0.5;
 /// Between two queries passes at least so many times as long as the last answer took.
 const REST: i32 = 4;
 /// An answer that was not there after so many timeouts is lost: the station answers each query, and says so
@@ -27,6 +30,8 @@ pub struct PeriodicQuery {
     asked: Option<Timestamp>,
     took: SignedDuration,
     wanted: bool,
+    /// The operator did not wait for the last one.
+    cancelled: bool,
 }
 
 impl PeriodicQuery {
@@ -68,9 +73,39 @@ impl PeriodicQuery {
         self.wanted = true;
     }
 
+    /// Gives up the query on its way, if it has been waited for long enough to be seen; `false` if there is none. The next
+    /// one goes out when it would have gone out anyway.
+    pub fn cancel(&mut self, cx: &ViewContext) -> bool {
+        let noticed = self.noticed(cx).is_some();
+        if noticed {
+            (self.on_way, self.wanted, self.cancelled) = (None, false, true);
+        }
+        noticed
+    }
+
+    fn noticed(&self, cx: &ViewContext) -> Option<SignedDuration> {
+        self.waiting(cx.steady()).filter(|waiting| real(cx, NOTICED_S) <= *waiting)
+    }
+
+    /// What is said while an answer is waited for; `None` for as long as nobody notices.
+    pub fn shown_waiting(&self, cx: &ViewContext) -> Option<String> {
+        if self.cancelled {
+            return Some(t!("cancelled").to_owned());
+        }
+        let waiting = self.noticed(cx)?;
+        let (seconds, most) = ((waiting.as_secs_f64() / cx.snapshot.speed.max(0.01)).round(), QUERY_TIME_MAX.as_secs());
+        Some(t!("reading for {seconds} s of at most {most} s, Esc cancels", seconds, most))
+    }
+
     /// Query `number` goes out.
     pub fn asked(&mut self, number: u32, now: Timestamp) {
-        *self = PeriodicQuery { on_way: Some((number, now)), asked: Some(now), took: self.took, wanted: false };
+        *self = PeriodicQuery {
+            on_way: Some((number, now)),
+            asked: Some(now),
+            took: self.took,
+            wanted: false,
+            cancelled: false,
+        };
     }
 
     /// An answer has come: when it was asked for, or `None` if it is the answer to an older query.

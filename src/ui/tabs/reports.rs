@@ -169,8 +169,11 @@ impl TabView for Reports {
         .unwrap_or_default()
     }
 
-    fn back(&mut self, _cx: &ViewContext) -> bool {
-        std::mem::take(&mut self.batches.shown)
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        match self.batches.shown {
+            true => self.batches.rows.query.cancel(cx) || std::mem::take(&mut self.batches.shown),
+            false => self.report.query.cancel(cx),
+        }
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
@@ -209,7 +212,10 @@ impl Reports {
                 self.export = Export::Not;
             }
             Action::Refresh => self.report.query.want(),
-            Action::Batches => (self.batches.shown, self.export) = (true, Export::Not),
+            Action::Batches => {
+                (self.batches.shown, self.export) = (true, Export::Not);
+                self.batches.rows.query.want();
+            }
             Action::Why => {
                 let rows = self.report.value.iter().flat_map(|report| &report.tags);
                 return Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()));

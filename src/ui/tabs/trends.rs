@@ -115,6 +115,11 @@ impl TabView for Trends {
         self.ask(cx)
     }
 
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        let cancelled = [&mut self.curves, &mut self.hours.query].map(|query| query.cancel(cx));
+        cancelled.contains(&true)
+    }
+
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
     }

@@ -5,10 +5,13 @@ use std::sync::mpsc as std_mpsc;
 use tokio::sync::{mpsc, oneshot};
 
 use super::*;
-use crate::history::io::{
-    read::ROWS_MAX,
-    reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, Request, TIME_MAX},
-    thread::COMMIT_EVERY,
+use crate::history::{
+    QUERY_TIME_MAX,
+    io::{
+        read::ROWS_MAX,
+        reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, Request},
+        thread::COMMIT_EVERY,
+    },
 };
 
 /// Answers that never end by themselves, and two queues that say when one has begun and how it ended.
@@ -137,7 +140,7 @@ async fn a_question_that_takes_too_long_is_ended_and_says_so() {
     let (query, answer) = query();
     reader.queries.send((1, query)).await.unwrap();
     tokio::task::spawn_blocking(move || begun.recv().unwrap()).await.unwrap();
-    tokio::time::advance(TIME_MAX + Duration::from_secs(1)).await;
+    tokio::time::advance(QUERY_TIME_MAX + Duration::from_secs(1)).await;
     // Virtual time stands still while a thread works; an interruption that comes before the statement is repeated.
     let mut answer = answer;
     let answered = loop {
@@ -147,7 +150,7 @@ async fn a_question_that_takes_too_long_is_ended_and_says_so() {
             () = tokio::time::advance(Duration::from_millis(10)) => {}
         }
     };
-    assert_eq!(answered, Ok(Err(HistoryError::TooLong { seconds: TIME_MAX.as_secs() })));
+    assert_eq!(answered, Ok(Err(HistoryError::TooLong { seconds: QUERY_TIME_MAX.as_secs() })));
     assert!(ended.recv().unwrap().contains("INTERRUPT"));
 }
 

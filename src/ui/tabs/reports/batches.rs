@@ -114,7 +114,11 @@ impl Batches {
         canvas.text(1, 1, &fit(&draw::columns(WIDTHS, names), columns), theme.dim());
         canvas.text(1, height.saturating_sub(1), &fit(&file.0, columns.saturating_sub(2)), file.1);
         if self.rows().is_empty() {
-            let words = if self.rows.value.is_some() { t!("No batch ran yet.") } else { t!("collecting data") };
+            let waiting = self.rows.query.shown_waiting(cx);
+            let words = match self.rows.value {
+                Some(_) => t!("No batch ran yet."),
+                None => waiting.as_deref().unwrap_or(t!("collecting data")),
+            };
             canvas.text(2, 3, words, theme.dim());
             return;
         }

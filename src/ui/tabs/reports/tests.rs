@@ -68,6 +68,7 @@ impl Stand {
                 '→' => KeyCode::Right,
                 '↓' => KeyCode::Down,
                 '⏎' => KeyCode::Enter,
+                '⎋' => KeyCode::Esc,
                 key => KeyCode::Char(key),
             };
             self.send(Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)));
@@ -250,6 +251,28 @@ fn a_night_without_unicode_and_colour() {
     stand.answer(true);
     stand.answer(true);
     insta::assert_snapshot!(stand.screen());
+}
+
+#[test]
+fn a_report_that_takes_long_says_so_and_is_cancelled() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("←");
+    let (id, _) = stand.asked.last().expect("it asks at once").clone();
+    let silent = |tenths: u64| Msg::Tick { silent: std::time::Duration::from_millis(100 * tenths) };
+    stand.send(silent(4));
+    assert!(stand.screen().contains("collecting data") && !stand.screen().contains("Esc cancels"));
+    stand.send(silent(30));
+    assert!(stand.screen().contains("reading for 3 s of at most 20 s, Esc cancels"));
+    assert!(stand.model.tabs.awaits(id));
+    stand.press("⎋");
+    assert!(stand.screen().contains("cancelled"));
+    assert!(!stand.model.tabs.awaits(id), "the history need not work on it");
+    stand.asked.clear();
+    stand.send(silent(90));
+    assert!(stand.asked.is_empty(), "a closed shift is not asked for again by itself");
+    stand.press("u");
+    stand.answer(true);
+    assert!(stand.screen().contains("TIC-1.PV"));
 }
 
 #[test]

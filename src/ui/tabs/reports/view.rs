@@ -39,7 +39,8 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         None => {
-            let words = reports.report.trouble.as_deref().unwrap_or(t!("collecting data"));
+            let waiting = reports.report.query.shown_waiting(cx);
+            let words = reports.report.trouble.as_deref().or(waiting.as_deref()).unwrap_or(t!("collecting data"));
             let style = if reports.report.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
             canvas.text_centred(height / 2, words, style);
         }
@@ -62,17 +63,14 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
         (false, _) => t!("closed").to_owned(),
     };
     let x = canvas.text(x + 3, 0, &state, if running { theme.strong() } else { theme.normal() });
-    let slow = reports
-        .report
-        .query
-        .waiting(cx.steady())
-        .is_some_and(|waiting| waiting.as_secs_f64() > 2.0 * cx.snapshot.speed);
     if reports.report.value.is_some() {
         let right = canvas.width().saturating_sub(1);
         match &reports.report.trouble {
             Some(trouble) => canvas.text_right(right, 0, &fit(trouble, right.saturating_sub(x + 2)), theme.trouble()),
-            None if slow => canvas.text_right(right, 0, &fit(t!("reading"), right.saturating_sub(x + 2)), theme.dim()),
-            None => {}
+            None => {
+                let waiting = reports.report.query.shown_waiting(cx).unwrap_or_default();
+                canvas.text_right(right, 0, &fit(&waiting, right.saturating_sub(x + 2)), theme.dim());
+            }
         }
     }
 }

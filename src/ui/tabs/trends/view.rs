@@ -107,10 +107,12 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
 
 /// What is wrong with the history, or that it keeps us waiting.
 fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
-    let mut waiting = [&trends.curves, &trends.hours.query].into_iter().filter_map(|query| query.waiting(cx.steady()));
-    let slow = waiting.any(|time| time >= real(cx, 2.0));
+    // Curves that are drawn are refreshed all the time: only a long wait is worth a word.
+    let long = |query: &&PeriodicQuery| query.waiting(cx.steady()).is_some_and(|time| time >= real(cx, 2.0));
+    let mut waiting =
+        [&trends.curves, &trends.hours.query].into_iter().filter(long).filter_map(|query| query.shown_waiting(cx));
     let failed = [&trends.trouble, &trends.hours.trouble, &trends.raised.trouble].into_iter().flatten().next();
-    failed.cloned().or_else(|| slow.then(|| t!("waiting for the history").to_owned()))
+    failed.cloned().or_else(|| waiting.next())
 }
 
 fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
