@@ -4,7 +4,7 @@ use std::{path::Path, process::Command, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
 use sightglass::{
-    history::io::store::Store,
+    history::io::{archive::LeftOut, store::Store},
     plant::{
         PlantDef,
         def::{HistoryDef, ParquetVersion},
@@ -35,7 +35,7 @@ pub fn archived(path: &Path, parquet: ParquetVersion) {
         store.append(&part.iter().flat_map(|second| row(*second)).collect::<Vec<_>>()).unwrap();
     }
     let now = start + SignedDuration::from_secs(SECONDS);
-    while let Some(job) = store.archive_due(now, Timestamp::MIN).unwrap() {
+    while let Some(job) = store.archive_due(now, &LeftOut::default()).unwrap() {
         store.archive(&job, &mut |_| Ok(())).unwrap();
     }
     store.checkpoint().unwrap();

@@ -63,6 +63,15 @@ pub enum Job {
     Merge(Tier, Range<i64>),
 }
 
+/// What could not be archived, and is left as it is for now: later jobs do not wait for it.
+#[derive(Debug, Clone, Default)]
+pub struct LeftOut {
+    /// Hours before it.
+    pub before: Option<Timestamp>,
+    /// Merges.
+    pub merges: Vec<(Tier, Range<i64>)>,
+}
+
 /// A step of a job, for tests that end the program there.
 pub type Steps<'a> = &'a mut dyn FnMut(&'static str) -> Result<(), HistoryError>;
 
@@ -76,14 +85,14 @@ impl Store {
         }
     }
 
-    /// What is due in the archive, the oldest first; without hours before `after`, which could not be archived. Room is made
-    /// before it is needed.
-    pub fn archive_due(&self, now: Timestamp, after: Timestamp) -> Result<Option<Job>, HistoryError> {
+    /// What is due in the archive, the oldest first; without what is left out. Room is made before it is needed.
+    pub fn archive_due(&self, now: Timestamp, left: &LeftOut) -> Result<Option<Job>, HistoryError> {
         let files = self.files(None)?;
         if let Some(deletion) = self.next_deletion(&files, now).filter(|next| next.at <= now.as_microsecond()) {
             return Ok(Some(Job::Delete(Box::new(deletion))));
         }
         let closed = now.checked_sub(GRACE).unwrap_or(now).as_microsecond();
+        let after = left.before.unwrap_or(Timestamp::MIN);
         let oldest: Option<i64> =
             self.db.query_row(sql::OLDEST_SAMPLE, params![utc(after)], |row| row.get(0)).map_err(engine)?;
         let oldest = oldest.map_or(i64::MAX, |oldest| floor(oldest, HOUR));
@@ -91,7 +100,7 @@ impl Store {
         if oldest.saturating_add(HOUR) <= closed {
             return Ok(Some(Job::Hour(oldest)));
         }
-        Ok(next_merge(&files, closed.min(oldest)))
+        Ok(next_merge(&files, closed.min(oldest), &left.merges))
     }
 
     /// The files of the archive that touch a span, or all of them; oldest first.
@@ -238,14 +247,15 @@ impl Written {
     }
 }
 
-/// The day or month of a tier that is over and lies in more than one file; the oldest.
-fn next_merge(files: &[ArchiveFile], closed: i64) -> Option<Job> {
+/// The day or month of a tier that is over and lies in more than one file; the oldest that is not left out.
+fn next_merge(files: &[ArchiveFile], closed: i64, left: &[(Tier, Range<i64>)]) -> Option<Job> {
     let of = |tier: Tier, period: fn(i64) -> Range<i64>| {
         let within =
             |file: &ArchiveFile| Some(period(file.from)).filter(|span| file.to <= span.end && span.end <= closed);
         let spans: Vec<Range<i64>> = files.iter().filter(|file| file.tier == tier).filter_map(within).collect();
         // Sorted by their beginning, as the files are.
-        spans.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| Job::Merge(tier, pair[0].clone()))
+        let several = spans.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| (tier, pair[0].clone()));
+        several.into_iter().find(|merge| !left.contains(merge)).map(|(tier, span)| Job::Merge(tier, span))
     };
     let days = Tier::ALL.into_iter().find_map(|tier| of(tier, day));
     days.or_else(|| of(Tier::Hour, month))

@@ -14,7 +14,7 @@ use tokio::task::{JoinHandle, spawn_blocking};
 
 use super::{
     BackupRequest,
-    archive::Job,
+    archive::{Job, LeftOut},
     reader::stop,
     store::{Store, instant},
 };
@@ -47,8 +47,9 @@ pub struct Archiver {
     /// Commits until the next look: a start is not the time for it.
     wait: u32,
     commit_every: Duration,
-    /// Hours before it cannot be read in the database, and stay there.
-    after: Timestamp,
+    /// Hours that cannot be read in the database, and stay there; and merges of files that cannot be read or written, which
+    /// are tried again when nothing else is due.
+    left: LeftOut,
     /// Why, if there are any.
     skipped: Option<HistoryError>,
 }
@@ -62,7 +63,7 @@ impl Archiver {
             stopped: Arc::default(),
             wait: commits(LOOK_EVERY, commit_every),
             commit_every,
-            after: Timestamp::MIN,
+            left: LeftOut::default(),
             skipped: None,
         }
     }
@@ -80,10 +81,10 @@ impl Archiver {
             return;
         }
         let Some(Ok(store)) = store.map(Store::try_clone) else { return };
-        let (interrupt, after) = (store.interrupt_handle(), self.after);
+        let (interrupt, left) = (store.interrupt_handle(), self.left.clone());
         let work = move || {
             let nothing = |error| (None, error);
-            let Some(job) = store.archive_due(now, after).map_err(nothing)? else {
+            let Some(job) = store.archive_due(now, &left).map_err(nothing)? else {
                 return store.missing_files().map(Looked::Idle).map_err(nothing);
             };
             match store.archive(&job, &mut |_| Ok(())) {
@@ -135,10 +136,21 @@ impl Archiver {
                 tracing::info!(?job, "archived");
                 (pause(&job), Ok(Looked::Did(job)))
             }
-            Ok(Ok(Looked::Idle(missing))) => (LOOK_EVERY, Ok(Looked::Idle(missing))),
+            Ok(Ok(Looked::Idle(missing))) => {
+                if self.left.merges.is_empty() && self.left.before.is_none() {
+                    self.skipped = None;
+                }
+                self.left.merges.clear();
+                (LOOK_EVERY, Ok(Looked::Idle(missing)))
+            }
             Ok(Ok(Looked::BackedUp)) => (Duration::ZERO, Ok(Looked::BackedUp)),
             Ok(Err((Some(Job::Hour(hour)), error))) if error.is_damage() => {
-                self.after = instant(hour + HOUR).unwrap_or(Timestamp::MAX);
+                self.left.before = instant(hour + HOUR);
+                self.skipped = Some(error.clone());
+                (Duration::ZERO, Err(error))
+            }
+            Ok(Err((Some(Job::Merge(tier, span)), error))) if error.is_damage_of_file() => {
+                self.left.merges.push((tier, span));
                 self.skipped = Some(error.clone());
                 (Duration::ZERO, Err(error))
             }

@@ -5,7 +5,6 @@ use jiff::Timestamp;
 
 use super::{
     read::{ROWS_MAX, check_span, maybe_shared, shared, time, within},
-    sql,
     store::{Store, utc},
 };
 use crate::{
@@ -19,6 +18,17 @@ use crate::{
     report::batch::{self, BatchReport},
 };
 
+/// The records of the batches that ran in a span, newest batch first, of at most so many batches.
+const BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch JOIN (
+    SELECT name, number, first(utc ORDER BY place) AS begun, last(utc ORDER BY place) AS changed,
+        bool_or(event IN ('ended', 'found ended')) AS over
+    FROM batch GROUP BY name, number HAVING begun < $2 AND (NOT over OR $1 < changed)
+    ORDER BY begun DESC, name, number LIMIT $3) USING (name, number)
+    ORDER BY begun DESC, name, number, place";
+/// The last record of each name.
+const LATEST_BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch
+    QUALIFY row_number() OVER (PARTITION BY name ORDER BY number DESC, place DESC) = 1";
+
 impl Store {
     /// The batches that ran between two instants, newest first, at most so many; without figures where these are more than
     /// [`BATCHES_MAX`].
@@ -28,7 +38,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Vec<BatchReport>, HistoryError> {
         check_span(from, to)?;
-        let records = self.list(sql::BATCHES, params![utc(from), utc(to), limit], record)?;
+        let records = self.list(BATCHES, params![utc(from), utc(to), limit], record)?;
         within(records.len() as u64, ROWS_MAX)?;
         let batches = batches(&records, now);
         let with_figures = batches.len() <= BATCHES_MAX;
@@ -44,7 +54,7 @@ impl Store {
 
     /// The last record of the batches of each name.
     pub(super) fn latest_batches(&self) -> Result<Vec<BatchRecord>, HistoryError> {
-        self.list(sql::LATEST_BATCHES, &[], record)
+        self.list(LATEST_BATCHES, &[], record)
     }
 
     fn batch(&self, batch: Batch, until: Timestamp) -> Result<BatchReport, HistoryError> {

@@ -5,7 +5,7 @@ use std::fs;
 use jiff::Timestamp;
 
 use super::{
-    archive::{Steps, sync_and_hash},
+    archive::{LeftOut, Steps, sync_and_hash},
     backup::failed,
     files::{self, Exclusive},
     store::Store,
@@ -34,7 +34,7 @@ pub struct Compacted {
 pub fn compact(store: Store, now: Timestamp, steps: Steps) -> Result<Compacted, HistoryError> {
     let path = store.path.clone();
     let (before, mut jobs) = (store.file_bytes(), 0);
-    while let Some(job) = store.archive_due(now, Timestamp::MIN)? {
+    while let Some(job) = store.archive_due(now, &LeftOut::default())? {
         store.archive(&job, &mut |_| Ok(()))?;
         jobs += 1;
         steps("archived")?;

@@ -272,17 +272,6 @@ pub const LINE_MINUTES: &str = "SELECT * FROM (
         utilisation, reply_p99_ms, reply_max_ms
     FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";
 
-/// The records of the batches that ran in a span, newest batch first, of at most so many batches.
-pub const BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch JOIN (
-    SELECT name, number, first(utc ORDER BY place) AS begun, last(utc ORDER BY place) AS changed,
-        bool_or(event IN ('ended', 'found ended')) AS over
-    FROM batch GROUP BY name, number HAVING begun < $2 AND (NOT over OR $1 < changed)
-    ORDER BY begun DESC, name, number LIMIT $3) USING (name, number)
-    ORDER BY begun DESC, name, number, place";
-/// The last record of each name.
-pub const LATEST_BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch
-    QUALIFY row_number() OVER (PARTITION BY name ORDER BY number DESC, place DESC) = 1";
-
 /// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows, and most of its time
 /// unpacks what lies around them: smaller groups, and a compression that is a tenth larger and twice as fast (measured).
 pub fn parquet(tier: Tier, version: ParquetVersion) -> String {

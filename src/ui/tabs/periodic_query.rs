@@ -87,7 +87,7 @@ impl PeriodicQuery {
         self.waiting(cx.steady()).filter(|waiting| real(cx, NOTICED_S) <= *waiting)
     }
 
-    /// What is said while an answer is waited for; `None` for as long as nobody notices.
+    /// What is said while an answer is waited for; `None` for as long as it is not noticed.
     pub fn shown_waiting(&self, cx: &ViewContext) -> Option<String> {
         if self.cancelled {
             return Some(t!("cancelled").to_owned());

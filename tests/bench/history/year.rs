@@ -10,7 +10,7 @@ use jiff::{Timestamp, tz::TimeZone};
 use sightglass::{
     history::{
         Query,
-        io::{sql, store::Store},
+        io::{archive::LeftOut, sql, store::Store},
         tiers::Tier,
     },
     plant::def::{ParquetVersion, TagId},
@@ -83,7 +83,7 @@ fn store_a_day(path: &Path) {
 }
 
 fn archive(store: &Store) {
-    while let Some(job) = store.archive_due(at(LAST_DAY + DAY + 600), Timestamp::MIN).expect("known") {
+    while let Some(job) = store.archive_due(at(LAST_DAY + DAY + 600), &LeftOut::default()).expect("known") {
         store.archive(&job, &mut |_| Ok(())).expect("archived");
     }
 }

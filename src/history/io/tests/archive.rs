@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     history::{
-        io::archive::Job,
+        io::archive::{Job, LeftOut},
         tiers::{HOUR, Tier},
     },
     plant::def::HistoryDef,
@@ -46,7 +46,7 @@ pub(super) fn filled(db: &Path, rows: &[Record]) -> Store {
 
 /// Does all that is due at an hour.
 pub(super) fn archive_all(store: &Store, hour: i64) -> Vec<Job> {
-    let due = || store.archive_due(sec(hour * HOUR_S + 600), Timestamp::MIN).unwrap();
+    let due = || store.archive_due(sec(hour * HOUR_S + 600), &LeftOut::default()).unwrap();
     let work = |job: &Job| store.archive(job, &mut |_| Ok(())).unwrap();
     std::iter::from_fn(|| due().inspect(work)).collect()
 }
@@ -175,7 +175,7 @@ fn a_kill_at_any_step_loses_nothing_and_doubles_nothing() {
     let mut steps_to_kill = 1;
     loop {
         let (mut steps, mut last) = (0, "");
-        let Some(job) = store.archive_due(sec(26 * HOUR_S + 600), Timestamp::MIN).unwrap() else { break };
+        let Some(job) = store.archive_due(sec(26 * HOUR_S + 600), &LeftOut::default()).unwrap() else { break };
         let done = store.archive(&job, &mut |step| {
             (steps, last) = (steps + 1, step);
             if steps == steps_to_kill { Err(HistoryError::NotOpen) } else { Ok(()) }
@@ -300,6 +300,36 @@ fn damage_of_the_archive_costs_no_more_than_it_must() {
     assert!(words.contains("1970-01-01T"), "{words}");
 }
 
+#[test]
+fn a_merge_that_fails_does_not_hold_up_later_ones() {
+    let (_folder, db) = folder();
+    let store = filled(&db, &rows(50));
+    while let Some(job @ Job::Hour(_)) = store.archive_due(sec(50 * HOUR_S + 600), &LeftOut::default()).unwrap() {
+        store.archive(&job, &mut |_| Ok(())).unwrap();
+    }
+    let lost = store.files(None).unwrap().into_iter().find(|file| file.tier == Tier::Raw).unwrap();
+    let path = store.archive_folder().join(&lost.path);
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::remove_file(&path).unwrap();
+    let (mut left, mut failed) = (LeftOut::default(), 0);
+    while let Some(job) = store.archive_due(sec(50 * HOUR_S + 600), &left).unwrap() {
+        if let Err(error) = store.archive(&job, &mut |_| Ok(())) {
+            let Job::Merge(tier, span) = job else { panic!("{job:?}") };
+            assert!(error.is_damage_of_file(), "{error:?}");
+            left.merges.push((tier, span));
+            failed += 1;
+        }
+    }
+    let days =
+        |store: &Store| store.files(None).unwrap().iter().filter(|file| file.path.ends_with("day.parquet")).count();
+    assert_eq!((failed, days(&store)), (1, 5), "two days of three tiers, but one");
+    std::fs::write(&path, bytes).unwrap();
+    archive_all(&store, 50);
+    assert_eq!(days(&store), 6);
+    let (_other, plain) = folder();
+    assert_same(&store, &filled(&plain, &rows(50)), 50, "merged later");
+}
+
 /// The plant with a rule for its history.
 fn keeping(rule: HistoryDef) -> Arc<PlantDef> {
     Arc::new(PlantDef { history: rule, ..PlantDef::clone(&def()) })
@@ -318,7 +348,7 @@ fn what_was_deleted_is_answered_by_minutes() {
     let (all, formed) = (content(&store), aggregates(&store));
     // Eight days later the first day is too old. A kill in between changes nothing.
     let later = sec(8 * 24 * HOUR_S);
-    let due = |store: &Store| store.archive_due(later, Timestamp::MIN).unwrap();
+    let due = |store: &Store| store.archive_due(later, &LeftOut::default()).unwrap();
     let job = due(&store).unwrap();
     assert!(matches!(&job, Job::Delete(next) if next.file.path == "raw/date=1970-01-01/day.parquet"), "{job:?}");
     assert_eq!(store.archive(&job, &mut |_| Err(HistoryError::NotOpen)), Err(HistoryError::NotOpen));
@@ -347,7 +377,7 @@ fn what_was_deleted_is_answered_by_minutes() {
     // What comes late to an hour without samples does not replace what was formed of them.
     let late = |tag, second| Record::Sample(tag, Sample::good(9e9, sec(second)));
     store.append(&[late(PV, HOUR_S + 10), late(TagId(3), HOUR_S + 10)]).unwrap();
-    while let Some(job) = store.archive_due(sec(50 * HOUR_S + 600), Timestamp::MIN).unwrap() {
+    while let Some(job) = store.archive_due(sec(50 * HOUR_S + 600), &LeftOut::default()).unwrap() {
         store.archive(&job, &mut |_| Ok(())).unwrap();
     }
     let [got, expect] = [&store, &plain].map(|store| series(store, PV, 0, 5 * HOUR_S, 5));

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    history::tiers::HOUR,
+    history::{io::archive::LeftOut, tiers::HOUR},
     plant::{
         Plant,
         alarm::AlarmCommand,
@@ -141,7 +141,7 @@ fn a_past_instant_is_as_it_was_seen() {
     assert!(seen.iter().any(|(_, shown)| shown.1.contains("Acknowledged")), "alarms are acknowledged");
     assert!(seen.iter().any(|(_, shown)| shown.2.contains("Shelved")), "and shelved");
     check(&store, "as it was stored");
-    while let Some(job) = store.archive_due(sec(END), Timestamp::MIN).unwrap() {
+    while let Some(job) = store.archive_due(sec(END), &LeftOut::default()).unwrap() {
         store.archive(&job, &mut |_| Ok(())).unwrap();
     }
     check(&store, "archived");
