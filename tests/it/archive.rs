@@ -1,4 +1,4 @@
-//! Closed hours as files: what `sightglass history` says of them, and what another engine reads.
+//! Closed hours as files: what `sightglass history` says of them, and what other engines read.
 
 use std::{path::Path, process::Command, sync::Arc};
 
@@ -14,7 +14,7 @@ use sightglass::{
     profile::{self, Search},
 };
 
-use crate::support::{folder, python, sightglass};
+use crate::support::{engines, folder, sightglass};
 
 const START: &str = "2026-03-02T06:00:00Z";
 /// Samples of each tag, one a second: 26 hours.
@@ -89,29 +89,21 @@ fn the_archive_is_listed_and_verified() {
 }
 
 #[test]
-fn polars_reads_the_archive_as_it_lies() {
-    let Some(python) = python() else { return };
-    let script = "
-import sys, polars
-folder = sys.argv[1]
-tags = polars.read_parquet(folder + '/tag.parquet')
-raw = polars.scan_parquet(folder + '/raw/**/*.parquet').collect().join(tags, left_on='tag', right_on='id')
-pv = raw.filter(polars.col('name') == 'TIC-1.PV')
-minutes = polars.scan_parquet(folder + '/m1/**/*.parquet').collect().join(tags, left_on='tag', right_on='id')
-pv_minutes = minutes.filter(polars.col('name') == 'TIC-1.PV')
-print(raw.height, round(pv['value'].sum(), 3), pv['utc'].min(), pv['utc'].max(), pv_minutes.height,
-    round((pv_minutes['mean'] * pv_minutes['good_ms']).sum() / 1000, 3), pv_minutes['n'].sum())
-";
+fn other_engines_read_the_archive_as_it_lies() {
+    let Some(python) = engines() else { return };
     // 25 hours of one sample a second, each in force for one second: both sums are those of 0.0 … 99.9, ninety times.
-    let sum = (0..90_000).map(|second| (second % 1_000) as f64 / 10.0).sum::<f64>();
-    let expect = format!("180000 {sum:.1} 2026-03-02 06:00:00 2026-03-03 06:59:59 1500 {sum:.1} 90000");
+    let tenths = (0..90_000).map(|second| second % 1_000).sum::<u32>();
+    let expect = format!("180000 {tenths} 90000 2026-03-02 06:00:00 2026-03-03 06:59:59 1500 {tenths} 90000");
     for version in ParquetVersion::ALL {
         let folder = folder();
         archived(&folder.path().join("tank.duckdb"), version);
         let archive = folder.path().join("tank.archive");
-        let output = Command::new(&python).args(["-c", script]).arg(archive).output().unwrap();
-        let text = String::from_utf8(output.stdout).unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        assert_eq!(text.trim(), expect, "{version:?}");
+        for engine in ["polars", "pyarrow", "duckdb", "datafusion", "clickhouse", "spark"] {
+            let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/archive.py");
+            let output = Command::new(&python).args([script, engine]).arg(&archive).output().unwrap();
+            let text = String::from_utf8(output.stdout).unwrap();
+            assert!(output.status.success(), "{engine}: {}", String::from_utf8_lossy(&output.stderr));
+            assert_eq!(text.trim(), expect, "{engine}, Parquet {version:?}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `architecture` | the laws: the line of modules, the io edge, sizes, style of tests, words |
-//! | `archive` | closed hours as files: what `sightglass history` says of them, and what polars reads |
+//! | `archive` | closed hours as files: what `sightglass history` says of them, and what other engines read |
 //! | `backup` | backups and restores by command, beside a station and on a full disk |
 //! | `attach` | the station's socket: equal snapshots at both ends, stuck and hostile terminals, reconnecting |
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |

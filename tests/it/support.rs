@@ -221,28 +221,33 @@ pub fn have(program: &str, package: &str) -> bool {
     present(found(), &format!("{program} (Debian package {package})"))
 }
 
-/// The Python with pymodbus, minimalmodbus and polars, in a virtual environment of the tests.
+/// The Python with pymodbus and minimalmodbus, in a virtual environment of the tests.
 pub fn python() -> Option<PathBuf> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PYTHON
-        .get_or_init(|| {
-            let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("peers-venv");
-            let python = folder.join("bin/python");
-            let works = || {
-                Command::new(&python)
-                    .args(["-c", "import minimalmodbus, polars, pymodbus, serial; assert (minimalmodbus.__version__, polars.__version__, pymodbus.__version__) == ('2.1.1', '2.1.0', '3.16.1')"])
-                    .stderr(Stdio::null())
-                    .status()
-                    .is_ok_and(|status| status.success())
-            };
-            if !works() {
-                let _ = Command::new("python3").args(["-m", "venv"]).arg(&folder).status();
-                let pip = ["-m", "pip", "-q", "install", "pymodbus[serial]==3.16.1", "minimalmodbus==2.1.1", "polars==2.1.0"];
-                let _ = Command::new(&python).args(pip).status();
-            }
-            present(works(), "pymodbus 3.16.1, minimalmodbus 2.1.1 and polars 2.1.0 (PyPI, through python3 -m venv)").then_some(python)
-        })
-        .clone()
+    PYTHON.get_or_init(|| venv("peers-venv", &["pymodbus[serial]==3.16.1", "minimalmodbus==2.1.1"])).clone()
+}
+
+/// The Python with engines that read Parquet. Spark needs Java.
+pub fn engines() -> Option<PathBuf> {
+    let packages =
+        ["polars==2.1.0", "pyarrow==26.0.1", "duckdb==2.0.0", "datafusion==55.0.0", "chdb==4.4.0", "pyspark==4.3.0"];
+    have("java", "default-jre-headless").then(|| venv("engines-venv", &packages)).flatten()
+}
+
+/// A virtual environment with packages of PyPI, in these very versions.
+fn venv(name: &str, packages: &[&str]) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let python = folder.join("bin/python");
+    let find = "import re, sys; from importlib.metadata import version
+for package in sys.argv[1:]:
+    name, wanted = re.sub('[[].*[]]', '', package).split('==')
+    assert version(name) == wanted";
+    let works = || run_quietly(Command::new(&python).args(["-c", find]).args(packages));
+    if !works() {
+        run_quietly(Command::new("python3").args(["-m", "venv"]).arg(&folder));
+        run_quietly(Command::new(&python).args(["-m", "pip", "-q", "install"]).args(packages));
+    }
+    present(works(), &format!("{} (PyPI, through python3 -m venv)", packages.join(", "))).then_some(python)
 }
 
 /// libmodbus's own server for unit tests, while it runs. It serves one connection and ends.
