@@ -5,7 +5,7 @@ use jiff::SignedDuration;
 
 use super::protocol::encode;
 use crate::{
-    history::{BATCHES_MAX, Query},
+    history::Query,
     plant::{
         PlantDef,
         alarm::AlarmCommand,
@@ -119,16 +119,15 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
             rows(*limit)?;
             line(def, *id)
         }
-        Query::Journal { limit, .. } | Query::Actions { limit, .. } | Query::Audit { limit, .. } => rows(*limit),
-        Query::Batches { limit, .. } if BATCHES_MAX < *limit => {
-            Err(format!("{limit} batches, expected at most {BATCHES_MAX}"))
-        }
+        Query::Journal { limit, .. }
+        | Query::Actions { limit, .. }
+        | Query::Audit { limit, .. }
+        | Query::Batches { limit, .. } => rows(*limit),
         Query::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
             Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
         }
         Query::Report { .. }
         | Query::AlarmMetrics { .. }
-        | Query::Batches { .. }
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview => Ok(()),

@@ -22,6 +22,7 @@ use crate::{
     },
     plant::{
         PlantDef,
+        batch::Batch,
         def::{CsvDialect, TagId},
         record::{ActionRecord, AlarmRecord},
         sample::Sample,
@@ -44,6 +45,12 @@ Views (times are UTC):
   m1, h1   minutes and hours of what is archived: utc (begin), tag, min, max, mean, first, last, gain, good_ms, n, unit
   alarm    utc, subject, message, priority, event, value, limit_value, by_whom, reason
   action   utc, by_whom, from_where, action, target, old_value, new_value, outcome, note
+  batch    utc (begin), until (NULL while it runs), batch, number, minutes, begin_seen, end_seen
+  phase    utc (begin of the batch), batch, number, phase ('unknown' as well), minutes
+
+Other programs read the folder beside the history as it lies, Parquet, times UTC: raw/date=…/ utc, tag, value, quality
+(code: 0 good, 64 and up uncertain, 128 and up bad), epoch (how often the clock was set, 65535 imported); m1/… and h1/… as
+above; tag.parquet id, name, unit. Files are replaced by larger ones; none is changed.
 
 Example: sightglass sql tank \"SELECT tag, avg(mean) FROM h1 WHERE utc > '2026-11-01' GROUP BY tag\"";
 
@@ -119,6 +126,7 @@ impl HistoryTables {
             let tables = Tables::new(def, &overview, &folder.0)?;
             tables.add_alarms(journal(source).await?)?;
             tables.add_actions(actions(source).await?)?;
+            tables.add_batches(batches(source).await?)?;
             unarchived(source, &overview, |samples| tables.add_samples(def, samples)).await?;
             // An hour that was archived meanwhile would be missing or double.
             if self::overview(source).await?.files == overview.files {
@@ -237,6 +245,26 @@ async fn actions(source: &Source) -> Result<Vec<ActionRecord>, CliError> {
         let Answer::Actions(page) = source.query(query).await? else { return Err(unexpected()) };
         let Some(next) = add_page(&mut all, page, |action| action.at) else { return Ok(all) };
         to = next;
+    }
+}
+
+/// All batches, newest first, page by page; those that began at the begin of the last one of a page come again.
+async fn batches(source: &Source) -> Result<Vec<Batch>, CliError> {
+    let (mut all, mut to) = (Vec::<Batch>::new(), end(source));
+    loop {
+        let query = Query::Batches { from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
+        let Answer::Batches(page) = source.query(query).await? else { return Err(unexpected()) };
+        let (count, known) = (page.len(), all.len());
+        let fresh = page.into_iter().map(|report| report.batch).filter(|batch| {
+            all.iter().rev().take_while(|known| known.from <= batch.from).all(|known| known.label() != batch.label())
+        });
+        let fresh: Vec<Batch> = fresh.collect();
+        all.extend(fresh);
+        let next = all.last().and_then(|last| last.from.checked_add(Duration::from_micros(1)).ok());
+        match next.filter(|_| PAGE <= count && known < all.len()) {
+            Some(next) => to = next,
+            None => return Ok(all),
+        }
     }
 }
 

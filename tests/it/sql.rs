@@ -91,3 +91,35 @@ fn raw_samples_are_exported_whole() {
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert!(left.iter().all(|name| !name.to_string_lossy().ends_with(".new")), "{left:?}");
 }
+
+#[test]
+fn the_help_names_the_columns_that_there_are() {
+    let folder = folder();
+    let history = folder.path().join("tank.duckdb");
+    archived(&history, ParquetVersion::V1);
+    let (_, help) = run_at(&history, &["sql", "--help"]);
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    let columns = |of: &str| {
+        let sql = format!("SELECT string_agg(name, ', ' ORDER BY cid) FROM pragma_table_info('{of}')");
+        let (code, text) = run(&history, &["sql", &sql, "--csv"]);
+        assert_eq!(code, Some(0), "{text}");
+        text.lines().nth(1).unwrap().trim_matches('"').to_owned()
+    };
+    let named = |view: &str, notes: &[&str]| {
+        let after = help.split_once(&format!(" {view} utc")).unwrap_or_else(|| panic!("{view} in {help}")).1;
+        let plain = notes.iter().fold(format!("utc{after}"), |text, note| text.replacen(note, "", 1));
+        let columns = columns(view);
+        assert!(plain.starts_with(&columns), "{view}: found {columns}, the help has {plain}");
+    };
+    named("sample", &[]);
+    named("alarm", &[]);
+    named("action", &[]);
+    named("batch", &[" (begin)", " (NULL while it runs)"]);
+    named("phase", &[" (begin of the batch)", " ('unknown' as well)"]);
+    let listed = "m1, h1 minutes and hours of what is archived: utc (begin), ";
+    let listed = help.split_once(listed).unwrap().1;
+    for tier in ["m1", "h1"] {
+        let columns = columns(tier);
+        assert!(listed.starts_with(columns.strip_prefix("utc, ").unwrap()), "{tier}: {columns}");
+    }
+}

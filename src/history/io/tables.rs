@@ -6,9 +6,11 @@
 //! | `sample` | `utc`, `tag`, `value`, `unit`, `quality` (`good`, `uncertain: …`, `bad: …`) |
 //! | `m1`, `h1` | `utc` (begin), `tag`, `min`, `max`, `mean` (over good time), `first`, `last`, `gain` (of a counter), `good_ms`, `n` (samples), `unit`: of what is archived |
 //! | `alarm` | `utc`, `subject`, `message`, `priority` (1–4), `event`, `value`, `limit_value`, `by_whom`, `reason` |
+//! | `batch` | `utc` (begin), `until` (NULL while it runs), `batch`, `number`, `minutes`, `begin_seen`, `end_seen` |
+//! | `phase` | `utc` (begin of the batch), `batch`, `number`, `phase` (`unknown` as well), `minutes` |
 //! | `action` | `utc`, `by_whom`, `from_where`, `action`, `target`, `old_value`, `new_value`, `outcome`, `note` |
 
-use std::{path::Path, sync::Arc};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use duckdb::{Connection, InterruptHandle, params};
 
@@ -20,6 +22,7 @@ use crate::{
     history::{ArchiveFile, HistoryError, Overview, tiers::Tier},
     plant::{
         PlantDef,
+        batch::Batch,
         def::{CsvDialect, TagId},
         record::{ActionRecord, AlarmRecord},
         sample::{Quality, Sample},
@@ -65,7 +68,10 @@ impl Tables {
              CREATE TABLE alarm (utc TIMESTAMP, subject VARCHAR, message VARCHAR, priority UTINYINT, event VARCHAR,
                 value DOUBLE, limit_value DOUBLE, by_whom VARCHAR, reason VARCHAR);
              CREATE TABLE action (utc TIMESTAMP, by_whom VARCHAR, from_where VARCHAR, action VARCHAR, target VARCHAR,
-                old_value VARCHAR, new_value VARCHAR, outcome VARCHAR, note VARCHAR);",
+                old_value VARCHAR, new_value VARCHAR, outcome VARCHAR, note VARCHAR);
+             CREATE TABLE batch (utc TIMESTAMP, until TIMESTAMP, batch VARCHAR, number UINTEGER, minutes DOUBLE,
+                begin_seen BOOLEAN, end_seen BOOLEAN);
+             CREATE TABLE phase (utc TIMESTAMP, batch VARCHAR, number UINTEGER, phase VARCHAR, minutes DOUBLE);",
             folder = quoted(&folder.join("")),
             archive = quoted(Path::new(&archive)),
         ))?;
@@ -106,6 +112,21 @@ impl Tables {
         self.fill("action", actions.into_iter(), |to, action| {
             let ActionRecord { at, by, from, action, target, old, new, outcome, note, .. } = action;
             to.append_row(params![utc(at), by, from, action, target, old, new, outcome, note])
+        })
+    }
+
+    /// Adds batches, and their phases.
+    pub fn add_batches(&self, batches: Vec<Batch>) -> Result<(), HistoryError> {
+        let minutes = |time: Duration| time.as_secs_f64() / 60.0;
+        let phases = batches.iter().flat_map(|batch| {
+            let unknown = (!batch.unknown.is_zero()).then(|| (Arc::from("unknown"), batch.unknown));
+            batch.phases.iter().cloned().chain(unknown).map(move |phase| (batch, phase))
+        });
+        self.fill("phase", phases, |to, (batch, (phase, time))| {
+            to.append_row(params![utc(batch.from), batch.name, batch.number, phase, minutes(time)])
+        })?;
+        self.fill("batch", batches.iter(), |to, Batch { name, number, from, to: end, seen, lasted, .. }| {
+            to.append_row(params![utc(*from), end.map(utc), name, number, minutes(*lasted), seen.0, seen.1])
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    history::BATCHES_MAX,
+    history::{BATCHES_MAX, io::tables::Tables},
     plant::{
         Plant,
         batch::{BatchDef, BatchEvent, BatchRecord},
@@ -87,6 +87,25 @@ fn batches_survive_kills_and_have_the_figures_of_a_report() {
         (5, 1_380, None, (true, true), 0),
     ];
     assert_eq!(found.iter().map(|(facts, _)| *facts).collect::<Vec<_>>(), expect);
+    let Answer::Overview(overview) = store.answer(&Query::Overview, sec(1_420)).unwrap() else { panic!() };
+    let scratch = tempfile::tempdir().unwrap();
+    let tables = Tables::new(&def, &overview, scratch.path()).unwrap();
+    tables.add_batches(found.iter().map(|(_, report)| report.batch.clone()).collect()).unwrap();
+    let sql =
+        "SELECT number, minutes, until IS NULL, (SELECT round(sum(minutes), 3) FROM phase p WHERE p.number = b.number
+        AND phase = 'unknown'), begin_seen, end_seen FROM batch b WHERE number IN (2, 3, 5) ORDER BY number";
+    let text = |row: &Vec<Option<String>>| {
+        row.iter().map(|cell| cell.as_deref().unwrap_or("-").to_owned()).collect::<Vec<_>>().join(" ")
+    };
+    let rows: Vec<String> = tables.rows(sql, 9).unwrap().1.iter().map(text).collect();
+    assert_eq!(
+        rows,
+        [
+            "2 0.6666666666666666 false - true true",
+            "3 2.75 false 2.167 true false",
+            "5 0.6666666666666666 true - true true"
+        ]
+    );
     for (_, report) in found {
         let period = report.period();
         let Answer::Report(all) = store.answer(&Query::Report { period }, sec(1_420)).unwrap() else { panic!() };
