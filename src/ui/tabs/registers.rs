@@ -5,6 +5,7 @@
 
 mod advice;
 mod cells;
+mod compare;
 mod find;
 mod import;
 mod keys;
@@ -37,7 +38,6 @@ use self::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    access::right::needs_for_question,
     plant::{
         live::{AddressSpan, LiveRead, LiveReading, ReplyTimes, TABLES},
         tag::{ByteOrder, Table},
@@ -46,7 +46,6 @@ use crate::{
     ui::{
         Effect,
         keys::{find, hints},
-        rights,
     },
 };
 
@@ -103,6 +102,7 @@ pub struct Registers {
     trouble: Option<String>,
     writing: writing::Writing,
     watch: watch::WatchList,
+    comparison: Option<compare::Comparison>,
     /// What the open prompt asks for.
     asking: Asking,
 }
@@ -118,6 +118,7 @@ enum Asking {
     Save,
     List,
     Write,
+    Compare,
 }
 
 impl TabView for Registers {
@@ -151,6 +152,7 @@ impl TabView for Registers {
             trouble: None,
             writing: writing::Writing::default(),
             watch: watch::WatchList::default(),
+            comparison: None,
             asking: Asking::Address,
         }
     }
@@ -210,6 +212,7 @@ impl TabView for Registers {
                 return self.ask_text(Asking::Address, t!("go to address"), hint);
             }
             Action::Unit => return self.ask_unit(cx),
+            Action::Compare => return self.toggle_comparison(),
             Action::Find => {
                 let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
                 return self.ask_text(Asking::Value, t!("find a value in what was read"), hint);
@@ -259,14 +262,18 @@ impl TabView for Registers {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.on_way.is_some_and(|(on_way, ..)| on_way == number) || self.recognition.awaits(number)
+        self.on_way.is_some_and(|(on_way, ..)| on_way == number)
+            || self.recognition.awaits(number)
+            || self.comparison.as_ref().is_some_and(|comparison| comparison.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         if self.recognition.awaits(number) {
-            let reading =
-                answer.ok().and_then(|answer| if let Answer::Registers(read) = answer { Some(read) } else { None });
-            return self.on_probed(cx, reading);
+            return self.on_probed(cx, reading_of(answer));
+        }
+        if self.comparison.as_ref().is_some_and(|comparison| comparison.awaits(number)) {
+            self.on_compared(reading_of(answer));
+            return Vec::new();
         }
         if self.on_way.take_if(|(on_way, ..)| *on_way == number).is_none() {
             return Vec::new();
@@ -290,6 +297,7 @@ impl TabView for Registers {
         if self.paused {
             return actions;
         }
+        actions.extend(self.read_compared(cx));
         actions.extend(self.recognise(cx));
         actions.extend(self.ask(cx, began.checked_add(self.period).ok()));
         actions
@@ -304,6 +312,7 @@ impl TabView for Registers {
                 self.first = address;
             }
             Asking::Unit => self.unit_typed(cx, text)?,
+            Asking::Compare => self.compare_typed(cx, text)?,
             Asking::Save => return self.save(cx, text),
             Asking::List => {
                 return Ok(vec![UiAction::Do(Effect::Load { tab: Tab::Registers, path: PathBuf::from(text) })]);
@@ -356,32 +365,10 @@ impl Registers {
         self.asking = asking;
         vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, "")))]
     }
+}
 
-    /// Something else is shown: what is on its way is no longer wanted.
-    fn read_now(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if self.paused {
-            self.on_way = None;
-            return Vec::new();
-        }
-        self.ask(cx, None)
-    }
-
-    fn ask(&mut self, cx: &ViewContext, not_before: Option<Timestamp>) -> Vec<UiAction> {
-        if cx.def().lines.is_empty() {
-            return Vec::new();
-        }
-        let span = self.span(cx);
-        let relearn = std::mem::take(&mut self.relearn);
-        let spans = std::iter::once(span).chain(self.watched_spans(span)).collect();
-        let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
-        if let Some(why) = rights::lacks(cx, needs_for_question(&query)) {
-            self.trouble = Some(why);
-            return Vec::new();
-        }
-        self.number = self.number.wrapping_add(1);
-        self.on_way = Some((self.number, cx.steady(), span));
-        vec![UiAction::query(self.tab, self.number, query)]
-    }
+fn reading_of(answer: Result<Answer, HistoryError>) -> Option<LiveReading> {
+    answer.ok().and_then(|answer| if let Answer::Registers(read) = answer { Some(read) } else { None })
 }
 
 fn next<T: PartialEq + Copy>(all: &[T], now: T) -> T {

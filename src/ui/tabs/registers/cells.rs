@@ -64,6 +64,13 @@ impl Cells {
         good.map(|(address, _)| *address)
     }
 
+    /// The cells with a good word that `is_good` takes, as they are now, without what they held before.
+    pub fn frozen(&self, is_good: impl Fn(&Cell) -> bool) -> Cells {
+        let good = self.0.iter().filter(|(_, cell)| cell.word.is_some() && is_good(cell));
+        let frozen = |cell: &Cell| Cell { word: cell.word, ..Cell::new(cell.at) };
+        Cells(good.map(|(at, cell)| (*at, frozen(cell))).collect())
+    }
+
     /// Was nothing ever read?
     pub fn is_blank(&self) -> bool {
         self.0.values().all(|cell| cell.word.is_none())

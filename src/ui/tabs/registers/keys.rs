@@ -15,6 +15,8 @@ pub enum Action {
     Find,
     /// Asks for another unit.
     Unit,
+    /// Asks with what to compare, or ends that.
+    Compare,
     /// The next byte order.
     Order,
     /// The next way to write addresses.
@@ -95,6 +97,12 @@ pub(super) const KEYS: &[Key<Action>] = &[
         Action::Save,
     ),
     Key::new(char('U'), "unit", "read another unit", Action::Unit),
+    Key::new(
+        char('c'),
+        "compare",
+        "compare with another unit, or with this moment later; again to end it",
+        Action::Compare,
+    ),
     Key::new(char('r'), "", "ask again for what the unit has refused", Action::Relearn),
 ];
 
@@ -122,6 +130,7 @@ impl Action {
             | Action::GoTo
             | Action::Find
             | Action::Unit
+            | Action::Compare
             | Action::Order
             | Action::Base
             | Action::Pause

@@ -1,5 +1,6 @@
 //! A terminal at a device without a plant file, and a scripted unit behind it.
 
+mod compare;
 mod keep;
 mod watch;
 

@@ -15,12 +15,16 @@ impl Registers {
         if self.watch.is_logging() {
             return Err(t!("another unit has other registers: end the log first, with L").to_owned());
         }
+        let unit = self.parse_unit(cx, text)?;
+        self.show_unit(cx, unit);
+        Ok(())
+    }
+
+    pub(super) fn parse_unit(&self, cx: &ViewContext, text: &str) -> Result<u8, String> {
         let units = self.units(cx);
         let (least, most) = (units.start(), units.end());
         let wrong = || t!("found `{text}`, expected {least} to {most}", text, least, most);
-        let unit = text.parse().ok().filter(|unit| units.contains(unit)).ok_or_else(wrong)?;
-        self.show_unit(cx, unit);
-        Ok(())
+        text.parse().ok().filter(|unit| units.contains(unit)).ok_or_else(wrong)
     }
 
     /// Nothing that was read of one unit is shown of another, and each has names of its own.
@@ -30,6 +34,7 @@ impl Registers {
         (self.unit, self.reads) = (unit, 0);
         (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
         self.watch.clear();
+        self.comparison = None;
         self.names_of_plant = Names::default();
         self.name_by_plant(cx.snapshot);
     }

@@ -4,6 +4,7 @@ use super::{
     Base, Registers,
     advice::advice,
     cells::Cell,
+    compare,
     layout::{Columns, layout, name_column},
     names::Named,
     watch,
@@ -55,8 +56,8 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let advice = advice(tab, cx);
     if advice.is_empty() {
         columns(tab, cx, canvas);
-        for (y, address) in tab.rows(cx).map(to_u16).enumerate() {
-            row(tab, cx, canvas, HEAD + to_u16(y), address);
+        for (y, address) in (HEAD..).zip(tab.rows(cx).map(to_u16)) {
+            row(tab, cx, canvas, y, address);
         }
     } else {
         canvas.text(2, HEAD, t!("In the order of likelihood:"), cx.theme.normal());
@@ -120,6 +121,9 @@ pub fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
         return (t!("unit {unit}   {fault}", unit, fault), false);
     }
     let every = tab.period.as_secs_f64();
+    if let Some(comparison) = &tab.comparison {
+        return (compare::summary(tab, cx, comparison) + &t!("   every {every} s", every), true);
+    }
     let reply = last.reply.map_or(String::new(), |reply| format!("{:.1} ms", reply.as_secs_f64() * 1e3));
     let words = t!(
         "unit {unit}   every {every} s   reply {reply}   requests per read {requests}   reads {reads}",
@@ -144,6 +148,9 @@ fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         Base::One => t!("from 1"),
     };
     canvas.text(2, 2, &fit(&format!("{base}/{}", t!("wire")), 14), theme.dim());
+    if let Some(comparison) = &tab.comparison {
+        return compare::columns(tab, cx, comparison, canvas);
+    }
     if tab.table.is_bits() {
         canvas.text(17, 2, t!("value"), theme.dim());
         canvas.text(at.age, 2, t!("changed"), theme.dim());
@@ -191,6 +198,9 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
     canvas.text(0, y, mark, theme.strong());
     let place = if selected { theme.focus() } else { theme.dim() };
     canvas.text(1, y, &address_text(tab, address), place);
+    if let Some(comparison) = &tab.comparison {
+        return compare::row(tab, cx, comparison, canvas, (y, address));
+    }
     let Some((cell, word)) = cell.and_then(|cell| cell.word.map(|word| (cell, word))) else {
         let why = match cell {
             Some(cell) if cell.is_hole() => t!("----   no such address").to_owned(),
@@ -268,7 +278,7 @@ fn bits(word: u16) -> String {
 }
 
 /// Does the unit perhaps hold something else by now? Nothing came, or for too long.
-fn is_old(tab: &Registers, cx: &ViewContext, cell: &Cell) -> bool {
+pub fn is_old(tab: &Registers, cx: &ViewContext, cell: &Cell) -> bool {
     cell.fault.is_some() || is_past(tab, cx, cell.at)
 }
 

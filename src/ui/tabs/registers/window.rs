@@ -4,8 +4,12 @@ use std::ops::Range;
 
 use super::{Registers, view};
 use crate::{
-    plant::{live::AddressSpan, number::to_u32},
-    ui::tabs::prelude::*,
+    access::right::needs_for_question,
+    plant::{
+        live::{AddressSpan, LiveRead},
+        number::to_u32,
+    },
+    ui::{rights, tabs::prelude::*},
 };
 
 /// Periods to choose from.
@@ -43,5 +47,31 @@ impl Registers {
         let at = PERIODS_MS.iter().position(|ms| SignedDuration::from_millis(*ms) == self.period).unwrap_or(0);
         let at = at.saturating_add_signed(by).min(PERIODS_MS.len() - 1);
         self.period = SignedDuration::from_millis(PERIODS_MS[at]);
+    }
+
+    /// Something else is shown: what is on its way is no longer wanted.
+    pub(super) fn read_now(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if self.paused {
+            self.on_way = None;
+            return Vec::new();
+        }
+        self.ask(cx, None)
+    }
+
+    pub(super) fn ask(&mut self, cx: &ViewContext, not_before: Option<Timestamp>) -> Vec<UiAction> {
+        if cx.def().lines.is_empty() {
+            return Vec::new();
+        }
+        let span = self.span(cx);
+        let relearn = std::mem::take(&mut self.relearn);
+        let spans = std::iter::once(span).chain(self.watched_spans(span)).collect();
+        let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
+        if let Some(why) = rights::lacks(cx, needs_for_question(&query)) {
+            self.trouble = Some(why);
+            return Vec::new();
+        }
+        self.number = self.number.wrapping_add(1);
+        self.on_way = Some((self.number, cx.steady(), span));
+        vec![UiAction::query(self.tab, self.number, query)]
     }
 }
