@@ -104,11 +104,11 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
 /// A word of the tag, or a number. The station checks range and decimals.
 fn value(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<f64, String> {
     let def = snapshot.def.tag(tag);
-    let word = def.labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text));
+    let word = def.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text));
     if let Some((value, _)) = word {
         return Ok(*value as f64);
     }
-    let labels: Vec<&str> = def.labels.iter().map(|(_, label)| label.as_str()).collect();
+    let labels: Vec<&str> = def.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
     let expected = if labels.is_empty() { "a number".to_owned() } else { format!("one of {}", labels.join(", ")) };
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),

@@ -161,19 +161,19 @@ impl Columns {
     }
 
     fn value(&self, tag: &TagDef, found: &str) -> Result<f64, String> {
-        if let Some((value, _)) = tag.labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(found)) {
+        if let Some((value, _)) = tag.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(found)) {
             return Ok(*value as f64);
         }
         let number = if self.decimal_comma { found.replace(',', ".") } else { found.to_owned() };
         let number = number.parse::<f64>().ok().filter(|number| number.is_finite());
         let is_bit = |value: f64| value == 0.0 || value == 1.0;
-        let fits = |value: &f64| match (tag.labels.is_empty(), tag.point.table.is_bits()) {
+        let fits = |value: &f64| match (tag.enum_labels.is_empty(), tag.point.table.is_bits()) {
             (false, _) => tag.label_of(*value).is_some(),
             (true, true) => is_bit(*value),
             // With decimals that the device announces its range is smaller still.
             (true, false) => scale::to_raw(tag, *value, 0).is_some(),
         };
-        let labels: Vec<&str> = tag.labels.iter().map(|(_, label)| label.as_str()).collect();
+        let labels: Vec<&str> = tag.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
         let expected = if labels.is_empty() { "a number that its type can hold".into() } else { labels.join(", ") };
         number.filter(fits).ok_or_else(|| format!("{}: found `{found}`, expected {expected}", tag.name))
     }

@@ -79,7 +79,7 @@ pub fn plant() -> PlantDef {
                 device: PLC,
                 name: "PLC-1.RUN".into(),
                 access: Access::ReadWrite,
-                labels: vec![(0, "STOP".into()), (1, "RUN".into())],
+                enum_labels: vec![(0, "STOP".into()), (1, "RUN".into())],
                 unit: String::new(),
                 ..tag(RUN, "RUN", Table::Coil, 3072)
             },

@@ -102,7 +102,7 @@ pub fn capture(
     for tag in def.tags_of(device).filter(|tag| tag.in_sets) {
         let unit = tag.unit_from.as_ref().map(|(from, _)| (def.tag(*from), trusted(*from)));
         // A number that the profile has no word for cannot be checked when it comes back.
-        let known = |value: &f64| tag.labels.is_empty() || tag.label_of(*value).is_some();
+        let known = |value: &f64| tag.enum_labels.is_empty() || tag.label_of(*value).is_some();
         match (trusted(tag.id).filter(known), unit) {
             // A number without its unit is another number.
             (None, _) | (_, Some((_, None))) => missing.push(tag.short.clone()),

@@ -58,7 +58,7 @@ pub struct TagDef {
     /// What must be given again to write it.
     pub reauthenticate: Option<Reauthentication>,
     /// Names of the numbers of an enumeration; empty for a quantity.
-    pub labels: Vec<(i64, String)>,
+    pub enum_labels: Vec<(i64, String)>,
     /// Names of the bits of a status word.
     pub bit_labels: Vec<(u8, String)>,
     /// Raw numbers (before scaling) that mean "no value".
@@ -119,7 +119,7 @@ impl TagDef {
             access: Access::Read,
             confirm: None,
             reauthenticate: None,
-            labels: Vec::new(),
+            enum_labels: Vec::new(),
             bit_labels: Vec::new(),
             bad_if: Vec::new(),
             quality_from: None,
@@ -208,7 +208,7 @@ impl TagDef {
     }
     /// The text of an enumeration's number.
     pub fn label_of(&self, value: f64) -> Option<&str> {
-        self.labels.iter().find(|(number, _)| *number as f64 == value).map(|(_, text)| text.as_str())
+        self.enum_labels.iter().find(|(number, _)| *number as f64 == value).map(|(_, text)| text.as_str())
     }
 }
 

@@ -207,8 +207,8 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
         let mut tag = defined.tag;
         for (need, what) in &defined.needs {
             let target = &all[need.value.index()];
-            let foreign = target.labels.iter().find(|(_, unit)| !units::known(unit));
-            if *what == "unit_from" && (target.labels.is_empty() || foreign.is_some()) {
+            let foreign = target.enum_labels.iter().find(|(_, unit)| !units::known(unit));
+            if *what == "unit_from" && (target.enum_labels.is_empty() || foreign.is_some()) {
                 let found = foreign.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
                 problems.add(need.at, format!("{} gives no unit: {found}", target.name)).label("unit_from");
             }
@@ -225,7 +225,7 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
             }
         }
         if let Some((target, units)) = &mut tag.unit_from {
-            *units = all[target.index()].labels.clone();
+            *units = all[target.index()].enum_labels.clone();
             // Until the device was asked, the first of its units stands in columns and headings.
             let first = units.first().map(|(_, unit)| unit.clone()).unwrap_or_default();
             tag.unit = Some(tag.unit).filter(|unit| !unit.is_empty()).unwrap_or(first);

@@ -296,7 +296,7 @@ impl<'a> Reader<'a, '_> {
         };
         let at = Span { end: last.at.end, ..first.at };
         let text = self.text[self.starts[start]..self.starts[start + count - 1] + last.value.len()].to_owned();
-        let is_label = tag.labels.iter().any(|(_, label)| *label == text);
+        let is_label = tag.enum_labels.iter().any(|(_, label)| *label == text);
         let in_device = self.device.map(|device| format!("{device}.{}", first.value));
         let is_tag = [Some(first.value), in_device.as_deref()]
             .into_iter()
@@ -311,7 +311,7 @@ impl<'a> Reader<'a, '_> {
         self.next += count;
         if let Ok(number) = first.parse::<f64>()
             && number.is_finite()
-            && tag.labels.is_empty()
+            && tag.enum_labels.is_empty()
         {
             if !rest.is_empty() && rest != tag.unit {
                 let problem = self.problems.add(at, format!("`{rest}` is not the unit of {}", tag.name));

@@ -174,7 +174,7 @@ fn controller(item: ControllerItem, defs: &Defs, problems: &mut Problems) -> Opt
 fn sequence(item: SequenceItem, defs: &Defs, problems: &mut Problems) -> Option<MimicItem> {
     let name = item.step.as_ref()?;
     let step = defs.tag(name, problems)?;
-    if step.labels.is_empty() {
+    if step.enum_labels.is_empty() {
         problems.add(name.at, format!("{} has no steps", step.name)).label("expected a tag with an `enum`");
     }
     Some(MimicItem::Sequence {
@@ -260,7 +260,7 @@ pub(super) fn trends(tables: &[At<TrendTable>], defs: &Defs, problems: &mut Prob
     }
     if tables.is_empty() {
         let curve = |tag: &&TagDef| {
-            tag.labels.is_empty()
+            tag.enum_labels.is_empty()
                 && tag.is_stored()
                 && (matches!(tag.poll, Poll::Every(_)) || tag.calculation.is_some())
         };

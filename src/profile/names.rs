@@ -153,10 +153,10 @@ impl Unique {
 
 /// The number that a choice means for a tag: a label of its enumeration, or a number that the tag can hold.
 pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
-    let labels = || tag.labels.iter().map(|(_, text)| text.as_str());
+    let labels = || tag.enum_labels.iter().map(|(_, text)| text.as_str());
     let known = match &choice.value {
-        Choice::Word(word) => tag.labels.iter().find(|(_, text)| text == word).map(|(number, _)| *number as f64),
-        Choice::Number(number) => Some(*number).filter(|n| tag.labels.is_empty() || tag.label_of(*n).is_some()),
+        Choice::Word(word) => tag.enum_labels.iter().find(|(_, text)| text == word).map(|(number, _)| *number as f64),
+        Choice::Number(number) => Some(*number).filter(|n| tag.enum_labels.is_empty() || tag.label_of(*n).is_some()),
     };
     if known.is_none() {
         let written = match &choice.value {
@@ -164,7 +164,7 @@ pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Proble
             Choice::Number(number) => number.to_string(),
         };
         let problem = problems.add(choice.at, format!("`{written}` is not a state of {}", tag.name));
-        if tag.labels.is_empty() {
+        if tag.enum_labels.is_empty() {
             problem.label("expected a number: the tag has no `enum`");
         } else {
             problem.label("not in its `enum`").suggest(&written, labels());

@@ -303,7 +303,7 @@ pub fn suggested_alarms(device: &str, tags: &[TagDef]) -> Vec<NewAlarm> {
         NewAlarm { tag: format!("{device}.{}", tag.short), condition, limit, deadband, message, reason, cause }
     };
     tags.iter()
-        .filter(|tag| tag.access == Access::Read && tag.labels.is_empty() && !tag.is_text())
+        .filter(|tag| tag.access == Access::Read && tag.enum_labels.is_empty() && !tag.is_text())
         .flat_map(|tag| {
             let fault = faults
                 .contains(&tag.id)
@@ -331,7 +331,7 @@ pub fn usual_shifts() -> Vec<(String, String)> {
 }
 
 fn is_number(tag: &TagDef) -> bool {
-    !tag.is_text() && tag.labels.is_empty()
+    !tag.is_text() && tag.enum_labels.is_empty()
 }
 
 /// The keys of a tag, those that are usual left out.
@@ -364,8 +364,8 @@ fn tag_text(tag: &TagDef) -> String {
             true => keys.extend((!tag.unit.is_empty()).then(|| format!("unit = {}", quoted(&tag.unit)))),
             false => keys.push(format!("label = {}", quoted(&format!("{} in {}", tag.short, tag.unit)))),
         }
-        if !tag.labels.is_empty() {
-            let labels = tag.labels.iter().map(|(number, word)| format!("{number} = {}", quoted(word)));
+        if !tag.enum_labels.is_empty() {
+            let labels = tag.enum_labels.iter().map(|(number, word)| format!("{number} = {}", quoted(word)));
             keys.push(format!("enum = {{ {} }}", labels.collect::<Vec<_>>().join(", ")));
         }
     }

@@ -196,8 +196,8 @@ fn units_of(table: &At<Raw>, tags: &[&TagDef], problems: &mut Problems) -> BTree
 fn row(value: &SetValue, tag: Option<&TagDef>, unit: &str) -> String {
     let label = tag.and_then(|tag| tag.label_of(value.value));
     // A label that two numbers share would come back as the first of them.
-    let label =
-        label.filter(|label| tag.is_some_and(|tag| tag.labels.iter().filter(|(_, other)| other == label).count() == 1));
+    let label = label
+        .filter(|label| tag.is_some_and(|tag| tag.enum_labels.iter().filter(|(_, other)| other == label).count() == 1));
     let written = label.map_or_else(|| number(value.value), quoted);
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let key = if value.tag.chars().all(bare) && !value.tag.is_empty() { value.tag.clone() } else { quoted(&value.tag) };

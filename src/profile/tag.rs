@@ -4,7 +4,7 @@ mod bits;
 
 use std::time::Duration;
 
-use self::bits::{bit_field, bit_labels, labels};
+use self::bits::{bit_field, bit_labels, enum_labels};
 use super::{
     address::{check_modicon, locate},
     diagnostic::{Problems, Span},
@@ -87,7 +87,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         access,
         confirm: row.confirm.as_ref().map(|confirm| confirm.value.clone()),
         reauthenticate: row.reauthenticate.map(|kind| kind.value),
-        labels: labels(&row, kind, problems),
+        enum_labels: enum_labels(&row, kind, problems),
         bit_labels: bit_labels(&row.bits, kind, problems),
         bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),
         quality_from: links.quality.map(|tag| (tag, row.quality_mask.value_or(u64::MAX))),

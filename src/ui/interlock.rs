@@ -35,7 +35,7 @@ pub fn other_state(cx: &ViewContext, tag: TagId) -> Option<f64> {
 }
 
 fn two_states(def: &TagDef) -> Option<(f64, f64)> {
-    match (def.labels.as_slice(), def.point.kind) {
+    match (def.enum_labels.as_slice(), def.point.kind) {
         ([one, other], _) => Some((one.0 as f64, other.0 as f64)),
         ([], DataType::Bool) => Some((0.0, 1.0)),
         _ => None,

@@ -10,7 +10,7 @@ const NOW: &str = "2026-11-23T12:00:00Z";
 
 fn read(text: &str) -> Result<Rows, Vec<String>> {
     let mut def = plant("Europe/Berlin", &THREE);
-    def.tags[1].labels = vec![(0, "OFF".into()), (1, "ON".into())];
+    def.tags[1].enum_labels = vec![(0, "OFF".into()), (1, "ON".into())];
     def.tags[2].point.kind = DataType::U16;
     parse(&def, text.as_bytes(), Timestamp::UNIX_EPOCH, at(NOW))
 }

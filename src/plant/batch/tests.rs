@@ -23,8 +23,8 @@ fn rule() -> (BatchDef, TagDef) {
         energy: None,
         tags: Vec::new(),
     };
-    let labels = vec![(0, "IDLE".into()), (1, "FILL".into()), (2, "HEAT".into())];
-    (def, TagDef { labels, ..fixture::plant().tags[STEP.index()].clone() })
+    let enum_labels = vec![(0, "IDLE".into()), (1, "FILL".into()), (2, "HEAT".into())];
+    (def, TagDef { enum_labels, ..fixture::plant().tags[STEP.index()].clone() })
 }
 
 /// A step at a second: a number, an uncertain number, or none.

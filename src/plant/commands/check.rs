@@ -55,7 +55,7 @@ impl CommandTracker {
         if is_busy && (!urgent || under_way.any(same)) {
             return refuse(Refusal::UnderWay);
         }
-        if !def.labels.is_empty() && def.label_of(value).is_none() {
+        if !def.enum_labels.is_empty() && def.label_of(value).is_none() {
             return refuse(Refusal::NotAChoice);
         }
         if let Some(lock) = self.def.logic.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {

@@ -143,7 +143,7 @@ fn carries(def: &PlantDef, device: DeviceId, tag: TagId) -> bool {
 /// Why a value cannot be in the device when all is written.
 fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, trusted: Trusted) -> Option<Problem> {
     let tag = def.tag(change.tag);
-    if !tag.labels.is_empty() && tag.label_of(change.new).is_none() {
+    if !tag.enum_labels.is_empty() && tag.label_of(change.new).is_none() {
         return Some(Problem::NotAChoice { tag: tag.short.clone(), value: change.new });
     }
     let held = tag.scaling_decimals(trusted).and_then(|decimals| scale::held(tag, change.new, decimals));

@@ -35,11 +35,11 @@ fn def() -> PlantDef {
         TagDef { min: Some(Bound::Fixed(0.0)), max: high, unit_from: unit.clone(), ..tag(LOW, "SV-L") },
         TagDef { min: low, max: Some(Bound::Fixed(500.0)), ..tag(HIGH, "SV-H") },
         TagDef { min: low, max: high, ..tag(SV, "SV") },
-        TagDef { labels: vec![(0, "PID".into()), (1, "FUZZY".into())], ..tag(MODE, "CTRL") },
+        TagDef { enum_labels: vec![(0, "PID".into()), (1, "FUZZY".into())], ..tag(MODE, "CTRL") },
         TagDef {
             access: Access::Read,
             in_sets: false,
-            labels: vec![(0, "°C".into()), (1, "°F".into())],
+            enum_labels: vec![(0, "°C".into()), (1, "°F".into())],
             ..tag(UNIT, "P-F")
         },
         TagDef { in_sets: false, ..tag(RUN, "RUN") },

@@ -95,7 +95,7 @@ toml_tables! {
         opt "confirm" confirm: String,
         /// What must be given again to write it.
         opt "reauthenticate" reauthenticate: Reauthentication,
-        opt "enum" labels: Numbered,
+        opt "enum" enum_labels: Numbered,
         opt "bits" bits: Numbered,
         list "bad_if" bad_if: i64,
         opt "quality_from" quality_from: String,

@@ -53,7 +53,7 @@ fn two_devices_of_a_profile_may_have_tags_of_their_own() {
     let plc = def.devices.iter().find(|device| device.profile == "koyo_dl06").expect("the tank has a PLC").clone();
     // A second PLC whose plant file gives it another register, and none of the first one's.
     let second = crate::plant::def::DeviceId(def.devices.len() as u16);
-    let base = def.tags_of(plc.id).find(|tag| tag.labels.is_empty()).expect("a number").clone();
+    let base = def.tags_of(plc.id).find(|tag| tag.enum_labels.is_empty()).expect("a number").clone();
     def.devices.push(crate::plant::def::DeviceDef { id: second, name: "PLC-2".into(), ..plc.clone() });
     let id = crate::plant::def::TagId(def.tags.len() as u16);
     let name = "PLC-2.RECIPE".to_owned();

@@ -33,8 +33,8 @@ pub(super) fn bit_field(field: &At<Choice>, kind: DataType, table: Table, proble
     valid.map(|(high, low)| (low, high - low + 1))
 }
 
-pub(super) fn labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i64, String)> {
-    let Some(Numbered(rows)) = row.labels.as_ref().map(|labels| &labels.value) else { return Vec::new() };
+pub(super) fn enum_labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i64, String)> {
+    let Some(Numbered(rows)) = row.enum_labels.as_ref().map(|labels| &labels.value) else { return Vec::new() };
     let range = kind.and_then(raw_range);
     for (number, text) in rows {
         let outside = range.filter(|(low, high)| (number.value as f64) < *low || (number.value as f64) > *high);

@@ -177,7 +177,7 @@ impl Model {
         let Some(value) = self.value(tag.id) else { return tag.is_text() };
         let above = self.bound(tag.min).is_none_or(|min| min <= value);
         let below = self.bound(tag.max).is_none_or(|max| value <= max);
-        above && below && (tag.labels.is_empty() || tag.label_of(value).is_some())
+        above && below && (tag.enum_labels.is_empty() || tag.label_of(value).is_some())
     }
 }
 
@@ -187,7 +187,7 @@ fn at_rest(tag: &TagDef) -> f64 {
         Some(Bound::Fixed(value)) => Some(value),
         Some(Bound::From(_)) | None => None,
     };
-    match tag.labels.first() {
+    match tag.enum_labels.first() {
         Some((first, _)) if tag.label_of(0.0).is_none() => *first as f64,
         _ => 0f64.min(fixed(tag.max).unwrap_or(0.0)).max(fixed(tag.min).unwrap_or(0.0)),
     }

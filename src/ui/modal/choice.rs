@@ -43,7 +43,7 @@ impl Choice {
         // A state that the device only reports is no choice.
         let range = cx.snapshot.range(tag);
         let may = |number: f64| range.is_none_or(|(min, max)| (min..=max).contains(&number));
-        let choices = || def.labels.iter().filter(|(number, _)| may(*number as f64));
+        let choices = || def.enum_labels.iter().filter(|(number, _)| may(*number as f64));
         let rows = choices().map(|(number, label)| {
             let next = Confirm::write(cx, tag, *number as f64);
             Row { text: format!("{number}  {label}"), tag, next }

@@ -98,7 +98,7 @@ impl Modal {
     /// read-only. Where the device cannot be reached the window says so, before anything is typed.
     pub fn write(cx: &ViewContext, tag: TagId) -> Option<Modal> {
         let def = cx.def().tag(tag);
-        match (def.writable(), Notice::unreachable(cx, def.device), def.labels.is_empty()) {
+        match (def.writable(), Notice::unreachable(cx, def.device), def.enum_labels.is_empty()) {
             (false, ..) => None,
             (true, Some(notice), _) => Some(Modal::Notice(notice)),
             (true, None, true) => Some(Modal::Entry(Entry::new(cx, tag))),

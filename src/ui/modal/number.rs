@@ -129,7 +129,7 @@ pub fn warnings(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
 
 /// The permitted range in words.
 pub fn range_text(cx: &ViewContext, tag: TagId) -> String {
-    let labels = &cx.def().tag(tag).labels;
+    let labels = &cx.def().tag(tag).enum_labels;
     if !labels.is_empty() {
         return t!("range one of {count}", count = labels.len());
     }

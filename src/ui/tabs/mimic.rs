@@ -231,7 +231,7 @@ fn intent(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     if cx.def().logic.sequences.iter().any(|sequence| sequence.run == tag) {
         return Some(Modal::Confirm(Confirm::write(cx, tag, 0.0)));
     }
-    match def.labels.as_slice() {
+    match def.enum_labels.as_slice() {
         [_, _] => Some(Modal::Choice(Choice::values(cx, tag))),
         _ => Modal::write(cx, tag),
     }

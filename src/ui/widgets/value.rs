@@ -36,7 +36,7 @@ pub fn show(cx: &ViewContext, tag: TagId) -> Shown {
     let style = cx.theme.quality(sample.quality);
     let def = cx.def().tag(tag);
     let unit = cx.snapshot.unit(tag).to_owned();
-    let number = def.labels.is_empty() && def.bit_labels.is_empty() && !def.is_text();
+    let number = def.enum_labels.is_empty() && def.bit_labels.is_empty() && !def.is_text();
     let nothing = |text: &str, note: &str, style| Shown {
         text: text.to_owned(),
         unit: String::new(),

@@ -64,7 +64,7 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
 #[test]
 fn what_will_be_sent_is_blocked_whatever_was_typed() {
     let mut def = fixture::plant();
-    def.tags[RUN.index()].labels.clear();
+    def.tags[RUN.index()].enum_labels.clear();
     let message = "not while it is hot".to_owned();
     let when = InterlockCondition::Above(60.0);
     def.logic.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, message, refuse: true }];

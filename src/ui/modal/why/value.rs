@@ -190,7 +190,7 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     let mut words = words.trim_end().to_owned();
     match def.decimals {
         Decimals::From(from) => words += &t!(", decimals from {name}", name = cx.def().tag(from).name),
-        Decimals::Fixed(_) if def.scale == 1.0 && def.offset == 0.0 && def.labels.is_empty() => {
+        Decimals::Fixed(_) if def.scale == 1.0 && def.offset == 0.0 && def.enum_labels.is_empty() => {
             words += t!(", not scaled")
         }
         Decimals::Fixed(_) => {}

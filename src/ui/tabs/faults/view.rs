@@ -185,7 +185,7 @@ fn compare(cx: &ViewContext, status: &Status, target: FaultTarget) -> Vec<Compar
 /// What a value may change between two readings: two hundredths of its range; a state not at all.
 fn allowed(cx: &ViewContext, tag: TagId) -> f64 {
     let span = cx.snapshot.range(tag).map_or(0.0, |(low, high)| high - low);
-    if cx.def().tag(tag).labels.is_empty() { (0.02 * span).max(0.5) } else { 0.0 }
+    if cx.def().tag(tag).enum_labels.is_empty() { (0.02 * span).max(0.5) } else { 0.0 }
 }
 
 fn comparison(cx: &ViewContext, rows: &[Compared], canvas: &mut Canvas) {

@@ -172,9 +172,9 @@ impl Rule {
         }
         let suffix = self.suffix.trim();
         let unit = unit_of(suffix).map_or(suffix.to_owned(), str::to_owned);
-        let labels = self.labels.into_iter().map(|Label { value, text }| (value, text)).collect();
+        let enum_labels = self.labels.into_iter().map(|Label { value, text }| (value, text)).collect();
         let decimals = self.decimals.unwrap_or_else(|| list::decimals_of(scale, kind));
-        Ok(Named { scale, offset, decimals, unit, labels, ..Named::new(table, address, kind, order, name) })
+        Ok(Named { scale, offset, decimals, unit, enum_labels, ..Named::new(table, address, kind, order, name) })
     }
 }
 

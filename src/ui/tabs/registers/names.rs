@@ -31,7 +31,7 @@ pub struct Named {
     /// `SV`.
     pub name: String,
     /// Names of the numbers of an enumeration, before scaling; empty for a quantity.
-    pub labels: Vec<(i64, String)>,
+    pub enum_labels: Vec<(i64, String)>,
 }
 
 impl Named {
@@ -47,7 +47,7 @@ impl Named {
             decimals: 0,
             unit: String::new(),
             name: name.to_owned(),
-            labels: Vec::new(),
+            enum_labels: Vec::new(),
         }
     }
 
@@ -58,8 +58,8 @@ impl Named {
         let plain = Named::new(point.table, point.address, point.kind, point.order, &tag.short);
         let Some((decimals, unit)) = scaling else { return Named { unit: t!("raw").to_owned(), ..plain } };
         let point = if let Decimals::From(_) = tag.decimals { 0.1f64.powi(i32::from(decimals)) } else { 1.0 };
-        let labels = tag.labels.clone();
-        Named { scale: tag.scale * point, offset: tag.offset, decimals, unit, labels, ..plain }
+        let enum_labels = tag.enum_labels.clone();
+        Named { scale: tag.scale * point, offset: tag.offset, decimals, unit, enum_labels, ..plain }
     }
 
     /// Registers or bits that it takes.
@@ -78,7 +78,7 @@ impl Named {
             return words.get(..usize::from(self.len())).map(interpret::text);
         }
         let raw = self.raw(words)?;
-        if let Some((_, label)) = self.labels.iter().find(|(number, _)| *number as f64 == raw) {
+        if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| *number as f64 == raw) {
             return Some(label.clone());
         }
         let value = format!("{:.*}", usize::from(self.decimals), raw * self.scale + self.offset);
@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(scaled.text(&[700]).as_deref(), Some("70.0 °C"));
         assert_eq!(scaled.text(&[0xFFF6]).as_deref(), Some("-1.0 °C"));
         assert_eq!(scaled.text(&[]), None);
-        let state = Named { labels: vec![(0, "RUN".into())], ..plain.clone() };
+        let state = Named { enum_labels: vec![(0, "RUN".into())], ..plain.clone() };
         assert_eq!((state.text(&[0]).as_deref(), state.text(&[7]).as_deref()), (Some("RUN"), Some("7")));
         let float = Named { kind: DataType::F32, decimals: 2, ..plain.clone() };
         assert_eq!((float.text(&[0x42D1, 0x6353]).as_deref(), float.text(&[0x42D1])), (Some("104.69"), None));

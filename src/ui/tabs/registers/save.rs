@@ -141,7 +141,7 @@ pub fn tag(named: &Named, name: &str) -> TagDef {
         offset: named.offset,
         decimals: Decimals::Fixed(named.decimals),
         unit: named.unit.clone(),
-        labels: named.labels.clone(),
+        enum_labels: named.enum_labels.clone(),
         ..TagDef::new(TagId(0), DeviceId(0), name, point)
     }
 }

@@ -110,10 +110,10 @@ impl Registers {
                 t!("write {name}, now {value}", name = named.name, value = named.text(&held).unwrap_or_default());
             let hint = if let DataType::Text(most) = named.kind {
                 t!("at most {most} characters", most)
-            } else if named.labels.is_empty() {
+            } else if named.enum_labels.is_empty() {
                 t!("a value as it is shown, or +1; 0x2BC: words as they are").to_owned()
             } else {
-                let labels: Vec<&str> = named.labels.iter().map(|(_, label)| label.as_str()).collect();
+                let labels: Vec<&str> = named.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
                 labels.join(", ")
             };
             return self.ask_text(super::Asking::Write, &title, &hint);
@@ -241,7 +241,7 @@ fn typed_as(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String>
         let words = codec::encode_text(named.point(), text);
         return words.ok_or_else(|| t!("found `{text}`, expected at most {most} printable characters", text, most));
     }
-    if let Some((raw, _)) = named.labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text)) {
+    if let Some((raw, _)) = named.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text)) {
         return encode(named, *raw as f64).ok_or_else(|| does_not_fit(text, named));
     }
     let wrong = || {

@@ -262,7 +262,7 @@ fn draw_pen(
 fn draw_figures(trends: &Trends, cx: &ViewContext, row: &mut Canvas, tag: TagId) {
     let (columns, style) = (Columns::of(row.width()), cx.theme.normal());
     let Some((summary, good)) = trends.figures.get(&tag) else { return };
-    if cx.def().tag(tag).labels.is_empty() {
+    if cx.def().tag(tag).enum_labels.is_empty() {
         for (end, value) in [columns.min, columns.mean, columns.max]
             .into_iter()
             .zip(summary.map_or([None; 3], |s| [Some(s.0), Some(s.1), Some(s.2)]))
@@ -305,7 +305,7 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
         canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());
         canvas.text_right(value, y, &shown.within(value - label), shown.style);
         let Some(series) = hour(trends, *tag) else { continue };
-        if let Some((min, _, max)) = series.summary.filter(|_| def.labels.is_empty()) {
+        if let Some((min, _, max)) = series.summary.filter(|_| def.enum_labels.is_empty()) {
             canvas.text_right(low, y, &cx.snapshot.format(*tag, min), theme.dim());
             canvas.text_right(high, y, &cx.snapshot.format(*tag, max), theme.dim());
         }

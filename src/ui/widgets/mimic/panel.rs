@@ -151,7 +151,7 @@ impl Sequence<'_> {
         let theme = cx.theme;
         let now = cx.snapshot.sample(self.step).good_value();
         let (mut x, mut y) = (0, 0);
-        for (number, name) in &cx.def().tag(self.step).labels {
+        for (number, name) in &cx.def().tag(self.step).enum_labels {
             let present = now == Some(*number as f64);
             let text =
                 if present { format!("{}{name}", theme.pick("▸", ">")) } else { format!(" {}", name.to_lowercase()) };

@@ -126,7 +126,7 @@ pub fn states(cx: &ViewContext, canvas: &mut Canvas, y: u16, tags: &[TagId]) {
 /// The state in a word: the profile's, else ours; why not, when it is not known.
 fn word(cx: &ViewContext, tag: TagId, (on, off): (&str, &str)) -> String {
     let shown = value::show(cx, tag);
-    match (value::is_on(cx, tag), cx.def().tag(tag).labels.is_empty()) {
+    match (value::is_on(cx, tag), cx.def().tag(tag).enum_labels.is_empty()) {
         (Some(true), true) => on.to_owned(),
         (Some(false), true) => off.to_owned(),
         (Some(_), false) | (None, _) => shown.text,

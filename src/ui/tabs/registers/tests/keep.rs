@@ -113,7 +113,7 @@ fn registers_named_by_hand_are_saved_as_tags_of_the_plant_file() {
     names.put(Named { scale: 0.1, decimals: 1, unit: "°C".into(), ..named(1002, DataType::I16, "SV tank \"1\"") });
     names.put(Named { unit: "furlong".into(), ..named(1010, DataType::F32, "way") });
     names.put(named(1011, DataType::U16, "inside the float"));
-    names.put(Named { labels: vec![(0, "off".into()), (1, "on".into())], ..named(1020, DataType::U16, "way") });
+    names.put(Named { enum_labels: vec![(0, "off".into()), (1, "on".into())], ..named(1020, DataType::U16, "way") });
     names.put(Named::new(Table::Coil, 7, DataType::Bool, ByteOrder::Abcd, "run"));
     names.put(Named::new(Table::Input, 0, DataType::Text(8), ByteOrder::Abcd, "serial"));
     let (text, def) = bench.saved();

@@ -15,7 +15,7 @@ fn a_named_value_is_typed_as_it_is_shown() {
     for wrong in ["70.25", "3276.8", "x", "1 2", "", "inf"] {
         assert!(typed_as(wrong, &sv(), &[700]).is_err(), "{wrong}");
     }
-    let state = Named { labels: vec![(0, "RUN".into()), (1, "STOP".into())], scale: 1.0, ..sv() };
+    let state = Named { enum_labels: vec![(0, "RUN".into()), (1, "STOP".into())], scale: 1.0, ..sv() };
     assert_eq!(typed_as("stop", &state, &[0]), Ok(vec![1]));
     let bcd = Named { kind: DataType::Bcd16, scale: 1.0, ..sv() };
     assert_eq!((typed_as("1234", &bcd, &[0]), next_step(&bcd, &[0x0999], 1)), (Ok(vec![0x1234]), Some(vec![0x1000])));
