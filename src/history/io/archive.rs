@@ -182,9 +182,8 @@ impl Store {
         let (last, new) = (folder.join(&path), folder.join(format!("{path}{UNFINISHED}")));
         fs::create_dir_all(last.parent().unwrap_or(&folder)).map_err(|error| wrong(&new, &error))?;
         let to = quoted(&new);
-        self.db
-            .execute_batch(&format!("COPY ({rows} {order}) TO {to} ({})", sql::parquet(tier, self.def.history.parquet)))
-            .map_err(engine)?;
+        let copy = sql::copy_to(tier, self.def.history.parquet, &format!("{rows} {order}"), &to);
+        self.db.execute_batch(&copy).map_err(engine)?;
         let sum = |from: &str| {
             let sql = format!("SELECT count(*), sum(hash({}))::VARCHAR FROM {from}", sql::columns(tier));
             self.db.query_row(&sql, [], |row| Ok((row.get::<_, u64>(0)?, row.get::<_, Option<String>>(1)?)))

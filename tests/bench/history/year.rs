@@ -97,14 +97,13 @@ fn copy_days(archive: &Path, days: i64, raw_days: i64) {
             let last = at(LAST_DAY).to_zoned(TimeZone::UTC).strftime("%Y-%m-%d").to_string();
             let [from, to] = [last, date.clone()].map(|date| archive.join(format!("{}/date={date}", tier.word())));
             std::fs::create_dir_all(&to).expect("a folder");
-            db.execute_batch(&format!(
-                "COPY (SELECT * REPLACE (utc - INTERVAL {back} DAY AS utc) FROM read_parquet('{}/day.parquet', hive_partitioning = false))
-                 TO '{}/day.parquet' ({})",
-                from.display(),
-                to.display(),
-                sql::parquet(tier, ParquetVersion::V1)
-            ))
-            .expect("copied");
+            let rows = format!(
+                "SELECT * REPLACE (utc - INTERVAL {back} DAY AS utc)
+                 FROM read_parquet('{}/day.parquet', hive_partitioning = false)",
+                from.display()
+            );
+            let to = format!("'{}/day.parquet'", to.display());
+            db.execute_batch(&sql::copy_to(tier, ParquetVersion::V1, &rows, &to)).expect("copied");
         }
     }
     println!("copied: {:.0} s", began.elapsed().as_secs_f64());
