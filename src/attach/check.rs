@@ -124,7 +124,9 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
         | Query::Audit { limit, .. }
         | Query::Batches { limit, .. } => rows(*limit),
         Query::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
-            Err(format!("a report of more than {} days, choose a shorter period", REPORT_MAX.as_hours() / 24))
+            let days = |time: SignedDuration| time.as_hours() / 24;
+            let (asked, most) = (days(period.to.duration_since(period.from)), days(REPORT_MAX));
+            Err(format!("a report of {asked} days, expected at most {most}"))
         }
         Query::Report { .. }
         | Query::AlarmMetrics { .. }

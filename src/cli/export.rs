@@ -12,7 +12,7 @@ use jiff::Timestamp;
 
 use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
-    history::{Answer, Query, io::tables::Format},
+    history::{Answer, Query, bound::about, io::tables::Format},
     plant::{
         PlantDef,
         def::{CsvDialect, TagId},
@@ -168,19 +168,47 @@ fn rows(from: Timestamp, to: Timestamp, every: Duration, tags: usize) -> Result<
     if every < Duration::from_millis(1) {
         return Err(CliError::Usage("--every: expected 1ms or more".to_owned()));
     }
-    let rows = elapsed(from, to).as_nanos() / every.as_nanos();
+    let period = elapsed(from, to);
+    let rows = period.as_nanos() / every.as_nanos();
     let max = ROWS_MAX.min(VALUES_MAX / tags.max(1) as u128);
-    if rows == 0 || max < rows {
-        return Err(CliError::Usage(format!(
-            "found {rows} rows of {tags} tags, expected 1 … {max}: change --every, --tags or the period"
-        )));
+    let refuse = |words: String| Err(CliError::Usage(words));
+    let asked = format!("found {rows} rows of {tags} tags in {}", about(period));
+    match (rows, usize::try_from(rows)) {
+        (0, _) => refuse(format!("{asked}, expected 1 or more: choose a shorter --every or a longer period")),
+        (_, Ok(count)) if rows <= max => Ok(count),
+        (_, Ok(_) | Err(_)) => {
+            let fits = about(every.saturating_mul(u32::try_from(max).unwrap_or(u32::MAX)));
+            let every = period.as_millis().div_ceil(max).div_ceil(1_000);
+            refuse(format!(
+                "{asked}, at most {max}: choose a period of at most {fits}, or --every {every}s, or fewer tags"
+            ))
+        }
     }
-    Ok(rows as usize)
 }
 
 fn values(answer: Answer) -> Result<Vec<Vec<Option<HeldValue>>>, CliError> {
     match answer {
         Answer::Values(values) => Ok(values),
         _ => Err(unexpected()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_that_is_too_long_says_what_fits() {
+        let rows = |days: i64, every, tags| {
+            let to = Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_hours(24 * days);
+            rows(Timestamp::UNIX_EPOCH, to, Duration::from_secs(every), tags).map_err(|error| error.to_string())
+        };
+        assert_eq!(rows(1, 10, 1_000), Ok(8_640));
+        let long = "found 3153600 rows of 1000 tags in 365 days, at most 20000: choose a period of at most 2 days, \
+                    or --every 1577s, or fewer tags";
+        assert_eq!(rows(365, 10, 1_000), Err(long.to_owned()));
+        // What it says can be done.
+        assert_eq!(rows(365, 1_577, 1_000), Ok(19_997));
+        assert!(rows(1, 100_000, 1).is_err_and(|error| error.contains("expected 1 or more")));
     }
 }

@@ -2,6 +2,10 @@
 
 use std::{
     io::{IsTerminal, Write, stderr},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -46,6 +50,19 @@ impl Drop for Progress {
             let _ = write!(stderr(), "\r\x1b[K");
         }
     }
+}
+
+/// Is set by Ctrl-C, which no longer ends the program; then `stop` is called.
+pub fn cancelled_by_ctrl_c(stop: impl FnOnce() + Send + 'static) -> Arc<AtomicBool> {
+    let cancelled = Arc::<AtomicBool>::default();
+    let flag = Arc::clone(&cancelled);
+    tokio::spawn(async move {
+        if tokio::signal::ctrl_c().await.is_ok() {
+            flag.store(true, Ordering::Relaxed);
+            stop();
+        }
+    });
+    cancelled
 }
 
 /// Never 100 before all is done.

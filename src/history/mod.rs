@@ -7,6 +7,7 @@ pub mod alarm_state;
 mod engine_error;
 pub mod words;
 pub mod backup;
+pub mod bound;
 pub mod import;
 pub mod io;
 
@@ -281,14 +282,14 @@ pub enum HistoryError {
         path: String,
     },
     /// The answer would be longer than is safe to hold; a shorter period is answered.
-    #[error("too much for one query: {rows} rows, at most {max}; {}", shorter(*.fits))]
+    #[error("too much for one query: {}", bound::too_many_rows(*.rows, *.max, *.asked))]
     TooManyRows {
         /// Rows that the query means.
         rows: u64,
         /// Rows that are permitted.
         max: u64,
-        /// The longest period that would be answered, in seconds, where that can be said.
-        fits: Option<u64>,
+        /// Seconds of the period that they lie in, where they lie evenly.
+        asked: Option<u64>,
     },
     /// Another version of the program wrote the file; only a station, which may change it, upgrades an older one.
     #[error(
@@ -336,16 +337,6 @@ pub enum HistoryError {
         /// That time.
         seconds: u64,
     },
-}
-
-/// What to ask instead.
-fn shorter(fits: Option<u64>) -> String {
-    match fits {
-        Some(seconds @ 172_800..) => format!("choose a period of at most {} days", seconds / 86_400),
-        Some(seconds @ 7_200..) => format!("choose a period of at most {} hours", seconds / 3_600),
-        Some(seconds) => format!("choose a period of at most {} minutes", seconds / 60),
-        None => "choose a shorter period".to_owned(),
-    }
 }
 
 impl HistoryError {

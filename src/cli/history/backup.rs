@@ -1,14 +1,22 @@
 //! `sightglass history backup PLANT DIR`: through the station while it runs, else from the file.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::Ordering,
+};
 
 use jiff::Timestamp;
 
 use super::Place;
 use crate::{
     access::{SessionRequest, io::audit_log},
-    cli::{CliError, client, in_runtime, run, say},
+    cli::{
+        CliError, client, in_runtime,
+        progress::{Progress, cancelled_by_ctrl_c},
+        run, say,
+    },
     history::{
+        HistoryError,
         backup::Backup,
         io::{backup::read_manifest, store::Store},
     },
@@ -33,8 +41,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         match station.history.is_none() && client::place(Some(&def.name)).await.is_ok() {
             false => {
                 let store = Store::open_read_only(&path, &def)?;
-                let audit_log = audit_log::beside(&path);
-                Ok(Some(store.back_up(&to, Some(&audit_log), Timestamp::now(), &mut |_| Ok(()))?))
+                from_file(&store, &to, &audit_log::beside(&path)).map(Some)
             }
             true => {
                 let session = client::attach(Some(&def.name), &args.place.login).await?;
@@ -47,6 +54,30 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         }
     })?;
     said(&to, written.as_ref())
+}
+
+/// Ctrl-C ends it at its next step, and nothing new is left of it.
+fn from_file(store: &Store, to: &Path, audit_log: &Path) -> Result<Backup, CliError> {
+    let files: Vec<u64> = store.files(None)?.iter().map(|file| file.bytes).collect();
+    let (mut done, mut files_done) = (0, files.iter());
+    let mut progress = Progress::new(store.file_bytes() + files.iter().sum::<u64>());
+    let interrupt = store.interrupt_handle();
+    let cancelled = cancelled_by_ctrl_c(move || interrupt.interrupt());
+    let is_cancelled = || cancelled.load(Ordering::Relaxed);
+    let written = store.back_up(to, Some(audit_log), Timestamp::now(), &mut |step| {
+        done += match step {
+            "database copied" => store.file_bytes(),
+            "file copied" => files_done.next().copied().unwrap_or(0),
+            _ => 0,
+        };
+        progress.at(done);
+        if is_cancelled() { Err(HistoryError::NotOpen) } else { Ok(()) }
+    });
+    drop(progress);
+    match written {
+        Err(_) if is_cancelled() => Err(CliError::Failed("cancelled: nothing new is left in the folder".to_owned())),
+        written => Ok(written?),
+    }
 }
 
 fn said(to: &Path, backup: Option<&Backup>) -> Result<(), CliError> {

@@ -12,6 +12,7 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
+    read::SAMPLES_MAX,
     samples::Wanted,
     sql,
     store::{Store, engine, instant, utc},
@@ -41,8 +42,16 @@ impl Store {
         let avoided = self.avoided.borrow().clone();
         let files = self.files(None)?;
         let kept = |tier| kept(&files, tier, &avoided);
+        let pieces = pieces(from.as_microsecond(), to.as_microsecond(), widest, &kept);
+        // Before anything is read. Those of aggregates are few in any period.
+        let of_samples = pieces.iter().filter(|piece| piece.tier == Tier::Raw);
+        if let Some(longest) = of_samples.max_by_key(|piece| piece.to - piece.from)
+            && let (Some(from), Some(until)) = (instant(longest.from), instant(longest.to))
+        {
+            self.bounded(tags.len(), from, until, to, SAMPLES_MAX)?;
+        }
         let mut gaps = Vec::new();
-        for piece in pieces(from.as_microsecond(), to.as_microsecond(), widest, &kept) {
+        for piece in pieces {
             let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { continue };
             if piece.tier != Tier::Raw {
                 self.each_aggregate(tags, piece.tier, (from, to), &mut each)?;

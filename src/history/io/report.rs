@@ -11,7 +11,7 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{ROWS_MAX, SAMPLES_MAX, action, chain_hash, check_span, within},
+    read::{ROWS_MAX, SAMPLES_MAX, action, chain_hash, check_span},
     sql,
     store::{Store, utc},
 };
@@ -20,7 +20,7 @@ use crate::{
         HistoryError,
         tiers::{Aggregate, Part, Tier},
     },
-    plant::{PlantDef, def::TagId, record::AlarmRecord},
+    plant::{PlantDef, def::TagId, record::AlarmRecord, time::elapsed},
     report::{
         Gap, Period, RecordRow, ShiftReport, TagFigures,
         figures::{self, Figures, TagDescription},
@@ -91,7 +91,7 @@ impl Store {
         let (from, until) = (period.from, period.to.min(now));
         check_span(from, until)?;
         let (def, reported) = (&*self.def, reported_tags(&self.def));
-        let recorded = self.recorded(from, until)?;
+        let recorded = self.recorded((from, until), now)?;
         let active = self.active_at(from)?;
         let alarms = self.events(from, until)?;
         let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
@@ -103,7 +103,7 @@ impl Store {
         let mut gathered = self.gather(&reported, more, (from, until))?;
         let (record, record_of) = match recorded {
             Some(recorded) => {
-                let rows = self.record(&recorded, (from, until), now)?;
+                let rows = self.record(&recorded, (from, until))?;
                 (rows, Some((recorded.name, TagDescription::at(def.tag(recorded.pv), &gathered.latest).unit)))
             }
             None => (Vec::new(), None),
@@ -157,11 +157,9 @@ impl Store {
         &self,
         recorded: &Recorded,
         (from, until): (Timestamp, Timestamp),
-        now: Timestamp,
     ) -> Result<Vec<RecordRow>, HistoryError> {
         let Recorded { sv, pv, instants, .. } = recorded;
         let tags = if sv == pv { vec![*sv] } else { vec![*sv, *pv] };
-        self.bounded(tags.len(), from, until, now, SAMPLES_MAX)?;
         let mut stood: Vec<ValuesAt> = tags.iter().map(|_| ValuesAt::new(instants.clone())).collect();
         self.each_sample(&tags, from, until, |place, sample| stood[place].next(sample))?;
         let stood: Vec<_> = stood.into_iter().map(ValuesAt::end).collect();
@@ -169,12 +167,20 @@ impl Store {
         Ok(figures::record(instants, sv, pv))
     }
 
-    /// The controller of the record and the instants of its rows.
-    fn recorded(&self, from: Timestamp, until: Timestamp) -> Result<Option<Recorded>, HistoryError> {
+    /// The controller of the record and the instants of its rows; an error if these, or its samples, are too many.
+    fn recorded(
+        &self,
+        (from, until): (Timestamp, Timestamp),
+        now: Timestamp,
+    ) -> Result<Option<Recorded>, HistoryError> {
         let Some((device, interval)) = self.def.report.record else { return Ok(None) };
         let device = self.def.device(device);
         let Some(face) = &device.faceplate else { return Ok(None) };
-        within(rows(from, until, interval), ROWS_MAX)?;
+        let rows = rows(from, until, interval);
+        if ROWS_MAX < rows {
+            return Err(HistoryError::TooManyRows { rows, max: ROWS_MAX, asked: Some(elapsed(from, until).as_secs()) });
+        }
+        self.bounded(2, from, until, now, SAMPLES_MAX)?;
         let instants = figures::record_grid(interval, &self.def.time_zone, from, until).into();
         Ok(Some(Recorded { name: device.name.clone(), sv: face.sv, pv: face.pv, instants }))
     }

@@ -273,8 +273,8 @@ impl Store {
         let share = (to - from).max(0) as f64 / (last - first).max(1) as f64;
         let tags = tags as f64 / self.ids.len().max(1) as f64;
         let rows = to_u64((self.rows_about()? as f64 * share * tags.min(1.0)).ceil());
-        let fits = to_u64(((to - from) as f64 / 1e6 * max as f64 / rows.max(1) as f64).floor());
-        if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max, fits: Some(fits) }) }
+        let asked = to_u64(((to - from).max(0) as f64 / 1e6).floor());
+        if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max, asked: Some(asked) }) }
     }
 
     /// The rows up to an instant and the microseconds that they lie in, about; `None` if that is not known.

@@ -82,7 +82,7 @@ impl Store {
     }
 
     /// Ends what this connection is doing, from any thread.
-    pub(super) fn interrupt_handle(&self) -> Arc<InterruptHandle> {
+    pub fn interrupt_handle(&self) -> Arc<InterruptHandle> {
         self.db.interrupt_handle()
     }
 

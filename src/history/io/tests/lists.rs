@@ -137,7 +137,7 @@ fn a_query_of_too_many_rows_is_refused_before_reading() {
     assert_eq!(store.bounded(1, sec(0), sec(4), now, 2), Ok(()));
     assert_eq!(
         store.bounded(3, sec(0), sec(4), now, 2),
-        Err(HistoryError::TooManyRows { rows: 3, max: 2, fits: Some(1) })
+        Err(HistoryError::TooManyRows { rows: 3, max: 2, asked: Some(2) })
     );
     // A connection that has not seen the rows come refuses as well.
     let reader = open(&folder().1, 0).try_clone().unwrap();
