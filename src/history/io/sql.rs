@@ -271,9 +271,8 @@ pub const LINE_MINUTES: &str = "SELECT * FROM (
         utilisation, reply_p99_ms, reply_max_ms
     FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";
 
-/// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows, and most of its time
-/// unpacks what lies around them: smaller groups, and a compression with which it takes 0.6 of the time of zstd. Files of
-/// minutes are 14 to 31 % larger for it, by their values (measured).
+/// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows: smaller groups, and with
+/// snappy it takes 0.6 of the time of zstd, for minutes in 14 to 31 % more room, by their values (measured).
 pub fn parquet(tier: Tier, version: ParquetVersion) -> String {
     let options = match tier {
         // A dictionary of thousands of time stamps takes more room than the stamps themselves (measured).
