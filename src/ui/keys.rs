@@ -99,6 +99,12 @@ pub fn chords_of<A>(table: &[Key<A>]) -> Vec<Chord> {
     table.iter().map(|key| key.chord).collect()
 }
 
+/// Takes the keys out of the footer whose actions lack what they need; the help has them all the same.
+pub fn hide<A: PartialEq>(table: &mut [Key<A>], lacking: &[(A, bool)]) {
+    let is_hidden = |action: &A| lacking.iter().any(|(of, lacks)| *lacks && of == action);
+    table.iter_mut().filter(|key| is_hidden(&key.action)).for_each(|key| key.label = "");
+}
+
 /// The rows of a table for footer and help.
 pub fn hints<A>(table: &[Key<A>]) -> Vec<Hint> {
     table

@@ -24,7 +24,7 @@ use crate::{
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
-        keys::find,
+        keys::{find, hide, hints},
         modal::{Guidance, faceplate::device_text},
     },
 };
@@ -133,24 +133,15 @@ impl TabView for Alarms {
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let alarm = self.selected(cx);
-        let can = |label: &str| match label {
-            "reset" => alarm.is_some_and(|alarm| alarm.state.is_latched()),
-            "expand" => alarm.is_some_and(|alarm| alarm.first_out.is_some()),
-            "return" => self
-                .suppressed(cx)
-                .is_some_and(|suppressed| matches!(suppressed.state, AlarmState::Shelved | AlarmState::OutOfService)),
-            _ => true,
-        };
-        let mut hints = keys::page_hints(self.page);
-        hints.iter_mut().filter(|hint| !can(&hint.label)).for_each(|hint| hint.label.clear());
-        // The first of these must not fall off a narrow footer.
-        hints.sort_by_key(|hint| match hint.label.as_str() {
-            "ack" | "all" | "search" | "list" | "return" | "hand over" | "take over" => 0,
-            "reset" => 1,
-            "view" => 2,
-            _ => 3,
-        });
-        hints
+        let is_kept = |alarm: &SuppressedAlarm| matches!(alarm.state, AlarmState::Shelved | AlarmState::OutOfService);
+        let lacking = [
+            (Action::Reset, !alarm.is_some_and(|alarm| alarm.state.is_latched())),
+            (Action::Fold, alarm.is_none_or(|alarm| alarm.first_out.is_none())),
+            (Action::PutBack, !self.suppressed(cx).is_some_and(is_kept)),
+        ];
+        let mut keys = keys::table(self.page);
+        hide(&mut keys, &lacking);
+        [keys::everywhere(self.page), hints(&keys)].concat()
     }
 
     fn back(&mut self, _cx: &ViewContext) -> bool {

@@ -25,7 +25,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{event::LineState, line_minute::LineMinute, line_report::LineReport, snapshot::LineStatus},
     ui::{
-        keys::{find, hints},
+        keys::{find, hide, hints},
         modal::Settings,
         widgets::line_trend::{self, line_trend},
     },
@@ -141,17 +141,15 @@ impl TabView for Bus {
         if self.page == Page::Registers && self.registers.has_graph() {
             return self.registers.hints(&below(cx));
         }
-        let mut hints = hints(&table(cx, self.page));
+        let mut keys = table(cx, self.page);
+        let is_testing = Place::of(cx, self.line).is_some_and(|at| at.is_testing());
+        hide(&mut keys, &[(Action::Stop, !is_testing)]);
+        if 1 < cx.def().lines.len() {
+            keys.iter_mut().filter(|key| key.action == Action::NextLine).for_each(|key| key.label = "line");
+        }
+        let mut hints = hints(&keys);
         if self.page == Page::Registers {
             hints.extend(self.registers.hints(&below(cx)));
-        }
-        if self.page == Page::Test && !Place::of(cx, self.line).is_some_and(|at| at.is_testing()) {
-            for hint in hints.iter_mut().filter(|hint| hint.label == t!("stop")) {
-                hint.label.clear();
-            }
-        }
-        if 1 < cx.def().lines.len() {
-            hints.iter_mut().filter(|hint| hint.key == "n").for_each(|hint| hint.label = t!("line").to_owned());
         }
         hints
     }

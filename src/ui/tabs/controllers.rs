@@ -31,7 +31,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::parameter_set,
-    ui::keys::{find, hints},
+    ui::keys::{find, hide, hints},
 };
 
 /// The small trend is asked for again after this time.
@@ -134,29 +134,29 @@ impl TabView for Controllers {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut hints = hints(&page_keys(&self.page));
+        let mut keys = page_keys(&self.page);
         let device = cx.def().devices.get(self.device.index());
-        let lacks = |label: &str| {
-            device.is_some_and(|device| match label {
-                "tune" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.tune.is_none()),
-                "standby" => device.faceplate.as_ref().is_none_or(|faceplate| faceplate.run.is_none()),
-                "program" => device.program.is_none(),
-                "actions" => device.actions.is_empty(),
-                "defaults" => cx.def().tags_of(device.id).all(|tag| tag.default.is_none()),
-                "hold" => device.program.as_ref().is_none_or(|program| program.halt.is_none()),
-                "stop" => cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work()),
-                "turn" => !matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. })),
-                _ => false,
-            })
-        };
+        if let Some(device) = device {
+            let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
+            let copies = matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. }));
+            let lacking = [
+                (Action::Tune, faceplate.is_none_or(|faceplate| faceplate.tune.is_none())),
+                (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
+                (Action::Program, program.is_none()),
+                (Action::Actions, device.actions.is_empty()),
+                (Action::Defaults, cx.def().tags_of(device.id).all(|tag| tag.default.is_none())),
+                (Action::Control(keys::ProgramCommand::Hold), program.is_none_or(|program| program.halt.is_none())),
+                (Action::Stop, cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work())),
+                (Action::Turnaround, !copies),
+            ];
+            hide(&mut keys, &lacking);
+        }
+        let mut hints = hints(&keys);
         // On the page of a device there is no room left for a key that every operator tries anyway.
         if !matches!(self.page, Page::List | Page::Device) {
-            let place = hints.iter().position(|hint| hint.key == "⏎").map_or(hints.len(), |enter| enter + 1);
+            let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
+            let place = enter.map_or(keys.len(), |enter| enter + 1);
             hints.insert(place, Hint::new("Esc", t!("back"), t!("previous page")));
-        }
-        // What the device cannot do is not offered; the help has it all the same.
-        for hint in hints.iter_mut().filter(|hint| lacks(&hint.label)) {
-            hint.label.clear();
         }
         hints
     }

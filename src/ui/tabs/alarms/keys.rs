@@ -1,7 +1,6 @@
 //! The keys of the alarms tab, page by page.
 
 use super::Page;
-use crate::ui::keys::hints;
 use crate::ui::tabs::prelude::*;
 
 /// What a key means here.
@@ -67,15 +66,17 @@ const VIEWS: [Row; 3] = [
     Key::new(char('b'), "", "bell for new alarms on or off", Action::Bell),
 ];
 
-const ACTIONS: [Row; 9] = [
+const RESET: [Row; 1] =
+    [Key::new(char('r'), "reset", "reset a latched alarm whose condition has cleared (asks first)", Action::Reset)
+        .needs(Role::Technician)];
+
+const ACTIONS: [Row; 8] = [
     Key::new(char('n'), "note", "acknowledge with a note", Action::Note).needs(Role::Technician),
     Key::new(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve).needs(Role::Technician),
     Key::new(char('/'), "filter", "show only alarms with these words; Esc: show all", Action::Words),
     Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage)
         .needs(Role::Technician),
     Key::new(char(' '), "expand", "show or hide the consequences of a first-out group", Action::Fold),
-    Key::new(char('r'), "reset", "reset a latched alarm whose condition has cleared (asks first)", Action::Reset)
-        .needs(Role::Technician),
     Key::new(
         char('o'),
         "out of service",
@@ -125,27 +126,25 @@ const HANDOVER: [Row; 2] = [
         .needs(Role::Technician),
 ];
 
-/// The keys of a page, the most wanted ones first.
+/// The keys of a page, the most wanted ones first: these must not fall off a narrow footer.
 pub fn table(page: Page) -> Vec<Row> {
     let parts: &[&[Row]] = match page {
-        Page::Active | Page::System => &[&OPEN, &ACTIONS, &VIEWS, &MOVE, &GO, &AREA],
-        Page::Suppressed => &[&BACK, &OPEN, &VIEWS, &MOVE, &GO],
-        Page::Journal => &[&SEARCH, &SHIFT, &VIEWS, &MOVE],
-        Page::Metrics => &[&SHIFT, &VIEWS, &MOVE],
-        Page::Handover => &[&HANDOVER, &SHIFT, &VIEWS, &MOVE],
+        Page::Active | Page::System => &[&RESET, &VIEWS, &OPEN, &ACTIONS, &MOVE, &GO, &AREA],
+        Page::Suppressed => &[&BACK, &VIEWS, &OPEN, &MOVE, &GO],
+        Page::Journal => &[&SEARCH, &VIEWS, &SHIFT, &MOVE],
+        Page::Metrics => &[&VIEWS, &SHIFT, &MOVE],
+        Page::Handover => &[&HANDOVER, &VIEWS, &SHIFT, &MOVE],
     };
     parts.concat()
 }
 
-/// The same for footer and help.
-pub fn page_hints(page: Page) -> Vec<Hint> {
-    let everywhere = match page {
-        // Keys of every tab, but here is where they are looked for.
+/// Keys of every tab, but here is where they are looked for.
+pub fn everywhere(page: Page) -> Vec<Hint> {
+    match page {
         Page::Active | Page::System => vec![
             Hint::new("a", t!("ack"), t!("acknowledge the selected alarm")).needs(Role::Technician),
             Hint::new("A", t!("all"), t!("acknowledge all that are listed (asks first)")).needs(Role::Technician),
         ],
         Page::Suppressed | Page::Journal | Page::Metrics | Page::Handover => Vec::new(),
-    };
-    everywhere.into_iter().chain(hints(&table(page))).collect()
+    }
 }
