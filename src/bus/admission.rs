@@ -197,7 +197,7 @@ fn factor(loads: &[Load]) -> Option<f64> {
 fn dead(def: &PlantDef, line: &LineDef, blocks: &[Block], loads: &[Load]) -> Vec<DeadDevice> {
     let polled = def.devices.iter().filter(|device| blocks.iter().any(|block| block.device == device.id));
     let dead = polled.map(|device| {
-        let probe = Wire::of(line, device).failing(line.timeout);
+        let probe = Wire::new(line, device).failing(line.timeout);
         let words = PollWords { name: format!("the probe of {}", device.name), period: PROBE_EVERY, cost: probe };
         let others: Vec<&Load> = loads.iter().filter(|load| load.device != device.id).collect();
         DeadDevice {
@@ -214,7 +214,7 @@ fn dead(def: &PlantDef, line: &LineDef, blocks: &[Block], loads: &[Load]) -> Vec
 fn warnings(def: &PlantDef, line: &LineDef, blocks: &[Block], utilisation: f64) -> Vec<Warning> {
     let serial = line.transport.serial().filter(|serial| (serial.parity, serial.stop_bits) == (Parity::None, 1));
     let answer = |block: &Block| {
-        let wire = Wire::of(line, def.device(block.device));
+        let wire = Wire::new(line, def.device(block.device));
         wire.read(block.table, u32::from(block.count)) - wire.request - wire.turnaround - wire.silent_interval
     };
     let longest = blocks.iter().max_by_key(|block| answer(block)).filter(|block| line.timeout < answer(block));

@@ -145,8 +145,8 @@ impl LineStats {
         self.admission = admission::admit_as(def, settings, blocks);
     }
 
-    /// Takes the latest frames, and gives the counters that are kept here.
-    pub fn take(&mut self, frames: Vec<Frame>, counters: &mut LineCounters) {
+    /// Adds the latest frames, and writes the counters that are kept here.
+    pub fn add_frames(&mut self, frames: Vec<Frame>, counters: &mut LineCounters) {
         let mean = |over: usize| {
             let latest = self.busy.iter().rev().take(over);
             latest.sum::<f32>() / self.busy.len().clamp(1, over) as f32
@@ -202,7 +202,7 @@ mod tests {
         let mut counters = LineCounters::default();
         for second in 0..100 {
             stats.spent(if second < 90 { 0.2 } else { 0.8 }, Duration::from_secs(1));
-            stats.take(Vec::new(), &mut counters);
+            stats.add_frames(Vec::new(), &mut counters);
         }
         assert!((counters.utilisation - 0.8).abs() < 1e-5, "{}", counters.utilisation);
         assert!((counters.utilisation_minute - 0.3).abs() < 1e-5, "{}", counters.utilisation_minute);

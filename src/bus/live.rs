@@ -83,8 +83,8 @@ impl LiveJob {
         self.queue.front().copied()
     }
 
-    /// Takes the outcome of the request that was next.
-    pub fn take(&mut self, known: &mut KnownHoles, at: Timestamp, outcome: Result<Vec<u16>, Fault>) {
+    /// The request that was next has ended.
+    pub fn on_outcome(&mut self, known: &mut KnownHoles, at: Timestamp, outcome: Result<Vec<u16>, Fault>) {
         let Some(span) = self.queue.pop_front() else { return };
         self.reading.requests += 1;
         match outcome {
@@ -143,7 +143,7 @@ mod tests {
                 false => Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS)),
                 true => Ok(addresses),
             };
-            job.take(known, Timestamp::UNIX_EPOCH, outcome);
+            job.on_outcome(known, Timestamp::UNIX_EPOCH, outcome);
         }
         job.finish(None)
     }
@@ -185,7 +185,7 @@ mod tests {
         let read = LiveRead { line: LineId(0), unit: 1, spans, not_before: None, relearn: false };
         let mut known = KnownHoles::default();
         let mut job = LiveJob::new(&read, &mut known, Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
-        job.take(&mut known, Timestamp::UNIX_EPOCH, Err(Fault::Timeout));
+        job.on_outcome(&mut known, Timestamp::UNIX_EPOCH, Err(Fault::Timeout));
         assert_eq!(job.next(), None);
         let reading = job.finish(None);
         assert_eq!((reading.requests, reading.parts.len()), (1, 3));

@@ -81,7 +81,7 @@ fn blocks_of(def: &PlantDef, device: &DeviceDef, unreadable: &UnreadableRanges) 
     let (refused, mut tags): (Vec<&TagDef>, Vec<&TagDef>) =
         readable(def, device).partition(|tag| is_refused(device, tag, unreadable));
     tags.sort_by_key(|tag| (tag.poll, tag.point.table, tag.point.address, tag.point.len(), tag.id));
-    let wire = Wire::of(def.line(device.line), device);
+    let wire = Wire::new(def.line(device.line), device);
     let groups = tags.chunk_by(|a, b| (a.poll, a.point.table) == (b.poll, b.point.table));
     let runs = groups.flat_map(|group| cheapest::cut(group, device, wire, unreadable));
     runs.map(|run| together(device, &run)).chain(refused.iter().map(|tag| asked_again(device, tag))).collect()
@@ -108,7 +108,7 @@ fn readable<'a>(def: &'a PlantDef, device: &DeviceDef) -> impl Iterator<Item = &
 }
 
 fn is_refused(device: &DeviceDef, tag: &TagDef, unreadable: &UnreadableRanges) -> bool {
-    let alone = AddressRange::of(tag.point, end_of(tag.point), device);
+    let alone = AddressRange::new(tag.point, end_of(tag.point), device);
     unreadable.touch(device.id, alone.table, alone.start, alone.end)
 }
 
@@ -120,7 +120,7 @@ pub fn single(device: &DeviceDef, tag: &TagDef) -> Block {
 /// The block that reads these tags, which are sorted by address.
 fn together(device: &DeviceDef, tags: &[&TagDef]) -> Block {
     let first = tags[0];
-    let extent = AddressRange::of(first.point, tags.iter().map(|tag| end_of(tag.point)).max().unwrap_or(0), device);
+    let extent = AddressRange::new(first.point, tags.iter().map(|tag| end_of(tag.point)).max().unwrap_or(0), device);
     Block {
         device: device.id,
         unit: device.unit,
@@ -147,7 +147,7 @@ struct AddressRange {
 }
 
 impl AddressRange {
-    fn of(first: Point, end: u32, device: &DeviceDef) -> AddressRange {
+    fn new(first: Point, end: u32, device: &DeviceDef) -> AddressRange {
         let (table, start) = (first.table, u32::from(first.address));
         let step = if table.is_bits() { 1 } else { u32::from(device.limits.alignment.max(1)) };
         AddressRange { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000) }

@@ -17,11 +17,11 @@ pub struct Args {
 /// Attaches this terminal until its operator leaves.
 pub fn main(args: Args) -> Result<(), CliError> {
     ui::io::require_terminal()?;
-    in_runtime(async { at(&client::place(args.plant.as_deref()).await?).await })
+    in_runtime(async { attach_to(&client::find_station(args.plant.as_deref()).await?).await })
 }
 
 /// The same, where the station is known.
-pub async fn at(place: &Found) -> Result<(), CliError> {
-    let session = connect(&place.path).await.map_err(|error| CliError::Failed(error.to_string()))?;
+pub async fn attach_to(station: &Found) -> Result<(), CliError> {
+    let session = connect(&station.path).await.map_err(|error| CliError::Failed(error.to_string()))?;
     Ok(ui::io::run(session, ui::io::Options::new(ui::Leaving::Terminal)).await?)
 }

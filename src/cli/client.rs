@@ -44,9 +44,9 @@ pub struct ActionArgs {
     login: Login,
 }
 
-/// The place of the station of a plant, or of the only one that runs here.
-pub async fn place(plant: Option<&str>) -> Result<find::Found, CliError> {
-    let mut running = find::Places::here().living().await;
+/// The station of a plant, or of the only one that runs here.
+pub async fn find_station(plant: Option<&str>) -> Result<find::Found, CliError> {
+    let mut running = find::SocketFolders::here().living().await;
     if let Some(plant) = plant {
         let name = std::path::Path::new(plant).file_stem().map_or(plant.into(), |stem| stem.to_string_lossy());
         running.retain(|found| found.name == name);
@@ -54,7 +54,7 @@ pub async fn place(plant: Option<&str>) -> Result<find::Found, CliError> {
     match (running.len(), plant) {
         (1, _) => Ok(running.remove(0)),
         (0, Some(plant)) => Err(CliError::NotRunning(format!("no station of {plant} runs here"))),
-        (0, None) => Err(CliError::NotRunning(match find::Places::here().closed() {
+        (0, None) => Err(CliError::NotRunning(match find::SocketFolders::here().closed() {
             Some(folder) => {
                 format!("no station runs here that this user may reach; {} is not accessible", folder.display())
             }
@@ -134,7 +134,7 @@ pub fn warn_not_recorded(what: &str, durability: Durability) {
 
 /// Attaches to a station.
 pub async fn open(plant: Option<&str>) -> Result<Session, CliError> {
-    let found = place(plant).await?;
+    let found = find_station(plant).await?;
     connect::connect(&found.path).await.map_err(|error| CliError::Failed(error.to_string()))
 }
 

@@ -26,14 +26,14 @@ pub struct Args {
 /// Ends the station: what is stored is stored, the socket is gone.
 pub fn stop(args: Args) -> Result<(), CliError> {
     in_runtime(async {
-        let place = client::place(args.plant.as_deref()).await?;
-        let mut session = client::attach(Some(&place.name), &args.login).await?;
+        let station = client::find_station(args.plant.as_deref()).await?;
+        let mut session = client::attach(Some(&station.name), &args.login).await?;
         let reply = session.request(SessionRequest::Stop).await;
         // The connection may close before the reply arrives.
         if reply.is_ok() || session.status.borrow().gone.is_some() {
             let _ = session.status.wait_for(|status| status.gone.is_some()).await;
             drop(session);
-            gone(&place).await?;
+            gone(&station).await?;
         } else {
             reply.map_err(CliError::Failed)?;
         }
@@ -43,9 +43,9 @@ pub fn stop(args: Args) -> Result<(), CliError> {
 }
 
 /// Waits until the station has closed its socket: then the last record is on disk.
-async fn gone(place: &Found) -> Result<(), CliError> {
+async fn gone(station: &Found) -> Result<(), CliError> {
     let end = tokio::time::Instant::now() + END_MAX;
-    while find::Places::here().living().await.contains(place) {
+    while find::SocketFolders::here().living().await.contains(station) {
         if end < tokio::time::Instant::now() {
             return Err(CliError::Failed(format!("it still stores what it has after {} s", END_MAX.as_secs())));
         }

@@ -87,7 +87,7 @@ async fn demonstrate(
     history: PathBuf,
 ) -> Result<(), CliError> {
     let clock = Clock::starting_at(Timestamp::now(), args.speed);
-    let services: Vec<_> = def.lines.iter().map(sim::io::Service::of).collect();
+    let services: Vec<_> = def.lines.iter().map(sim::io::Service::new).collect();
     let simulated = drill::simulator(&def, scenario.as_deref())?;
     let simulated = sim::io::serve_simulator(&def, simulated, clock, &services).await.map_err(simulation_error)?;
     simulated.plug_into(&mut def);

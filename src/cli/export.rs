@@ -90,7 +90,7 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let (mut progress, mut done) = (Progress::new((rows * tags.len()) as u64), 0);
     let mut columns = Vec::new();
     for group in tags.chunks(SERIES_MAX) {
-        let label = |tag: &TagId| TagDescription::at(def.tag(*tag), &latest);
+        let label = |tag: &TagId| TagDescription::new(def.tag(*tag), &latest);
         let begin = columns.len();
         columns.extend(group.iter().map(label).map(|label| {
             let TagDescription { tag, unit, decimals, counts: _ } = label;
@@ -102,7 +102,7 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
                 column.values.extend(values);
             }
             done += (count * group.len()) as u64;
-            progress.at(done);
+            progress.show(done);
         }
     }
     drop(progress);

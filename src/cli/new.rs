@@ -125,7 +125,7 @@ async fn next_line(count: usize) -> Result<Option<LineDef>, CliError> {
     loop {
         let parsed = ask_until(&question, usual, |answer| match answer {
             END => Ok(None),
-            _ => open::Args::of(menu::chosen(answer, &choices)?).map(Some),
+            _ => open::Args::from_words(menu::chosen(answer, &choices)?).map(Some),
         });
         let Some(args) = parsed.await? else { return Ok(None) };
         let found = match args.line() {

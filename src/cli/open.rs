@@ -131,7 +131,7 @@ struct Words {
 
 impl Args {
     /// The arguments that these words mean, the first of them `open`; `Err` says what is wrong with them.
-    pub fn of(words: Vec<String>) -> Result<Args, String> {
+    pub fn from_words(words: Vec<String>) -> Result<Args, String> {
         Words::try_parse_from(words).map(|words| words.args).map_err(|error| error.to_string())
     }
 

@@ -29,7 +29,7 @@ impl Progress {
     }
 
     /// So many are done.
-    pub fn at(&mut self, done: u64) {
+    pub fn show(&mut self, done: u64) {
         let now = Instant::now();
         if now < self.next {
             return;

@@ -114,9 +114,9 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
     ui::io::require_terminal()?;
     in_runtime(async {
         if args.history.is_none()
-            && let Ok(place) = client::place(Some(&def.name)).await
+            && let Ok(station) = client::find_station(Some(&def.name)).await
         {
-            return attach::at(&place).await;
+            return attach::attach_to(&station).await;
         }
         let _log = log::start(args.log.as_deref(), Some(&history_file(&def, args)))?;
         let listener = listen(&def)?;
@@ -134,7 +134,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
 
 /// The socket of a plant, before anything else: it also keeps a second station of the plant away.
 fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
-    let path = find::Places::here().socket(&def.name).map_err(CliError::io("cannot create a socket"))?;
+    let path = find::SocketFolders::here().socket(&def.name).map_err(CliError::io("cannot create a socket"))?;
     serve::listen(&path).map_err(CliError::from)
 }
 

@@ -82,7 +82,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// Every line as the plant says, the first one as the arguments say.
 fn services(def: &PlantDef, args: &Args) -> Result<Vec<Service>, CliError> {
-    let mut services: Vec<Service> = def.lines.iter().map(Service::of).collect();
+    let mut services: Vec<Service> = def.lines.iter().map(Service::new).collect();
     if let Some(first) = services.first_mut() {
         first.mode = args.mode.map(Mode::from).or(args.tcp.map(|_| Mode::Tcp)).unwrap_or(first.mode);
         first.serial.data_bits = args.data_bits.unwrap_or(first.serial.data_bits);

@@ -109,7 +109,7 @@ pub enum Source {
 impl Source {
     /// The history of a plant. A file that is named is read as a file.
     pub async fn open(def: &Arc<PlantDef>, args: &StationArgs, login: &client::Login) -> Result<Source, CliError> {
-        if args.history.is_none() && client::place(Some(&def.name)).await.is_ok() {
+        if args.history.is_none() && client::find_station(Some(&def.name)).await.is_ok() {
             let session = client::attach(Some(&def.name), login).await?;
             if !session.status.borrow().view {
                 let why = "the station of this plant runs: log in to ask it, --user NAME asks for the password";

@@ -52,7 +52,7 @@ pub struct Effects {
 
 impl Effects {
     /// Only the records of operator actions.
-    fn of(actions: impl IntoIterator<Item = ActionRecord>) -> Effects {
+    fn of_actions(actions: impl IntoIterator<Item = ActionRecord>) -> Effects {
         Effects { records: actions.into_iter().map(Record::Action).collect(), ..Effects::default() }
     }
     /// Sends a write that is permitted, or records the one that is not.
@@ -245,7 +245,7 @@ impl Plant {
 
     /// A line accepted a request.
     pub fn on_delivered(&mut self, line: LineId, request: &BusRequest) -> Effects {
-        Effects::of(self.commands.delivered(line, request, &self.image))
+        Effects::of_actions(self.commands.delivered(line, request, &self.image))
     }
 
     /// The record that a write is about to be sent; none for other requests.
@@ -255,7 +255,7 @@ impl Plant {
 
     /// The station stops: ends all pending commands.
     pub fn on_stop(&mut self) -> Effects {
-        Effects::of(self.commands.stop(&self.image))
+        Effects::of_actions(self.commands.stop(&self.image))
     }
 
     /// The queue to a line was full: the request was not sent.
@@ -264,7 +264,7 @@ impl Plant {
             true => None,
             false => self.commands.undeliverable(line, request, &self.image),
         };
-        let mut effects = Effects::of(action);
+        let mut effects = Effects::of_actions(action);
         self.advance_restores(self.at, &mut effects);
         effects
     }

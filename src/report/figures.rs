@@ -38,7 +38,7 @@ const COUNTED: [&str; 12] = ["Wh", "kWh", "MWh", "GWh", "varh", "kvarh", "Mvarh"
 impl TagDescription {
     /// Name, unit and decimals of a tag, where the device may have chosen the last two: `latest` has the latest good values
     /// of the tags that hold them.
-    pub fn at(def: &TagDef, latest: &HashMap<TagId, f64>) -> TagDescription {
+    pub fn new(def: &TagDef, latest: &HashMap<TagId, f64>) -> TagDescription {
         let decimals = match def.decimals {
             Decimals::Fixed(decimals) => decimals,
             Decimals::From(tag) => {

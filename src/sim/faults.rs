@@ -72,9 +72,9 @@ enum Damage {
 
 impl Faults {
     /// None yet, in a plant whose values are known.
-    pub fn of(def: &PlantDef) -> Faults {
+    pub fn new(def: &PlantDef) -> Faults {
         let address = |device: &crate::plant::def::DeviceDef| (device.line, device.unit);
-        let units = def.devices.iter().map(|device| (address(device), Values::of(def, device))).collect();
+        let units = def.devices.iter().map(|device| (address(device), Values::of_device(def, device))).collect();
         let tags = def
             .tags
             .iter()
@@ -130,7 +130,7 @@ impl Faults {
                 }
             }
             (FaultTarget::Process, _) => {
-                let process_faults = ProcessFaults::of(self.at(FaultTarget::Process, TargetKind::Process));
+                let process_faults = ProcessFaults::new(self.at(FaultTarget::Process, TargetKind::Process));
                 if let Some(rig) = simulator.rig_mut() {
                     rig.set_process_faults(process_faults);
                 }

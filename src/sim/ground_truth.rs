@@ -23,7 +23,7 @@ pub struct GroundTruth {
 
 impl GroundTruth {
     /// The sources of a plant.
-    pub fn of(def: &PlantDef) -> GroundTruth {
+    pub fn new(def: &PlantDef) -> GroundTruth {
         let mut found = GroundTruth::default();
         for tag in &def.tags {
             match of_rig(def, tag) {

@@ -45,7 +45,7 @@ pub struct UnknownSimulation(pub String);
 
 impl Simulator {
     /// Simulates a plant: the rig that it names, and for every other device a model made from its profile.
-    pub fn of(def: &PlantDef) -> Result<Simulator, UnknownSimulation> {
+    pub fn new(def: &PlantDef) -> Result<Simulator, UnknownSimulation> {
         let rig = match def.simulation.as_deref() {
             Some(rig::SIMULATION) => Some(Rig::demo()),
             Some(other) => return Err(UnknownSimulation(other.to_owned())),

@@ -63,7 +63,7 @@ impl Hint {
         Hint { key: key.into(), label: label.into(), help: help.into(), needs: None }
     }
     /// A hint of a window, which the help does not list.
-    pub(crate) fn of(key: impl Into<String>, label: impl Into<String>) -> Hint {
+    pub(crate) fn in_window(key: impl Into<String>, label: impl Into<String>) -> Hint {
         Hint::new(key, label, "")
     }
     /// The same for users of at least this role.

@@ -14,7 +14,7 @@ use sightglass::{
         callers::TERMINALS_MAX,
         io::{
             connect::{AttachError, connect},
-            find::Places,
+            find::SocketFolders,
             serve::{ListenError, listen},
         },
         protocol::{

@@ -112,7 +112,7 @@ struct Plant {
 impl Plant {
     fn start(def: &Arc<PlantDef>, history: &Path) -> Plant {
         let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
-        let simulator = SimulatorHandle::spawn(Simulator::of(def).unwrap(), clock);
+        let simulator = SimulatorHandle::spawn(Simulator::new(def).unwrap(), clock);
         let connectors = def.lines.iter().map(|line| plug(&simulator, line)).collect();
         let options =
             station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors, file: None };
@@ -195,7 +195,7 @@ impl Plant {
 /// A port in memory that can be opened again and again, as the line reopens it.
 fn plug(simulator: &SimulatorHandle, line: &LineDef) -> Connector {
     let (ports, streams) = mpsc::channel(2);
-    let (units, framing) = (simulator.line(line.id), Service::of(line).tcp_framing());
+    let (units, framing) = (simulator.line(line.id), Service::new(line).tcp_framing());
     tokio::spawn(async move {
         loop {
             let (ours, theirs) = tokio::io::duplex(1024);
@@ -238,7 +238,7 @@ async fn check(golden: Golden<'_>) {
     }
     let def = Arc::new(def);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
-    let simulator = SimulatorHandle::spawn(Simulator::of(&def).unwrap(), clock);
+    let simulator = SimulatorHandle::spawn(Simulator::new(&def).unwrap(), clock);
     let (port, theirs) = tokio::io::duplex(1024);
     let (ports, streams) = mpsc::channel(1);
     ports.try_send(port).unwrap();

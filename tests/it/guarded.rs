@@ -68,7 +68,7 @@ impl Guarded {
         let mut def = Arc::unwrap_or_clone(def);
         change(&mut def);
         let clock = Clock::starting_at(jiff::Timestamp::now(), SPEED);
-        let service = Service { mode: Mode::Tcp, ..Service::of(&def.lines[0]) };
+        let service = Service { mode: Mode::Tcp, ..Service::new(&def.lines[0]) };
         let simulated = serve(&def, clock, &[service]).await.unwrap();
         let Endpoint::Address(device) = simulated.endpoints()[0] else { panic!("not served over TCP") };
         let (tap, port) = Tap::open(device).await;

@@ -64,7 +64,7 @@ impl SessionState {
     }
 
     /// Takes one request; `false` above the rate limit.
-    pub fn takes_request(&mut self, at: Timestamp) -> bool {
+    pub fn accepts_request(&mut self, at: Timestamp) -> bool {
         self.requests.try_acquire(steady(at))
     }
 

@@ -18,7 +18,7 @@ const TRY_MAX: Duration = Duration::from_millis(500);
 
 /// The folders that may hold sockets, from the environment.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Places {
+pub struct SocketFolders {
     /// `$RUNTIME_DIRECTORY`: the service manager has made it for this very process.
     pub given: Option<PathBuf>,
     /// `/run/sightglass`.
@@ -38,16 +38,16 @@ pub struct Found {
     pub path: PathBuf,
 }
 
-impl Places {
+impl SocketFolders {
     /// Of this process.
-    pub fn here() -> Places {
+    pub fn here() -> SocketFolders {
         let folder = |name: &str| {
             // A service manager may name several folders.
             let first = std::env::var(name).ok()?.split(':').next()?.to_owned();
             (!first.is_empty()).then(|| PathBuf::from(first))
         };
         let uid = rustix::process::getuid().as_raw();
-        Places {
+        SocketFolders {
             given: folder("RUNTIME_DIRECTORY"),
             service: SERVICE.into(),
             login: folder("XDG_RUNTIME_DIR").map(|folder| folder.join("sightglass")),

@@ -87,11 +87,11 @@ pub fn dissect(
         |message: &[u8]| asked.filter(|asked| asked.get(1).copied() == message.get(1).map(|code| code & 0x7F));
     let direction = direction.or(asked.map(|_| Direction::Answer));
     let mut envelope = envelope::open(bytes, framing.or_else(|| recognise(bytes)));
-    let mut read = Readings::of(&envelope, asked_of(&envelope.message));
+    let mut read = Readings::new(&envelope, asked_of(&envelope.message));
     if envelope.framing.is_none() && !read.fit(direction) {
         // A CRC that does not fit is an RTU frame all the same, if the rest makes sense.
         let rtu = envelope::open(bytes, Some(Framing::Rtu));
-        let readings = Readings::of(&rtu, asked_of(&rtu.message));
+        let readings = Readings::new(&rtu, asked_of(&rtu.message));
         if readings.fit(direction) {
             (envelope, read) = (rtu, readings);
         }
@@ -164,7 +164,7 @@ struct Readings {
 }
 
 impl Readings {
-    fn of(envelope: &Envelope, asked: Option<&[u8]>) -> Readings {
+    fn new(envelope: &Envelope, asked: Option<&[u8]>) -> Readings {
         let message = &envelope.message;
         let mbap = envelope.framing == Some(Framing::Mbap);
         let same = match message.get(1) {

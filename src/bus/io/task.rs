@@ -341,7 +341,7 @@ impl Task<'_> {
         let busy = link.take_busy().as_secs_f32();
         self.stats.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
         self.stats.late(&self.def, &link.take_late());
-        self.stats.take(link.take_frames(), link.counters());
+        self.stats.add_frames(link.take_frames(), link.counters());
         (self.memory, self.closed_at) = (link.memory(), now);
     }
 

@@ -19,7 +19,7 @@ pub(super) fn cut<'a>(
     unreadable: &UnreadableRanges,
 ) -> Vec<Vec<&'a TagDef>> {
     let too_long = |value: &Value| {
-        let alone = AddressRange::of(tags[value.tags.start].point, value.end, device);
+        let alone = AddressRange::new(tags[value.tags.start].point, value.end, device);
         device.limits.most(alone.table) < alone.count()
     };
     let (mut runs, mut values): (Vec<Vec<&TagDef>>, Vec<Value>) = (Vec::new(), Vec::new());
@@ -40,7 +40,7 @@ pub(super) fn cut<'a>(
         let mut found = None;
         for start in (0..=last).rev() {
             end = values[start].end.max(end);
-            let extent = AddressRange::of(tags[values[start].tags.start].point, end, device);
+            let extent = AddressRange::new(tags[values[start].tags.start].point, end, device);
             let alone = start == last;
             // From here on the run only grows: what is forbidden now stays forbidden.
             if !alone && (values[start + 1].gap > extent.gap_max(device) || !extent.allowed(device, unreadable)) {

@@ -39,7 +39,7 @@ pub struct Wire {
 impl Wire {
     /// Modbus over serial line V1.02: 2.5.1 (RTU: two bytes of CRC, silences of 3.5 characters), 2.5.2 (ASCII: `:`, two
     /// characters a byte with the LRC, CR LF, no silences); Modbus messaging on TCP/IP V1.0b, 3.1.3 (six bytes of header).
-    pub fn of(line: &LineDef, device: &DeviceDef) -> Wire {
+    pub fn new(line: &LineDef, device: &DeviceDef) -> Wire {
         let framing = line.transport.framing();
         let (fixed, per_byte) = match framing {
             Framing::Rtu => (2, 1),
@@ -78,5 +78,5 @@ pub fn data_bytes(table: Table, count: u32) -> u32 {
 
 /// Worst time that a good read takes on its line, the silences around it and the device's own gap included.
 pub fn cost(block: &Block, line: &LineDef, device: &DeviceDef) -> Duration {
-    Wire::of(line, device).read(block.table, u32::from(block.count))
+    Wire::new(line, device).read(block.table, u32::from(block.count))
 }

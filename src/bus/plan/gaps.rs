@@ -102,7 +102,7 @@ struct AddressRange {
 }
 
 impl AddressRange {
-    fn of(block: &Block, (start, end): (u32, u32)) -> AddressRange {
+    fn new(block: &Block, (start, end): (u32, u32)) -> AddressRange {
         AddressRange { device: block.device, table: block.table, start, end }
     }
 
@@ -114,7 +114,7 @@ impl AddressRange {
 impl RangeBisection {
     /// A block was refused with exception 02: what to poll in its place. `None`: leave it, nothing new was learnt.
     pub fn refused(&mut self, def: &PlantDef, unreadable: &UnreadableRanges, block: &Block) -> Option<Vec<Block>> {
-        let whole = AddressRange::of(block, block.range());
+        let whole = AddressRange::new(block, block.range());
         if unreadable.touch(whole.device, whole.table, whole.start, whole.end) {
             return None;
         }
@@ -123,7 +123,7 @@ impl RangeBisection {
         let confirmed = self.suspects.iter().any(|suspect| whole.contains(suspect));
         match parts {
             Some((parts, between)) if !confirmed => {
-                self.cuts.push((whole, AddressRange::of(block, between)));
+                self.cuts.push((whole, AddressRange::new(block, between)));
                 self.open.extend(parts.clone());
                 Some(parts.into())
             }
@@ -142,7 +142,7 @@ impl RangeBisection {
 
     /// A block was read. The device has all of it.
     pub fn answered(&mut self, block: &Block) {
-        let whole = AddressRange::of(block, block.range());
+        let whole = AddressRange::new(block, block.range());
         self.open.retain(|open| open != block);
         self.suspects.retain(|suspect| !whole.contains(suspect));
     }

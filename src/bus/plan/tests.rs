@@ -66,7 +66,7 @@ fn costs_are_those_of_the_wire() {
 fn a_silent_unit_costs_its_timeout_and_a_gap_of_the_line_counts() {
     let def = fixture::plant();
     let line = LineDef { gap: Duration::from_millis(10), ..def.lines[0].clone() };
-    let wire = Wire::of(&line, &def.devices[0]);
+    let wire = Wire::new(&line, &def.devices[0]);
     // 8 characters of 10 bits at 9600 are 8.33 ms, the gap is longer than 3.5 characters.
     let failing = wire.failing(Duration::from_millis(300)).as_secs_f64() * 1e3;
     assert!((failing - 318.33).abs() < 0.01, "{failing}");

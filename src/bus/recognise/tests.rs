@@ -26,7 +26,7 @@ fn read(simulator: &mut Simulator, unit: u8, span: AddressSpan) -> Vec<u16> {
 
 /// The profile that a simulated unit is taken for.
 fn recognised(plant: &PlantDef, unit: u8) -> Option<(String, Fit)> {
-    let mut simulator = Simulator::of(plant).unwrap();
+    let mut simulator = Simulator::new(plant).unwrap();
     simulator.advance(std::time::Duration::from_secs(5));
     let simulator = std::cell::RefCell::new(simulator);
     let known = OwnProfiles::default().recognisable();

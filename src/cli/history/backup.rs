@@ -7,7 +7,7 @@ use std::{
 
 use jiff::Timestamp;
 
-use super::Place;
+use super::StoredPlant;
 use crate::{
     access::{SessionRequest, io::audit_log},
     cli::{
@@ -26,7 +26,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    place: Place,
+    plant: StoredPlant,
     /// A folder that is new or empty, or has an earlier backup of this history: then only what is new is copied
     #[arg(value_name = "DIR")]
     to: PathBuf,
@@ -34,17 +34,17 @@ pub struct Args {
 
 /// Writes the backup and says what it has; a failure where files of the archive are missing of it.
 pub fn main(args: &Args) -> Result<(), CliError> {
-    let (def, station) = (args.place.load()?, &args.place.station);
+    let (def, station) = (args.plant.load()?, &args.plant.station);
     let to = std::path::absolute(&args.to).map_err(CliError::io(args.to.display().to_string()))?;
     let path = run::history_file(&def, station);
     let written = in_runtime(async {
-        match station.history.is_none() && client::place(Some(&def.name)).await.is_ok() {
+        match station.history.is_none() && client::find_station(Some(&def.name)).await.is_ok() {
             false => {
                 let store = Store::open_read_only(&path, &def)?;
                 from_file(&store, &to, &audit_log::beside(&path)).map(Some)
             }
             true => {
-                let session = client::attach(Some(&def.name), &args.place.login).await?;
+                let session = client::attach(Some(&def.name), &args.plant.login).await?;
                 let request = SessionRequest::Backup { folder: to.display().to_string() };
                 let durability = session.request(request).await.map_err(CliError::Failed)?;
                 client::warn_not_recorded("backed up", durability);
@@ -70,7 +70,7 @@ fn from_file(store: &Store, to: &Path, audit_log: &Path) -> Result<Backup, CliEr
             "file copied" => files_done.next().copied().unwrap_or(0),
             _ => 0,
         };
-        progress.at(done);
+        progress.show(done);
         if is_cancelled() { Err(HistoryError::NotOpen) } else { Ok(()) }
     });
     drop(progress);

@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 
-use super::{Place, size};
+use super::{StoredPlant, size};
 use crate::{
     cli::{CliError, run, say},
     history::io::{compact::compact, store::Store},
@@ -12,13 +12,13 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    place: Place,
+    plant: StoredPlant,
 }
 
 /// Compacts, and tells the size before and after.
 pub fn main(args: &Args) -> Result<(), CliError> {
-    let (def, now) = (args.place.load()?, Timestamp::now());
-    let path = run::history_file(&def, &args.place.station);
+    let (def, now) = (args.plant.load()?, Timestamp::now());
+    let path = run::history_file(&def, &args.plant.station);
     if !path.exists() {
         return Err(CliError::History(crate::history::HistoryError::Missing { path: path.display().to_string() }));
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use jiff::Timestamp;
 
-use super::{Place, open_log, record};
+use super::{StoredPlant, open_log, record};
 use crate::{
     access::io::audit_log,
     cli::{CliError, local, run, say},
@@ -24,15 +24,15 @@ const BYTES_MAX: u64 = 512 << 20;
 )]
 pub struct Args {
     #[command(flatten)]
-    place: Place,
+    plant: StoredPlant,
     /// A CSV file with a row for each sample
     file: PathBuf,
 }
 
 /// Reads the file, stores what fills a gap, and puts that on record.
 pub fn main(args: &Args) -> Result<(), CliError> {
-    let def = args.place.load()?;
-    let (path, now, file) = (run::history_file(&def, &args.place.station), Timestamp::now(), args.file.display());
+    let def = args.plant.load()?;
+    let (path, now, file) = (run::history_file(&def, &args.plant.station), Timestamp::now(), args.file.display());
     let failed = CliError::io(format!("cannot read {file}"));
     if BYTES_MAX < std::fs::metadata(&args.file).map_err(&failed)?.len() {
         return Err(CliError::Usage(format!("{file}: expected at most {} MiB: split the file", BYTES_MAX >> 20)));

@@ -51,7 +51,7 @@ enum Command {
 
 /// Which history.
 #[derive(Debug, clap::Args)]
-struct Place {
+struct StoredPlant {
     /// A plant file, or the name of a shipped plant
     plant: String,
     #[command(flatten)]
@@ -60,7 +60,7 @@ struct Place {
     station: StationArgs,
 }
 
-impl Place {
+impl StoredPlant {
     fn load(&self) -> Result<Arc<PlantDef>, CliError> {
         Ok(Arc::new(load(&self.plant, &self.station)?))
     }
@@ -79,7 +79,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Some(Command::Import(args)) => import::main(&args),
         Some(Command::Backup(args)) => backup::main(&args),
         Some(Command::Restore(args)) => restore::main(&args),
-        None => overview::main(&Place { plant: plant.unwrap_or_default(), login, station }, json),
+        None => overview::main(&StoredPlant { plant: plant.unwrap_or_default(), login, station }, json),
     }
 }
 

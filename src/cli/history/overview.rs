@@ -13,13 +13,13 @@ use crate::{
     plant::{PlantDef, number::to_u64},
 };
 
-use super::{Place, size};
+use super::{StoredPlant, size};
 use crate::cli::{CliError, in_runtime, local, say, source::unexpected};
 
 /// Asks the station, or reads the file, and prints.
-pub fn main(place: &Place, json: bool) -> Result<(), CliError> {
-    let def = place.load()?;
-    let overview = in_runtime(ask(place, &def))?;
+pub fn main(stored: &StoredPlant, json: bool) -> Result<(), CliError> {
+    let def = stored.load()?;
+    let overview = in_runtime(ask(stored, &def))?;
     match json {
         true => say(&serde_json::to_string_pretty(&overview).expect("its keys are words and its numbers are finite")),
         false => in_words(&overview, &def).iter().for_each(|line| say(line)),
@@ -28,8 +28,8 @@ pub fn main(place: &Place, json: bool) -> Result<(), CliError> {
 }
 
 /// What is stored, by the station or from the file.
-pub async fn ask(place: &Place, def: &Arc<PlantDef>) -> Result<Overview, CliError> {
-    match place.source(def).await?.query(Query::Overview).await? {
+pub async fn ask(stored: &StoredPlant, def: &Arc<PlantDef>) -> Result<Overview, CliError> {
+    match stored.source(def).await?.query(Query::Overview).await? {
         Answer::Overview(overview) => Ok(*overview),
         _ => Err(unexpected()),
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
 
-use super::{Place, open_log, record};
+use super::{StoredPlant, open_log, record};
 use crate::{
     access::io::audit_log,
     cli::{CliError, run, say},
@@ -19,7 +19,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    place: Place,
+    plant: StoredPlant,
     /// The folder of a backup
     #[arg(value_name = "DIR")]
     from: PathBuf,
@@ -27,13 +27,13 @@ pub struct Args {
 
 /// Restores, or finishes a restore that was interrupted. Refused while a station records to the history.
 pub fn main(args: &Args) -> Result<(), CliError> {
-    let def = args.place.load()?;
-    let db = run::history_file(&def, &args.place.station);
+    let def = args.plant.load()?;
+    let db = run::history_file(&def, &args.plant.station);
     let now = Timestamp::now();
     if let Some(folder) = db.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder.display().to_string()))?;
     }
-    let _exclusive = Exclusive::take(&db)?;
+    let _exclusive = Exclusive::acquire(&db)?;
     if let Some(before) = restore::finish(&db)? {
         say(&format!("the restore that was interrupted is finished{}", set_aside(&before)));
         return Ok(());

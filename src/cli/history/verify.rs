@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Place, overview};
+use super::{StoredPlant, overview};
 use crate::{
     cli::{CliError, in_runtime, progress::Progress, say},
     history::{ArchiveFile, io::archive::sync_and_hash},
@@ -12,19 +12,19 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    place: Place,
+    plant: StoredPlant,
 }
 
 /// Compares the files of the archive with the manifest.
 pub fn main(args: &Args) -> Result<(), CliError> {
-    let def = args.place.load()?;
-    let overview = in_runtime(overview::ask(&args.place, &def))?;
+    let def = args.plant.load()?;
+    let overview = in_runtime(overview::ask(&args.plant, &def))?;
     let mut progress = Progress::new(overview.files.iter().map(|file| file.bytes).sum());
     let (mut wrong, mut done) = (Vec::new(), 0);
     for file in &overview.files {
         wrong.extend(trouble(&overview.folder, file).map(|trouble| format!("{}: {trouble}", file.path)));
         done += file.bytes;
-        progress.at(done);
+        progress.show(done);
     }
     drop(progress);
     wrong.iter().for_each(|wrong| say(wrong));

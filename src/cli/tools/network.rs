@@ -39,7 +39,7 @@ pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<(), CliError>
         chosen.await
     })?;
     match opened {
-        Some(words) => open::main(open::Args::of(words).map_err(CliError::Usage)?),
+        Some(words) => open::main(open::Args::from_words(words).map_err(CliError::Usage)?),
         None => Ok(()),
     }
 }

@@ -165,7 +165,7 @@ impl Store {
     fn refuse_without_room(&self, folder: &Path) -> Result<(), HistoryError> {
         let Some(disk) = files::disk(&folder.join(MANIFEST)) else { return Ok(()) };
         let archive = self.files(None)?;
-        let missing = archive.iter().filter(|file| !folder.join(of(file).stored()).exists());
+        let missing = archive.iter().filter(|file| !folder.join(backup_file(file).stored()).exists());
         let needed = self.file_bytes() + missing.map(|file| file.bytes).sum::<u64>();
         match disk.free < needed {
             true => Err(HistoryError::Refused(format!(
@@ -202,7 +202,7 @@ pub fn read_manifest(folder: &Path) -> Result<Option<Backup>, HistoryError> {
 }
 
 /// A file of the archive as one of a backup.
-fn of(file: &ArchiveFile) -> BackupFile {
+fn backup_file(file: &ArchiveFile) -> BackupFile {
     let ArchiveFile { path, bytes, sha256, .. } = file;
     BackupFile { path: format!("{ARCHIVE}/{path}"), bytes: *bytes, sha256: sha256.clone() }
 }
@@ -217,7 +217,7 @@ fn copy_file(
     let is_sound = |path: &Path| {
         sync_and_hash(path).map(|(bytes, sha256)| (bytes, sha256.as_str()) == (file.bytes, file.sha256.as_str()))
     };
-    let (from, copied) = (archive.join(&file.path), of(file));
+    let (from, copied) = (archive.join(&file.path), backup_file(file));
     let to = folder.join(copied.stored());
     if is_sound(&to).unwrap_or(false) {
         return Ok(Some(copied));

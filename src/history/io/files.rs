@@ -98,7 +98,7 @@ impl Exclusive {
 
     /// The same, also for a database that cannot be opened any more. This process must not have it open: its own locks
     /// would go. [`HistoryError::Locked`] while another process has it.
-    pub fn take(db: &Path) -> Result<Exclusive, HistoryError> {
+    pub fn acquire(db: &Path) -> Result<Exclusive, HistoryError> {
         let mut held = Exclusive::hold(db)?;
         let wrong = |error: std::io::Error| HistoryError::Engine(format!("{}: {error}", db.display()));
         match File::options().read(true).write(true).open(db) {

@@ -68,7 +68,7 @@ impl GatheredTags {
         events.for_each(|event| by_subject.entry(&event.subject).or_default().push(event));
         let (from, until) = self.span;
         let row = |tag: &TagId| {
-            let label = TagDescription::at(def.tag(*tag), &self.latest);
+            let label = TagDescription::new(def.tag(*tag), &self.latest);
             let events = by_subject.get(label.tag.as_str()).into_iter().flatten().copied();
             let in_alarm = figures::time_in_alarm(events, from, until);
             Some(self.of.get_mut(tag)?.figures.take()?.end(label, in_alarm))
@@ -104,7 +104,7 @@ impl Store {
         let (record, record_of) = match recorded {
             Some(recorded) => {
                 let rows = self.record(&recorded, (from, until))?;
-                (rows, Some((recorded.name, TagDescription::at(def.tag(recorded.pv), &gathered.latest).unit)))
+                (rows, Some((recorded.name, TagDescription::new(def.tag(recorded.pv), &gathered.latest).unit)))
             }
             None => (Vec::new(), None),
         };

@@ -86,7 +86,7 @@ impl Plant {
 
     /// A set was written into the folder, or `Err` says why not.
     pub fn on_set_written(&mut self, command: CommandId, result: Result<(), String>) -> Effects {
-        Effects::of(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image))
+        Effects::of_actions(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image))
     }
 
     /// Begins a restore by reading the device: the value of a tag that is polled seldom may be hours old.

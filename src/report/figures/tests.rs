@@ -49,7 +49,7 @@ fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
 fn a_report_takes_the_decimals_that_the_screen_takes() {
     let pv = TagDef { decimals: Decimals::From(TagId(9)), ..tag(0, "PV") };
     for (announced, expect) in [(2.0, 2), (6.0, 6), (7.0, DECIMALS_UNKNOWN), (1.5, DECIMALS_UNKNOWN)] {
-        assert_eq!(TagDescription::at(&pv, &HashMap::from([(TagId(9), announced)])).decimals, expect, "{announced}");
+        assert_eq!(TagDescription::new(&pv, &HashMap::from([(TagId(9), announced)])).decimals, expect, "{announced}");
     }
 }
 
@@ -72,7 +72,7 @@ fn a_counter_has_a_difference_and_no_mean() {
         assert_eq!((got.difference, got.mean), (expect, None), "{readings:?}");
     }
     let mut def = crate::report::testing::tag(0, "E");
-    let counts = |def: &TagDef| TagDescription::at(def, &HashMap::new()).counts;
+    let counts = |def: &TagDef| TagDescription::new(def, &HashMap::new()).counts;
     assert!(!counts(&def));
     def.unit = "kWh".into();
     assert!(counts(&def));

@@ -16,7 +16,7 @@ pub struct ProcessFaults {
 
 impl ProcessFaults {
     /// The faults of the process among these.
-    pub fn of(faults: impl Iterator<Item = InjectedFault>) -> ProcessFaults {
+    pub fn new(faults: impl Iterator<Item = InjectedFault>) -> ProcessFaults {
         let mut process_faults = ProcessFaults::default();
         for fault in faults {
             match fault {
@@ -69,7 +69,7 @@ mod tests {
 
     fn check(faults: &[&str], wanted: Actuators, expect: Actuators) {
         let faults = faults.iter().map(|text| text.parse().expect("a fault"));
-        assert_eq!(ProcessFaults::of(faults).apply(wanted), expect);
+        assert_eq!(ProcessFaults::new(faults).apply(wanted), expect);
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub struct AvailableFaults {
 
 impl FaultTarget {
     /// The unit of a device.
-    pub fn of(device: &DeviceDef) -> FaultTarget {
+    pub fn of_unit(device: &DeviceDef) -> FaultTarget {
         FaultTarget::Unit(device.line, device.unit)
     }
 
@@ -72,7 +72,7 @@ pub fn device_at(def: &PlantDef, line: LineId, unit: u8) -> Option<&DeviceDef> {
 /// simulated, the process.
 pub fn available_faults(def: &PlantDef) -> Vec<AvailableFaults> {
     let lines = def.lines.iter().map(|line| FaultTarget::Line(line.id));
-    let units = def.devices.iter().map(FaultTarget::of);
+    let units = def.devices.iter().map(FaultTarget::of_unit);
     let targets = lines.chain(units).chain([FaultTarget::Process]);
     let available = targets.map(|target| {
         let faults = InjectedFault::all().filter(|fault| why_not_applicable(def, target, *fault).is_none()).collect();
@@ -106,7 +106,7 @@ pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: InjectedFa
             FaultTarget::Unit(line, unit),
             InjectedFault::Stuck | InjectedFault::Torn | InjectedFault::WordOrder | InjectedFault::SensorBurnout,
         ) => {
-            let values = device_at(def, line, unit).map(|device| Values::of(def, device)).unwrap_or_default();
+            let values = device_at(def, line, unit).map(|device| Values::of_device(def, device)).unwrap_or_default();
             if values.can_have(fault) {
                 return None;
             }

@@ -35,7 +35,7 @@ pub struct Memory {
 
 impl Values {
     /// Those of one device of a plant.
-    pub fn of(def: &PlantDef, device: &DeviceDef) -> Values {
+    pub fn of_device(def: &PlantDef, device: &DeviceDef) -> Values {
         Values::of_tags(def.tags_of(device.id))
     }
 
@@ -78,7 +78,7 @@ impl Values {
     /// The answer with what these faults make of it. `request` and `answer` are PDUs; what is no read of the four tables
     /// passes as it is.
     pub fn corrupt(&self, faults: &[InjectedFault], memory: &mut Memory, request: &[u8], answer: Vec<u8>) -> Vec<u8> {
-        let Some(mut cells) = Cells::of(request, &answer) else { return answer };
+        let Some(mut cells) = Cells::parse(request, &answer) else { return answer };
         let now = cells.clone();
         for fault in faults {
             match fault {
@@ -162,7 +162,7 @@ struct Cells {
 
 impl Cells {
     /// Of an answer that fits its request to read; `None` for any other exchange.
-    fn of(request: &[u8], answer: &[u8]) -> Option<Cells> {
+    fn parse(request: &[u8], answer: &[u8]) -> Option<Cells> {
         let (table, first, cells) = pdu::values_read(request, answer)?;
         Some(Cells { table, first, cells })
     }

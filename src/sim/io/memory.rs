@@ -21,7 +21,7 @@ pub fn in_memory(def: &PlantDef, simulator: &SimulatorHandle) -> Vec<Connector> 
         let (streams, opened) = mpsc::channel(OPENINGS);
         for _ in 0..OPENINGS {
             let (master, slave) = duplex(BYTES);
-            tokio::spawn(serve(slave, simulator.line(line.id), Service::of(line)));
+            tokio::spawn(serve(slave, simulator.line(line.id), Service::new(line)));
             // The channel has room for all of them.
             let _ = streams.try_send(master);
         }

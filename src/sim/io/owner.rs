@@ -73,7 +73,7 @@ impl SimulatorHandle {
 
     /// The same for a plant whose values are known: faults can be injected, and actual values are reported.
     pub fn spawn_for(def: &PlantDef, simulator: Simulator, clock: Clock) -> SimulatorHandle {
-        SimulatorHandle::start(simulator, clock, Faults::of(def), GroundTruth::of(def))
+        SimulatorHandle::start(simulator, clock, Faults::new(def), GroundTruth::new(def))
     }
 
     fn start(simulator: Simulator, clock: Clock, faults: Faults, ground_truth: GroundTruth) -> SimulatorHandle {

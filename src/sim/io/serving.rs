@@ -114,7 +114,7 @@ pub enum Mode {
 
 impl Mode {
     /// What a line speaks.
-    fn of(line: &LineDef) -> Mode {
+    fn new(line: &LineDef) -> Mode {
         match &line.transport {
             Transport::Serial { framing: Framing::Ascii, .. } => Mode::Ascii,
             Transport::Serial { .. } => Mode::Rtu,
@@ -154,9 +154,9 @@ pub struct Service {
 
 impl Service {
     /// As the plant says: at the pace of the line (9600 8N1 where it names none), on a free port of this machine.
-    pub fn of(line: &LineDef) -> Service {
+    pub fn new(line: &LineDef) -> Service {
         let serial = line.transport.serial().unwrap_or(Serial::USUAL);
-        Service { mode: Mode::of(line), serial, address: (Ipv4Addr::LOCALHOST, 0).into() }
+        Service { mode: Mode::new(line), serial, address: (Ipv4Addr::LOCALHOST, 0).into() }
     }
 
     /// What is spoken on any stream of bytes that stands for the line.
@@ -168,7 +168,7 @@ impl Service {
 
 /// Serves every line of a plant; `services` says how, by [`LineId`].
 pub async fn serve(def: &PlantDef, clock: Clock, services: &[Service]) -> Result<Serving, SimError> {
-    serve_simulator(def, Simulator::of(def)?, clock, services).await
+    serve_simulator(def, Simulator::new(def)?, clock, services).await
 }
 
 /// The same with a simulator that has already run.

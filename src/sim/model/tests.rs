@@ -38,7 +38,7 @@ tag = [
 
 /// Puts requests to one oven one after another.
 fn check(exchanges: &[(&[u8], &[u8])]) {
-    let mut simulator = Simulator::of(&plant(OVEN)).expect("no rig is named");
+    let mut simulator = Simulator::new(&plant(OVEN)).expect("no rig is named");
     let sv_h = plant(OVEN).tag_named("D-1.SV-H").expect("it is in the profile");
     assert!(simulator.set_value(sv_h, 200.0));
     for (request, expect) in exchanges {
@@ -88,7 +88,7 @@ fn a_locked_value_takes_a_write_only_after_its_key() {
 #[test]
 fn fields_of_one_word_do_not_disturb_each_other() {
     let plant = plant(OVEN);
-    let mut simulator = Simulator::of(&plant).expect("no rig is named");
+    let mut simulator = Simulator::new(&plant).expect("no rig is named");
     let id = |name: &str| plant.tag_named(name).expect("it is in the profile");
     assert!(simulator.set_value(id("D-1.HIGH"), 18.0) && simulator.set_value(id("D-1.LOW"), 52.0));
     assert_eq!(simulator.respond(L1, 1, &[3, 0, 40, 0, 1]), Some(vec![3, 2, 0x12, 0x34]));
@@ -102,7 +102,7 @@ fn a_device_with_an_alignment_refuses_odd_requests() {
     let meter = plant(
         "limits = { alignment = 2 }\ntag = [{ name = 'V1', table = 'input', address = 0, type = 'float32' }, { name = 'V2', table = 'input', address = 2, type = 'float32' }]",
     );
-    let mut simulator = Simulator::of(&meter).expect("no rig is named");
+    let mut simulator = Simulator::new(&meter).expect("no rig is named");
     assert_eq!(simulator.respond(L1, 1, &[4, 0, 0, 0, 4]), Some(vec![4, 8, 0, 0, 0, 0, 0, 0, 0, 0]));
     assert_eq!(simulator.respond(L1, 1, &[4, 0, 1, 0, 2]), Some(vec![0x84, 2]));
     assert_eq!(simulator.respond(L1, 1, &[4, 0, 0, 0, 3]), Some(vec![0x84, 3]));
@@ -115,12 +115,12 @@ fn the_second_controller_of_a_tank_plant_is_a_model() {
     let mut second = def.devices[0].clone();
     (second.id, second.unit) = (DeviceId(2), 3);
     def.devices.push(second);
-    let mut simulator = Simulator::of(&def).expect("the tank is known");
+    let mut simulator = Simulator::new(&def).expect("the tank is known");
     assert_eq!(simulator.respond(L1, 1, &[3, 0x03, 0xEA, 0, 1]), Some(vec![3, 2, 0x02, 0xBC]), "the rig's own");
     assert_eq!(simulator.respond(L1, 3, &[3, 0x03, 0xEA, 0, 1]), Some(vec![0x83, 1]), "a model without tags");
     def.simulation = Some("tanc".into());
     assert!(
-        Simulator::of(&def)
+        Simulator::new(&def)
             .is_err_and(|error| error.to_string().contains("`tank`") || error.to_string().contains("\"tank\""))
     );
 }

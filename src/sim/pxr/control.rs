@@ -69,7 +69,7 @@ impl Control {
             Law::Pid => pid,
             Law::Fuzzy => {
                 let band_c = set.p_percent / 100.0 * set.span_c;
-                Grades::of(error_c, self.slope_c_per_s, band_c, set.d_s).blend(pid)
+                Grades::new(error_c, self.slope_c_per_s, band_c, set.d_s).blend(pid)
             }
         }
     }

@@ -13,7 +13,7 @@ pub struct Display {
 
 impl Display {
     /// From the words of 41017 and 41020.
-    pub fn of(unit: i16, decimals: i16) -> Display {
+    pub fn new(unit: i16, decimals: i16) -> Display {
         Display { decimals: to_u8(decimals.clamp(0, 2)), fahrenheit: unit == 1 }
     }
 
@@ -55,7 +55,7 @@ mod tests {
     #[test]
     fn a_temperature_stands_in_its_unit_with_its_decimals() {
         let check = |unit, decimals, c: f64, temperature, difference| {
-            let display = Display::of(unit, decimals);
+            let display = Display::new(unit, decimals);
             assert_eq!((display.temperature(c), display.difference(c)), (temperature, difference), "{display:?}");
             let smallest = 1.0 / display.per_unit();
             assert!((display.temperature_c(temperature) - c).abs() < smallest);
@@ -66,6 +66,6 @@ mod tests {
         check(0, 2, -12.34, -1234, -1234);
         check(1, 0, 70.0, 158, 126);
         check(1, 1, 27.0, 806, 486);
-        assert_eq!(Display::of(1, 2).temperature(194.25), i16::MAX);
+        assert_eq!(Display::new(1, 2).temperature(194.25), i16::MAX);
     }
 }

@@ -29,7 +29,7 @@ pub struct Grades {
 
 impl Grades {
     /// From the deviation SV − PV in K, the slope of PV in K/s, the width of the proportional band in K and D in seconds.
-    pub fn of(error_k: f64, slope_k_per_s: f64, band_k: f64, d_s: f64) -> Grades {
+    pub fn new(error_k: f64, slope_k_per_s: f64, band_k: f64, d_s: f64) -> Grades {
         let expected_k = error_k - LOOK_AHEAD * d_s * slope_k_per_s;
         let heat = (expected_k / (FAR_BELOW * band_k)).clamp(0.0, 1.0);
         let coast = (-expected_k / (FAR_ABOVE * band_k)).clamp(0.0, 1.0);
@@ -49,7 +49,7 @@ mod tests {
     #[test]
     fn the_rules_share_the_output() {
         let check = |error_k: f64, slope: f64, expect: f64| {
-            let output = Grades::of(error_k, slope, 10.0, 60.0).blend(40.0);
+            let output = Grades::new(error_k, slope, 10.0, 60.0).blend(40.0);
             assert!((output - expect).abs() < 1e-9, "{error_k} K at {slope} K/s: {output} %, expected {expect} %");
         };
         check(20.0, 0.0, 100.0);

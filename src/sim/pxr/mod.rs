@@ -366,7 +366,7 @@ impl Pxr {
     }
 
     fn mode(&self) -> Mode {
-        Mode::of(self.settings[map::MODE])
+        Mode::from_word(self.settings[map::MODE])
     }
 
     /// A plain setting with one decimal: times, percent, amperes.

@@ -52,7 +52,7 @@ pub struct Mode {
 
 impl Mode {
     /// From the word of 41081.
-    pub fn of(word: i16) -> Mode {
+    pub fn from_word(word: i16) -> Mode {
         let bit = |number: u8| word >> number & 1 == 1;
         Mode { standby_at_end: bit(0), standby_at_off: bit(1), repeat: bit(2), start_at_power_on: bit(3) }
     }

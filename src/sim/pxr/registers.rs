@@ -50,8 +50,8 @@ impl Registers for Pxr {
         }
         match place {
             map::FIX if value == 1 => self.begin_saving(),
-            map::UNIT => self.show_as(Display::of(value, self.settings[map::DECIMALS]))?,
-            map::DECIMALS => self.show_as(Display::of(self.settings[map::UNIT], value))?,
+            map::UNIT => self.show_as(Display::new(value, self.settings[map::DECIMALS]))?,
+            map::DECIMALS => self.show_as(Display::new(self.settings[map::UNIT], value))?,
             _ => {}
         }
         self.settings[place] = value;
@@ -68,7 +68,7 @@ impl Registers for Pxr {
 impl Pxr {
     /// How temperatures stand in the registers now.
     pub(super) fn display(&self) -> Display {
-        Display::of(self.settings[map::UNIT], self.settings[map::DECIMALS])
+        Display::new(self.settings[map::UNIT], self.settings[map::DECIMALS])
     }
 
     /// The meaning of a setting; that of an alarm point hangs on the type of its alarm.

@@ -258,7 +258,7 @@ fn only_the_first_device_of_a_profile_belongs_to_the_rig() {
         let parts: Vec<_> = def.devices.iter().map(|device| part(&def, device.id)).collect();
         assert_eq!(parts, expect, "{simulation:?} {profiles:?}");
         // The simulator serves what this says.
-        let Ok(simulator) = super::super::simulator::Simulator::of(&def) else { panic!("{simulation:?} is known") };
+        let Ok(simulator) = super::super::simulator::Simulator::new(&def) else { panic!("{simulation:?} is known") };
         let answers: Vec<_> =
             def.devices.iter().map(|device| simulator.is_controller(device.line, device.unit)).collect();
         assert_eq!(answers, expect.map(|part| part == Some(Part::Controller)));

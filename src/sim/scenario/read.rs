@@ -194,7 +194,7 @@ fn target(table: &EventTable, def: &PlantDef, problems: &mut Problems) -> Option
         (None, Some(name), None) => {
             let device = def.devices.iter().find(|device| device.name == name.value);
             let known = def.devices.iter().map(|device| device.name.as_str());
-            unknown(device.map(FaultTarget::of), "device", name, known, problems)
+            unknown(device.map(FaultTarget::of_unit), "device", name, known, problems)
         }
         (None, None, Some(name)) => tag(name, def, problems).map(FaultTarget::Tag),
         (None, None, None) => match table.fault {

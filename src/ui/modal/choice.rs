@@ -68,7 +68,7 @@ impl Choice {
         if keys::code(KeyCode::Enter).is(event) && !self.rows.is_empty() {
             return Next::Stay(Modal::Confirm(self.rows.swap_remove(self.selected).next));
         }
-        if let Some(motion) = Motion::of(event) {
+        if let Some(motion) = Motion::from_key(event) {
             self.selected = motion.to(self.selected, self.rows.len(), PAGE_ROWS);
         }
         Next::Stay(Modal::Choice(self))

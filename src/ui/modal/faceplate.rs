@@ -48,21 +48,21 @@ impl Faceplate {
     pub(super) fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = Vec::new();
         if self.tags.len() > 1 {
-            hints.push(Hint::of("↑↓", t!("select")));
+            hints.push(Hint::in_window("↑↓", t!("select")));
         }
         match (self.toggle(cx), command_tag(cx, self.tag())) {
             (Some((tag, value)), _) => {
                 let words = format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(self.tag()).short);
-                hints.insert(0, Hint::of("t", &words));
+                hints.insert(0, Hint::in_window("t", &words));
             }
             (None, Some(tag)) if tag != self.tag() => {
-                hints.push(Hint::of("⏎", &t!("write {short}", short = cx.def().tag(tag).short)));
+                hints.push(Hint::in_window("⏎", &t!("write {short}", short = cx.def().tag(tag).short)));
             }
-            (None, Some(_)) => hints.push(Hint::of("⏎", t!("write"))),
+            (None, Some(_)) => hints.push(Hint::in_window("⏎", t!("write"))),
             (None, None) => {}
         }
-        hints.push(Hint::of("w", t!("why")));
-        hints.push(Hint::of(t!("Esc"), t!("close")));
+        hints.push(Hint::in_window("w", t!("why")));
+        hints.push(Hint::in_window(t!("Esc"), t!("close")));
         hints
     }
 

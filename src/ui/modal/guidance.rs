@@ -40,12 +40,15 @@ impl Guidance {
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
-        let faceplate = self.faceplate.is_some().then(|| Hint::of("⏎", t!("faceplate")));
-        faceplate.into_iter().chain([Hint::of("↑↓", t!("scroll")), Hint::of(t!("Esc"), t!("close"))]).collect()
+        let faceplate = self.faceplate.is_some().then(|| Hint::in_window("⏎", t!("faceplate")));
+        faceplate
+            .into_iter()
+            .chain([Hint::in_window("↑↓", t!("scroll")), Hint::in_window(t!("Esc"), t!("close"))])
+            .collect()
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
-        if let Some(motion) = Motion::of(event) {
+        if let Some(motion) = Motion::from_key(event) {
             let rows = self.sheet(cx, cx.area).len();
             self.scroll.on(motion, rows, usize::from(cx.area.height.saturating_sub(4)));
         }

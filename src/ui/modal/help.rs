@@ -21,7 +21,7 @@ pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
     match event.code {
         KeyCode::Char('q' | '?') | KeyCode::Enter => Next::Close,
         _ => {
-            let moved = Motion::of(event).map_or(row, |motion| to_u16(motion.to(usize::from(row), ROWS_MAX, 10)));
+            let moved = Motion::from_key(event).map_or(row, |motion| to_u16(motion.to(usize::from(row), ROWS_MAX, 10)));
             Next::Stay(Modal::Help(moved))
         }
     }

@@ -218,29 +218,37 @@ impl Modal {
     /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = match self {
-            Modal::Help(_) => vec![Hint::of("↑↓", t!("scroll")), Hint::of(t!("Esc"), t!("close"))],
-            Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![Hint::of(t!("Esc"), confirm.escape())],
+            Modal::Help(_) => vec![Hint::in_window("↑↓", t!("scroll")), Hint::in_window(t!("Esc"), t!("close"))],
+            Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![Hint::in_window(t!("Esc"), confirm.escape())],
             Modal::Confirm(confirm) => {
-                vec![Hint::of(confirm.key(), confirm.verb()), Hint::of(t!("Esc"), confirm.escape())]
+                vec![Hint::in_window(confirm.key(), confirm.verb()), Hint::in_window(t!("Esc"), confirm.escape())]
             }
-            Modal::Entry(_) => vec![Hint::of("⏎", t!("write and verify")), Hint::of(t!("Esc"), t!("cancel"))],
+            Modal::Entry(_) => {
+                vec![Hint::in_window("⏎", t!("write and verify")), Hint::in_window(t!("Esc"), t!("cancel"))]
+            }
             Modal::Choice(_) => {
-                vec![Hint::of("↑↓", t!("select")), Hint::of("⏎", t!("next")), Hint::of(t!("Esc"), t!("cancel"))]
+                vec![
+                    Hint::in_window("↑↓", t!("select")),
+                    Hint::in_window("⏎", t!("next")),
+                    Hint::in_window(t!("Esc"), t!("cancel")),
+                ]
             }
-            Modal::Prompt(_) => vec![Hint::of("⏎", t!("OK")), Hint::of(t!("Esc"), t!("cancel"))],
+            Modal::Prompt(_) => vec![Hint::in_window("⏎", t!("OK")), Hint::in_window(t!("Esc"), t!("cancel"))],
             Modal::Reason(reason) => reason.hints(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
-            Modal::Notice(_) => vec![Hint::of(t!("Esc"), t!("close"))],
+            Modal::Notice(_) => vec![Hint::in_window(t!("Esc"), t!("close"))],
             Modal::Guidance(guidance) => guidance.hints(),
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
-            Modal::UserForm(form) => form.hints().into_iter().chain([Hint::of(t!("Esc"), t!("cancel"))]).collect(),
-            Modal::AuditEntry(_) => vec![Hint::of(t!("Esc"), t!("close"))],
+            Modal::UserForm(form) => {
+                form.hints().into_iter().chain([Hint::in_window(t!("Esc"), t!("cancel"))]).collect()
+            }
+            Modal::AuditEntry(_) => vec![Hint::in_window(t!("Esc"), t!("close"))],
         };
         // A digit is typed here: the tabs are one key further away.
         if let Some(last) = Tab::offered(cx).last().filter(|_| self.takes_text()) {
-            hints.push(Hint::of(&t!("Esc, 0-{number}", number = last.number()), t!("another tab")));
+            hints.push(Hint::in_window(&t!("Esc, 0-{number}", number = last.number()), t!("another tab")));
         }
         hints
     }

@@ -61,11 +61,11 @@ impl Reason {
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
-        let choose = (1 < self.choices.len()).then(|| Hint::of("↑↓", t!("select")));
-        let other = self
-            .other()
-            .map(|time| Hint::of(t!("Tab"), if time.typing { t!("enter the reason") } else { t!("enter the time") }));
-        let (enter, escape) = (Hint::of("⏎", self.verb), Hint::of(t!("Esc"), t!("cancel")));
+        let choose = (1 < self.choices.len()).then(|| Hint::in_window("↑↓", t!("select")));
+        let other = self.other().map(|time| {
+            Hint::in_window(t!("Tab"), if time.typing { t!("enter the reason") } else { t!("enter the time") })
+        });
+        let (enter, escape) = (Hint::in_window("⏎", self.verb), Hint::in_window(t!("Esc"), t!("cancel")));
         [enter].into_iter().chain(choose).chain(other).chain([escape]).collect()
     }
 

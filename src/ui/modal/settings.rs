@@ -49,22 +49,26 @@ impl Settings {
     /// The settings in use of a line, to be changed.
     pub fn new(cx: &ViewContext, line: LineId) -> Settings {
         // The speed is what differs most often.
-        Settings { line, draft: Draft::of(in_use(cx, line)), row: 2, asking: None, problem: None }.in_range()
+        Settings { line, draft: Draft::new(in_use(cx, line)), row: 2, asking: None, problem: None }.in_range()
     }
 
     pub(super) fn hints(&self) -> Vec<Hint> {
         if self.asking.is_some() {
-            return vec![Hint::of("⏎", t!("yes")), Hint::of("n", t!("no")), Hint::of(t!("Esc"), t!("close"))];
+            return vec![
+                Hint::in_window("⏎", t!("yes")),
+                Hint::in_window("n", t!("no")),
+                Hint::in_window(t!("Esc"), t!("close")),
+            ];
         }
-        let mut hints = vec![Hint::of("↑↓", t!("select"))];
+        let mut hints = vec![Hint::in_window("↑↓", t!("select"))];
         if self.field().is_choice() {
-            hints.push(Hint::of("←→", t!("change")));
+            hints.push(Hint::in_window("←→", t!("change")));
         }
-        hints.push(Hint::of("⏎", t!("apply")));
+        hints.push(Hint::in_window("⏎", t!("apply")));
         if !self.field().is_text() {
-            hints.extend([Hint::of("u", t!("revert")), Hint::of("S", t!("save to plant file"))]);
+            hints.extend([Hint::in_window("u", t!("revert")), Hint::in_window("S", t!("save to plant file"))]);
         }
-        hints.push(Hint::of(t!("Esc"), t!("close")));
+        hints.push(Hint::in_window(t!("Esc"), t!("close")));
         hints
     }
 
@@ -121,7 +125,7 @@ impl Settings {
         let new_at = NAME + room.saturating_sub(NAME) / 2;
         canvas.text(NAME, 0, t!("in use"), theme.dim());
         canvas.text(new_at, 0, t!("new"), theme.dim());
-        let old = Draft::of(used);
+        let old = Draft::new(used);
         for (y, (n, field)) in fields.iter().enumerate().skip(first).take(shown).enumerate() {
             let y = to_u16(y) + 1;
             let selected = n == self.row && self.asking.is_none();
@@ -237,7 +241,7 @@ impl Settings {
     fn ask_revert(&mut self, cx: &ViewContext) -> Result<Option<SettingsAction>, String> {
         let before = cx.snapshot.line(self.line).settings_before.as_ref();
         let before = before.ok_or(t!("nothing to revert: the settings were not changed"))?;
-        self.draft = Draft::of(before);
+        self.draft = Draft::new(before);
         Ok(Some(SettingsAction::Revert(Box::new(LineDef::clone(before)))))
     }
 

@@ -61,13 +61,16 @@ impl Why {
     }
 
     pub(super) fn hints(&self) -> Vec<Hint> {
-        let others = (1 < self.tags.len()).then(|| Hint::of("←→", t!("other value")));
-        others.into_iter().chain([Hint::of("↑↓", t!("scroll")), Hint::of(t!("Esc"), t!("close"))]).collect()
+        let others = (1 < self.tags.len()).then(|| Hint::in_window("←→", t!("other value")));
+        others
+            .into_iter()
+            .chain([Hint::in_window("↑↓", t!("scroll")), Hint::in_window(t!("Esc"), t!("close"))])
+            .collect()
     }
 
     pub(super) fn on_key(mut self, event: KeyEvent) -> Next {
         let count = self.tags.len();
-        if let Some(motion) = Motion::of(event) {
+        if let Some(motion) = Motion::from_key(event) {
             self.row = to_u16(motion.to(usize::from(self.row), ROWS_MAX, 10));
         }
         match event.code {

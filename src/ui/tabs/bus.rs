@@ -105,11 +105,11 @@ impl TabView for Bus {
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        if self.page == Page::Registers && self.registers.takes(cx, event) {
+        if self.page == Page::Registers && self.registers.handles(cx, event) {
             return self.registers.on_key(&below(cx), event);
         }
         let action = find(&table(cx, self.page), event);
-        let (Some(action), Some(at)) = (action, Place::of(cx, self.line)) else { return Vec::new() };
+        let (Some(action), Some(at)) = (action, LineView::new(cx, self.line)) else { return Vec::new() };
         self.frames.dismiss();
         match action {
             Action::Turn(by) => {
@@ -142,7 +142,7 @@ impl TabView for Bus {
             return self.registers.hints(&below(cx));
         }
         let mut keys = table(cx, self.page);
-        let is_testing = Place::of(cx, self.line).is_some_and(|at| at.is_testing());
+        let is_testing = LineView::new(cx, self.line).is_some_and(|at| at.is_testing());
         hide(&mut keys, &[(Action::Stop, !is_testing)]);
         if 1 < cx.def().lines.len() {
             keys.iter_mut().filter(|key| key.action == Action::NextLine).for_each(|key| key.label = "line");
@@ -162,11 +162,11 @@ impl TabView for Bus {
             }
             return true;
         }
-        Place::of(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
+        LineView::new(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
     }
 
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
-        match (self.page, Place::of(cx, self.line)) {
+        match (self.page, LineView::new(cx, self.line)) {
             (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
             (Page::Frames, Some(_)) => self.frames.drawn_rows(),
             (Page::Line | Page::Plan | Page::Frames | Page::Test | Page::Registers, _) => Rows::default(),
@@ -174,7 +174,7 @@ impl TabView for Bus {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if let (Page::Frames, Some(at)) = (self.page, Place::of(cx, self.line)) {
+        if let (Page::Frames, Some(at)) = (self.page, LineView::new(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
         match self.page {
@@ -218,7 +218,7 @@ impl TabView for Bus {
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        let Some(at) = Place::of(cx, self.line) else {
+        let Some(at) = LineView::new(cx, self.line) else {
             canvas.text(1, 1, t!("this plant has no lines"), cx.theme.normal());
             return;
         };
@@ -272,12 +272,12 @@ impl Bus {
         self.frames.forget();
         self.test.first = None;
         self.minutes = Answered::default();
-        if let Some(at) = Place::of(cx, self.line) {
+        if let Some(at) = LineView::new(cx, self.line) {
             self.show(cx, &at, self.page);
         }
     }
 
-    fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion) {
+    fn scroll(&mut self, cx: &ViewContext, at: &LineView, motion: Motion) {
         let room = self.room(cx);
         match (self.page, motion) {
             (Page::Line, Motion::Rows(by)) if 1 < cx.def().lines.len() => self.choose_line(cx, by),
@@ -290,7 +290,7 @@ impl Bus {
         }
     }
 
-    fn open(&mut self, cx: &ViewContext, at: &Place) -> Vec<UiAction> {
+    fn open(&mut self, cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
         match self.page {
             Page::Line => Vec::new(),
             Page::Plan => self.plan.open(at).into_iter().collect(),
@@ -301,7 +301,7 @@ impl Bus {
     }
 
     /// The pages, and the line with its state.
-    fn heading(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
+    fn heading(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
         let mut x = 1;
         for page in Page::offered(cx) {
             let shown = *page == self.page;
@@ -322,7 +322,7 @@ impl Bus {
 
 /// A line and all that is known of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Place<'a> {
+pub struct LineView<'a> {
     /// Which.
     id: LineId,
     /// Its state and totals.
@@ -333,12 +333,12 @@ pub struct Place<'a> {
     report: Option<&'a LineReport>,
 }
 
-impl<'a> Place<'a> {
-    fn of(cx: &ViewContext<'a>, id: LineId) -> Option<Place<'a>> {
+impl<'a> LineView<'a> {
+    fn new(cx: &ViewContext<'a>, id: LineId) -> Option<LineView<'a>> {
         let def = cx.def().lines.get(id.index())?;
         let status = cx.snapshot.lines.get(id.index())?;
         let report = status.report.as_deref();
-        Some(Place { id, status, settings: report.map_or(def, |report| &report.settings), report })
+        Some(LineView { id, status, settings: report.map_or(def, |report| &report.settings), report })
     }
 
     fn is_testing(&self) -> bool {
@@ -357,7 +357,7 @@ pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
-fn state_text(cx: &ViewContext, at: &Place) -> String {
+fn state_text(cx: &ViewContext, at: &LineView) -> String {
     let zone = &cx.def().time_zone;
     let since = at
         .status

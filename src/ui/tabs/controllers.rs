@@ -82,7 +82,7 @@ pub struct Controllers {
 impl TabView for Controllers {
     fn new(snapshot: &Snapshot) -> Controllers {
         let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
-        Controllers::at(page, DeviceId(0), Table::default())
+        Controllers::on_page(page, DeviceId(0), Table::default())
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
@@ -266,7 +266,7 @@ impl TabView for Controllers {
 }
 
 impl Controllers {
-    fn at(page: Page, device: DeviceId, table: Table) -> Controllers {
+    fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
         let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
         Controllers { page, device, table, cell, set: 0, asked_for, trend, asked: 0 }
     }
@@ -274,7 +274,7 @@ impl Controllers {
     /// Shows a device.
     pub fn show(&mut self, device: DeviceId) {
         let table = Table { defaults: self.table.defaults, ..Table::default() };
-        *self = Controllers { asked: self.asked, ..Controllers::at(Page::Device, device, table) };
+        *self = Controllers { asked: self.asked, ..Controllers::on_page(Page::Device, device, table) };
     }
 
     /// Shows the device of a tag with the tag selected.

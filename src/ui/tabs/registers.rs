@@ -39,7 +39,7 @@ use self::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        live::{AddressSpan, LiveRead, LiveReading, ReplyTimes, TABLES},
+        live::{AddressSpan, LiveReading, ReplyTimes, TABLES},
         tag::{ByteOrder, Table},
     },
     profile::OwnProfiles,
@@ -196,7 +196,7 @@ impl TabView for Registers {
             }
             Action::Name => return self.ask_name(),
             Action::Log => return self.toggle_log(cx),
-            Action::Names => self.take_names(cx),
+            Action::Names => self.apply_names(cx),
             Action::Save => return self.ask_save(),
             Action::Load => {
                 let hint =
@@ -289,7 +289,7 @@ impl TabView for Registers {
         self.trouble = None;
         self.reads += 1;
         reading.reply.into_iter().for_each(|reply| self.replies.see(reply));
-        self.cells.take(&reading);
+        self.cells.on_reading(&reading);
         let mut actions = self.watch_reading(&reading);
         let began = reading.began;
         self.took = cx.steady().duration_since(began);
@@ -331,7 +331,7 @@ impl TabView for Registers {
 
     fn on_loaded(&mut self, cx: &ViewContext, result: Result<String, String>) -> Vec<UiAction> {
         let said = match result {
-            Ok(text) => self.take_list(&text),
+            Ok(text) => self.load_list(&text),
             Err(why) => UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![why]))),
         };
         std::iter::once(said).chain(self.read_now(cx)).collect()
@@ -339,7 +339,7 @@ impl TabView for Registers {
 
     /// A list that was copied; what came of it is said with the next snapshot.
     fn on_paste(&mut self, text: &str) {
-        self.said = Some(self.take_list(text));
+        self.said = Some(self.load_list(text));
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {

@@ -39,7 +39,7 @@ pub(crate) use motions;
 
 impl Motion {
     /// The movement of a key in a window.
-    pub fn of(event: KeyEvent) -> Option<Motion> {
+    pub fn from_key(event: KeyEvent) -> Option<Motion> {
         keys::find(&motions!("", std::convert::identity), event)
     }
 

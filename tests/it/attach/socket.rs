@@ -11,7 +11,7 @@ async fn a_second_station_is_refused_and_a_dead_socket_replaced() {
     assert!(matches!(error, ListenError::Running { .. }));
     assert_eq!(error.to_string(), format!("the station is already running, process {}", std::process::id()));
     let path = stand.path();
-    let places = Places {
+    let places = SocketFolders {
         given: Some(stand.folder.path().into()),
         service: "/nowhere".into(),
         login: None,
@@ -35,7 +35,7 @@ async fn a_second_station_is_refused_and_a_dead_socket_replaced() {
 async fn a_folder_writable_by_others_gets_no_passwords() {
     let folder = folder();
     let last = folder.path().join("sightglass-1");
-    let places = Places { given: None, service: "/nowhere".into(), login: None, last: last.clone() };
+    let places = SocketFolders { given: None, service: "/nowhere".into(), login: None, last: last.clone() };
     assert_eq!(places.socket("tank").unwrap(), last.join("tank.sock"));
     assert_eq!(std::fs::metadata(&last).unwrap().permissions().mode() & 0o777, 0o700);
     std::fs::set_permissions(&last, std::fs::Permissions::from_mode(0o777)).unwrap();

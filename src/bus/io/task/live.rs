@@ -57,7 +57,7 @@ impl Task<'_> {
                     return Ok(());
                 }
             };
-            job.take(&mut self.live.known, self.clock.utc(), words);
+            job.on_outcome(&mut self.live.known, self.clock.utc(), words);
         }
         if job.next().is_none()
             && let Some((job, request)) = self.live.job.take()

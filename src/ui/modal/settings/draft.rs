@@ -99,7 +99,7 @@ pub(super) struct Draft {
 
 impl Draft {
     /// The form filled with settings.
-    pub fn of(settings: &LineDef) -> Draft {
+    pub fn new(settings: &LineDef) -> Draft {
         let number = |number: u128| Line::new(&number.to_string());
         let mut draft = Draft {
             base: settings.clone(),

@@ -22,15 +22,15 @@ impl UserForm {
 
     /// The keys of the moment; Esc is notes by whoever shows the form.
     pub fn hints(&self) -> Vec<Hint> {
-        let mut hints = vec![Hint::of("⏎", self.verb())];
+        let mut hints = vec![Hint::in_window("⏎", self.verb())];
         if self.form.rows() > 1 {
-            hints.push(Hint::of(t!("Tab"), t!("next line")));
+            hints.push(Hint::in_window(t!("Tab"), t!("next line")));
         }
         if self.form.has_secret() {
-            hints.push(Hint::of(t!("Ctrl-R"), t!("show password")));
+            hints.push(Hint::in_window(t!("Ctrl-R"), t!("show password")));
         }
         if matches!(self.purpose, Purpose::Unlock(_)) {
-            hints.push(Hint::of(t!("Ctrl-O"), t!("other user")));
+            hints.push(Hint::in_window(t!("Ctrl-O"), t!("other user")));
         }
         hints
     }

@@ -104,7 +104,7 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let room = usize::from(height.saturating_sub(HEAD - 1 + guide(height + 1))).max(1);
     let first = first(place, rows.len(), room);
     filter_line(tab, cx, (&rows, all, first, room), canvas);
-    let columns = Columns::of(&rows[first.min(rows.len())..], cx, room, width);
+    let columns = Columns::new(&rows[first.min(rows.len())..], cx, room, width);
     let names = ["", "", t!("time"), t!("tag"), t!("what"), t!("value"), t!("state"), t!("for"), t!("by")];
     canvas.text(1, 1, &columns.row(names), theme.dim());
     if rows.is_empty() {
@@ -231,7 +231,7 @@ struct Columns {
 
 impl Columns {
     /// For the rows that are seen.
-    fn of(rows: &[Row], cx: &ViewContext, room: usize, width: u16) -> Columns {
+    fn new(rows: &[Row], cx: &ViewContext, room: usize, width: u16) -> Columns {
         let by = if width >= 110 { 12 } else { 0 };
         let free = width.saturating_sub(1 + 6 + 10 + 11 + 9 + 10 + if by > 0 { by + 1 } else { 0 });
         let seen = rows.iter().take(room).map(|row| self::width(&subject(cx, row.alarm.id)));

@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, path::PathBuf};
 
 use super::{
-    Place, Window,
+    LineView, Window,
     window::{Shown, TextWindow},
 };
 use crate::ui::tabs::prelude::*;
@@ -43,14 +43,14 @@ impl Ring {
     }
 
     /// Takes in what is new, if it runs and it is time.
-    pub fn follow(&mut self, cx: &ViewContext, at: &Place) {
+    pub fn follow(&mut self, cx: &ViewContext, at: &LineView) {
         let due = self.read_at.is_none_or(|taken| EVERY <= cx.phase.wrapping_sub(taken));
         if (!self.paused || self.read_at.is_none()) && due {
             self.read_frames(cx, at);
         }
     }
 
-    fn read_frames(&mut self, cx: &ViewContext, at: &Place) {
+    fn read_frames(&mut self, cx: &ViewContext, at: &LineView) {
         if let Some(report) = at.report {
             self.held = report.frames.clone();
             self.read_at = Some(cx.phase);
@@ -58,7 +58,7 @@ impl Ring {
     }
 
     /// Holds still, or runs on from the newest frame.
-    pub fn toggle(&mut self, cx: &ViewContext, at: &Place) {
+    pub fn toggle(&mut self, cx: &ViewContext, at: &LineView) {
         self.paused = !self.paused;
         self.selected = None;
         if !self.paused {
@@ -67,7 +67,7 @@ impl Ring {
     }
 
     /// Frames that were held still run on; `false` if they ran.
-    pub fn back(&mut self, cx: &ViewContext, at: &Place) -> bool {
+    pub fn back(&mut self, cx: &ViewContext, at: &LineView) -> bool {
         let paused = self.paused;
         if paused {
             self.toggle(cx, at);
@@ -81,7 +81,7 @@ impl Ring {
     }
 
     /// Moves the selection; looking back holds still.
-    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion, room: usize) {
+    pub fn scroll(&mut self, cx: &ViewContext, at: &LineView, motion: Motion, room: usize) {
         if self.read_at.is_none() {
             self.read_frames(cx, at);
         }
@@ -92,7 +92,7 @@ impl Ring {
     }
 
     /// The selected frame, byte by byte.
-    pub fn open(&mut self, at: &Place) -> Option<UiAction> {
+    pub fn open(&mut self, at: &LineView) -> Option<UiAction> {
         let shown = self.shown();
         // Frames that run go on below the window, which has this one for itself.
         let frame = (*shown.get(self.place(&shown))?).clone();
@@ -114,7 +114,7 @@ impl Ring {
     }
 
     /// Writes the frames that are shown, as text and as a capture.
-    pub fn save(&mut self, cx: &ViewContext, at: &Place) -> Vec<UiAction> {
+    pub fn save(&mut self, cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
         if !self.outgoing.is_empty() {
             return Vec::new();
         }
@@ -153,7 +153,7 @@ impl Ring {
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
         let theme = cx.theme;
         // Before the first message has come the page is drawn from the report itself.
         let held = at.report.map(|report| report.frames.clone()).unwrap_or_default();

@@ -5,7 +5,7 @@ mod worries;
 use worries::worries;
 
 use super::{
-    Place,
+    LineView,
     rows::{self, Row, bar, flow, number, plain, words},
     state_text,
 };
@@ -25,7 +25,7 @@ use crate::{
 const NEAR: f64 = 0.8;
 
 /// All rows of the page.
-pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     let mut rows = lines(cx, at);
     rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
@@ -43,14 +43,14 @@ pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
 }
 
 /// Every line with its state, to choose one; nothing where there is only one.
-fn lines(cx: &ViewContext, at: &Place) -> Vec<Row> {
+fn lines(cx: &ViewContext, at: &LineView) -> Vec<Row> {
     let lines = &cx.def().lines;
     if lines.len() < 2 {
         return Vec::new();
     }
     let row = |line: &LineDef| {
         let chosen = line.id == at.id;
-        let place = Place::of(cx, line.id)?;
+        let place = LineView::new(cx, line.id)?;
         let busy = f64::from(place.status.counters.utilisation) * 100.0;
         let words = format!("{:8} {}  {busy:.0} %  {}", line.name, place.settings.transport, state_text(cx, &place));
         let style = row_style(cx, chosen, place.status.state != LineState::Connected);
@@ -65,7 +65,7 @@ fn sentence(cx: &ViewContext, words: &str, width: u16) -> Vec<Row> {
     lines.map(|(n, line)| plain(format!("{} {line}", if n == 0 { "!" } else { " " }), cx.theme.trouble())).collect()
 }
 
-fn settings(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
+fn settings(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     let (theme, line) = (cx.theme, at.settings);
     let mut parts =
         vec![plain(line.transport.to_string(), theme.strong()), value(cx, t!("timeout"), &ms(line.timeout))];
@@ -100,7 +100,7 @@ fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
 }
 
 fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
-    let plan = Planned::of(report);
+    let plan = Planned::new(report);
     let measured = plan.measured.map_or(t!("not yet").to_owned(), ms);
     let parts = [
         value(cx, t!("blocks"), &plan.blocks.to_string()),
@@ -124,7 +124,7 @@ struct Planned {
 }
 
 impl Planned {
-    fn of(report: &LineReport) -> Planned {
+    fn new(report: &LineReport) -> Planned {
         let mut plan = Planned { blocks: 0, round: Duration::ZERO, measured: Some(Duration::ZERO), load: 0.0 };
         for poll in &report.polls {
             let Poll::Every(period) = poll.poll else { continue };
@@ -141,9 +141,9 @@ fn missed_lately(report: &LineReport) -> bool {
     0.9 <= report.counters.utilisation && 0 < report.counters.missed
 }
 
-fn counters(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
+fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> Vec<Row> {
     let (dim, counters) = (cx.theme.dim(), &report.counters);
-    let sum = DeviceStats::of(report);
+    let sum = DeviceStats::new(report);
     let count = |name: &str, times| count(cx, name, times, sum.lately);
     let mut parts = vec![
         plain(grouped(counters.requests), cx.theme.normal()),
@@ -193,7 +193,7 @@ struct DeviceStats {
 }
 
 impl DeviceStats {
-    fn of(report: &LineReport) -> DeviceStats {
+    fn new(report: &LineReport) -> DeviceStats {
         let mut sum = DeviceStats::default();
         for (_, stats) in &report.devices {
             sum.check += stats.check;
@@ -212,7 +212,7 @@ impl DeviceStats {
     }
 }
 
-fn devices(cx: &ViewContext, at: &Place, report: &LineReport, width: u16) -> Vec<Row> {
+fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> Vec<Row> {
     let columns = [
         words("", 0),
         words(t!("device"), 0),

@@ -1,7 +1,7 @@
 //! Page Plan: every block of the read plan with its addresses, its cost and how its reads end.
 
 use super::{
-    Place, Window,
+    LineView, Window,
     line::{grouped, ms, short_ms},
     rows::{self, number, plain, words},
     window::{Shown, TextWindow},
@@ -27,36 +27,36 @@ pub struct Plan {
 
 impl Plan {
     /// Moves the selection.
-    pub fn scroll(&mut self, at: &Place, motion: Motion, room: usize) {
+    pub fn scroll(&mut self, at: &LineView, motion: Motion, room: usize) {
         self.selected = motion.to(self.selected, at.report.map_or(0, |report| report.polls.len()), room);
     }
 
     /// The list that keys act on.
-    pub fn drawn_rows(&self, at: &Place) -> Rows {
+    pub fn drawn_rows(&self, at: &LineView) -> Rows {
         let polls = at.report.map_or(&[][..], |report| &report.polls);
         Rows::of(polls.iter().map(|poll| &poll.tags), self.selected)
     }
 
     /// Device, table and first address of the selected block.
-    pub fn place(&self, at: &Place) -> Option<(DeviceId, Table, u16)> {
+    pub fn place(&self, at: &LineView) -> Option<(DeviceId, Table, u16)> {
         at.report?.polls.get(self.selected).map(|poll| (poll.device, poll.table, poll.address))
     }
 
     /// The tags of the selected block.
-    pub fn open(&self, at: &Place) -> Option<UiAction> {
+    pub fn open(&self, at: &LineView) -> Option<UiAction> {
         let poll = at.report?.polls.get(self.selected)?;
         let shown = Shown::Block { line: at.id, device: poll.device, table: poll.table, address: poll.address };
         Some(Window::Text(TextWindow::new(shown)).open())
     }
 
     /// Why the values of the selected block are what they are, beginning with one that is not good.
-    pub fn why(&self, cx: &ViewContext, at: &Place) -> Vec<UiAction> {
+    pub fn why(&self, cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
         let poll = at.report.and_then(|report| report.polls.get(self.selected));
         Why::open(Why::of_all(cx, poll.map(|poll| poll.tags.to_vec()).unwrap_or_default()))
     }
 
     /// Draws it.
-    pub fn view(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
         let theme = cx.theme;
         let Some(report) = at.report.filter(|report| !report.polls.is_empty()) else {
             canvas.text(1, 0, t!("nothing is polled on this line yet"), theme.normal());

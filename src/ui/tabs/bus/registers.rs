@@ -1,11 +1,11 @@
 //! Page Registers: the tab of that name, for the chosen device.
 
-use super::{Bus, Page, Place};
+use super::{Bus, LineView, Page};
 use crate::ui::tabs::prelude::*;
 
 impl Bus {
     /// Turns to a page; the registers are those of the device that was chosen.
-    pub(super) fn show(&mut self, cx: &ViewContext, at: &Place, page: Page) {
+    pub(super) fn show(&mut self, cx: &ViewContext, at: &LineView, page: Page) {
         let block = (self.page == Page::Plan).then(|| self.plan.place(at)).flatten();
         let first = || cx.def().devices.iter().find(|device| device.line == at.id).map(|device| device.id);
         let device = block.map(|(device, ..)| device);

@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 use ratatui::Frame as Screen;
 
 use super::{
-    Place, Window,
+    LineView, Window,
     line::ms,
     test::{self, Bench, TRANSACTION, Tried},
 };
@@ -64,7 +64,7 @@ const CHARACTERS: [(Parity, u8); 4] = [(Parity::None, 1), (Parity::Even, 1), (Pa
 
 impl Form {
     /// With what suits most.
-    pub fn new(cx: &ViewContext, at: &Place, tried: Tried) -> Form {
+    pub fn new(cx: &ViewContext, at: &LineView, tried: Tried) -> Form {
         let unit = cx.def().devices.iter().find(|device| device.line == at.id).map_or(1, |device| device.unit);
         let text = |label, text: &str| Field { label, input: Input::Text(Line::long(text, 400)) };
         let choice = |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0) };
@@ -142,7 +142,7 @@ impl Form {
     }
 
     fn start(&self, cx: &ViewContext) -> Result<Vec<UiAction>, String> {
-        let at = Place::of(cx, self.line).ok_or(t!("this line no longer exists"))?;
+        let at = LineView::new(cx, self.line).ok_or(t!("this line no longer exists"))?;
         let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
         if self.fields.iter().any(missed) {
             return Err(t!("the text was cut; Ctrl-U clears a field").to_owned());
@@ -219,7 +219,7 @@ impl Form {
 
     /// Draws it.
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
-        let Some(at) = Place::of(cx, self.line) else { return };
+        let Some(at) = LineView::new(cx, self.line) else { return };
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);
         let wrapped = |words: &str, style| wrap(words, room).into_iter().map(move |line| (line, style));

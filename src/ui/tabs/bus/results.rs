@@ -1,7 +1,7 @@
 //! What came of a test, in words.
 
 use super::{
-    Place,
+    LineView,
     frames::{broken, bytes_text},
     line::{ms, short_ms},
     rows::{Row, bar, plain},
@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// The last test of a line, or how to begin.
-pub fn rows(cx: &ViewContext, at: &Place, width: u16) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     let theme = cx.theme;
     let room = width.saturating_sub(3);
     let Some(run) = &at.status.test else {
@@ -108,7 +108,7 @@ fn remaining(cx: &ViewContext, run: &DiagnosticRun) -> Option<std::time::Duratio
 /// What came back for bytes, decoded.
 fn came_back(
     cx: &ViewContext,
-    at: &Place,
+    at: &LineView,
     run: &DiagnosticRun,
     bytes: &[u8],
     reply: Option<std::time::Duration>,

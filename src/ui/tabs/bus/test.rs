@@ -6,7 +6,7 @@ use ratatui::Frame as Screen;
 pub use send::Send;
 
 use super::{
-    Place, Window,
+    LineView, Window,
     frames::{broken, bytes_text},
     request::Form,
     results,
@@ -82,7 +82,7 @@ impl Bench {
     }
 
     /// Opens the entry of a test.
-    pub fn open(&mut self, cx: &ViewContext, at: &Place, tried: Tried) -> Vec<UiAction> {
+    pub fn open(&mut self, cx: &ViewContext, at: &LineView, tried: Tried) -> Vec<UiAction> {
         self.selected = Tried::ALL.iter().position(|known| *known == tried).unwrap_or(0);
         self.first = None;
         let window = match tried {
@@ -106,7 +106,7 @@ impl Bench {
     }
 
     /// Single rows move the selection; pages scroll the results.
-    pub fn scroll(&mut self, cx: &ViewContext, at: &Place, motion: Motion) {
+    pub fn scroll(&mut self, cx: &ViewContext, at: &LineView, motion: Motion) {
         if matches!(motion, Motion::Rows(_)) {
             self.selected = motion.to(self.selected, Tried::ALL.len(), 1);
             return;
@@ -119,7 +119,7 @@ impl Bench {
     }
 
     /// Draws it: the tests, then what came of the last one.
-    pub fn view(&self, cx: &ViewContext, at: &Place, canvas: &mut Canvas) {
+    pub fn view(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
         let tests = height.saturating_sub(3).min(TOP - 2);
@@ -144,7 +144,7 @@ impl Bench {
 
 /// First row of the results until the first scroll: what has one answer is read from its beginning, what goes on for
 /// long is followed at its end.
-fn begin(at: &Place) -> usize {
+fn begin(at: &LineView) -> usize {
     match at.status.test.as_ref().map(|run| &run.diagnostic) {
         Some(Diagnostic::Loopback { .. } | Diagnostic::Scan(_)) => usize::MAX,
         Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_))
@@ -157,7 +157,7 @@ fn begin(at: &Place) -> usize {
 const TOP: u16 = Tried::ALL.len() as u16 + 2;
 
 /// Why nothing can be sent on a line; `None` if it is open.
-pub fn closed(at: &Place) -> Option<String> {
+pub fn closed(at: &LineView) -> Option<String> {
     let name = &at.settings.name;
     match &at.status.state {
         LineState::Connected | LineState::Testing => None,
@@ -168,7 +168,7 @@ pub fn closed(at: &Place) -> Option<String> {
 }
 
 /// Starts a test, or asks first; `Err` says why it cannot be started.
-pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
+pub fn start(at: &LineView, diagnostic: Diagnostic) -> Result<UiAction, String> {
     let alone = matches!(&diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty());
     if let Some(why) = closed(at).filter(|_| !alone) {
         return Err(why);
@@ -181,7 +181,7 @@ pub fn start(at: &Place, diagnostic: Diagnostic) -> Result<UiAction, String> {
 }
 
 /// What must be asked before a test; `None` for one that only reads.
-fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
+fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
     match diagnostic {
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Some(t!(
             "Polling of {name} pauses while other settings are tested, and its alarms are not evaluated. Start the scan?",
@@ -220,11 +220,11 @@ fn danger(at: &Place, diagnostic: &Diagnostic) -> Option<String> {
 }
 
 /// The last test once more.
-pub fn again(at: &Place) -> Vec<UiAction> {
+pub fn again(at: &LineView) -> Vec<UiAction> {
     at.status.test.iter().filter_map(|run| start(at, run.diagnostic.clone()).ok()).collect()
 }
 
 /// Stops the test at work.
-pub fn stop(at: &Place) -> Vec<UiAction> {
+pub fn stop(at: &LineView) -> Vec<UiAction> {
     if at.is_testing() { vec![UiAction::Command(CommandKind::StopTest(at.id))] } else { Vec::new() }
 }

@@ -136,7 +136,7 @@ impl TextWindow {
         if matches!(event.code, KeyCode::Enter | KeyCode::Char('q')) {
             return Next::Close;
         }
-        if let Some(motion) = Motion::of(event) {
+        if let Some(motion) = Motion::from_key(event) {
             self.first = motion.to(self.first, ROWS_MAX, 8);
         }
         Window::Text(self).stay()

@@ -22,7 +22,7 @@ impl Columns {
     const ALARM: u16 = 6;
     const REPLY: u16 = 6;
 
-    fn of(cx: &ViewContext, screen: u16) -> Columns {
+    fn new(cx: &ViewContext, screen: u16) -> Columns {
         let devices = &cx.def().devices;
         let widest = |text: &dyn Fn(&DeviceDef) -> String, least: u16, most: u16| {
             devices.iter().map(|device| width(&text(device))).max().unwrap_or(0).clamp(least, most)
@@ -46,7 +46,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
     let (theme, devices) = (cx.theme, &cx.def().devices);
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     canvas.text(1, 0, &fit_words(&summary(cx), end), theme.normal());
-    let columns = Columns::of(cx, canvas.width());
+    let columns = Columns::new(cx, canvas.width());
     put(canvas, 1, heading(&columns, theme.dim()));
     let room = usize::from(bottom.saturating_sub(3)).max(1);
     let first = first(selected, devices.len(), room);

@@ -56,7 +56,7 @@ impl Table {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, device: DeviceId) -> usize {
         let theme = cx.theme;
         let tags = self.rows(cx, device);
-        let columns = Columns::of(cx, device, canvas.width());
+        let columns = Columns::new(cx, device, canvas.width());
         let names = ["", t!("parameter"), t!("value"), "", t!("range"), t!("default"), t!("age"), t!("meaning")];
         canvas.text(1, 0, &columns.row(names), theme.dim());
         if tags.is_empty() {
@@ -153,7 +153,7 @@ impl Columns {
     const RANGE: u16 = 16;
     const AGE: u16 = 6;
 
-    fn of(cx: &ViewContext, device: DeviceId, wide: u16) -> Columns {
+    fn new(cx: &ViewContext, device: DeviceId, wide: u16) -> Columns {
         let tags = || cx.def().tags_of(device);
         let short = tags().map(|tag| width(&tag.short)).max().unwrap_or(0).min(10);
         let label = tags().map(|tag| width(&tag.label)).max().unwrap_or(0);

@@ -367,3 +367,14 @@ fn a_key_for_a_set_acts_only_on_the_set_that_was_drawn() {
     type_keys(&mut model, "↓⏎");
     assert!(screen(&mut model, 80, 24).contains("set winter → TIC-1"));
 }
+
+#[test]
+fn only_a_copy_between_devices_offers_to_be_reversed() {
+    for (fixture, keys, offered) in [(many(2), "4⏎s⏎", true), (with_sets(), "4⏎s↓⏎", false)] {
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, keys);
+        let shown = screen(&mut model, 120, 40);
+        let footer = shown.lines().last().unwrap_or_default();
+        assert_eq!((footer.contains("all"), footer.contains("reverse")), (true, offered), "{footer}");
+    }
+}

@@ -76,8 +76,8 @@ impl Cells {
         self.0.values().all(|cell| cell.word.is_none())
     }
 
-    /// Takes what a read has brought.
-    pub fn take(&mut self, reading: &LiveReading) {
+    /// A read has ended.
+    pub fn on_reading(&mut self, reading: &LiveReading) {
         if CELLS_MAX < self.0.len() {
             self.0.clear();
         }
@@ -85,7 +85,7 @@ impl Cells {
             for (n, address) in part.span.range().map(to_u16).enumerate() {
                 let cell = self.0.entry((part.span.table, address)).or_insert_with(|| Cell::new(part.at));
                 match &part.words {
-                    Ok(words) => words.get(n).iter().for_each(|word| cell.take(**word, part.at)),
+                    Ok(words) => words.get(n).iter().for_each(|word| cell.update(**word, part.at)),
                     Err(fault) => cell.fault = Some(*fault),
                 }
             }
@@ -98,7 +98,7 @@ impl Cell {
         Cell { word: None, at, changed: None, fault: None, seen: VecDeque::new() }
     }
 
-    fn take(&mut self, word: u16, at: Timestamp) {
+    fn update(&mut self, word: u16, at: Timestamp) {
         if self.word.is_some_and(|old| old != word) {
             self.changed = Some(at);
         }

@@ -99,7 +99,7 @@ impl Registers {
     pub(super) fn on_compared(&mut self, reading: Option<LiveReading>) {
         let Some(comparison) = &mut self.comparison else { return };
         comparison.on_way = None;
-        reading.iter().for_each(|reading| comparison.cells.take(reading));
+        reading.iter().for_each(|reading| comparison.cells.on_reading(reading));
     }
 }
 

@@ -25,7 +25,7 @@ pub fn parse(text: &str, table: Table, first: u16) -> Option<List> {
 }
 
 impl List {
-    fn take(&mut self, place: &str, named: Result<Named, String>) {
+    fn push(&mut self, place: &str, named: Result<Named, String>) {
         match named {
             Ok(named) => self.named.push(named),
             Err(why) => self.problems.push(format!("{place}: {why}")),
@@ -122,7 +122,7 @@ fn mtui(text: &str) -> List {
                 continue;
             }
             let name = label.unwrap_or_else(|| format!("{}-{address}", table.word()));
-            list.take(&table.modicon(address), rule.unwrap_or_default().named(table, address, usual, &name));
+            list.push(&table.modicon(address), rule.unwrap_or_default().named(table, address, usual, &name));
         }
     }
     list
@@ -197,7 +197,7 @@ fn wingpath(text: &str, table: Table, first: u16) -> List {
             let at = columns.iter().position(|column| column.trim() == name);
             at.and_then(|at| record.get(at)).unwrap_or_default().trim()
         };
-        list.take(&place, exported(cell, table, first));
+        list.push(&place, exported(cell, table, first));
     }
     list
 }

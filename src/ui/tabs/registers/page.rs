@@ -61,7 +61,7 @@ impl Registers {
     }
 
     /// Is a key one of its own?
-    pub fn takes(&self, cx: &ViewContext, event: KeyEvent) -> bool {
+    pub fn handles(&self, cx: &ViewContext, event: KeyEvent) -> bool {
         self.watch.has_graph() || find(&table(cx), event).is_some()
     }
 

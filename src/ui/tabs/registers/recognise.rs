@@ -33,7 +33,7 @@ impl Recognition {
     }
 
     /// The profile whose names were taken.
-    pub fn taken(&self) -> Option<&Arc<PlantDef>> {
+    pub fn applied(&self) -> Option<&Arc<PlantDef>> {
         match self {
             Recognition::Done(Some((def, _, true))) => Some(def),
             Recognition::Waiting | Recognition::Asking { .. } | Recognition::Done(_) => None,
@@ -93,13 +93,13 @@ impl Registers {
             (*at, *on_way) = (*at + 1, None);
         }
         if let Some(reading) = reading {
-            self.cells.take(&reading);
+            self.cells.on_reading(&reading);
         }
         self.recognise(cx)
     }
 
     /// The names, units and scales of the profile that fits; names that are there already stay.
-    pub(super) fn take_names(&mut self, cx: &ViewContext) {
+    pub(super) fn apply_names(&mut self, cx: &ViewContext) {
         let Recognition::Done(Some((def, _, taken))) = &mut self.recognition else { return };
         *taken = true;
         let def = Arc::clone(def);

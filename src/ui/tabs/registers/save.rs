@@ -40,7 +40,7 @@ impl Registers {
         }
         let here = path.parent().is_none_or(|folder| folder.as_os_str().is_empty());
         let beside = |def: &Arc<PlantDef>| self.profiles.beside(&def.name);
-        if let Some(profile) = self.recognition.taken().and_then(beside).filter(|_| !here) {
+        if let Some(profile) = self.recognition.applied().and_then(beside).filter(|_| !here) {
             return Err(t!("{profile} would not be found from there: save the plant file beside it", profile));
         }
         let plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
@@ -51,7 +51,7 @@ impl Registers {
     fn new_plant(&self, cx: &ViewContext, stem: &str) -> Option<NewPlant> {
         let def = cx.def();
         let line = LineDef { name: "L1".to_owned(), ..def.lines.get(self.line.index())?.clone() };
-        let profile = self.recognition.taken();
+        let profile = self.recognition.applied();
         let mut taken: Vec<String> = Vec::new();
         let tags = self.names.iter().filter(|named| !profile.is_some_and(|profile| is_of(named, &profile.tags)));
         let tags = tags.map(|named| {
@@ -81,7 +81,7 @@ impl Registers {
 
 impl Registers {
     /// Gives the names of a register list, in place of those that were there; says what could not be read, by line.
-    pub(super) fn take_list(&mut self, text: &str) -> UiAction {
+    pub(super) fn load_list(&mut self, text: &str) -> UiAction {
         let first = u16::from(self.base == Base::One);
         let list = import::parse(text, self.table, first).unwrap_or_else(|| list::parse(text, self.table, first));
         let mut words = vec![t!("{count} names read", count = list.named.len())];

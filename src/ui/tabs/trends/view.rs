@@ -169,7 +169,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(width: u16) -> Columns {
+    fn new(width: u16) -> Columns {
         let name = 13 + width.saturating_sub(80).min(30) / 2;
         let value = 4 + name + 13 + width.saturating_sub(80).min(40) / 4;
         Columns { name, value, min: value + 8, mean: value + 16, max: value + 24, good: value + 33, hour: value + 36 }
@@ -177,7 +177,7 @@ impl Columns {
 }
 
 fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Option<&Plan>) {
-    let (columns, dim) = (Columns::of(canvas.width()), cx.theme.dim());
+    let (columns, dim) = (Columns::new(canvas.width()), cx.theme.dim());
     if canvas.height() == 0 {
         return;
     }
@@ -221,7 +221,7 @@ fn draw_pen(
     cursor: Option<Timestamp>,
     own: Option<(f64, f64)>,
 ) {
-    let (theme, columns, def) = (cx.theme, Columns::of(row.width()), cx.def().tag(pen.tag));
+    let (theme, columns, def) = (cx.theme, Columns::new(row.width()), cx.def().tag(pen.tag));
     let (selected, off) = (trends.selected == n, trends.off.contains(&pen.tag));
     if selected {
         row.text(0, 0, theme.pick("▸", ">"), theme.strong());
@@ -260,7 +260,7 @@ fn draw_pen(
 /// Least, mean and greatest of the window and its share of good time; nothing where there was no good value, and no
 /// arithmetic with the numbers of an enumeration.
 fn draw_figures(trends: &Trends, cx: &ViewContext, row: &mut Canvas, tag: TagId) {
-    let (columns, style) = (Columns::of(row.width()), cx.theme.normal());
+    let (columns, style) = (Columns::new(row.width()), cx.theme.normal());
     let Some((summary, good)) = trends.figures.get(&tag) else { return };
     if cx.def().tag(tag).enum_labels.is_empty() {
         for (end, value) in [columns.min, columns.mean, columns.max]

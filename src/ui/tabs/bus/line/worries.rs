@@ -3,7 +3,7 @@
 use super::*;
 
 /// What is wrong and what to do about it, a sentence each.
-pub(super) fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
+pub(super) fn worries(cx: &ViewContext, at: &LineView) -> Vec<String> {
     let mut worries = Vec::new();
     if let Some(before) = &at.status.settings_before {
         worries.push(t!("settings under test, not saved; before: {transport}", transport = before.transport));
@@ -27,7 +27,7 @@ pub(super) fn worries(cx: &ViewContext, at: &Place) -> Vec<String> {
         );
     }
     let uart = report.counters.uart.unwrap_or_default();
-    if 0 < uart.parity + uart.framing && DeviceStats::of(report).lately {
+    if 0 < uart.parity + uart.framing && DeviceStats::new(report).lately {
         worries
             .push(t!("parity or framing errors at the port: compare baud rate and parity with the devices").to_owned());
     }

@@ -50,7 +50,7 @@ impl Send {
     }
 
     fn send(&self, cx: &ViewContext) -> Result<UiAction, String> {
-        let at = Place::of(cx, self.line).ok_or(t!("this line no longer exists"))?;
+        let at = LineView::new(cx, self.line).ok_or(t!("this line no longer exists"))?;
         if self.text.missed() {
             return Err(t!("the text was cut; Ctrl-U clears the line").to_owned());
         }
@@ -71,7 +71,7 @@ impl Send {
 
     /// Draws it over the tests, so that what comes back is seen below.
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
-        let Some(at) = Place::of(cx, self.line) else { return };
+        let Some(at) = LineView::new(cx, self.line) else { return };
         let theme = cx.theme;
         let area = Rect { height: (TOP + 1).min(body.height), ..body };
         let mut outer = Canvas::new(screen.buffer_mut(), area);
