@@ -39,6 +39,19 @@ pub enum InjectedFault {
     AgitatorFailed,
 }
 
+/// A fault of values inside good answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ValueFault {
+    /// [`InjectedFault::Stuck`].
+    Stuck,
+    /// [`InjectedFault::Torn`].
+    Torn,
+    /// [`InjectedFault::WordOrder`].
+    WordOrder,
+    /// [`InjectedFault::SensorBurnout`].
+    SensorBurnout,
+}
+
 /// A valve of the tank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Valve {
@@ -131,6 +144,27 @@ impl InjectedFault {
         self.row().parameter
     }
 
+    /// What it does to values; `None` for a fault that leaves them alone.
+    pub fn of_values(self) -> Option<ValueFault> {
+        match self {
+            InjectedFault::Stuck => Some(ValueFault::Stuck),
+            InjectedFault::Torn => Some(ValueFault::Torn),
+            InjectedFault::WordOrder => Some(ValueFault::WordOrder),
+            InjectedFault::SensorBurnout => Some(ValueFault::SensorBurnout),
+            InjectedFault::Noise(_)
+            | InjectedFault::Silent
+            | InjectedFault::Late(_)
+            | InjectedFault::BadCrc
+            | InjectedFault::Cut
+            | InjectedFault::Exception(_)
+            | InjectedFault::HeaterBurnout
+            | InjectedFault::ValveStuck(..)
+            | InjectedFault::Leak(_)
+            | InjectedFault::PumpFailed
+            | InjectedFault::AgitatorFailed => None,
+        }
+    }
+
     /// Its number, in the unit of [`InjectedFault::parameter`].
     pub fn number(self) -> Option<f64> {
         match self {
@@ -181,23 +215,12 @@ impl InjectedFault {
 impl fmt::Display for InjectedFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.word())?;
-        match self {
-            InjectedFault::Late(by) if by.subsec_millis() == 0 => write!(f, " {}s", by.as_secs()),
-            InjectedFault::Late(by) => write!(f, " {}ms", by.as_millis()),
-            InjectedFault::Exception(code) => write!(f, " {code}"),
-            InjectedFault::Noise(percent) => write!(f, " {percent} %"),
-            InjectedFault::Leak(ml_per_min) => write!(f, " {} l/min", f64::from(*ml_per_min) / 1e3),
-            InjectedFault::Silent
-            | InjectedFault::BadCrc
-            | InjectedFault::Cut
-            | InjectedFault::Stuck
-            | InjectedFault::Torn
-            | InjectedFault::WordOrder
-            | InjectedFault::SensorBurnout
-            | InjectedFault::HeaterBurnout
-            | InjectedFault::ValveStuck(..)
-            | InjectedFault::PumpFailed
-            | InjectedFault::AgitatorFailed => Ok(()),
+        match (self, self.number(), self.parameter()) {
+            (InjectedFault::Late(by), ..) if by.subsec_millis() == 0 => write!(f, " {}s", by.as_secs()),
+            (InjectedFault::Late(by), ..) => write!(f, " {}ms", by.as_millis()),
+            (_, Some(number), Some(Parameter { unit: "", .. })) => write!(f, " {number}"),
+            (_, Some(number), Some(parameter)) => write!(f, " {number} {}", parameter.unit),
+            (_, None, _) | (_, _, None) => Ok(()),
         }
     }
 }

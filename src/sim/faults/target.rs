@@ -1,7 +1,7 @@
 //! The target of a fault, by its name in the plant, and the faults that apply to it.
 
 use super::{
-    syntax::{InjectedFault, TargetKind},
+    syntax::{InjectedFault, TargetKind, ValueFault},
     values::Values,
 };
 use crate::plant::{
@@ -102,18 +102,20 @@ pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: InjectedFa
         (FaultTarget::Process, _) if def.simulation.as_deref() != Some(SIMULATION) => "is not simulated",
         // The thesis's controller reports a broken sensor in its fault word.
         (FaultTarget::Unit(line, unit), InjectedFault::SensorBurnout) if is_controller(line, unit) => return None,
-        (
-            FaultTarget::Unit(line, unit),
-            InjectedFault::Stuck | InjectedFault::Torn | InjectedFault::WordOrder | InjectedFault::SensorBurnout,
-        ) => {
-            let values = device_at(def, line, unit).map(|device| Values::of_device(def, device)).unwrap_or_default();
-            if values.can_have(fault) {
-                return None;
+        (FaultTarget::Unit(..) | FaultTarget::Tag(_), _) => {
+            let values = match target {
+                FaultTarget::Unit(line, unit) => {
+                    device_at(def, line, unit).map(|device| Values::of_device(def, device))
+                }
+                FaultTarget::Tag(tag) => Some(Values::of_tags(std::iter::once(def.tag(tag)))),
+                FaultTarget::Line(_) | FaultTarget::Process => None,
+            };
+            match fault.of_values() {
+                Some(fault) if !values.unwrap_or_default().can_have(fault) => lack(fault),
+                Some(_) | None => return None,
             }
-            lack(fault)
         }
-        (FaultTarget::Tag(tag), _) if !Values::of_tags(std::iter::once(def.tag(tag))).can_have(fault) => lack(fault),
-        (FaultTarget::Line(_) | FaultTarget::Unit(..) | FaultTarget::Tag(_) | FaultTarget::Process, _) => return None,
+        (FaultTarget::Line(_) | FaultTarget::Process, _) => return None,
     };
     Some(format!("{name} {why}"))
 }
@@ -122,21 +124,10 @@ fn over_mbap(def: &PlantDef, line: LineId) -> bool {
     matches!(def.line(line).transport, Transport::Tcp { framing: Framing::Mbap, .. })
 }
 
-fn lack(fault: InjectedFault) -> &'static str {
+fn lack(fault: ValueFault) -> &'static str {
     match fault {
-        InjectedFault::Torn | InjectedFault::WordOrder => "has no value of 32 bits",
-        InjectedFault::SensorBurnout => "has no mark for a broken sensor in its profile (bad_if)",
-        InjectedFault::Stuck
-        | InjectedFault::Noise(_)
-        | InjectedFault::Silent
-        | InjectedFault::Late(_)
-        | InjectedFault::BadCrc
-        | InjectedFault::Cut
-        | InjectedFault::Exception(_)
-        | InjectedFault::HeaterBurnout
-        | InjectedFault::ValveStuck(..)
-        | InjectedFault::Leak(_)
-        | InjectedFault::PumpFailed
-        | InjectedFault::AgitatorFailed => "has no value that is only read",
+        ValueFault::Stuck => "has no value that is only read",
+        ValueFault::Torn | ValueFault::WordOrder => "has no value of 32 bits",
+        ValueFault::SensorBurnout => "has no mark for a broken sensor in its profile (bad_if)",
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::syntax::InjectedFault;
+use super::syntax::{InjectedFault, ValueFault};
 use crate::{
     bus::{codec, pdu},
     plant::{
@@ -56,22 +56,11 @@ impl Values {
     }
 
     /// Whether a fault can be there: torn values need 32 bits, a burnt-out sensor its mark.
-    pub fn can_have(&self, fault: InjectedFault) -> bool {
+    pub fn can_have(&self, fault: ValueFault) -> bool {
         match fault {
-            InjectedFault::Stuck => !self.measured.is_empty(),
-            InjectedFault::Torn | InjectedFault::WordOrder => !self.pairs.is_empty(),
-            InjectedFault::SensorBurnout => !self.marks.is_empty(),
-            InjectedFault::Noise(_)
-            | InjectedFault::Silent
-            | InjectedFault::Late(_)
-            | InjectedFault::BadCrc
-            | InjectedFault::Cut
-            | InjectedFault::Exception(_)
-            | InjectedFault::HeaterBurnout
-            | InjectedFault::ValveStuck(..)
-            | InjectedFault::Leak(_)
-            | InjectedFault::PumpFailed
-            | InjectedFault::AgitatorFailed => false,
+            ValueFault::Stuck => !self.measured.is_empty(),
+            ValueFault::Torn | ValueFault::WordOrder => !self.pairs.is_empty(),
+            ValueFault::SensorBurnout => !self.marks.is_empty(),
         }
     }
 
@@ -80,24 +69,12 @@ impl Values {
     pub fn corrupt(&self, faults: &[InjectedFault], memory: &mut Memory, request: &[u8], answer: Vec<u8>) -> Vec<u8> {
         let Some(mut cells) = Cells::parse(request, &answer) else { return answer };
         let now = cells.clone();
-        for fault in faults {
+        for fault in faults.iter().filter_map(|fault| fault.of_values()) {
             match fault {
-                InjectedFault::Stuck => self.hold(&mut cells, memory),
-                InjectedFault::Torn => self.tear(&mut cells, &now, memory),
-                InjectedFault::WordOrder => self.swap(&mut cells),
-                InjectedFault::SensorBurnout => self.mark(&mut cells),
-                // They leave the values alone.
-                InjectedFault::Noise(_)
-                | InjectedFault::Silent
-                | InjectedFault::Late(_)
-                | InjectedFault::BadCrc
-                | InjectedFault::Cut
-                | InjectedFault::Exception(_)
-                | InjectedFault::HeaterBurnout
-                | InjectedFault::ValveStuck(..)
-                | InjectedFault::Leak(_)
-                | InjectedFault::PumpFailed
-                | InjectedFault::AgitatorFailed => {}
+                ValueFault::Stuck => self.hold(&mut cells, memory),
+                ValueFault::Torn => self.tear(&mut cells, &now, memory),
+                ValueFault::WordOrder => self.swap(&mut cells),
+                ValueFault::SensorBurnout => self.mark(&mut cells),
             }
         }
         memory.before.extend(now.each());
@@ -269,7 +246,9 @@ mod tests {
 
     #[test]
     fn a_fault_is_offered_where_it_can_be() {
-        let can = |values: &Values| InjectedFault::all().filter(|fault| values.can_have(*fault)).count();
+        let can = |values: &Values| {
+            InjectedFault::all().filter_map(InjectedFault::of_values).filter(|fault| values.can_have(*fault)).count()
+        };
         assert_eq!((can(&values()), can(&Values::default())), (4, 0));
     }
 

@@ -13,7 +13,7 @@ use crate::{
         def::{LineDef, Transport},
         diagnostics::{Diagnostic, RegisterWrite},
         event::{ExceptionCode, Fault, LineState},
-        live::LivePart,
+        live::{LivePart, LiveRead},
         tag::DataType,
     },
     ui::{
