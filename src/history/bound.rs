@@ -6,21 +6,20 @@ use super::QUERY_TIME_MAX;
 
 /// Of so many rows, behind a period of so many seconds where that can be said.
 pub(super) fn too_many_rows(rows: u64, max: u64, asked: Option<u64>) -> String {
-    let (time, most) = (QUERY_TIME_MAX.as_secs(), format!("at most {max} rows"));
+    let most = format!("at most {max} rows and, at a station, {} s", QUERY_TIME_MAX.as_secs());
     match asked {
-        None => format!("{rows} rows, {most} or {time} s; choose a shorter period"),
+        None => format!("{rows} rows, {most}; choose a shorter period"),
         Some(asked) => {
             let asked = Duration::from_secs(asked);
-            let instead = shorter(asked, max, rows).map_or("choose fewer tags".to_owned(), |fits| {
-                format!("choose a period of at most {fits}, or fewer tags")
-            });
-            format!("{rows} rows in {}, {most} or {time} s; {instead}", about(asked))
+            let instead = shorter(asked, max, rows)
+                .map_or("choose fewer tags".to_owned(), |fits| format!("choose a period of at most {fits}"));
+            format!("{rows} rows in {}, {most}; {instead}", about(asked))
         }
     }
 }
 
 /// The part of a period that has `max` of its `rows`; `None` if that is less than a second.
-pub fn shorter(period: Duration, max: u64, rows: u64) -> Option<String> {
+fn shorter(period: Duration, max: u64, rows: u64) -> Option<String> {
     let millis = period.as_millis() * u128::from(max) / u128::from(rows.max(1));
     let fits = Duration::from_millis(u64::try_from(millis).unwrap_or(u64::MAX));
     (Duration::from_secs(1) <= fits).then(|| about(fits))
@@ -49,16 +48,16 @@ mod tests {
             (
                 400,
                 Some(40 * DAY),
-                "400 rows in 40 days, at most 100 rows or 20 s; choose a period of at most 10 days, or fewer tags",
+                "400 rows in 40 days, at most 100 rows and, at a station, 20 s; choose a period of at most 10 days",
             ),
-            (101, None, "101 rows, at most 100 rows or 20 s; choose a shorter period"),
+            (101, None, "101 rows, at most 100 rows and, at a station, 20 s; choose a shorter period"),
             // Not `0 minutes`.
             (
                 400,
                 Some(80),
-                "400 rows in 80 s, at most 100 rows or 20 s; choose a period of at most 20 s, or fewer tags",
+                "400 rows in 80 s, at most 100 rows and, at a station, 20 s; choose a period of at most 20 s",
             ),
-            (400, Some(3), "400 rows in 3 s, at most 100 rows or 20 s; choose fewer tags"),
+            (400, Some(3), "400 rows in 3 s, at most 100 rows and, at a station, 20 s; choose fewer tags"),
         ];
         for (rows, asked, expect) in cases {
             assert_eq!(refused(rows, asked), expect);

@@ -180,7 +180,7 @@ impl Store {
         if ROWS_MAX < rows {
             return Err(HistoryError::TooManyRows { rows, max: ROWS_MAX, asked: Some(elapsed(from, until).as_secs()) });
         }
-        self.bounded(2, from, until, now, SAMPLES_MAX)?;
+        self.bounded(if face.sv == face.pv { 1 } else { 2 }, from, until, now, SAMPLES_MAX)?;
         let instants = figures::record_grid(interval, &self.def.time_zone, from, until).into();
         Ok(Some(Recorded { name: device.name.clone(), sv: face.sv, pv: face.pv, instants }))
     }

@@ -170,3 +170,22 @@ fn an_action_stored_before_its_chain_hash_is_kept_once() {
     assert_eq!(store.chain_hashes().unwrap(), [chain_hash(4), chain_hash(2), chain_hash(1)]);
     assert_eq!(store.count_rows().unwrap(), 4, "the second was stored twice, the third waits for its chain_hash");
 }
+
+#[test]
+fn rows_behind_aggregates_do_not_count_for_the_bound() {
+    let (_folder, db) = folder();
+    let store = archive::filled(&db, &archive::rows(50));
+    archive::archive_all(&store, 50);
+    store.db.execute("UPDATE archive SET rows = 1000000000 WHERE tier = 'raw'", []).unwrap();
+    let hours = |hours: i64| sec(hours * 3_600);
+    let curve = |to, buckets| {
+        store.answer(&Query::Series { tags: vec![PV], from: hours(0), to: hours(to), buckets }, hours(50)).map(drop)
+    };
+    assert_eq!(curve(48, 24), Ok(()), "of hours");
+    let period = Period { name: "period".into(), from: hours(0), to: hours(48) };
+    let report = store.answer(&Query::Report { period }, hours(50));
+    assert!(matches!(report, Err(HistoryError::TooManyRows { .. })), "its record is of samples");
+    let refused = curve(20, 4_000).unwrap_err();
+    assert!(matches!(refused, HistoryError::TooManyRows { asked: Some(71_000..=72_000), .. }), "{refused}");
+    assert!(refused.to_string().contains("choose a period of at most"), "{refused}");
+}
