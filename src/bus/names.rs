@@ -35,6 +35,19 @@ pub fn diagnostic(code: u16) -> &'static str {
     }
 }
 
+/// What a request does to the unit beyond what its name says (V1.1b3, 6.8); `message` is the unit's number and the PDU.
+pub fn effect(message: &[u8]) -> Option<&'static str> {
+    let [_, 8, high, low, ..] = message else { return None };
+    Some(match u16::from_be_bytes([*high, *low]) {
+        0x01 => "the unit restarts its port and clears all its counters; it leaves listen only mode",
+        0x03 => "from then on its ASCII messages end with another character: this line may not understand it any more",
+        0x04 => "the unit listens only: it answers nothing until sub-function 01 or until its power is switched off",
+        0x0A => "the unit clears all its counters and its diagnostic register",
+        0x14 => "the unit clears its counter of overruns",
+        _ => return None,
+    })
+}
+
 /// Name of a device identification object (V1.1b3, 6.21).
 pub fn object(id: u8) -> &'static str {
     match id {

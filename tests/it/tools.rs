@@ -78,6 +78,8 @@ fn send_asks_before_it_changes_something() {
         let (code, said) = run(&[&["send", &unit, two], more].concat());
         assert!(code == Some(2) && said.contains("nothing was sent"), "a write behind a read: {code:?} {said}");
     }
+    let (code, said) = run(&["send", &unit, "01 08 00 04 00 00"]);
+    assert!(code == Some(2) && said.contains("it answers nothing until sub-function 01"), "{code:?} {said}");
     let (code, said) = run(&["send", &unit, "01 2B 0D 00 00"]);
     assert!(code == Some(2) && said.contains("nothing was sent"), "CANopen may write: {code:?} {said}");
     let (code, said) = run(&["send", &unit, "--as-is", "55 55"]);

@@ -3,7 +3,7 @@
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
     bus::{
-        ascii, dissect, frame, hex_input,
+        ascii, dissect, frame, hex_input, names,
         request_lint::{check_request, only_reads},
     },
     cli::{CliError, in_runtime, menu, prompt, say, say_error},
@@ -60,7 +60,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let dissection = dissect::dissect(&frame, Some(framing), Some(dissect::Direction::Request), None);
     let harmless = wrong.is_empty() && only_reads(&message);
     if !args.yes && !harmless {
-        agree(&format!("{} on {}", dissection.summary, line.transport))?;
+        let effect = names::effect(&message).map_or_else(String::new, |effect| format!("; {effect}"));
+        agree(&format!("{} on {}{effect}", dissection.summary, line.transport))?;
     }
     let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", dissection.summary)];
     let request = message.clone();

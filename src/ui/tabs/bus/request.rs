@@ -19,7 +19,7 @@ use crate::{
     bus::{
         dissect::{self, Direction},
         frame::{self, hex},
-        request_lint,
+        names, request_lint,
     },
     plant::{
         def::{Framing, Parity, Serial},
@@ -46,6 +46,8 @@ pub struct Form {
 struct Field {
     label: &'static str,
     input: Input,
+    /// What may be typed; empty where it need not be said.
+    range: String,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -66,15 +68,21 @@ impl Form {
     /// With what suits most.
     pub fn new(cx: &ViewContext, at: &LineView, tried: Tried) -> Form {
         let unit = cx.def().devices.iter().find(|device| device.line == at.id).map_or(1, |device| device.unit);
-        let text = |label, text: &str| Field { label, input: Input::Text(Line::long(text, 400)) };
-        let choice = |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0) };
+        let typed = |label, text: &str, range: &str| Field {
+            label,
+            input: Input::Text(Line::long(text, 400)),
+            range: range.to_owned(),
+        };
+        let text = |label, text: &str| typed(label, text, "");
+        let choice =
+            |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0), range: String::new() };
         let unit = text(t!("unit"), &unit.to_string());
         let fields = match tried {
             Tried::Bytes | Tried::Request => {
                 let function = choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec());
                 [vec![unit, function], functions::fields(FUNCTIONS[0], &[])].concat()
             }
-            Tried::Loopback => vec![unit, text(t!("times"), "10")],
+            Tried::Loopback => vec![unit, typed(t!("times"), "10", "1 – 1000")],
             Tried::Identify => vec![unit],
             Tried::Scan => {
                 let mut settings = vec![t!("current settings: {transport}", transport = at.settings.transport)];
@@ -82,7 +90,10 @@ impl Form {
                     settings.push(t!("all baud rates and parities; polling pauses").to_owned());
                 }
                 let units = [text(t!("from unit"), "1"), text(t!("to unit"), "247")];
-                units.into_iter().chain([choice(t!("settings"), settings), text(t!("wait ms"), "200")]).collect()
+                units
+                    .into_iter()
+                    .chain([choice(t!("settings"), settings), typed(t!("wait ms"), "200", "10 – 10000")])
+                    .collect()
             }
         };
         Form { line: at.id, tried, fields, at: 0, problem: None }
@@ -245,6 +256,8 @@ impl Form {
             match &field.input {
                 Input::Text(line) if n == self.at => {
                     line.view(theme, &mut canvas, x, y);
+                    let left = canvas.width().saturating_sub(x + width(&line.text()) + 3);
+                    canvas.text_right(canvas.width(), y, &fit(&field.range, left), theme.dim());
                 }
                 Input::Text(line) => {
                     canvas.text(x, y, &line.text(), theme.normal());
@@ -287,7 +300,8 @@ fn request_text(message: &[u8], framing: Framing) -> Result<Vec<String>, String>
     }
     let whole = frame::wrap(framing, TRANSACTION, message);
     let dissection = dissect::dissect(&whole, Some(framing), Some(Direction::Request), None);
-    Ok(vec![dissection.summary, hex(message)])
+    let effect = names::effect(message).map(|effect| t!("Effect: {effect}.", effect));
+    Ok([Some(dissection.summary), Some(hex(message)), effect].into_iter().flatten().collect())
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use crate::{
         ascii,
         dissect::{self, Direction, Dissection},
         frame::{self, Mbap, hex},
-        hex_input, request_lint,
+        hex_input, names, request_lint,
     },
     plant::{def::Framing, diagnostics::Diagnostic, event::LineState},
     ui::modal::{Next, line::Line},
@@ -205,10 +205,13 @@ fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
                     "{summary}. Broadcast: every device executes it, none responds. Send it?",
                     summary = dissection.summary
                 )),
-                (None, false, false) => Some(t!(
-                    "{summary}. This bypasses all limits of the plant file and is not read back. Send it?",
-                    summary = dissection.summary
-                )),
+                (None, false, false) => Some(match names::effect(&dissection.message) {
+                    Some(effect) => t!("{summary}: {effect}. Send it?", summary = dissection.summary, effect),
+                    None => t!(
+                        "{summary}. This bypasses all limits of the plant file and is not read back. Send it?",
+                        summary = dissection.summary
+                    ),
+                }),
                 (Some(wrong), ..) => Some(t!(
                     "These bytes are not a valid request: {wrong}. Send {hex} anyway?",
                     wrong,

@@ -172,7 +172,7 @@ fn writes_and_broadcasts_are_asked_first() {
     for (typed, bytes, words) in [
         ("01 06 03 EA 00 32", vec![1, 6, 3, 0xEA, 0, 0x32], "This bypasses all limits of the plant file"),
         ("00 06 03 EA 00 32", vec![0, 6, 3, 0xEA, 0, 0x32], "Broadcast: every device executes it, none responds."),
-        ("01 08 00 01 00 00", vec![1, 8, 0, 1, 0, 0], "This bypasses all limits"),
+        ("01 08 00 01 00 00", vec![1, 8, 0, 1, 0, 0], "the unit restarts its port"),
         ("00 03 03 EA 00 01", vec![0, 3, 3, 0xEA, 0, 1], "no unit responds to a broadcast"),
     ] {
         let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tt{typed}"));

@@ -5,7 +5,11 @@ use super::{
     fields::{address, bit, number, register},
 };
 use crate::ui::tabs::prelude::*;
-use crate::{bus::names, plant::number::to_u8, ui::modal::line::Line};
+use crate::{
+    bus::names,
+    plant::{number::to_u8, tag::Table},
+    ui::modal::line::Line,
+};
 
 /// Functions that the form offers, the most used first.
 pub const FUNCTIONS: [u8; 14] = [3, 4, 1, 2, 6, 5, 16, 15, 22, 23, 8, 11, 17, 43];
@@ -56,6 +60,20 @@ fn row(function: u8) -> Vec<(&'static str, Kind, &'static str)> {
     }
 }
 
+/// What may be typed.
+fn range(kind: Kind, table: Table) -> String {
+    match kind {
+        Kind::Address => t!("{first} …, or 0 – 65535 as sent", first = table.modicon(0)),
+        Kind::Count(most) => t!("1 – {most}", most),
+        Kind::Bit => t!("0 or 1").to_owned(),
+        Kind::Register => t!("0 – 65535, -32768 …, 0x…").to_owned(),
+        Kind::Registers => t!("1 – 123 numbers, spaces between").to_owned(),
+        Kind::Bits => t!("1 – 1968 of 0 and 1, spaces between").to_owned(),
+        Kind::Object => t!("0 – 255").to_owned(),
+        Kind::SubFunction | Kind::ReadCode => String::new(),
+    }
+}
+
 /// The fields of a function; what was filled in under the same label before stays, where the table is the same.
 pub fn fields(function: u8, before: &[Field]) -> Vec<Field> {
     let table = names::table(function);
@@ -83,7 +101,7 @@ pub fn fields(function: u8, before: &[Field]) -> Vec<Field> {
                 Input::Text(Line::long(&kept.unwrap_or(first), 400))
             }
         };
-        Field { label, input }
+        Field { label, input, range: range(kind, table) }
     };
     row(function).into_iter().map(field).collect()
 }

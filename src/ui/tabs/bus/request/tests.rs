@@ -54,4 +54,7 @@ fn fields_become_the_bytes_of_the_standard() {
     for function in functions::FUNCTIONS {
         assert!(names::function(function).is_some(), "{function}");
     }
+    let words = request_text(&[17, 8, 0, 4, 0, 0], Framing::Rtu).expect("a request");
+    assert!(words.last().is_some_and(|words| words.starts_with("Effect: the unit listens only")), "{words:?}");
+    assert_eq!(names::effect(&[17, 8, 0, 0, 0xA5, 0x37]), None, "a loopback changes nothing");
 }
