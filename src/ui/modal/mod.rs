@@ -138,7 +138,7 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Reason(reason) => reason.on_key(cx, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
-            Modal::Notice(notice) => notice.on_key(event),
+            Modal::Notice(notice) => notice.on_key(cx, event),
             Modal::Guidance(guidance) => guidance.on_key(cx, event),
             Modal::Why(why) => why.on_key(event),
             Modal::Settings(settings) => settings.on_key(cx, event),

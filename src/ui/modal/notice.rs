@@ -9,7 +9,10 @@ use crate::{
     plant::{command::CommandKind, def::DeviceId, event::LineState, snapshot::DeviceState},
     ui::{
         UiAction, ViewContext, rights,
-        widgets::text::{clock, width, wrap},
+        widgets::{
+            list::{Motion, Scroll, on_screen},
+            text::{clock, width, wrap},
+        },
     },
 };
 
@@ -20,6 +23,7 @@ pub struct Notice {
     words: Vec<String>,
     /// The first line is why it is there.
     worry: bool,
+    scroll: Scroll,
 }
 
 impl Notice {
@@ -61,31 +65,67 @@ impl Notice {
 
     /// Words to be read, the first line as the worry.
     pub fn new(title: impl Into<String>, words: Vec<String>) -> Notice {
-        Notice { title: title.into(), words, worry: true }
+        Notice { title: title.into(), words, worry: true, scroll: Scroll::default() }
     }
 
-    /// A list without a worry; the first lines where there is not room for all.
+    /// A list without a worry.
     pub fn list(title: impl Into<String>, words: Vec<String>) -> Notice {
-        Notice { title: title.into(), words, worry: false }
+        Notice { title: title.into(), words, worry: false, scroll: Scroll::default() }
     }
 
-    pub(super) fn on_key(self, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
+        if let Some(motion) = Motion::from_key(event) {
+            let rows = self.rows(cx.area).len();
+            self.scroll.on(motion, rows, usize::from(cx.area.height.saturating_sub(4)));
+        }
         match event.code {
             KeyCode::Enter | KeyCode::Char('q') => Next::Close,
             _ => Next::Stay(Modal::Notice(self)),
         }
     }
 
+    fn rows(&self, body: Rect) -> Vec<String> {
+        let width = body.width.saturating_sub(8).min(64);
+        self.words.iter().flat_map(|words| wrap(words, width)).collect()
+    }
+
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
-        let room = body.width.saturating_sub(8).min(64);
-        let rows: Vec<String> = self.words.iter().flat_map(|words| wrap(words, room)).collect();
+        let rows = self.rows(body);
         let inner = rows.iter().map(|row| width(row)).max().unwrap_or(0);
         let mut canvas = window(cx, frame, body, &self.title, (inner, rows.len() + 2));
-        for (y, row) in rows.iter().enumerate() {
-            let style = if y == 0 && self.worry { cx.theme.trouble() } else { cx.theme.normal() };
+        let last = canvas.height().saturating_sub(1);
+        let shown = usize::from(last.saturating_sub(1));
+        for (y, n, row) in on_screen(&rows, self.scroll.first(rows.len(), shown), shown) {
+            let style = if n == 0 && self.worry { cx.theme.trouble() } else { cx.theme.normal() };
             canvas.text(0, y, row, style);
         }
-        let last = canvas.height().saturating_sub(1);
-        canvas.text(0, last, t!("Esc close"), cx.theme.strong());
+        let keys = if shown < rows.len() { t!("↑↓ scroll   Esc close") } else { t!("Esc close") };
+        canvas.text(0, last, &cx.theme.enter(keys), cx.theme.strong());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crossterm::event::KeyModifiers;
+    use ratatui::{Terminal, backend::TestBackend};
+
+    use super::*;
+    use crate::ui::{Model, Msg, fixture::Fixture, theme::Theme, update, view};
+
+    #[test]
+    fn a_list_that_is_longer_than_the_screen_scrolls() {
+        let session = crate::ui::fixture::session();
+        let mut model = Model::new(Fixture::normal().snapshot(), Theme::FULL, 1, session);
+        update(&mut model, Msg::Resize(80, 24));
+        model.modal = Some(Modal::Notice(Notice::list("writes", (1..=200).map(|n| format!("write {n}.")).collect())));
+        let mut shown = |key: KeyCode| {
+            update(&mut model, Msg::Key(KeyEvent::new(key, KeyModifiers::NONE)));
+            let mut terminal = Terminal::new(TestBackend::new(80, 24)).expect("a test backend never fails");
+            terminal.draw(|frame| view(&model, frame)).expect("a test backend never fails");
+            terminal.backend().to_string()
+        };
+        assert!(shown(KeyCode::Home).contains("write 1.") && shown(KeyCode::Home).contains("↑↓ scroll"));
+        assert!(shown(KeyCode::End).contains("write 200.") && !shown(KeyCode::End).contains("write 1."));
+        assert!(shown(KeyCode::PageUp).contains("write 180."));
     }
 }

@@ -76,6 +76,8 @@ pub struct Registers {
     order: ByteOrder,
     base: Base,
     period: SignedDuration,
+    /// When the next read of the rhythm is due; one that a key asked for before that changes nothing of it.
+    due: Option<Timestamp>,
     paused: bool,
     cells: Cells,
     names: Names,
@@ -134,6 +136,7 @@ impl TabView for Registers {
             order: ByteOrder::Abcd,
             base: Base::Modicon,
             period: SignedDuration::from_secs(1),
+            due: None,
             paused: false,
             cells: Cells::default(),
             names: Names::default(),
@@ -290,8 +293,9 @@ impl TabView for Registers {
         self.reads += 1;
         reading.reply.into_iter().for_each(|reply| self.replies.see(reply));
         self.cells.on_reading(&reading);
-        let mut actions = self.watch_reading(&reading);
         let began = reading.began;
+        let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);
+        let mut actions = self.watch_reading(&reading, early.is_none());
         self.took = cx.steady().duration_since(began);
         self.last = Some(reading);
         if self.paused {
@@ -299,7 +303,8 @@ impl TabView for Registers {
         }
         actions.extend(self.read_compared(cx));
         actions.extend(self.recognise(cx));
-        actions.extend(self.ask(cx, began.checked_add(self.period).ok()));
+        self.due = early.or_else(|| began.checked_add(self.period).ok());
+        actions.extend(self.ask(cx, self.due));
         actions
     }
 

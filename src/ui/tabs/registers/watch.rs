@@ -197,8 +197,8 @@ impl Registers {
         self.watch.items.iter().map(span).filter(move |span| !inside(span))
     }
 
-    /// Takes the values of a read, and writes their row.
-    pub(super) fn watch_reading(&mut self, reading: &LiveReading) -> Vec<UiAction> {
+    /// Takes the values of a read, and writes their row where it is due.
+    pub(super) fn watch_reading(&mut self, reading: &LiveReading, is_due: bool) -> Vec<UiAction> {
         let Some(at) = reading.parts.iter().map(|part| part.at).max() else { return Vec::new() };
         let mut cells = Vec::new();
         for item in &mut self.watch.items {
@@ -208,7 +208,7 @@ impl Registers {
             item.push(sample);
             cells.push((sample.good_value().map_or(String::new(), |value| exact(named, value)), sample.quality));
         }
-        self.watch.log_row(at, cells)
+        if is_due { self.watch.log_row(at, cells) } else { Vec::new() }
     }
 
     /// Ends values that may be others by now, in the graph and, by a row, in the log.

@@ -51,6 +51,23 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
 }
 
 #[test]
+fn a_read_for_a_key_adds_no_row_and_keeps_the_rhythm() {
+    let mut bench = Bench::new();
+    bench.keys("j1002⏎");
+    bench.answer(0, device);
+    bench.keys("eSV int16 0.1 °C⏎pL");
+    bench.answer(1, device);
+    for _ in 0..3 {
+        bench.keys("j1010⏎");
+        bench.answer(1, device);
+    }
+    let due = bench.asked.last().and_then(|(_, read)| read.not_before);
+    assert_eq!(due, Some(now() + SignedDuration::from_secs(2)), "the next one is read when it was due");
+    bench.answer(2, device);
+    assert_eq!(bench.rows.len(), 3, "a header and two rows: {:?}", bench.rows);
+}
+
+#[test]
 fn a_log_says_when_its_values_became_old() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");
