@@ -94,6 +94,8 @@
 //! | gap registers | registers read only because they stand between two blocks |
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
+//! | batch, phase | what the plant makes between two conditions of its file; a value of its phase tag |
+//! | total | what an expression adds up to: an integral, hours, starts |
 //! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
 //! | tier, archive, manifest | samples, minutes or hours; the files of closed hours; the table that names these |
 //! | fault, injected fault | why a request or the station failed; what a trainer puts into the simulated plant
