@@ -157,7 +157,7 @@ fn extension(sim::io::Port { commands, mut status }: sim::io::Port) -> Extension
 async fn headless(session: Session, clock: Clock, duration: Option<Duration>, args: &Args) -> Result<(), CliError> {
     let from = clock.now();
     let last = run::follow(session.snapshots.clone(), clock, duration).await?;
-    let period = Period { name: "demo".into(), from, to: clock.now() };
+    let period = Period::free(from, clock.now());
     let Answer::Report(report) = query_station(&session, Query::Report { period }).await? else {
         return Err(unexpected());
     };

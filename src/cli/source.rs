@@ -82,7 +82,7 @@ impl HistoryArgs {
         let source = Source::open(def, &self.station, &self.login).await?;
         let to = source.now();
         let from = to.checked_sub(time).unwrap_or(Timestamp::MIN);
-        Ok((source, Period { name: "period".into(), from, to }))
+        Ok((source, Period::free(from, to)))
     }
 }
 

@@ -69,7 +69,7 @@ pub struct AlarmMetricsReport {
 pub fn metrics(figures: &PeriodMetrics, def: &PlantDef, period: &Period) -> AlarmMetricsReport {
     AlarmMetricsReport {
         plant: def.name.clone(),
-        period: period.name.clone(),
+        period: period.name.to_string(),
         from: iso(&def.time_zone, figures.from),
         until: iso(&def.time_zone, figures.until),
         watched_s: figures.watched.as_secs(),
@@ -161,7 +161,7 @@ pub(super) mod tests {
     use super::*;
     use crate::{
         plant::alarm::metrics::Frequent,
-        report::testing::{THREE, at, plant},
+        report::testing::{THREE, at, named, plant},
     };
 
     /// Eight hours with 24 alarms, six of them of one that chatters.
@@ -191,7 +191,7 @@ pub(super) mod tests {
     #[test]
     fn a_metric_stands_beside_its_target_and_none_is_a_dash() {
         let period = Period {
-            name: "morning 2026-11-21".into(),
+            name: named("morning 2026-11-21"),
             from: at("2026-11-21T06:00+07"),
             to: at("2026-11-21T14:00+07"),
         };

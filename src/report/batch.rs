@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Gap, Period, TagFigures,
+    Gap, Period, PeriodName, TagFigures,
     csv::{self, Table, floor_percent, iso, number, plain},
     text::mean_or_difference,
 };
@@ -42,7 +42,7 @@ impl BatchReport {
 
     /// Its time, as a period to report on.
     pub fn period(&self) -> Period {
-        Period { name: self.batch.label(), from: self.batch.from, to: self.until }
+        Period { name: PeriodName::Batch(self.batch.label()), from: self.batch.from, to: self.until }
     }
 }
 

@@ -15,9 +15,9 @@ pub(crate) mod text;
 #[cfg(test)]
 pub(crate) mod testing;
 
-use std::{sync::Arc, time::Duration};
+use std::{fmt, sync::Arc, time::Duration};
 
-use jiff::Timestamp;
+use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
 
 use crate::plant::{
@@ -47,14 +47,13 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
     fn file_name(&self, def: &PlantDef, period: &Period, until: Timestamp) -> String {
         let local = |at: Timestamp| at.to_zoned(def.time_zone.clone());
         let (from, to) = (local(period.from), local(period.to));
-        let word = period.name.split_whitespace().next().unwrap_or("period");
         let running = until < period.to;
         let end = if running { local(until).strftime("-until-%H%M").to_string() } else { String::new() };
-        if word == "period" {
+        let Some(word) = period.name.word() else {
             let to = if running { local(until) } else { to };
             let (from, to) = (from.strftime("%Y-%m-%dT%H%M"), to.strftime("%Y-%m-%dT%H%M"));
             return format!("{from}-to-{to}.{}", self.extension());
-        }
+        };
         let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
         format!("{}-{}{end}.{}", from.date(), word.chars().map(plain).collect::<String>(), self.extension())
     }
@@ -83,15 +82,68 @@ pub fn raised(alarms: &[AlarmRecord], priority: Priority) -> usize {
 /// Decimals to print where the device has not said how many there are.
 pub const DECIMALS_UNKNOWN: u8 = 2;
 
-/// A span of time with a name: a shift, or a free period.
+/// What a period is called.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PeriodName {
+    /// A period from any time to any other.
+    Free,
+    /// A shift.
+    Shift {
+        /// Its name in the plant file.
+        name: String,
+        /// The local date of its start.
+        date: civil::Date,
+    },
+    /// A local day of a plant without shifts.
+    Day(civil::Date),
+    /// The time of a batch: its name and number.
+    Batch(String),
+}
+
+impl PeriodName {
+    /// The local date that the name has.
+    pub fn date(&self) -> Option<civil::Date> {
+        match self {
+            PeriodName::Shift { date, .. } | PeriodName::Day(date) => Some(*date),
+            PeriodName::Free | PeriodName::Batch(_) => None,
+        }
+    }
+
+    /// The word in the name of a file; `None` for a free period, which has its times there.
+    fn word(&self) -> Option<&str> {
+        match self {
+            PeriodName::Free => None,
+            PeriodName::Shift { name, .. } | PeriodName::Batch(name) => Some(name),
+            PeriodName::Day(_) => Some("day"),
+        }
+    }
+}
+
+/// `morning 2026-11-21`, `day 2026-11-21`, `water-3`, `period`.
+impl fmt::Display for PeriodName {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let word = self.word().unwrap_or("period");
+        f.write_str(word)?;
+        self.date().map_or(Ok(()), |date| write!(f, " {date}"))
+    }
+}
+
+/// A span of time with a name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Period {
-    /// Name of the shift and its local date (`morning 2026-11-21`), or `period`.
-    pub name: String,
+    /// What it is called.
+    pub name: PeriodName,
     /// From, inclusive.
     pub from: Timestamp,
     /// To, exclusive; may lie in the future for a running shift.
     pub to: Timestamp,
+}
+
+impl Period {
+    /// A period from any time to any other.
+    pub fn free(from: Timestamp, to: Timestamp) -> Period {
+        Period { name: PeriodName::Free, from, to }
+    }
 }
 
 /// A span of stored values that could not be read.

@@ -3,7 +3,7 @@
 use jiff::{Timestamp, civil, tz::AmbiguousOffset};
 
 use super::{
-    Period,
+    Period, PeriodName,
     shift::{instant, previous, recent, shift_at, shift_on},
 };
 use crate::plant::def::PlantDef;
@@ -80,7 +80,7 @@ pub fn period(
             if from >= to {
                 return Err(PeriodError::Empty { from, to });
             }
-            begun(Period { name: "period".into(), from, to }, now)
+            begun(Period::free(from, to), now)
         }
     }
 }
@@ -124,13 +124,13 @@ fn shift_named(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, Per
         // Two days of shifts hold every name, even if a clock change skipped one of them.
         None => recent(def, now, 2 * def.shifts.len() + 1)
             .into_iter()
-            .find(|period| period.name.rsplit_once(' ').is_some_and(|(start, _)| start == name))
+            .find(|period| matches!(&period.name, PeriodName::Shift { name: found, .. } if found == name))
             .ok_or(PeriodError::NoShifts),
     }
 }
 
 fn begun(period: Period, now: Timestamp) -> Result<Period, PeriodError> {
-    if period.from < now { Ok(period) } else { Err(PeriodError::NotBegun(period.name)) }
+    if period.from < now { Ok(period) } else { Err(PeriodError::NotBegun(period.name.to_string())) }
 }
 
 /// Which of two equal local times is meant.
@@ -161,7 +161,7 @@ fn moment(def: &PlantDef, text: &str, fold: DstFold) -> Result<Timestamp, Period
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::testing::{THREE, at, plant};
+    use crate::report::testing::{THREE, at, named, plant};
 
     const NOW: &str = "2026-11-21T09:00+07";
 
@@ -185,7 +185,7 @@ mod tests {
     }
 
     fn check(typed: (Option<&str>, Option<&str>, Option<&str>), name: &str, from: &str, to: &str) {
-        assert_eq!(ask(typed), Ok(Period { name: name.into(), from: at(from), to: at(to) }), "{typed:?}");
+        assert_eq!(ask(typed), Ok(Period { name: named(name), from: at(from), to: at(to) }), "{typed:?}");
     }
 
     #[test]
@@ -218,7 +218,7 @@ mod tests {
     fn a_repeated_hour_is_read_so_that_nothing_is_left_out() {
         let def = plant("Europe/Berlin", &THREE);
         let got = period(&def, None, Some("2026-10-25T02:30"), Some("2026-10-25T02:30"), at(NOW));
-        let expect = Period { name: "period".into(), from: at("2026-10-25T02:30+02"), to: at("2026-10-25T02:30+01") };
+        let expect = Period::free(at("2026-10-25T02:30+02"), at("2026-10-25T02:30+01"));
         assert_eq!(got, Ok(expect));
     }
 

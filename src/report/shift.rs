@@ -8,7 +8,7 @@
 
 use jiff::{Timestamp, ToSpan, civil, tz::AmbiguousOffset, tz::TimeZone};
 
-use super::Period;
+use super::{Period, PeriodName};
 use crate::plant::def::PlantDef;
 
 /// The shift that is running at an instant; `None` if the plant has no shifts, or at the very ends of the calendar.
@@ -19,7 +19,11 @@ pub fn shift_at(def: &PlantDef, at: Timestamp) -> Option<Period> {
     let next = starts.partition_point(|start| start.at <= at);
     let current = starts.get(next.checked_sub(1)?)?;
     let end = starts.get(next)?;
-    Some(Period { name: format!("{} {}", current.name, current.date), from: current.at, to: end.at })
+    Some(Period {
+        name: PeriodName::Shift { name: current.name.into(), date: current.date },
+        from: current.at,
+        to: end.at,
+    })
 }
 
 /// The shift before a period.
@@ -36,7 +40,7 @@ pub fn recent(def: &PlantDef, now: Timestamp, n: usize) -> Vec<Period> {
 pub fn shift_on(def: &PlantDef, name: &str, date: civil::Date) -> Option<Period> {
     let start = def.shifts.iter().find(|shift| shift.name == name)?.start;
     let period = shift_at(def, instant(&def.time_zone, date.to_datetime(start))?)?;
-    (period.name == format!("{name} {date}")).then_some(period)
+    (period.name == PeriodName::Shift { name: name.into(), date }).then_some(period)
 }
 
 /// The instant of a local time: the clock change itself for a time that it skips, the first of two for one that it repeats.
@@ -81,11 +85,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::report::testing::{THREE, at, plant};
+    use crate::report::testing::{THREE, at, named, plant};
 
     fn check(zone: &str, shifts: &[(&str, i8, i8)], now: &str, name: &str, from: &str, to: &str) {
         let period = shift_at(&plant(zone, shifts), at(now)).unwrap();
-        assert_eq!(period, Period { name: name.into(), from: at(from), to: at(to) }, "{zone} at {now}");
+        assert_eq!(period, Period { name: named(name), from: at(from), to: at(to) }, "{zone} at {now}");
     }
 
     #[test]
@@ -139,7 +143,7 @@ mod tests {
     fn the_list_of_shifts_is_unbroken_and_newest_first() {
         let def = plant("Asia/Bangkok", &THREE);
         let list = recent(&def, at("2026-11-21T09:00+07"), 4);
-        let names: Vec<_> = list.iter().map(|period| period.name.as_str()).collect();
+        let names: Vec<_> = list.iter().map(|period| period.name.to_string()).collect();
         assert_eq!(names, ["morning 2026-11-21", "night 2026-11-20", "afternoon 2026-11-20", "morning 2026-11-20"]);
         assert_eq!(shift_at(&def, list[1].to).as_ref(), Some(&list[0]));
     }
@@ -172,7 +176,7 @@ mod tests {
             let mut names = std::collections::HashSet::new();
             while period.from < end {
                 prop_assert!(period.from < period.to);
-                prop_assert!(names.insert(period.name.clone()), "{} twice", period.name);
+                prop_assert!(names.insert(period.name.to_string()), "{} twice", period.name);
                 // Every instant of it belongs to it: its first, a middle one and its last.
                 let middle = period.from + period.to.duration_since(period.from) / 2;
                 for instant in [period.from, middle, period.to - 1.nanosecond()] {

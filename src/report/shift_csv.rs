@@ -41,7 +41,7 @@ fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u
     table.section("shift report", &header);
     table.row(vec![
         text(&def.title),
-        text(&report.period.name),
+        text(&report.period.name.to_string()),
         plain(iso(zone, report.period.from)),
         plain(iso(zone, report.period.to)),
         plain(iso(zone, report.until)),

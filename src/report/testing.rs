@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jiff::{Timestamp, civil::time, tz::TimeZone};
 
-use super::{figures::Figures, step_series::StepSeries};
+use super::{PeriodName, figures::Figures, step_series::StepSeries};
 use crate::plant::{
     def::{CsvDialect, DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, ReportDef, ShiftDef, TagId},
     sample::Sample,
@@ -19,6 +19,15 @@ pub fn sec(at: i64) -> Timestamp {
 /// An instant from its text.
 pub fn at(text: &str) -> Timestamp {
     text.parse().expect("tests write valid times")
+}
+
+/// The name of a period from its text: `morning 2026-11-21`, `period`.
+pub fn named(text: &str) -> PeriodName {
+    let shift = |(name, date): (&str, &str)| PeriodName::Shift {
+        name: name.into(),
+        date: date.parse().expect("tests write valid dates"),
+    };
+    text.split_once(' ').map_or(PeriodName::Free, shift)
 }
 
 /// A time zone by name.

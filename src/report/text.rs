@@ -99,7 +99,7 @@ mod tests {
         plant::record::ChainHash,
         report::{
             Period,
-            testing::{THREE, at, plant},
+            testing::{THREE, at, named, plant},
         },
     };
 
@@ -107,7 +107,7 @@ mod tests {
     fn a_missing_figure_is_a_dash_and_a_running_shift_says_so() {
         let report = ShiftReport {
             period: Period {
-                name: "morning 2026-11-21".into(),
+                name: named("morning 2026-11-21"),
                 from: at("2026-11-21T06:00+07"),
                 to: at("2026-11-21T14:00+07"),
             },

@@ -100,7 +100,7 @@ fn history(c: &mut Criterion) {
         c.bench_function(&format!("curve of a {name}"), |b| b.iter(|| black_box(store.answer(&query, end))));
     }
     let from = Timestamp::from_second(WEEK - 8 * 3600).expect("in range");
-    let query = Query::Report { period: Period { name: "period".into(), from, to: end } };
+    let query = Query::Report { period: Period::free(from, end) };
     c.bench_function("report of eight hours", |b| b.iter(|| black_box(store.answer(&query, end))));
     let mut at = WEEK;
     c.bench_function("commit of one second", |b| {

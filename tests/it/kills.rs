@@ -261,7 +261,7 @@ async fn report_on(session: Session, asked: watch::Sender<bool>) -> u64 {
     log_in(&session, "tom").await;
     while session.status.borrow().gone.is_none() {
         let to = session.snapshots.borrow().at;
-        let period = Period { name: "shift".into(), from: to - jiff::SignedDuration::from_hours(8), to };
+        let period = Period::free(to - jiff::SignedDuration::from_hours(8), to);
         let (reply, answer) = tokio::sync::oneshot::channel();
         if session.ask(QueryRequest { query: Query::Report { period }, reply }).is_ok() {
             asked.send_replace(true);

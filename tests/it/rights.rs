@@ -360,7 +360,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::LineMinutes { line: LineId(0), from, to, limit },
         Query::Values { tags: vec![def.tags[0].id], from, every: std::time::Duration::from_secs(10), count: 6 },
         Query::AlarmMetrics { from, to },
-        Query::Report { period: Period { name: "period".into(), from, to } },
+        Query::Report { period: Period::free(from, to) },
         Query::Past { at: to },
         Query::Batches { from, to, limit },
         Query::Unarchived { from, to },

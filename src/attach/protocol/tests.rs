@@ -160,7 +160,7 @@ fn what_this_plant_does_not_have_never_reaches_it() {
     let series = |tags: Vec<TagId>, buckets| Query::Series { tags, from: now(), to: now(), buckets };
     let report = |days: i64| {
         let to = now() + jiff::SignedDuration::from_hours(24 * days);
-        Query::Report { period: crate::report::Period { name: "period".into(), from: now(), to } }
+        Query::Report { period: crate::report::Period::free(now(), to) }
     };
     assert_eq!(check::query(&def, &series(vec![TagId(0)], 200)), Ok(()));
     assert_eq!(check::query(&def, &report(5 * 366)), Ok(()));

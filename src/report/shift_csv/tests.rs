@@ -8,14 +8,14 @@ use crate::{
     report::{
         Period, RecordRow,
         record_csv::RecordCsv,
-        testing::{THREE, at, plant},
+        testing::{THREE, at, named, plant},
     },
 };
 
 fn report() -> ShiftReport {
     let from = at("2026-11-21T06:00+07");
     ShiftReport {
-        period: Period { name: "morning 2026-11-21".into(), from, to: at("2026-11-21T14:00+07") },
+        period: Period { name: named("morning 2026-11-21"), from, to: at("2026-11-21T14:00+07") },
         until: at("2026-11-21T13:59:30+07"),
         audit: Some(ChainHash { number: 17, hash: [0xA5; 32] }),
         unreadable: vec![Gap {

@@ -162,7 +162,7 @@ fn commits(handle: &history::Handle, clock: Clock, counts: &Counts) -> Vec<Durat
 }
 
 fn report(now: Timestamp) -> (&'static str, Query) {
-    let period = Period { name: "period".into(), from: now - Duration::from_secs(8 * 3_600), to: now };
+    let period = Period::free(now - Duration::from_secs(8 * 3_600), now);
     ("report of 8 h, 1,000 tags", Query::Report { period })
 }
 

@@ -75,7 +75,7 @@ fn assert_series(got: &[Series], expect: &[Series], what: &str) {
 }
 
 fn report(store: &Store, from: i64, to: i64) -> ShiftReport {
-    let period = Period { name: "period".into(), from: sec(from), to: sec(to) };
+    let period = Period::free(sec(from), sec(to));
     match store.answer(&Query::Report { period }, sec(to)).unwrap() {
         Answer::Report(report) => *report,
         other => panic!("{other:?}"),

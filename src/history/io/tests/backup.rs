@@ -44,7 +44,7 @@ fn everything(store: &Store) -> (Vec<(u16, Sample)>, Vec<Answer>) {
         Query::Actions { from, to, limit: 100 },
         Query::Audit { from, to, words: all(), by: all(), action: all(), limit: 100 },
         Query::Series { tags: vec![PV, SV], from: sec(0), to: sec(HOURS * HOUR_S), buckets: 77 },
-        Query::Report { period: Period { name: "p".into(), from: sec(500), to: sec(20 * HOUR_S) } },
+        Query::Report { period: Period::free(sec(500), sec(20 * HOUR_S)) },
     ];
     let answers = queries.map(|query| store.answer(&query, sec(HOURS * HOUR_S)).unwrap());
     (content(store), answers.into())

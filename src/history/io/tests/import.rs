@@ -89,7 +89,7 @@ fn an_import_is_no_time_at_which_alarms_were_watched() {
     let file: Vec<Record> = (0..2 * HOUR_S / 60).map(|n| good(PV, 60 * n, 1.0)).collect();
     store.import(by_tag(&file), "x.csv", sec(5 * HOUR_S)).unwrap().unwrap();
     let watched = |store: &Store| {
-        let period = Period { name: "p".into(), from: sec(0), to: sec(2 * HOUR_S) };
+        let period = Period::free(sec(0), sec(2 * HOUR_S));
         match store.answer(&Query::Report { period }, sec(3 * HOUR_S)).unwrap() {
             Answer::Report(report) => report.alarm_metrics.watched,
             other => panic!("{other:?}"),

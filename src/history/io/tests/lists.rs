@@ -63,7 +63,7 @@ fn a_shift_report_has_figures_alarms_and_actions() {
     let alarms =
         [step(5, "high", Raised), step(30, "high", ReturnedToNormal), step(50, "low", Raised)].map(Record::Alarm);
     store.append(&samples.chain(alarms).chain([Record::Action(action(25))]).collect::<Vec<_>>()).unwrap();
-    let period = Period { name: "period".into(), from: sec(20), to: sec(200) };
+    let period = Period::free(sec(20), sec(200));
     let query = Query::Report { period: period.clone() };
     let Answer::Report(report) = store.answer(&query, sec(100)).unwrap() else { panic!("not a report") };
     assert_eq!((report.period, report.until), (period, sec(100)));
@@ -79,7 +79,7 @@ fn a_shift_report_has_figures_alarms_and_actions() {
     assert_eq!(report.record_of, Some(("TIC-1".into(), "°C".into())));
     assert_eq!(report.record.len(), 8);
     assert_eq!((report.record[0].at, report.record[0].er), (sec(20), Some(48.0)));
-    let future = Query::Report { period: Period { name: "period".into(), from: sec(300), to: sec(400) } };
+    let future = Query::Report { period: Period::free(sec(300), sec(400)) };
     assert_eq!(store.answer(&future, sec(100)), Err(HistoryError::EmptyPeriod));
 }
 
@@ -95,7 +95,7 @@ fn a_report_has_the_last_entry_of_the_audit_log_before_its_end() {
     let log = [entry(10, 1), entry(30, 2), entry(50, 3), entry(40, 4), entry(45, 5), entry(100, 6)];
     store.append(&log.into_iter().chain([Record::Action(action(60))]).collect::<Vec<_>>()).unwrap();
     let audit = |from: i64, to: i64| {
-        let period = Period { name: "period".into(), from: sec(from), to: sec(to) };
+        let period = Period::free(sec(from), sec(to));
         store.report(&period, sec(1_000)).unwrap().audit.map(|entry| (entry.number, entry.hash[0]))
     };
     assert_eq!(audit(20, 100), Some((5, 5)));
@@ -111,7 +111,7 @@ fn a_century_is_answered_and_millions_of_rows_are_refused() {
     store.append(&[good(PV, 0, 27.0), good(PV, 100_000, 28.0)]).unwrap();
     let century = 3_000_000_000;
     assert_eq!(series(&store, PV, -century, century, 3).buckets.len(), 3);
-    let period = Period { name: "period".into(), from: sec(0), to: sec(century) };
+    let period = Period::free(sec(0), sec(century));
     let answer = store.answer(&Query::Report { period }, sec(century));
     assert!(matches!(answer, Err(HistoryError::TooManyRows { .. })));
 }
@@ -182,7 +182,7 @@ fn rows_behind_aggregates_do_not_count_for_the_bound() {
         store.answer(&Query::Series { tags: vec![PV], from: hours(0), to: hours(to), buckets }, hours(50)).map(drop)
     };
     assert_eq!(curve(48, 24), Ok(()), "of hours");
-    let period = Period { name: "period".into(), from: hours(0), to: hours(48) };
+    let period = Period::free(hours(0), hours(48));
     let report = store.answer(&Query::Report { period }, hours(50));
     assert!(matches!(report, Err(HistoryError::TooManyRows { .. })), "its record is of samples");
     let refused = curve(20, 4_000).unwrap_err();

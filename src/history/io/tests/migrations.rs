@@ -83,7 +83,7 @@ fn answers(db: &Path) -> Vec<Answer> {
     assert_eq!(opened.trouble, None);
     let (store, from, to) = (opened.store, sec(0), sec(90));
     store.end_curves_left_behind(sec(100)).unwrap();
-    let period = Period { name: "period".into(), from, to };
+    let period = Period::free(from, to);
     let queries = [
         Query::Series { tags: vec![PV, SV], from, to, buckets: 9 },
         Query::Values { tags: vec![PV, SV], from, every: Duration::from_secs(10), count: 8 },

@@ -302,7 +302,7 @@ fn a_stop_ends_every_curve_and_a_run_answers_queries() {
     assert_eq!(handle.restored.take().unwrap().blocking_recv().unwrap().events, []);
     handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmEvent::Raised))]).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
-    let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
+    let period = Period::free(sec(0), sec(10));
     handle.queries.blocking_send((1, QueryRequest { query: Query::Report { period }, reply })).unwrap();
     let Ok(Ok(Answer::Report(report))) = answer.blocking_recv() else { panic!("no report") };
     assert_eq!(report.tags[0].last, Some(27.0));

@@ -59,7 +59,7 @@ proptest! {
         };
         prop_assert_eq!(store.answer(&query, until), Ok(Answer::Series(tags.map(curve).to_vec())));
         if from < until {
-            let period = Period { name: "period".into(), from, to };
+            let period = Period::free(from, to);
             let Ok(Answer::Report(report)) = store.answer(&Query::Report { period }, until) else { panic!("no report") };
             for (place, row) in report.tags.iter().enumerate() {
                 let figures = figures_of(samples(TagId(place as u16), from).filter(|s| s.at < until), from, until);
@@ -100,7 +100,7 @@ fn a_damaged_block_costs_the_period_of_its_rows_and_is_named() {
     drop(file);
     let handle = thread::start(&db, def(), Clock::starting_at(sec(rows), 1.0)).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
-    let period = Period { name: "period".into(), from: sec(0), to: sec(rows) };
+    let period = Period::free(sec(0), sec(rows));
     handle.queries.blocking_send((1, QueryRequest { query: Query::Report { period }, reply })).unwrap();
     let answer = answer.blocking_recv().unwrap();
     let Ok(Answer::Report(report)) = answer else { panic!("{answer:?}") };

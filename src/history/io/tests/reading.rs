@@ -178,7 +178,7 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
     reader.stores.send(Some(open(&db, 0))).await.unwrap();
     for answers in [true, false] {
         let (reply, mut answer) = oneshot::channel();
-        let period = Period { name: "period".into(), from: sec(0), to: sec(10) };
+        let period = Period::free(sec(0), sec(10));
         reader.queries.send((1, QueryRequest { query: Query::Report { period }, reply })).await.unwrap();
         let Some(Request::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
         assert!(answer.try_recv().is_err(), "answered before the commit");
@@ -308,7 +308,7 @@ fn the_longest_lists_fit_in_the_engines_memory() {
     );
     store.db.execute_batch(&rows).unwrap();
     let (from, to) = (sec(0), sec(8 * 3_600));
-    let period = Period { name: "period".into(), from, to };
+    let period = Period::free(from, to);
     let Ok(Answer::Report(report)) = store.answer(&Query::Report { period }, to) else { panic!("no report") };
     assert_eq!((report.alarms.len() as u64, report.actions.len() as u64), (ROWS_MAX, ROWS_MAX));
     let lists = [

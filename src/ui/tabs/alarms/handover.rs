@@ -79,7 +79,7 @@ impl Handover {
         let (width, height) = (canvas.width(), canvas.height());
         let x = canvas.text(1, 0, t!("Handover  "), theme.strong());
         let x = match self.period(cx) {
-            Some(shown) => canvas.text(x, 0, &span::words(cx, &shown), theme.normal()),
+            Some(shown) => canvas.text(x, 0, &period::words(cx, &shown), theme.normal()),
             None => x,
         };
         match &self.actions.trouble {

@@ -95,7 +95,7 @@ impl Journal {
         let rows = self.rows(cx);
         let (alarms, actions) = self.records();
         let all = alarms.len() + actions.len();
-        let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| span::words(cx, period));
+        let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| period::words(cx, period));
         let mut what = vec![period];
         if !self.words.is_empty() {
             what.push(t!("\"{typed}\": {count} of {all}, / changes it", typed = self.typed(), count = rows.len(), all));

@@ -67,7 +67,7 @@ impl Metrics {
         canvas.text(x, 0, &words, if flood { theme.trouble() } else { theme.normal() });
         let what = match &self.period {
             None => t!("last 24 hours").to_owned(),
-            Some(period) => span::words(cx, period),
+            Some(period) => period::words(cx, period),
         };
         let count = self.figures(cx).map(|figures| match figures.annunciated() {
             1 => t!(": 1 alarm{quiet}", quiet = alarm_metrics::quiet(figures)),

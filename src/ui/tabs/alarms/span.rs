@@ -19,12 +19,3 @@ pub fn ask(
     let every = real(cx, if past { 20.0 * seconds } else { seconds });
     periodic.ask(cx, (Tab::Alarms, number), every, real(cx, TIMEOUT_S), query)
 }
-
-/// `morning 2026-11-21 06:00–14:00`; a period without a name of its own has its times in it already.
-pub fn words(cx: &ViewContext, shown: &Period) -> String {
-    let local = |at| draw::local(cx, at, "%H:%M");
-    match shown.name.contains(':') {
-        true => shown.name.clone(),
-        false => format!("{} {}–{}", shown.name, local(shown.from), local(shown.to)),
-    }
-}

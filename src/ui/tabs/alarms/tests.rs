@@ -210,7 +210,7 @@ fn the_meter_is_shown_with_target_limit_and_verdict() {
     let past = PeriodMetrics { by_priority: [0, 0, 0, 7], ..figures() };
     update(&mut model, Msg::Answer(*id, Ok(Answer::AlarmMetrics(Box::new(past)))));
     assert!(
-        screen(&mut model, 80, 24).contains("morning 2026-11-21 06:00–14:00: 7 alarms"),
+        screen(&mut model, 80, 24).contains("morning 2026-11-21 06:00 – 14:00 +07: 7 alarms"),
         "{}",
         screen(&mut model, 80, 24)
     );

@@ -1,11 +1,11 @@
 //! Which period a report is of: the shifts of the plant, days where it has none, or a typed period; pure.
 
-use jiff::{ToSpan, civil};
+use jiff::{ToSpan, civil, tz::TimeZone};
 
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::def::PlantDef,
-    report::{Period, period_parser, shift},
+    report::{Period, PeriodName, period_parser, shift},
 };
 
 /// The longest free period: five years.
@@ -19,7 +19,44 @@ pub fn at(def: &PlantDef, at: Timestamp) -> Option<Period> {
         return shift::shift_at(def, at);
     }
     let date = at.to_zoned(def.time_zone.clone()).date();
-    Some(Period { name: t!("day {date}", date), from: midnight(def, date)?, to: midnight(def, date.tomorrow().ok()?)? })
+    Some(Period { name: PeriodName::Day(date), from: midnight(def, date)?, to: midnight(def, date.tomorrow().ok()?)? })
+}
+
+/// The name of a period as it stands on a screen.
+pub fn label(name: &PeriodName) -> String {
+    match name {
+        PeriodName::Free => t!("period").to_owned(),
+        PeriodName::Day(date) => t!("day {date}", date),
+        PeriodName::Shift { .. } | PeriodName::Batch(_) => name.to_string(),
+    }
+}
+
+/// `22:00 – 11-21 06:00 +07`; dates only where the name of the period does not have them.
+pub fn span(period: &Period, zone: &TimeZone) -> String {
+    let (from, to) = (period.from.to_zoned(zone.clone()), period.to.to_zoned(zone.clone()));
+    let form = if from.date() == to.date() { "%H:%M" } else { "%m-%d %H:%M" };
+    let named = period.name.date() == Some(from.date());
+    let start = from.strftime(if named { "%H:%M" } else { "%Y-%m-%d %H:%M" });
+    let offset = |at: &jiff::Zoned| {
+        let (seconds, sign) = (at.offset().seconds(), if at.offset().is_negative() { '-' } else { '+' });
+        let minutes = seconds.abs() / 60 % 60;
+        let hours = format!("{sign}{:02}", seconds.abs() / 3_600);
+        if minutes == 0 { hours } else { format!("{hours}:{minutes:02}") }
+    };
+    // Where the clocks change in between, both ends show their offset.
+    let first = if from.offset() == to.offset() { String::new() } else { format!(" {}", offset(&from)) };
+    format!("{start}{first} – {} {}", to.strftime(form), offset(&to))
+}
+
+/// `morning 2026-11-21 06:00 – 14:00 +07`; a free period has its times only.
+pub fn words(cx: &ViewContext, period: &Period) -> String {
+    let span = span(period, &cx.def().time_zone);
+    match period.name {
+        PeriodName::Free => span,
+        PeriodName::Shift { .. } | PeriodName::Day(_) | PeriodName::Batch(_) => {
+            format!("{} {span}", label(&period.name))
+        }
+    }
 }
 
 /// The shift or day before a period.
@@ -127,10 +164,9 @@ fn midnight(def: &PlantDef, date: civil::Date) -> Option<Timestamp> {
 #[cfg(test)]
 mod tests {
     use crate::report::FORMATS;
-    use jiff::tz::TimeZone;
 
     use super::*;
-    use crate::ui::fixture::{Fixture, now};
+    use crate::ui::fixture::{Fixture, now, with_cx};
 
     fn words(def: &PlantDef, period: &Period) -> String {
         let local = |at: Timestamp| at.to_zoned(def.time_zone.clone()).strftime("%m-%d %H:%M").to_string();
@@ -185,7 +221,19 @@ mod tests {
         def.time_zone = TimeZone::get("Europe/Berlin").expect("a zone");
         let summer_ends = at(&def, "2026-10-25T12:00:00Z".parse().expect("a time")).expect("a day");
         assert_eq!(summer_ends.to.duration_since(summer_ends.from), SignedDuration::from_hours(25));
-        assert_eq!(before(&def, &summer_ends).map(|day| day.name).as_deref(), Some("day 2026-10-24"));
+        assert_eq!(before(&def, &summer_ends).map(|day| day.name.to_string()).as_deref(), Some("day 2026-10-24"));
+    }
+
+    #[test]
+    fn a_free_period_is_called_by_its_dates() {
+        let fixture = Fixture::normal();
+        let check = |text: &str, expect: &str| {
+            let period = typed(&fixture.def, text, now()).expect("a period");
+            with_cx(&fixture.snapshot(), |cx| assert_eq!(super::words(cx, &period), expect, "{text}"));
+        };
+        check("2026-11-18..2026-11-20", "2026-11-18 00:00 – 11-21 00:00 +07");
+        check("2026-11-20 22:00-06:00", "2026-11-20 22:00 – 11-21 06:00 +07");
+        check("night@2026-11-19", "night 2026-11-19 22:00 – 11-20 06:00 +07");
     }
 
     #[test]

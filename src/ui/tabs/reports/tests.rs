@@ -176,7 +176,7 @@ fn batches() -> Vec<BatchReport> {
         let to = end.map(|end| from + SignedDuration::from_mins(end));
         let batch = Batch { name: "hot-water".into(), number, from, to, seen, lasted: minutes(21), phases, unknown };
         let until = to.unwrap_or(now());
-        let tags = report(Period { name: String::new(), from, to: until }, true).tags[..1].to_vec();
+        let tags = report(Period::free(from, until), true).tags[..1].to_vec();
         BatchReport {
             tags,
             energy: Some((0.263, 1.0)),

@@ -2,7 +2,6 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use jiff::tz::TimeZone;
 use ratatui::text::{Line, Span};
 
 use super::{Export, Reports};
@@ -51,8 +50,8 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
 fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut Canvas) {
     let (theme, zone) = (cx.theme, &cx.def().time_zone);
     let x = canvas.text(1, 0, theme.pick("▸ ", "> "), theme.dim());
-    let x = canvas.text(x, 0, &period.name, theme.strong());
-    let x = canvas.text(x + 3, 0, &span(period, zone), theme.normal());
+    let x = canvas.text(x, 0, &period::label(&period.name), theme.strong());
+    let x = canvas.text(x + 3, 0, &period::span(period, zone), theme.normal());
     let running = reports.is_running(cx.now);
     let until = reports.report.value.as_ref().map_or(cx.now, |report| report.until);
     let state = match (running, &reports.report.value) {
@@ -272,23 +271,6 @@ fn action_line(cx: &ViewContext, action: &ActionRecord, time: String) -> Line<'s
         Span::styled(text, cx.theme.normal()),
         Span::styled(format!("  {outcome}"), cx.theme.strong()),
     ])
-}
-
-/// `22:00 – 11-21 06:00 +07`; dates only where the name of the period does not have them.
-fn span(period: &Period, zone: &TimeZone) -> String {
-    let (from, to) = (period.from.to_zoned(zone.clone()), period.to.to_zoned(zone.clone()));
-    let form = if from.date() == to.date() { "%H:%M" } else { "%m-%d %H:%M" };
-    let named = period.name.contains(&from.date().to_string());
-    let start = from.strftime(if named { "%H:%M" } else { "%Y-%m-%d %H:%M" });
-    let offset = |at: &jiff::Zoned| {
-        let (seconds, sign) = (at.offset().seconds(), if at.offset().is_negative() { '-' } else { '+' });
-        let minutes = seconds.abs() / 60 % 60;
-        let hours = format!("{sign}{:02}", seconds.abs() / 3_600);
-        if minutes == 0 { hours } else { format!("{hours}:{minutes:02}") }
-    };
-    // Where the clocks change in between, both ends show their offset.
-    let first = if from.offset() == to.offset() { String::new() } else { format!(" {}", offset(&from)) };
-    format!("{start}{first} – {} {}", to.strftime(form), offset(&to))
 }
 
 /// Hours, minutes, seconds: `00:00:41`.

@@ -156,7 +156,7 @@ impl Audit {
         let room = columns.saturating_sub(x + 1);
         match &self.rows.trouble {
             Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
-            None => canvas.text(x, 0, &fit(&self.summary(), room), theme.normal()),
+            None => canvas.text(x, 0, &fit(&self.summary(cx), room), theme.normal()),
         };
         let names = [t!("no"), t!("time"), t!("who"), t!("from"), t!("action"), t!("target")];
         let names = draw::columns(widths(columns), names);
@@ -174,8 +174,8 @@ impl Audit {
     }
 
     /// `last 7 days   by anna   more than 1000: choose a time`.
-    fn summary(&self) -> String {
-        let time = self.period.as_ref().map_or(t!("last 7 days").to_owned(), |period| period.name.clone());
+    fn summary(&self, cx: &ViewContext) -> String {
+        let time = self.period.as_ref().map_or(t!("last 7 days").to_owned(), |period| period::words(cx, period));
         let part = |name: &str, text: &str| (!text.is_empty()).then(|| format!("{name} \"{text}\""));
         let parts = [part(t!("by"), &self.who), part(t!("action"), &self.action), part(t!("with"), &self.words)];
         let count = match self.rows().len() {
