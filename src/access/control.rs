@@ -30,14 +30,14 @@ use super::{
     LoggedInUser, Secret, SessionRequest,
     lockout::LoginAttempts,
     right,
-    user::{Change, Users},
+    user::{UserChange, Users},
 };
 use crate::{
     history::Query,
     plant::{PlantDef, command::CommandStatus, record::ActionRecord, role::Role},
 };
 
-pub use jobs::{JobId, Outcome, PasswordJob};
+pub use jobs::{JobId, JobOutcome, PasswordJob};
 
 /// Said where a terminal asks more than it may.
 const TOO_MANY: &str = "too many requests from this terminal, wait a moment";
@@ -118,7 +118,7 @@ pub struct AccessControl {
     last_job: JobId,
     saving: Option<Saving>,
     /// A change that waits until last logins are written.
-    next: Option<(Asker, Change)>,
+    next: Option<(Asker, UserChange)>,
     /// A last login is not saved yet.
     unsaved: bool,
     /// The entries of backups that are being written.

@@ -37,7 +37,7 @@ pub struct Users {
 
 /// A change of who may what.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Change {
+pub enum UserChange {
     /// The first Supervisor, only while no users exist.
     First {
         /// Name.
@@ -71,35 +71,37 @@ pub enum Change {
     },
 }
 
-impl Change {
+impl UserChange {
     /// Whom it is about.
     pub fn user(&self) -> &Arc<str> {
         match self {
-            Change::First { user, .. }
-            | Change::Add { user, .. }
-            | Change::Role(user, _)
-            | Change::Disable(user, _)
-            | Change::Delete(user)
-            | Change::Password { user, .. } => user,
+            UserChange::First { user, .. }
+            | UserChange::Add { user, .. }
+            | UserChange::Role(user, _)
+            | UserChange::Disable(user, _)
+            | UserChange::Delete(user)
+            | UserChange::Password { user, .. } => user,
         }
     }
 
     /// What it is called in the audit log.
     pub fn action(&self) -> &'static str {
         match self {
-            Change::First { .. } | Change::Add { .. } => "add user",
-            Change::Role(..) => "set role",
-            Change::Disable(_, true) => "disable user",
-            Change::Disable(_, false) => "enable user",
-            Change::Delete(_) => "delete user",
-            Change::Password { must_change: true, .. } => "reset password",
-            Change::Password { must_change: false, .. } => "change password",
+            UserChange::First { .. } | UserChange::Add { .. } => "add user",
+            UserChange::Role(..) => "set role",
+            UserChange::Disable(_, true) => "disable user",
+            UserChange::Disable(_, false) => "enable user",
+            UserChange::Delete(_) => "delete user",
+            UserChange::Password { must_change: true, .. } => "reset password",
+            UserChange::Password { must_change: false, .. } => "change password",
         }
     }
 
     /// With this hash of the password, where it sets one.
-    pub fn with_hash(mut self, new: Arc<str>) -> Change {
-        if let Change::First { hash, .. } | Change::Add { hash, .. } | Change::Password { hash, .. } = &mut self {
+    pub fn with_hash(mut self, new: Arc<str>) -> UserChange {
+        if let UserChange::First { hash, .. } | UserChange::Add { hash, .. } | UserChange::Password { hash, .. } =
+            &mut self
+        {
             *hash = new;
         }
         self
@@ -153,13 +155,13 @@ impl Users {
     }
 
     /// The users after a change. `Err`: why the change is not permitted, for the operator.
-    pub fn with(&self, change: &Change) -> Result<Users, String> {
+    pub fn with(&self, change: &UserChange) -> Result<Users, String> {
         let mut users = self.clone();
         users.change(change)?;
         if users.has_supervisor() { Ok(users) } else { Err(NO_SUPERVISOR.to_owned()) }
     }
 
-    fn change(&mut self, change: &Change) -> Result<(), String> {
+    fn change(&mut self, change: &UserChange) -> Result<(), String> {
         let new = |user: &Arc<str>, role, hash: &Arc<str>, must_change| User {
             name: one_form(user).into(),
             role,
@@ -168,19 +170,19 @@ impl Users {
             must_change,
             last_login: None,
         };
-        if let Change::First { .. } | Change::Add { .. } = change {
+        if let UserChange::First { .. } | UserChange::Add { .. } = change {
             self.check_new(change.user())?;
         }
         let place = self.place(change.user());
         let place = place.ok_or_else(|| format!("there is no user {}", change.user()));
         match change {
-            Change::First { .. } if !self.list.is_empty() => return Err("users already exist".to_owned()),
-            Change::First { user, hash } => self.list.push(new(user, Role::Supervisor, hash, false)),
-            Change::Add { user, role, hash } => self.list.push(new(user, *role, hash, true)),
-            Change::Role(_, role) => self.list[place?].role = *role,
-            Change::Disable(_, disabled) => self.list[place?].disabled = *disabled,
-            Change::Delete(_) => drop(self.list.remove(place?)),
-            Change::Password { hash, must_change, .. } => {
+            UserChange::First { .. } if !self.list.is_empty() => return Err("users already exist".to_owned()),
+            UserChange::First { user, hash } => self.list.push(new(user, Role::Supervisor, hash, false)),
+            UserChange::Add { user, role, hash } => self.list.push(new(user, *role, hash, true)),
+            UserChange::Role(_, role) => self.list[place?].role = *role,
+            UserChange::Disable(_, disabled) => self.list[place?].disabled = *disabled,
+            UserChange::Delete(_) => drop(self.list.remove(place?)),
+            UserChange::Password { hash, must_change, .. } => {
                 let user = &mut self.list[place?];
                 (user.hash, user.must_change) = (hash.clone(), *must_change);
             }
@@ -258,7 +260,7 @@ mod tests {
     use super::*;
 
     fn first() -> Users {
-        Users::default().with(&Change::First { user: "anna".into(), hash: "h".into() }).unwrap()
+        Users::default().with(&UserChange::First { user: "anna".into(), hash: "h".into() }).unwrap()
     }
 
     #[test]
@@ -270,32 +272,38 @@ mod tests {
         for name in ["", " ", "a b", "a/b", "a\n", "a\u{202e}b", "аnna", "ann\u{3b1}", &"x".repeat(33)] {
             assert!(check_name(name).is_err(), "{name:?}");
         }
-        let again = first().with(&Change::Add { user: "ANNA".into(), role: Role::Viewer, hash: "h".into() });
+        let again = first().with(&UserChange::Add { user: "ANNA".into(), role: Role::Viewer, hash: "h".into() });
         assert_eq!(again.unwrap_err(), "user ANNA already exists");
     }
 
     #[test]
     fn the_last_supervisor_always_remains() {
         let anna: Arc<str> = "anna".into();
-        for change in
-            [Change::Delete(anna.clone()), Change::Disable(anna.clone(), true), Change::Role(anna, Role::Technician)]
-        {
+        for change in [
+            UserChange::Delete(anna.clone()),
+            UserChange::Disable(anna.clone(), true),
+            UserChange::Role(anna, Role::Technician),
+        ] {
             assert_eq!(first().with(&change).unwrap_err(), NO_SUPERVISOR, "{change:?}");
         }
-        assert!(first().with(&Change::First { user: "bert".into(), hash: "h".into() }).is_err());
+        assert!(first().with(&UserChange::First { user: "bert".into(), hash: "h".into() }).is_err());
     }
 
-    fn change() -> impl Strategy<Value = Change> {
+    fn change() -> impl Strategy<Value = UserChange> {
         let user = prop::sample::select(vec!["anna", "bert", "cleo", "dora"]).prop_map(Arc::<str>::from);
         let role = prop::sample::select(Role::ALL.to_vec());
         let hash: Arc<str> = "h".into();
         let other = hash.clone();
         prop_oneof![
-            (user.clone(), role.clone()).prop_map(move |(user, role)| Change::Add { user, role, hash: hash.clone() }),
-            (user.clone(), role).prop_map(|(user, role)| Change::Role(user, role)),
-            (user.clone(), any::<bool>()).prop_map(|(user, disabled)| Change::Disable(user, disabled)),
-            user.clone().prop_map(Change::Delete),
-            user.prop_map(move |user| Change::Password { user, hash: other.clone(), must_change: true }),
+            (user.clone(), role.clone()).prop_map(move |(user, role)| UserChange::Add {
+                user,
+                role,
+                hash: hash.clone()
+            }),
+            (user.clone(), role).prop_map(|(user, role)| UserChange::Role(user, role)),
+            (user.clone(), any::<bool>()).prop_map(|(user, disabled)| UserChange::Disable(user, disabled)),
+            user.clone().prop_map(UserChange::Delete),
+            user.prop_map(move |user| UserChange::Password { user, hash: other.clone(), must_change: true }),
         ]
     }
 

@@ -11,7 +11,7 @@ use super::{
     schedule::{Demand, FACTOR_MAX, WRITE_SHARE},
 };
 use crate::plant::{
-    admission::{Admission, DeadDevice, OverloadInterval, PollWords, Verdict, Warning},
+    admission::{Admission, DeadDevice, OverloadInterval, PollWords, Schedulability, Warning},
     def::{DeviceId, Framing, LineDef, LineId, Parity, PlantDef, Transport},
     tag::{Poll, PollClass},
 };
@@ -126,7 +126,7 @@ pub fn admit_as(def: &PlantDef, line: &LineDef, blocks: &[Block]) -> Admission {
     Admission {
         line: line.id,
         utilisation,
-        verdict: judge(&all, None),
+        schedulability: judge(&all, None),
         critical: judge(&critical, None),
         factor: factor(&loads),
         cycle: loads.iter().map(|load| load.words.cost).sum(),
@@ -161,14 +161,14 @@ fn load_of(loads: &[&Load]) -> f64 {
 }
 
 /// The test in microseconds (costs rounded up), in words. `extra` is one more task, such as the probes of a dead device.
-fn judge(loads: &[&Load], extra: Option<&PollWords>) -> Verdict {
+fn judge(loads: &[&Load], extra: Option<&PollWords>) -> Schedulability {
     let polls: Vec<&PollWords> = loads.iter().map(|load| &load.words).chain(extra).collect();
     let micros = |span: Duration| u64::try_from(span.as_nanos().div_ceil(1000)).unwrap_or(u64::MAX);
     let tasks: Vec<Task> =
         polls.iter().map(|poll| Task { cost: micros(poll.cost), period: micros(poll.period) }).collect();
     match test(&tasks) {
-        Test::Accept => Verdict::Fits,
-        Test::TooMuch => Verdict::TooMuch { utilisation: utilisation(&tasks) },
+        Test::Accept => Schedulability::Fits,
+        Test::TooMuch => Schedulability::TooMuch { utilisation: utilisation(&tasks) },
         Test::OverloadInterval { length, demand, blocker } => {
             let span = Duration::from_micros(length);
             let mut due: Vec<PollWords> =
@@ -177,7 +177,7 @@ fn judge(loads: &[&Load], extra: Option<&PollWords>) -> Verdict {
             let more = due.len().saturating_sub(NAMED_MAX);
             due.truncate(NAMED_MAX);
             let (demand, blocker) = (Duration::from_micros(demand), polls[blocker].clone());
-            Verdict::Blocked(OverloadInterval { span, demand, blocker, due, more })
+            Schedulability::Blocked(OverloadInterval { span, demand, blocker, due, more })
         }
     }
 }
@@ -205,7 +205,7 @@ fn dead(def: &PlantDef, line: &LineDef, blocks: &[Block], loads: &[Load]) -> Vec
             name: device.name.clone(),
             probe,
             utilisation: load_of(&others) + probe.as_secs_f64() / PROBE_EVERY.as_secs_f64(),
-            verdict: judge(&others, Some(&words)),
+            schedulability: judge(&others, Some(&words)),
         }
     });
     dead.collect()

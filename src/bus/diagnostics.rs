@@ -240,12 +240,12 @@ impl Job {
                 return;
             }
         };
-        self.found(Finding::Verdict(summary));
+        self.found(Finding::Conclusion(summary));
     }
 
     /// Keeps a finding; the last place is for what is concluded from all of them.
     fn found(&mut self, finding: Finding) {
-        let room = if matches!(finding, Finding::Verdict(_)) { FINDINGS_MAX } else { FINDINGS_MAX - 1 };
+        let room = if matches!(finding, Finding::Conclusion(_)) { FINDINGS_MAX } else { FINDINGS_MAX - 1 };
         if self.run.findings.len() < room {
             self.run.findings.push(finding);
         }

@@ -12,7 +12,7 @@ use crate::plant::{
 
 /// The part of an answer that is one tag's.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct TagBytes {
     /// Its place in the answer as it was on the wire (characters of an ASCII frame). A bit has its whole byte.
     pub range: Range<usize>,
     /// Its words as they came; of a bit: 0 or 1.
@@ -22,7 +22,7 @@ pub struct Found {
 }
 
 /// Looks a tag up in an exchange; `None` if the answer does not hold it.
-pub fn find(point: Point, exchange: &Exchange) -> Option<Found> {
+pub fn find(point: Point, exchange: &Exchange) -> Option<TagBytes> {
     match exchange.outcome {
         Ok(()) | Err(Fault::NotANumber) => {}
         Err(_) => return None,
@@ -57,7 +57,7 @@ pub fn find(point: Point, exchange: &Exchange) -> Option<Found> {
         Framing::Ascii => (1, 2),
         Framing::Mbap => (6, 1),
     };
-    Some(Found { range: start + step * first..start + step * (first + bytes), words, raw })
+    Some(TagBytes { range: start + step * first..start + step * (first + bytes), words, raw })
 }
 
 /// What a technician does about a fault, most likely first.

@@ -1,7 +1,7 @@
 //! `sightglass` and `sightglass attach`: a terminal at a running station. Leaving it stops nothing.
 
 use crate::{
-    attach::io::{connect::connect, find::Found},
+    attach::io::{connect::connect, find::FoundStation},
     ui,
 };
 
@@ -21,7 +21,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 }
 
 /// The same, where the station is known.
-pub async fn attach_to(station: &Found) -> Result<(), CliError> {
+pub async fn attach_to(station: &FoundStation) -> Result<(), CliError> {
     let session = connect(&station.path).await.map_err(|error| CliError::Failed(error.to_string()))?;
     Ok(ui::io::run(session, ui::io::Options::new(ui::Leaving::Terminal)).await?)
 }

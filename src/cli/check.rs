@@ -96,10 +96,10 @@ fn block_words(def: &PlantDef, line: &LineDef, block: &Block) -> String {
     text.trim_end().to_owned()
 }
 
-/// The verdict, and what will happen if it is not good.
+/// The schedulability, and what will happen if it is not good.
 fn verdict_words(admission: &Admission) -> Vec<String> {
-    let mut text = vec![format!("  {}", admission.verdict)];
-    if admission.verdict.fits() {
+    let mut text = vec![format!("  {}", admission.schedulability)];
+    if admission.schedulability.fits() {
         return text;
     }
     let consequence = match (admission.factor, admission.critical.fits()) {
@@ -118,7 +118,10 @@ fn verdict_words(admission: &Admission) -> Vec<String> {
 fn dead_words(dead: &DeadDevice) -> String {
     let probe = dead.probe.as_secs_f64() * 1e3;
     let load = dead.utilisation * 100.0;
-    format!("  with {} dead: a probe of {probe:.1} ms each 30 s, utilisation {load:.1} %, {}", dead.name, dead.verdict)
+    format!(
+        "  with {} dead: a probe of {probe:.1} ms each 30 s, utilisation {load:.1} %, {}",
+        dead.name, dead.schedulability
+    )
 }
 
 #[cfg(test)]

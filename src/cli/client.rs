@@ -45,7 +45,7 @@ pub struct ActionArgs {
 }
 
 /// The station of a plant, or of the only one that runs here.
-pub async fn find_station(plant: Option<&str>) -> Result<find::Found, CliError> {
+pub async fn find_station(plant: Option<&str>) -> Result<find::FoundStation, CliError> {
     let mut running = find::SocketFolders::here().living().await;
     if let Some(plant) = plant {
         let name = std::path::Path::new(plant).file_stem().map_or(plant.into(), |stem| stem.to_string_lossy());

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::{
     access::{Durability, SessionRequest},
-    attach::io::find::{self, Found},
+    attach::io::find::{self, FoundStation},
 };
 
 use super::{CliError, client, in_runtime, say};
@@ -43,7 +43,7 @@ pub fn stop(args: Args) -> Result<(), CliError> {
 }
 
 /// Waits until the station has closed its socket: then the last record is on disk.
-async fn gone(station: &Found) -> Result<(), CliError> {
+async fn gone(station: &FoundStation) -> Result<(), CliError> {
     let end = tokio::time::Instant::now() + END_MAX;
     while find::SocketFolders::here().living().await.contains(station) {
         if end < tokio::time::Instant::now() {

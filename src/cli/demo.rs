@@ -14,7 +14,7 @@ use crate::{
     sim::{
         self,
         drill::SimCommand,
-        scenario::{Scenario, judge::Verdict},
+        scenario::{Scenario, judge::DrillResult},
     },
     station::{Session, io as station},
     ui::{
@@ -130,7 +130,7 @@ async fn demonstrate(
 }
 
 /// Prints the verdict of a drill. Without a terminal one that was not passed is a failure.
-fn close_drill(verdict: &Verdict, headless: bool) -> Result<(), CliError> {
+fn close_drill(verdict: &DrillResult, headless: bool) -> Result<(), CliError> {
     drill::say_verdict(verdict);
     if headless && !(verdict.over && verdict.passed()) {
         return Err(CliError::Failed("the drill was not passed".into()));

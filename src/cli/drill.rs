@@ -13,7 +13,7 @@ use crate::{
         io::{SimulatorHandle, Trainer, in_memory, journal},
         scenario::{
             Scenario, Start,
-            judge::{Verdict, clock},
+            judge::{DrillResult, clock},
             read,
         },
         simulator::Simulator,
@@ -70,7 +70,7 @@ pub fn simulator(def: &PlantDef, scenario: Option<&Scenario>) -> Result<Simulato
 }
 
 /// Prints a table of what was expected and what came of it.
-pub fn say_verdict(verdict: &Verdict) {
+pub fn say_verdict(verdict: &DrillResult) {
     say("");
     say(&verdict.title);
     verdict.lines().iter().for_each(|line| say(line));
@@ -94,7 +94,7 @@ fn run_drill(
     def: Arc<PlantDef>,
     with_operator: bool,
     print: impl Fn(&str),
-) -> Result<Verdict, CliError> {
+) -> Result<DrillResult, CliError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_time()
         .start_paused(true)
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
     use crate::sim::faults::{FaultTarget, InjectedFault, available_faults};
 
-    fn drill(name: &str, with_operator: bool) -> (Verdict, Vec<String>) {
+    fn drill(name: &str, with_operator: bool) -> (DrillResult, Vec<String>) {
         let printed = std::cell::RefCell::new(Vec::new());
         let (scenario, def) = read::load(Path::new(name), &Search::shipped()).expect("a shipped scenario");
         let verdict =
@@ -185,7 +185,7 @@ mod tests {
     }
 
     /// A drill of this fault in this target from 0:40 to 2:40, with more to expect.
-    fn drill_of(target: &str, fault: &str, more: &str) -> (Verdict, Vec<String>) {
+    fn drill_of(target: &str, fault: &str, more: &str) -> (DrillResult, Vec<String>) {
         let text = format!(
             "title = 't'\nplant = 'tank'\nduration = '4m'\n[[event]]\nat = '40s'\nfor = '2m'\nfault = '{fault}'\n{target}\n{more}"
         );

@@ -1,6 +1,6 @@
 //! `sightglass experiments`: the six experiments of the thesis on the simulated rig, beside what the thesis measured.
 
-use crate::sim::experiment::{self, Experiment, Outcome, THESIS};
+use crate::sim::experiment::{self, Experiment, Milestones, THESIS};
 
 use super::{CliError, say};
 
@@ -25,7 +25,7 @@ pub struct Args {
 /// A row: what was asked, what the thesis measured, what came out here.
 struct Row {
     experiment: Experiment,
-    here: Outcome,
+    here: Milestones,
 }
 
 /// Runs all six and prints them.
@@ -143,7 +143,7 @@ the second. Their phase is fitted as the other constants are; with another one t
 and steady from, of fuzzy most of all, by minutes: that those fit is partly luck.
 The thesis gives one run of each; mains, room and cold water of the day are not in it, and are constant here.";
 
-fn order(rows: &[Row], outcome: impl Fn(&Row) -> Outcome) -> Vec<&str> {
+fn order(rows: &[Row], outcome: impl Fn(&Row) -> Milestones) -> Vec<&str> {
     let mut names: Vec<&Row> = rows.iter().collect();
     names.sort_by_key(|row| outcome(row).first_at_sv_s.unwrap_or(u32::MAX));
     names.into_iter().map(|row| row.experiment.control.name).collect()
@@ -153,7 +153,7 @@ fn order(rows: &[Row], outcome: impl Fn(&Row) -> Outcome) -> Vec<&str> {
 mod tests {
     use super::*;
 
-    fn rows(change: impl Fn(usize, &mut Outcome)) -> [Row; 6] {
+    fn rows(change: impl Fn(usize, &mut Milestones)) -> [Row; 6] {
         let mut number = 0;
         THESIS.map(|experiment| {
             let mut here = experiment.thesis;
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn the_table_says_what_misses_the_goal() {
-        let check = |change: fn(usize, &mut Outcome), expect: &str| {
+        let check = |change: fn(usize, &mut Milestones), expect: &str| {
             let lines = table(&rows(change)).join("\n");
             assert!(lines.contains(expect), "{lines}");
         };

@@ -235,7 +235,7 @@ fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
         | Finding::Values { .. }
         | Finding::Failed { .. }
         | Finding::Written(_)
-        | Finding::Verdict(_) => None,
+        | Finding::Conclusion(_) => None,
     })
 }
 
@@ -250,7 +250,7 @@ fn trace(run: &DiagnosticRun) -> Option<String> {
         | Finding::Object { .. }
         | Finding::Values { .. }
         | Finding::Written(_)
-        | Finding::Verdict(_) => None,
+        | Finding::Conclusion(_) => None,
     })
 }
 

@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     Bucket, Series,
-    tiers::{Part, Tier, floor},
+    tiers::{CurvePart, Tier, floor},
 };
 use crate::{
     plant::{def::TagId, sample::Sample},
@@ -68,14 +68,14 @@ impl Curve {
     /// The next sample.
     pub fn next(&mut self, sample: Sample) {
         if let Some(piece) = self.steps.next(sample) {
-            self.add(Part::Held(piece));
+            self.add(CurvePart::Held(piece));
         }
     }
 
     /// The curve, when the last sample has come.
     pub fn end(mut self) -> Series {
         if let Some(piece) = self.steps.clone().end() {
-            self.add(Part::Held(piece));
+            self.add(CurvePart::Held(piece));
         }
         let Curve { tag, from, columns, stats, whole, steps: _ } = self;
         let bucket =
@@ -91,14 +91,14 @@ impl Curve {
     }
 
     /// The next part: a value that stood, or an aggregate that lies in one column.
-    pub fn add(&mut self, part: Part) {
+    pub fn add(&mut self, part: CurvePart) {
         let Curve { columns, stats, whole, .. } = self;
         match part {
-            Part::Held(piece) => {
+            CurvePart::Held(piece) => {
                 IntervalStats::add(whole, piece);
                 columns.cut(piece, |column, part| IntervalStats::add(&mut stats[column], part));
             }
-            Part::Aggregate(aggregate) => {
+            CurvePart::Aggregate(aggregate) => {
                 let Ok(at) = Timestamp::from_microsecond(aggregate.at) else { return };
                 IntervalStats::add(whole, aggregate.stats);
                 IntervalStats::add(&mut stats[columns.column_of(at)], aggregate.stats);

@@ -103,7 +103,7 @@ impl Aggregate {
 
 /// A part of a curve: a value that stood, or what is kept of a minute or an hour.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Part {
+pub enum CurvePart {
     /// A good value, for as long as it stood.
     Held(HoldInterval),
     /// An aggregate.

@@ -1,4 +1,4 @@
-//! Whether the polls of a line can all meet their periods: the verdict, the interval that is overloaded, and warnings, as plain data.
+//! Whether the polls of a line can all meet their periods: the schedulability, the interval that is overloaded, and warnings, as plain data.
 
 use crate::t;
 use std::{fmt, time::Duration};
@@ -14,9 +14,9 @@ pub struct Admission {
     /// Share of the line's time that its periodic reads take, 0–1 and beyond.
     pub utilisation: f64,
     /// Can all polls meet their periods?
-    pub verdict: Verdict,
+    pub schedulability: Schedulability,
     /// Can those of the alarm inputs, if all others are left out?
-    pub critical: Verdict,
+    pub critical: Schedulability,
     /// By what the periods of process values grow where the line has too much to do; 1 is not at all. `None`: the critical
     /// polls leave nothing for them.
     pub factor: Option<f64>,
@@ -39,8 +39,8 @@ impl Admission {
         Admission {
             line,
             utilisation: 0.0,
-            verdict: Verdict::Fits,
-            critical: Verdict::Fits,
+            schedulability: Schedulability::Fits,
+            critical: Schedulability::Fits,
             factor: Some(1.0),
             cycle: Duration::ZERO,
             dead: Vec::new(),
@@ -51,7 +51,7 @@ impl Admission {
 
 /// Can the polls of a line meet their periods?
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Verdict {
+pub enum Schedulability {
     /// Each of them, always.
     Fits,
     /// They want more time than there is.
@@ -63,12 +63,12 @@ pub enum Verdict {
     Blocked(OverloadInterval),
 }
 
-impl Verdict {
+impl Schedulability {
     /// Do the polls fit?
     pub fn fits(&self) -> bool {
         match self {
-            Verdict::Fits => true,
-            Verdict::TooMuch { .. } | Verdict::Blocked(_) => false,
+            Schedulability::Fits => true,
+            Schedulability::TooMuch { .. } | Schedulability::Blocked(_) => false,
         }
     }
 }
@@ -109,7 +109,7 @@ pub struct DeadDevice {
     /// What its silence leaves of the line's time to the others: their reads and its probes, 0–1 and beyond.
     pub utilisation: f64,
     /// Can the polls of the others still meet their periods?
-    pub verdict: Verdict,
+    pub schedulability: Schedulability,
 }
 
 /// Something that works, or seems to, and is better otherwise.
@@ -129,15 +129,15 @@ pub enum Warning {
 }
 
 /// `fits`, or what does not, in a sentence.
-impl fmt::Display for Verdict {
+impl fmt::Display for Schedulability {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Verdict::Fits => f.write_str(t!("every poll meets its period")),
-            Verdict::TooMuch { utilisation } => {
+            Schedulability::Fits => f.write_str(t!("every poll meets its period")),
+            Schedulability::TooMuch { utilisation } => {
                 let share = format!("{:.1}", utilisation * 100.0);
                 f.write_str(&t!("overloaded: the polls need {share} % of the line's time", share))
             }
-            Verdict::Blocked(overload) => overload.fmt(f),
+            Schedulability::Blocked(overload) => overload.fmt(f),
         }
     }
 }

@@ -288,5 +288,5 @@ pub enum Finding {
         fault: Fault,
     },
     /// A conclusion: `10 of 10 came back, 11.8 to 12.4 ms`.
-    Verdict(String),
+    Conclusion(String),
 }

@@ -16,7 +16,7 @@ use super::{
     visible::is_control_or_bidi,
 };
 
-pub(crate) use plan::{Change, Problem, plan};
+pub(crate) use plan::{PlannedChange, Problem, plan};
 
 /// The settings of a device under a name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     command::{CommandId, NotConfirmed, Outcome, Refusal},
     def::{DeviceId, PlantDef, TagId},
-    parameter_set::{Change, ParameterSet},
+    parameter_set::{ParameterSet, PlannedChange},
     sample::Sample,
     tag::{Poll, TagDef},
 };
@@ -27,7 +27,7 @@ pub struct RestoreRequest {
     /// The values.
     pub set: Arc<ParameterSet>,
     /// The confirmed changes, in order. If the device needs others by then, nothing is written.
-    pub changes: Vec<Change>,
+    pub changes: Vec<PlannedChange>,
 }
 
 /// A restore with its progress.
@@ -61,7 +61,7 @@ pub struct Restore {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// What.
-    pub change: Change,
+    pub change: PlannedChange,
     /// The command that writes it; `None` before its turn.
     pub command: Option<CommandId>,
     /// The outcome of the write; `None` before its end.
@@ -86,7 +86,7 @@ pub enum State {
 impl Restore {
     /// A restore that reads its device.
     pub fn new(id: CommandId, by: Arc<str>, request: &RestoreRequest, at: Timestamp) -> Restore {
-        let step = |change: &Change| Step { change: *change, command: None, outcome: None };
+        let step = |change: &PlannedChange| Step { change: *change, command: None, outcome: None };
         let steps = request.changes.iter().map(step).collect();
         Restore {
             id,

@@ -28,7 +28,7 @@ pub struct Tuning {
     /// When it was seen off again.
     pub ended: Option<Timestamp>,
     /// What it finds: tag, value before, value after (`None`: not read since, or not known).
-    pub found: Vec<Found>,
+    pub found: Vec<TunedParameter>,
     /// Where PV has turned, oldest first.
     pub extrema: Vec<Extremum>,
     /// Turns beyond those that are kept.
@@ -40,7 +40,7 @@ pub struct Tuning {
 
 /// A parameter that auto-tuning finds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Found {
+pub struct TunedParameter {
     pub tag: TagId,
     /// Before.
     pub old: Option<f64>,
@@ -127,7 +127,7 @@ impl TuningTracker {
 }
 
 fn begin(plate: &Faceplate, sample: &dyn Fn(TagId) -> Sample, span: Option<f64>, seen: bool, at: Timestamp) -> Tuning {
-    let found = plate.tunes.iter().map(|tag| Found { tag: *tag, old: sample(*tag).good_value(), new: None });
+    let found = plate.tunes.iter().map(|tag| TunedParameter { tag: *tag, old: sample(*tag).good_value(), new: None });
     let mut tuning = Tuning {
         began: at,
         seen,
@@ -238,7 +238,7 @@ mod tests {
         observe(&mut watch, 11, 69.0, Some(0.0), 1.2);
         let tuning = watch.tuning.expect("one has ended");
         assert!(tuning.seen && tuning.is_known());
-        assert_eq!(tuning.found, [Found { tag: P, old: Some(5.0), new: Some(1.2) }]);
+        assert_eq!(tuning.found, [TunedParameter { tag: P, old: Some(5.0), new: Some(1.2) }]);
         assert_eq!((tuning.elapsed(second(99)).as_secs(), tuning.period()), (9, Some(Duration::from_secs(3))));
     }
 

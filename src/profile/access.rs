@@ -4,7 +4,7 @@ use std::{ops::RangeInclusive, time::Duration};
 
 use super::{
     diagnostic::Problems,
-    reader::{Written, within},
+    reader::{OptionalKey, within},
     schema::AccessTable,
 };
 use crate::plant::role::{AccessDef, Role};

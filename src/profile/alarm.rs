@@ -8,7 +8,7 @@ use super::{
     diagnostic::Problems,
     expr,
     names::{Defs, Unique},
-    reader::{At, Written, text},
+    reader::{At, OptionalKey, text},
     schema::PlantFile,
 };
 use crate::plant::{

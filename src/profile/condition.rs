@@ -6,7 +6,7 @@ use super::{
     diagnostic::{Problems, Span},
     interlock::check_bit,
     names::{Defs, number_of},
-    reader::{At, Choice, Written, toml_tables},
+    reader::{At, Choice, OptionalKey, toml_tables},
     tag::range_of,
 };
 use crate::plant::{

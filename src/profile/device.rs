@@ -5,7 +5,7 @@ use std::{rc::Rc, time::Duration};
 use super::{
     diagnostic::{Problems, Span},
     names::{Names, Scope, Unique, check_number, held_number_of, number_of},
-    reader::{At, Node, Raw, Written, text},
+    reader::{At, Node, OptionalKey, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, SignatureTable},
     simulate::simulate,
     tag::Defined,

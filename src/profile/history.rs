@@ -2,7 +2,7 @@
 
 use super::{
     diagnostic::Problems,
-    reader::{At, Written, within},
+    reader::{At, OptionalKey, within},
     schema::HistoryTable,
 };
 use crate::plant::def::HistoryDef;

@@ -3,7 +3,7 @@
 use super::{
     diagnostic::Problems,
     names::{Defs, Unique, check_writable, held_number_of, number_of},
-    reader::{At, Written, text},
+    reader::{At, OptionalKey, text},
     schema::{ActuatorTable, InterlockTable, NeedTable, PlantFile, SequenceTable},
 };
 use crate::plant::{

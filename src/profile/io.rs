@@ -59,7 +59,7 @@ impl Search {
 }
 
 /// A plant file that was found.
-pub(super) struct Found {
+pub(super) struct FoundPlant {
     /// The stem of the file.
     pub name: String,
     /// Its text.
@@ -68,7 +68,7 @@ pub(super) struct Found {
     pub path: Option<PathBuf>,
 }
 
-impl Found {
+impl FoundPlant {
     /// The file on disk, to save settings into.
     pub fn file(&self) -> Option<PlantFile> {
         Some(PlantFile::new(self.path.as_deref()?, &self.text.bytes))
@@ -76,7 +76,7 @@ impl Found {
 }
 
 /// Reads the plant file that an argument means: a path, or the name of a plant.
-pub(super) fn plant(argument: &Path, search: &Search) -> Result<Found, Errors> {
+pub(super) fn plant(argument: &Path, search: &Search) -> Result<FoundPlant, Errors> {
     find(Kind::Plant, argument, search)
 }
 
@@ -85,7 +85,7 @@ pub(crate) fn scenario(argument: &Path, search: &Search) -> Result<(String, Text
     find(Kind::Scenario, argument, search).map(|found| (found.name, found.text))
 }
 
-fn find(kind: Kind, argument: &Path, search: &Search) -> Result<Found, Errors> {
+fn find(kind: Kind, argument: &Path, search: &Search) -> Result<FoundPlant, Errors> {
     let folder = folder_of(kind);
     let name = argument.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let by_name = argument.to_str().filter(|name| plain(name)).map(|name| format!("{name}.toml"));
@@ -95,14 +95,14 @@ fn find(kind: Kind, argument: &Path, search: &Search) -> Result<Found, Errors> {
         let file = path.display().to_string();
         let bytes =
             read(&path).map_err(|why| Errors::unreadable(format!("{file} cannot be read: {why}"), String::new()))?;
-        return Ok(Found { name, text: Text { file, bytes }, path: Some(path) });
+        return Ok(FoundPlant { name, text: Text { file, bytes }, path: Some(path) });
     }
     let inside = match &by_name {
         Some(file) => SHIPPED.get_file(format!("{folder}/{file}")),
         None => argument.strip_prefix("profiles").ok().and_then(|inside| SHIPPED.get_file(inside)),
     };
     match inside {
-        Some(file) => Ok(Found { name, text: shipped_text(file), path: None }),
+        Some(file) => Ok(FoundPlant { name, text: shipped_text(file), path: None }),
         None => Err(missing(kind, argument, &name, search)),
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Unique, check_name},
-    reader::{At, Node, Raw, Written, kind_of, text},
+    reader::{At, Node, OptionalKey, Raw, kind_of, text},
     schema::{SerialTable, TcpTable},
 };
 use crate::plant::{

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Defs, Unique, check_writable, number_of},
-    reader::{At, Raw, Written, kind_of, text, toml_tables},
+    reader::{At, OptionalKey, Raw, kind_of, text, toml_tables},
     schema::{CommandTable, MimicTable, TrendTable},
 };
 use crate::plant::{

@@ -88,7 +88,7 @@ impl NewPlant {
     fn write(&self, out: &mut String) -> std::fmt::Result {
         writeln!(
             out,
-            "# Written by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
+            "# OptionalKey by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
         )?;
         writeln!(out, "# `sightglass profiles` lists the device profiles, and README.md beside them every key.\n")?;
         writeln!(out, "title = {}", quoted(&self.title))?;

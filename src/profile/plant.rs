@@ -10,7 +10,7 @@ use super::{
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
     program, reader,
-    reader::{At, Node, Raw, Written, text},
+    reader::{At, Node, OptionalKey, Raw, text},
     report,
     schema::{DeviceTable, PlantFile, ProfileFile},
     sets,

@@ -321,12 +321,12 @@ pub(crate) fn within<T: PartialOrd + Debug + Copy>(
 }
 
 /// A key that may be left out.
-pub(crate) trait Written<T> {
+pub(crate) trait OptionalKey<T> {
     /// What is written, or else the usual value.
     fn value_or(self, usual: T) -> T;
 }
 
-impl<T> Written<T> for Option<At<T>> {
+impl<T> OptionalKey<T> for Option<At<T>> {
     fn value_or(self, usual: T) -> T {
         self.map_or(usual, |written| written.value)
     }

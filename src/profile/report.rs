@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use super::{
     diagnostic::Problems,
     names::{Defs, Unique},
-    reader::{At, Written},
+    reader::{At, OptionalKey},
     schema::{CsvTable, ReportTable, ShiftTable},
 };
 use crate::plant::def::{CsvDialect, ReportDef, ShiftDef};

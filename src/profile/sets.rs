@@ -2,7 +2,7 @@
 
 use super::{
     diagnostic::Problems,
-    reader::{At, Written},
+    reader::{At, OptionalKey},
 };
 use crate::plant::{
     def::DeviceDef,

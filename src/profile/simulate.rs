@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Scope, number_of},
-    reader::{At, Choice, Value, Written},
+    reader::{At, Choice, OptionalKey, Value},
     schema::{CheckTable, SimulateTable},
     tag::field_of,
 };

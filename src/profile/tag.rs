@@ -9,7 +9,7 @@ use super::{
     address::{check_modicon, locate},
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
-    reader::{At, Choice, Raw, Written, either, supersede, text},
+    reader::{At, Choice, OptionalKey, Raw, either, supersede, text},
     schema::{PollWord, Scheme, SimulateTable, TagTable},
     tag_keys::{check_calculated, check_text},
     units,

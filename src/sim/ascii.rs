@@ -1,6 +1,6 @@
 //! Modbus ASCII as a slave receives it: characters become requests.
 
-use super::wire::Request;
+use super::wire::SlaveRequest;
 use crate::bus::ascii::{self, FRAME_MAX};
 
 /// Collects characters and cuts whole requests with a right check out of them.
@@ -11,7 +11,7 @@ pub struct Receiver {
     /// From `:` on.
     frame: Vec<u8>,
     /// What is complete but not taken yet: `None` if it could not be read.
-    done: Vec<Option<Request>>,
+    done: Vec<Option<SlaveRequest>>,
 }
 
 impl Receiver {
@@ -33,7 +33,7 @@ impl Receiver {
                 b'\n' if self.frame.ends_with(b"\r") => {
                     self.frame.push(b'\n');
                     let message = ascii::open(&self.frame).ok();
-                    self.done.push(message.map(|message| Request { message, characters: self.frame.len() }));
+                    self.done.push(message.map(|message| SlaveRequest { message, characters: self.frame.len() }));
                     self.frame.clear();
                 }
                 _ if self.frame.len() >= FRAME_MAX => self.break_off(),
@@ -43,7 +43,7 @@ impl Receiver {
     }
 
     /// The next frame that ended: a request, or `None` in its place if it could not be read.
-    pub fn take(&mut self) -> Option<Option<Request>> {
+    pub fn take(&mut self) -> Option<Option<SlaveRequest>> {
         (!self.done.is_empty()).then(|| self.done.remove(0))
     }
 

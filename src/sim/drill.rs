@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use super::{
     faults::{ActiveFault, AvailableFaults, FaultTarget, InjectedFault},
-    scenario::judge::{ActualValues, Verdict},
+    scenario::judge::{ActualValues, DrillResult},
 };
 
 /// A command to the simulator.
@@ -42,7 +42,7 @@ pub struct Progress {
     /// How long it takes.
     pub duration: Duration,
     /// Points by now.
-    pub verdict: Verdict,
+    pub verdict: DrillResult,
 }
 
 impl Status {

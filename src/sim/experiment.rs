@@ -37,7 +37,7 @@ pub struct Control {
 
 /// What a recording shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Outcome {
+pub struct Milestones {
     /// When the rounded PV was first at SV, in seconds from the start.
     pub first_at_sv_s: Option<u32>,
     /// From when the rounded PV stayed at SV until the end of the recording, five minutes at least; `None` is never.
@@ -52,11 +52,11 @@ pub struct Experiment {
     /// The settings.
     pub control: Control,
     /// Measured on the real rig: to compare with, never to compute from.
-    pub thesis: Outcome,
+    pub thesis: Milestones,
 }
 
 const fn experiment(control: Control, first_at_sv_s: u32, steady_from_s: Option<u32>, overshoot_c: i32) -> Experiment {
-    Experiment { control, thesis: Outcome { first_at_sv_s: Some(first_at_sv_s), steady_from_s, overshoot_c } }
+    Experiment { control, thesis: Milestones { first_at_sv_s: Some(first_at_sv_s), steady_from_s, overshoot_c } }
 }
 
 const fn control(name: &'static str, p_percent: f64, i_s: f64, d_s: f64, fuzzy: bool) -> Control {
@@ -74,7 +74,7 @@ pub const THESIS: [Experiment; 6] = [
 ];
 
 /// Runs one experiment from the start.
-pub fn run(control: &Control) -> Outcome {
+pub fn run(control: &Control) -> Milestones {
     let mut rig = Rig::filled(FILL_L);
     let tenths = |value: f64| to_u16((value * 10.0).round());
     let settings = [
@@ -103,8 +103,8 @@ pub fn run(control: &Control) -> Outcome {
 }
 
 /// What a recording of seconds and PV shows on a display without decimals.
-pub fn measure(recording: impl Iterator<Item = (u32, f64)>) -> Outcome {
-    let mut outcome = Outcome { first_at_sv_s: None, steady_from_s: None, overshoot_c: 0 };
+pub fn measure(recording: impl Iterator<Item = (u32, f64)>) -> Milestones {
+    let mut outcome = Milestones { first_at_sv_s: None, steady_from_s: None, overshoot_c: 0 };
     let mut last_s = 0;
     for (second, pv_c) in recording {
         last_s = second;
@@ -131,7 +131,7 @@ mod tests {
             // The last value is held for long enough.
             let held = std::iter::repeat_n(recording.last().copied().unwrap_or(27.0), 300);
             let seconds = (0..).zip(recording.iter().copied().chain(held));
-            let expect = Outcome { first_at_sv_s, steady_from_s, overshoot_c };
+            let expect = Milestones { first_at_sv_s, steady_from_s, overshoot_c };
             assert_eq!(measure(seconds), expect, "{recording:?}");
         };
         check(&[27.0, 69.4, 69.5, 70.4, 70.0], Some(2), Some(2), 0);
@@ -140,7 +140,7 @@ mod tests {
         check(&[27.0, 69.5, 70.6], Some(1), None, 1);
         check(&[27.0, 69.4], None, None, 0);
         let late = (0..300).map(|second| (second, if second < 10 { 27.0 } else { 70.0 }));
-        assert_eq!(measure(late), Outcome { first_at_sv_s: Some(10), steady_from_s: None, overshoot_c: 0 });
+        assert_eq!(measure(late), Milestones { first_at_sv_s: Some(10), steady_from_s: None, overshoot_c: 0 });
         // What jumps over SV was not at it.
         check(&[27.0, 71.0, 70.0], Some(2), Some(2), 1);
     }

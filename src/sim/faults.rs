@@ -27,7 +27,7 @@ use crate::{
     },
 };
 use process::ProcessFaults;
-use values::{Memory, Values};
+use values::{AnswerMemory, Values};
 
 /// The active faults.
 #[derive(Debug, Clone, Default)]
@@ -35,7 +35,7 @@ pub struct Faults {
     list: Vec<ActiveFault>,
     units: BTreeMap<(LineId, u8), Values>,
     tags: BTreeMap<TagId, ((LineId, u8), Values)>,
-    memories: BTreeMap<FaultTarget, Memory>,
+    memories: BTreeMap<FaultTarget, AnswerMemory>,
     /// Messages on noisy lines so far: the same drill has the same noise.
     messages: u64,
 }

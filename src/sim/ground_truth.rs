@@ -1,7 +1,7 @@
 //! The actual value of each tag: from the process behind the instruments of the tank, or the registers of a modelled device.
 
 use super::{
-    rig::{Part, RigState, part},
+    rig::{RigDevice, RigState, part},
     scenario::judge::ActualValues,
     simulator::Simulator,
 };
@@ -47,8 +47,8 @@ impl GroundTruth {
 fn of_rig(def: &PlantDef, tag: &TagDef) -> Option<RigValue> {
     let point = (tag.point.table, tag.point.address);
     match part(def, tag.device)? {
-        Part::Controller => of_controller(point),
-        Part::Plc => of_plc(point),
+        RigDevice::Controller => of_controller(point),
+        RigDevice::Plc => of_plc(point),
     }
 }
 

@@ -120,9 +120,9 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Exception
     }
 }
 
-type Span = std::ops::RangeInclusive<u16>;
+type Addresses = std::ops::RangeInclusive<u16>;
 
-fn read_bits<D: Registers>(device: &D, function: u8, addresses: Span) -> Result<Vec<u8>, ExceptionCode> {
+fn read_bits<D: Registers>(device: &D, function: u8, addresses: Addresses) -> Result<Vec<u8>, ExceptionCode> {
     let table = names::table(function);
     let bytes = addresses.len().div_ceil(8);
     let mut reply = vec![function, to_u8(bytes)];
@@ -150,7 +150,7 @@ fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) 
     Ok(reply)
 }
 
-fn write_bits<D: Registers>(device: &mut D, addresses: Span, packed: &[u8]) -> Result<(), ExceptionCode> {
+fn write_bits<D: Registers>(device: &mut D, addresses: Addresses, packed: &[u8]) -> Result<(), ExceptionCode> {
     if packed.len() != addresses.len().div_ceil(8) {
         return Err(ExceptionCode::ILLEGAL_VALUE);
     }
@@ -163,7 +163,7 @@ fn write_bits<D: Registers>(device: &mut D, addresses: Span, packed: &[u8]) -> R
 }
 
 /// The registers of a write, which must be as many as its addresses.
-fn registers(addresses: Span, packed: &[u8]) -> Result<Vec<u16>, ExceptionCode> {
+fn registers(addresses: Addresses, packed: &[u8]) -> Result<Vec<u16>, ExceptionCode> {
     let values: Vec<u16> = packed.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
     (packed.len() == 2 * addresses.len()).then_some(values).ok_or(ExceptionCode::ILLEGAL_VALUE)
 }
@@ -176,7 +176,7 @@ fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Re
 }
 
 /// The addresses of the `nth` block of a request: a wrong count is a wrong value, an end beyond 65535 a wrong address.
-fn span(function: u8, nth: usize, address: u16, count: u16, limit: u16) -> Result<Span, ExceptionCode> {
+fn span(function: u8, nth: usize, address: u16, count: u16, limit: u16) -> Result<Addresses, ExceptionCode> {
     let most = most(function).nth(nth).unwrap_or(limit).min(limit);
     if count == 0 || count > most {
         return Err(ExceptionCode::ILLEGAL_VALUE);

@@ -23,7 +23,7 @@ const PLC: &str = "koyo_dl06";
 
 /// What a device of the plant is in the rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum RigDevice {
     /// Its temperature controller.
     Controller,
     /// Its PLC.
@@ -31,12 +31,12 @@ pub enum Part {
 }
 
 /// What a device is in the rig of its plant; `None` for every other device, and where the plant has no rig.
-pub fn part(def: &PlantDef, device: DeviceId) -> Option<Part> {
+pub fn part(def: &PlantDef, device: DeviceId) -> Option<RigDevice> {
     let first = |profile: &str| def.devices.iter().find(|other| other.profile == profile).map(|other| other.id);
     match Some(device) {
         _ if def.simulation.as_deref() != Some(SIMULATION) => None,
-        one if one == first(CONTROLLER) => Some(Part::Controller),
-        one if one == first(PLC) => Some(Part::Plc),
+        one if one == first(CONTROLLER) => Some(RigDevice::Controller),
+        one if one == first(PLC) => Some(RigDevice::Plc),
         _ => None,
     }
 }

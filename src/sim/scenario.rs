@@ -3,7 +3,7 @@
 //! ```text
 //!  scenario file ── read ──> Scenario ──> timeline: inject and clear faults, (headless) act as a good operator
 //!                                │
-//!  journal, snapshots, actual ───┴─ judge ──> Verdict
+//!  journal, snapshots, actual ───┴─ judge ──> DrillResult
 //! ```
 
 pub mod judge;

@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use super::{
     model::{Model, Models},
-    rig::{self, Part, Rig},
+    rig::{self, Rig, RigDevice},
     slave::{Slave, Unit},
 };
 use crate::plant::{
@@ -58,8 +58,8 @@ impl Simulator {
         };
         for device in def.devices.iter().filter(|device| !is_broadcast(device)) {
             let responder = match rig::part(def, device.id) {
-                Some(Part::Controller) => Responder::Controller,
-                Some(Part::Plc) => Responder::Plc,
+                Some(RigDevice::Controller) => Responder::Controller,
+                Some(RigDevice::Plc) => Responder::Plc,
                 None => {
                     modelled.push(device.id);
                     Responder::Model(modelled.len() - 1)

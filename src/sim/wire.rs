@@ -11,7 +11,7 @@ const BYTES_MAX: usize = 2 * 256;
 
 /// A request as a slave found it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Request {
+pub struct SlaveRequest {
     /// Unit and PDU, without the check.
     pub message: Vec<u8>,
     /// How many characters it took on the wire.
@@ -46,7 +46,7 @@ impl FrameReceiver {
     }
 
     /// The next thing that is complete: a request, or `None` in its place if it could not be read.
-    pub fn take(&mut self) -> Option<Option<Request>> {
+    pub fn take(&mut self) -> Option<Option<SlaveRequest>> {
         match self {
             FrameReceiver::Rtu(receiver) => receiver.take().map(|frame| Some(request(frame))),
             FrameReceiver::Ascii(receiver) => receiver.take(),
@@ -54,7 +54,7 @@ impl FrameReceiver {
     }
 
     /// The line was silent for long enough to end a frame.
-    pub fn on_silent_interval(&mut self) -> Option<Option<Request>> {
+    pub fn on_silent_interval(&mut self) -> Option<Option<SlaveRequest>> {
         match self {
             FrameReceiver::Rtu(receiver) if receiver.is_empty() => None,
             FrameReceiver::Rtu(receiver) => Some(receiver.on_silent_interval().map(request)),
@@ -74,10 +74,10 @@ impl FrameReceiver {
     }
 }
 
-fn request(mut frame: Vec<u8>) -> Request {
+fn request(mut frame: Vec<u8>) -> SlaveRequest {
     let characters = frame.len();
     frame.truncate(characters.saturating_sub(2));
-    Request { message: frame, characters }
+    SlaveRequest { message: frame, characters }
 }
 
 /// Collects the bytes of RTU and cuts whole frames with a right check out of them.

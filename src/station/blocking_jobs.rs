@@ -6,7 +6,7 @@ use tokio::task::{JoinHandle, JoinSet};
 
 use crate::access::{
     Users,
-    control::{JobId, Outcome, PasswordJob},
+    control::{JobId, JobOutcome, PasswordJob},
     io::{random, users},
 };
 
@@ -19,7 +19,7 @@ const SAVING_MAX: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 pub enum Done {
     /// A hash.
-    Job(JobId, Outcome),
+    Job(JobId, JobOutcome),
     /// The file of users.
     Saved(Result<(), String>),
 }
@@ -29,7 +29,7 @@ pub enum Done {
 pub struct BlockingJobs {
     path: Option<PathBuf>,
     waiting: VecDeque<(JobId, PasswordJob)>,
-    working: JoinSet<(JobId, Outcome)>,
+    working: JoinSet<(JobId, JobOutcome)>,
     /// The jobs that are running, to report one that panics.
     jobs: Vec<(tokio::task::Id, JobId)>,
     saving: Option<JoinHandle<Result<(), String>>>,
@@ -61,7 +61,7 @@ impl BlockingJobs {
             && let Some((job, work)) = self.waiting.pop_front()
         {
             let begun = self.working.spawn_blocking(move || {
-                let outcome = random().map_or_else(Outcome::Failed, |salt| work.run(salt));
+                let outcome = random().map_or_else(JobOutcome::Failed, |salt| work.run(salt));
                 (job, outcome)
             });
             self.jobs.push((begun.id(), job));
@@ -87,7 +87,7 @@ impl BlockingJobs {
                     Err(error) => {
                         tracing::error!(%error, "a password check failed");
                         let job = job.expect("every piece of work that is begun is noted");
-                        Done::Job(job, Outcome::Failed("internal error, see the log".to_owned()))
+                        Done::Job(job, JobOutcome::Failed("internal error, see the log".to_owned()))
                     }
                 }
             }

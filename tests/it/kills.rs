@@ -23,7 +23,7 @@ use sightglass::{
         audit_log::{Check, Entry},
         io::{audit_log, sealing, users, users_beside},
         sealing::VerificationKey,
-        user::Change,
+        user::UserChange,
     },
     attach::io::connect::connect,
     history::{
@@ -141,12 +141,12 @@ impl Place {
         let hash: Arc<str> = sightglass::access::password::hash(PASSWORD, [3; 16]).unwrap().into();
         let mut all = Users::default();
         for (user, change) in [
-            ("sue", Change::First { user: "sue".into(), hash: hash.clone() }),
-            ("tom", Change::Add { user: "tom".into(), role: Role::Technician, hash: hash.clone() }),
+            ("sue", UserChange::First { user: "sue".into(), hash: hash.clone() }),
+            ("tom", UserChange::Add { user: "tom".into(), role: Role::Technician, hash: hash.clone() }),
         ] {
             all = all.with(&change).unwrap();
             let (user, hash, must_change) = (user.into(), hash.clone(), false);
-            all = all.with(&Change::Password { user, hash, must_change }).unwrap();
+            all = all.with(&UserChange::Password { user, hash, must_change }).unwrap();
         }
         let text = profile::text_of("tank", &Search::shipped()).unwrap();
         std::fs::write(folder.path().join("tank.toml"), text + ALARM_TOML).unwrap();

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{AccessControl, Asker, Effect, audit_entries::audit};
-use crate::access::{Secret, lockout::Key, password, user, user::Change};
+use crate::access::{Secret, lockout::Key, password, user, user::UserChange};
 use crate::plant::command::Command;
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
@@ -38,17 +38,17 @@ pub enum PasswordJob {
 
 impl PasswordJob {
     /// Runs the job. `salt` must be fresh and random.
-    pub fn run(self, salt: [u8; password::SALT_BYTES]) -> Outcome {
+    pub fn run(self, salt: [u8; password::SALT_BYTES]) -> JobOutcome {
         match self {
-            PasswordJob::Verify { password, hash } => Outcome::Verified(password::is(&password.0, &hash)),
-            PasswordJob::Hash(password) => Outcome::Hashed(password::hash(&password.0, salt)),
+            PasswordJob::Verify { password, hash } => JobOutcome::Verified(password::is(&password.0, &hash)),
+            PasswordJob::Hash(password) => JobOutcome::Hashed(password::hash(&password.0, salt)),
         }
     }
 }
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Outcome {
+pub enum JobOutcome {
     /// Right or wrong.
     Verified(bool),
     /// The hash.
@@ -80,11 +80,11 @@ pub(super) enum JobPurpose {
     /// The password of the logged-in user.
     Unlock { asker: Asker, user: Arc<str> },
     /// The present password of the user, before it is changed.
-    Change { asker: Asker, user: Arc<str>, new: Secret },
+    UserChange { asker: Asker, user: Arc<str>, new: Secret },
     /// The password of the approver.
     Reauthenticate { by: Arc<str>, approver: Option<Arc<str>>, command: Box<Command> },
     /// A new one is hashed.
-    Hash { asker: Asker, change: Change },
+    Hash { asker: Asker, change: UserChange },
 }
 
 /// Why an attempt failed.
@@ -125,7 +125,7 @@ impl AccessControl {
     }
 
     /// Has a new password hashed.
-    pub(super) fn hash(&mut self, asker: Asker, password: Secret, change: Change) -> Result<Vec<Effect>, String> {
+    pub(super) fn hash(&mut self, asker: Asker, password: Secret, change: UserChange) -> Result<Vec<Effect>, String> {
         let session = self.session(asker.terminal)?;
         let origin = format!("hash for terminal {}", asker.terminal).into();
         let key = Key { origin, account: None, never_locked: self.is_host(&session.peer) };
@@ -189,13 +189,13 @@ impl AccessControl {
     }
 
     /// A piece of work is done.
-    pub fn on_job_done(&mut self, job: JobId, outcome: Outcome, at: Timestamp) -> Vec<Effect> {
+    pub fn on_job_done(&mut self, job: JobId, outcome: JobOutcome, at: Timestamp) -> Vec<Effect> {
         let Some(job) = self.jobs.remove(&job) else { return Vec::new() };
         let mut effects = match outcome {
-            Outcome::Verified(right) => self.on_verified(job, right, at),
-            Outcome::Hashed(_) if self.is_stale(&job) => self.on_hashed(job, Err(CHANGED.to_owned()), at),
-            Outcome::Hashed(hash) => self.on_hashed(job, hash, at),
-            Outcome::Failed(why) => self.refuse_job(job.terminal, job.what, why, at),
+            JobOutcome::Verified(right) => self.on_verified(job, right, at),
+            JobOutcome::Hashed(_) if self.is_stale(&job) => self.on_hashed(job, Err(CHANGED.to_owned()), at),
+            JobOutcome::Hashed(hash) => self.on_hashed(job, hash, at),
+            JobOutcome::Failed(why) => self.refuse_job(job.terminal, job.what, why, at),
         };
         effects.extend(self.start_waiting_jobs(at));
         effects
@@ -227,7 +227,7 @@ impl AccessControl {
         effects.extend(match what {
             JobPurpose::Login { asker, user } => self.login_done(asker, user, wrong, at),
             JobPurpose::Unlock { asker, user } => self.unlock_done(asker, user, wrong, at),
-            JobPurpose::Change { asker, user, new } => self.old_password_done(asker, user, new, wrong, at),
+            JobPurpose::UserChange { asker, user, new } => self.old_password_done(asker, user, new, wrong, at),
             JobPurpose::Reauthenticate { by, approver, command } => {
                 self.on_reauthenticated(terminal, by, approver, *command, wrong, at)
             }
@@ -268,7 +268,7 @@ impl AccessControl {
         match what {
             JobPurpose::Login { asker, .. }
             | JobPurpose::Unlock { asker, .. }
-            | JobPurpose::Change { asker, .. }
+            | JobPurpose::UserChange { asker, .. }
             | JobPurpose::Hash { asker, .. } => asker.refused(why),
             JobPurpose::Reauthenticate { command, .. } => self.refuse_reauthentication(terminal, *command, why, at),
         }
@@ -293,7 +293,7 @@ impl JobPurpose {
         match self {
             JobPurpose::Login { user, .. } => user.as_ref(),
             JobPurpose::Reauthenticate { approver, .. } => approver.as_ref(),
-            JobPurpose::Unlock { user, .. } | JobPurpose::Change { user, .. } => Some(user),
+            JobPurpose::Unlock { user, .. } | JobPurpose::UserChange { user, .. } => Some(user),
             JobPurpose::Hash { change, .. } => Some(change.user()),
         }
     }
@@ -304,7 +304,7 @@ impl JobPurpose {
         match self {
             JobPurpose::Login { .. } => true,
             JobPurpose::Reauthenticate { by, approver, .. } => approver.as_ref() != Some(by),
-            JobPurpose::Unlock { .. } | JobPurpose::Change { .. } | JobPurpose::Hash { .. } => false,
+            JobPurpose::Unlock { .. } | JobPurpose::UserChange { .. } | JobPurpose::Hash { .. } => false,
         }
     }
 }

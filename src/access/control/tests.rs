@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::{
-    access::{Credentials, lockout::Key, user::Change},
+    access::{Credentials, lockout::Key, user::UserChange},
     plant::{
         command::{Command, CommandId, CommandKind, Refusal},
         def::Reauthentication,
@@ -38,10 +38,10 @@ impl Bench {
         let mut def = fixture::plant();
         def.access = rules;
         def.tags[fixture::SV.index()].reauthenticate = Some(Reauthentication::SecondUser);
-        let users = Users::default().with(&Change::First { user: "boss".into(), hash: BOSS.into() }).unwrap();
+        let users = Users::default().with(&UserChange::First { user: "boss".into(), hash: BOSS.into() }).unwrap();
         let add = |users: Users, user: &str, role, hash: &str| {
-            let users = users.with(&Change::Add { user: user.into(), role, hash: hash.into() }).unwrap();
-            users.with(&Change::Password { user: user.into(), hash: hash.into(), must_change: false }).unwrap()
+            let users = users.with(&UserChange::Add { user: user.into(), role, hash: hash.into() }).unwrap();
+            users.with(&UserChange::Password { user: user.into(), hash: hash.into(), must_change: false }).unwrap()
         };
         let users = add(users, "tech", Role::Technician, TECH);
         let users = add(users, "view", Role::Viewer, VIEW);
@@ -76,10 +76,14 @@ impl Bench {
             for effect in std::mem::take(&mut to_do) {
                 match effect {
                     Effect::Job(job, PasswordJob::Verify { password, hash }) => {
-                        to_do.extend(self.access.on_job_done(job, Outcome::Verified(*password.0 == *hash), self.now));
+                        to_do.extend(self.access.on_job_done(
+                            job,
+                            JobOutcome::Verified(*password.0 == *hash),
+                            self.now,
+                        ));
                     }
                     Effect::Job(job, PasswordJob::Hash(password)) => {
-                        to_do.extend(self.access.on_job_done(job, Outcome::Hashed(Ok(password.0)), self.now));
+                        to_do.extend(self.access.on_job_done(job, JobOutcome::Hashed(Ok(password.0)), self.now));
                     }
                     Effect::Save(users) => {
                         let result = if self.disk_full { Err("disk full".to_owned()) } else { Ok(()) };

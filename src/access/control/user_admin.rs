@@ -16,7 +16,7 @@ use crate::{
         LoggedInUser, Secret, SessionRequest, Users,
         audit_log::USERS_FILE,
         password,
-        user::{self, Change},
+        user::{self, UserChange},
     },
     plant::{record::ActionRecord, role::Role},
 };
@@ -28,7 +28,7 @@ const NO_HASH: &str = "";
 #[derive(Debug)]
 pub(super) struct Saving {
     /// `None` where only last logins are written.
-    request: Option<(Asker, Change, Box<ActionRecord>)>,
+    request: Option<(Asker, UserChange, Box<ActionRecord>)>,
 }
 
 impl AccessControl {
@@ -45,18 +45,18 @@ impl AccessControl {
             SessionRequest::FirstSupervisor { user, password } => self.first(asker, user.into(), password),
             SessionRequest::ChangePassword { old, new } => self.change_own(asker, old, new, at),
             SessionRequest::AddUser { user, role, password } => {
-                let change = Change::Add { user: user.into(), role, hash: NO_HASH.into() };
+                let change = UserChange::Add { user: user.into(), role, hash: NO_HASH.into() };
                 self.new_password(asker, password, change)
             }
             SessionRequest::ResetPassword { user, password } => {
-                let change = Change::Password { user: user.into(), hash: NO_HASH.into(), must_change: true };
+                let change = UserChange::Password { user: user.into(), hash: NO_HASH.into(), must_change: true };
                 self.new_password(asker, password, change)
             }
-            SessionRequest::SetRole { user, role } => self.change(asker, Change::Role(user.into(), role), at),
+            SessionRequest::SetRole { user, role } => self.change(asker, UserChange::Role(user.into(), role), at),
             SessionRequest::Disable { user, disabled } => {
-                self.change(asker, Change::Disable(user.into(), disabled), at)
+                self.change(asker, UserChange::Disable(user.into(), disabled), at)
             }
-            SessionRequest::DeleteUser { user } => self.change(asker, Change::Delete(user.into()), at),
+            SessionRequest::DeleteUser { user } => self.change(asker, UserChange::Delete(user.into()), at),
             SessionRequest::Login { .. }
             | SessionRequest::Logout
             | SessionRequest::Lock
@@ -84,7 +84,7 @@ impl AccessControl {
         if self.users.as_ref().is_none_or(|users| !users.is_empty()) {
             return Err("users already exist".to_owned());
         }
-        self.new_password(asker, password, Change::First { user, hash: NO_HASH.into() })
+        self.new_password(asker, password, UserChange::First { user, hash: NO_HASH.into() })
     }
 
     fn change_own(&mut self, asker: Asker, old: Secret, new: Secret, at: Timestamp) -> Result<Vec<Effect>, String> {
@@ -97,7 +97,7 @@ impl AccessControl {
         if password::one_form(&new.0) == password::one_form(&old.0) {
             return Err("this is the current password, choose another one".to_owned());
         }
-        self.verify_password(asker.terminal, &user.clone(), old, JobPurpose::Change { asker, user, new }, at)
+        self.verify_password(asker.terminal, &user.clone(), old, JobPurpose::UserChange { asker, user, new }, at)
     }
 
     pub(super) fn old_password_done(
@@ -111,22 +111,22 @@ impl AccessControl {
         if let Some(wrong) = wrong {
             return self.failed(asker, "change password", Some(&user), wrong, at);
         }
-        let change = Change::Password { user, hash: NO_HASH.into(), must_change: false };
+        let change = UserChange::Password { user, hash: NO_HASH.into(), must_change: false };
         self.new_password(asker, new, change).unwrap_or_else(|why| asker.refused(why))
     }
 
     /// Checks a new password and has it hashed.
-    fn new_password(&mut self, asker: Asker, password: Secret, change: Change) -> Result<Vec<Effect>, String> {
+    fn new_password(&mut self, asker: Asker, password: Secret, change: UserChange) -> Result<Vec<Effect>, String> {
         // Checked before the hash and again after it.
         self.check_change(&change)?;
         password::check(&password.0, change.user(), self.def.access.password_chars_min)?;
         self.hash(asker, password, change)
     }
 
-    fn check_change(&self, change: &Change) -> Result<crate::access::Users, String> {
+    fn check_change(&self, change: &UserChange) -> Result<crate::access::Users, String> {
         let users = self.users.as_ref().ok_or("this station has no users")?;
         let name = user::key(change.user());
-        if let Change::Add { .. } | Change::First { .. } = change
+        if let UserChange::Add { .. } | UserChange::First { .. } = change
             && self.def.access.trusted.iter().any(|(trusted, _)| user::key(trusted) == name)
         {
             return Err(format!("{} is a user of the operating system who needs no password here", change.user()));
@@ -137,7 +137,7 @@ impl AccessControl {
     pub(super) fn set_password(
         &mut self,
         asker: Asker,
-        change: Change,
+        change: UserChange,
         hash: Result<String, String>,
         at: Timestamp,
     ) -> Vec<Effect> {
@@ -148,15 +148,15 @@ impl AccessControl {
     }
 
     /// Starts a change, which takes effect when it is on disk. Checks the rights again, because hashing takes time.
-    fn change(&mut self, asker: Asker, change: Change, at: Timestamp) -> Result<Vec<Effect>, String> {
+    fn change(&mut self, asker: Asker, change: UserChange, at: Timestamp) -> Result<Vec<Effect>, String> {
         let session = self.session(asker.terminal)?;
         match &change {
-            Change::First { .. } | Change::Password { must_change: false, .. } => {}
-            Change::Add { .. }
-            | Change::Role(..)
-            | Change::Disable(..)
-            | Change::Delete(_)
-            | Change::Password { must_change: true, .. } => {
+            UserChange::First { .. } | UserChange::Password { must_change: false, .. } => {}
+            UserChange::Add { .. }
+            | UserChange::Role(..)
+            | UserChange::Disable(..)
+            | UserChange::Delete(_)
+            | UserChange::Password { must_change: true, .. } => {
                 let who = session.acting().ok_or(super::LOG_IN_FIRST)?;
                 enough(who.role, right::Right::ManageUsers.role())?;
             }
@@ -179,17 +179,19 @@ impl AccessControl {
     }
 
     /// Old value and new value of the entry of a change.
-    fn old_and_new(&self, change: &Change) -> (Option<Arc<str>>, Option<Arc<str>>) {
+    fn old_and_new(&self, change: &UserChange) -> (Option<Arc<str>>, Option<Arc<str>>) {
         let before = self.users.as_ref().and_then(|users| users.get(change.user()));
         let role = before.map(|user| user.role.word().into());
         let can = |disabled| if disabled { "disabled" } else { "enabled" };
         match change {
-            Change::First { .. } => (None, Some(Role::Supervisor.word().into())),
-            Change::Add { role: new, .. } => (None, Some(new.word().into())),
-            Change::Role(_, new) => (role, Some(new.word().into())),
-            Change::Disable(_, disabled) => (before.map(|user| can(user.disabled).into()), Some(can(*disabled).into())),
-            Change::Delete(_) => (role, None),
-            Change::Password { .. } => (None, None),
+            UserChange::First { .. } => (None, Some(Role::Supervisor.word().into())),
+            UserChange::Add { role: new, .. } => (None, Some(new.word().into())),
+            UserChange::Role(_, new) => (role, Some(new.word().into())),
+            UserChange::Disable(_, disabled) => {
+                (before.map(|user| can(user.disabled).into()), Some(can(*disabled).into()))
+            }
+            UserChange::Delete(_) => (role, None),
+            UserChange::Password { .. } => (None, None),
         }
     }
 
@@ -227,30 +229,30 @@ impl AccessControl {
         effects
     }
 
-    fn change_or_refuse(&mut self, asker: Asker, change: Change, at: Timestamp) -> Vec<Effect> {
+    fn change_or_refuse(&mut self, asker: Asker, change: UserChange, at: Timestamp) -> Vec<Effect> {
         let (action, target) = (change.action(), change.user().clone());
         self.change(asker, change, at).unwrap_or_else(|why| self.refuse(asker, action, &target, why, at))
     }
 
     /// Applies a change to the sessions.
-    fn apply_to_sessions(&mut self, terminal: u32, change: &Change, at: Timestamp) -> Vec<Effect> {
+    fn apply_to_sessions(&mut self, terminal: u32, change: &UserChange, at: Timestamp) -> Vec<Effect> {
         let name = change.user();
         match change {
-            Change::Disable(..) | Change::Delete(_) | Change::Password { must_change: true, .. } => {
+            UserChange::Disable(..) | UserChange::Delete(_) | UserChange::Password { must_change: true, .. } => {
                 self.attempts.clear(&user::key(name));
             }
-            Change::First { .. } | Change::Add { .. } | Change::Role(..) | Change::Password { .. } => {}
+            UserChange::First { .. } | UserChange::Add { .. } | UserChange::Role(..) | UserChange::Password { .. } => {}
         }
         match change {
-            Change::First { user, .. } => {
+            UserChange::First { user, .. } => {
                 let who = LoggedInUser { user: user.clone(), role: Role::Supervisor, must_change: false };
                 self.log_in(terminal, who, at)
             }
-            Change::Add { .. } | Change::Disable(_, false) => Vec::new(),
-            Change::Role(..) => self.log_out_everywhere(name, None, "done: role changed", at),
-            Change::Disable(_, true) => self.log_out_everywhere(name, None, "done: user disabled", at),
-            Change::Delete(_) => self.log_out_everywhere(name, None, "done: user deleted", at),
-            Change::Password { must_change, .. } => {
+            UserChange::Add { .. } | UserChange::Disable(_, false) => Vec::new(),
+            UserChange::Role(..) => self.log_out_everywhere(name, None, "done: role changed", at),
+            UserChange::Disable(_, true) => self.log_out_everywhere(name, None, "done: user disabled", at),
+            UserChange::Delete(_) => self.log_out_everywhere(name, None, "done: user deleted", at),
+            UserChange::Password { must_change, .. } => {
                 let own = (!must_change).then_some(terminal);
                 let effects = self.log_out_everywhere(name, own, "done: password changed", at);
                 let session = own.and_then(|own| self.sessions.get_mut(&own));

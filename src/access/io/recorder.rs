@@ -24,7 +24,7 @@ use crate::{
     bus::io::clock::Clock,
     history::{
         io::{
-            alarm_file::{self, AlarmFile, Found},
+            alarm_file::{self, AlarmFile, RestoredAlarms},
             chain::CHAIN_HASHES_MAX,
         },
         words::plain,
@@ -90,7 +90,7 @@ pub struct Handle {
     /// What was found when the log was opened.
     pub opened: Opened,
     /// What was found when the alarm-state file was opened.
-    pub alarms: Found,
+    pub alarms: RestoredAlarms,
     /// The thread; ends with the last entry of the log.
     pub join: JoinHandle<Option<ChainHash>>,
 }
@@ -146,7 +146,7 @@ struct Recorder {
 }
 
 impl Recorder {
-    fn new(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> (Recorder, Found) {
+    fn new(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> (Recorder, RestoredAlarms) {
         let (alarms, found) = AlarmFile::open(&alarm_file::beside(history_file), clock.utc());
         let recorder = Recorder {
             path: audit_log::beside(history_file),

@@ -147,12 +147,12 @@ mod tests {
     use std::{fs, os::unix::fs::PermissionsExt, sync::Arc};
 
     use super::*;
-    use crate::access::user::Change;
+    use crate::access::user::UserChange;
 
     fn two() -> Users {
         let hash: Arc<str> = password::DUMMY.into();
-        let users = Users::default().with(&Change::First { user: "anna".into(), hash: hash.clone() }).unwrap();
-        let mut users = users.with(&Change::Add { user: "สมชาย".into(), role: Role::Viewer, hash }).unwrap();
+        let users = Users::default().with(&UserChange::First { user: "anna".into(), hash: hash.clone() }).unwrap();
+        let mut users = users.with(&UserChange::Add { user: "สมชาย".into(), role: Role::Viewer, hash }).unwrap();
         users.logged_in("anna", "2026-05-01T12:00:00.25Z".parse().unwrap());
         users
     }

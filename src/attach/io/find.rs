@@ -31,7 +31,7 @@ pub struct SocketFolders {
 
 /// A station that takes connections.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundStation {
     /// The plant.
     pub name: String,
     /// Its socket.
@@ -83,16 +83,16 @@ impl SocketFolders {
     }
 
     /// The stations that live, by name. One that is stuck is not among them.
-    pub async fn living(&self) -> Vec<Found> {
+    pub async fn living(&self) -> Vec<FoundStation> {
         let own =
             [self.login.as_ref(), Some(&self.last)].into_iter().flatten().filter(|path| require_own(path).is_ok());
-        let mut found: Vec<Found> = Vec::new();
+        let mut found: Vec<FoundStation> = Vec::new();
         for folder in self.given.iter().chain([&self.service]).chain(own) {
             for path in sockets(folder) {
                 let Some(name) = path.file_stem().and_then(|name| name.to_str()) else { continue };
                 let is_new = found.iter().all(|other| other.path != path);
                 if is_new && matches!(timeout(TRY_MAX, UnixStream::connect(&path)).await, Ok(Ok(_))) {
-                    found.push(Found { name: name.to_owned(), path });
+                    found.push(FoundStation { name: name.to_owned(), path });
                 }
             }
         }

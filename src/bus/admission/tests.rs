@@ -24,12 +24,12 @@ fn every_row_of_the_vectors_has_the_verdict_that_it_names() {
     for row in rows.records() {
         let row = row.expect("a row");
         let tasks = tasks(&row[1]);
-        let (verdict, overload) = match test(&tasks) {
+        let (schedulability, overload) = match test(&tasks) {
             Test::Accept => ("accept", String::new()),
             Test::TooMuch => ("reject", String::new()),
             Test::OverloadInterval { length, demand, .. } => ("reject", format!("L={length} demand {demand}")),
         };
-        let found = (format!("{:.3}", utilisation(&tasks)), verdict, overload.as_str());
+        let found = (format!("{:.3}", utilisation(&tasks)), schedulability, overload.as_str());
         assert_eq!(found, (row[2].to_owned(), &row[3], &row[4]), "{}", &row[0]);
         count += 1;
     }
@@ -71,7 +71,7 @@ proptest! {
 fn a_plant_that_fits_has_its_cycle_and_its_dead_units() {
     let def = fixture::plant();
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
-    assert_eq!((&admission.verdict, admission.factor), (&Verdict::Fits, Some(1.0)));
+    assert_eq!((&admission.schedulability, admission.factor), (&Schedulability::Fits, Some(1.0)));
     // Four blocks, one a second each: cycle and utilisation are the same number.
     assert!((admission.cycle.as_secs_f64() - admission.utilisation).abs() < 1e-9);
     assert_eq!(admission.warnings, [Warning::NoParityOneStopBit]);
@@ -86,7 +86,7 @@ fn a_long_poll_in_the_way_of_a_fast_one_is_named() {
     def.tags[fixture::RUN.index()].poll = Poll::Every(Duration::from_millis(30));
     def.tags[fixture::PV.index()].poll = Poll::Every(Duration::from_millis(200));
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
-    let words = admission.verdict.to_string();
+    let words = admission.schedulability.to_string();
     for part in ["in 30.1 ms the line must transfer", "PLC-1 coil 3072 every 30 ms", "is read", "its period"] {
         assert!(words.contains(part), "no {part:?} in {words:?}");
     }
@@ -100,7 +100,10 @@ fn an_overload_says_how_far_process_values_are_stretched() {
     }
     def.lines[0].timeout = Duration::from_millis(20);
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));
-    assert!(matches!(admission.verdict, Verdict::TooMuch { utilisation } if utilisation > 1.0), "{admission:?}");
+    assert!(
+        matches!(admission.schedulability, Schedulability::TooMuch { utilisation } if utilisation > 1.0),
+        "{admission:?}"
+    );
     assert!(admission.critical.fits(), "no tag of the fixture is critical");
     assert!(admission.factor.is_some_and(|factor| factor > 1.0));
     let timeout = |warning: &Warning| matches!(warning, Warning::TimeoutBelowAnswer { .. });

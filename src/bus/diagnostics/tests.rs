@@ -37,7 +37,7 @@ fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>)
 
 fn verdict(run: &DiagnosticRun) -> &str {
     match run.findings.last() {
-        Some(Finding::Verdict(words)) => words,
+        Some(Finding::Conclusion(words)) => words,
         other => panic!("no verdict but {other:?}"),
     }
 }

@@ -31,7 +31,7 @@ use self::{receive::Received, transactions::Transactions};
 use super::{
     clock::Clock,
     transport::{CountUart, Opened},
-    wire::{Memory, Wire},
+    wire::{LineMemory, Wire},
 };
 use crate::{
     bus::{
@@ -90,7 +90,7 @@ pub struct Link {
 
 impl Link {
     /// A link on a freshly opened port; `memory` goes on from an earlier opening.
-    pub fn new(opened: Opened, line: &LineDef, clock: Clock, memory: Memory) -> Link {
+    pub fn new(opened: Opened, line: &LineDef, clock: Clock, memory: LineMemory) -> Link {
         let uart = opened.uart;
         let wire = Wire::new(opened.stream, opened.pause, line, clock, memory);
         Link {
@@ -311,7 +311,7 @@ impl Link {
     }
 
     /// What is remembered until the next opening.
-    pub fn memory(&self) -> Memory {
+    pub fn memory(&self) -> LineMemory {
         self.wire.memory()
     }
 

@@ -19,7 +19,7 @@ use super::{
     live_reads::LiveReads,
     requests::{Closed, Requests},
     transport::{Connector, Opened},
-    wire::Memory,
+    wire::LineMemory,
 };
 use crate::{
     bus::{
@@ -65,7 +65,7 @@ pub async fn run(
         live_budget: Budget::new(LIVE_SHARE, clock.now()),
         unconfirmed: Vec::new(),
         under_way: Vec::new(),
-        memory: Memory::new(def.line(line), clock).expect(&blocks),
+        memory: LineMemory::new(def.line(line), clock).expect(&blocks),
         settings: def.line(line).clone(),
         clock,
         connector,
@@ -135,7 +135,7 @@ struct Task<'a> {
     /// The same of live reads.
     live_budget: Budget,
     /// Counters and outstanding replies, from one opening to the next.
-    memory: Memory,
+    memory: LineMemory,
     /// Writes whose fate is not known yet.
     unconfirmed: Vec<confirm::Unconfirmed>,
     /// Reads that are under way over Modbus TCP, no more than a device takes at once.

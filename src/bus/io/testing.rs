@@ -8,7 +8,7 @@ use super::{
     clock::Clock,
     link::{Link, LinkError},
     transport::Connector,
-    wire::Memory,
+    wire::LineMemory,
 };
 use crate::{
     bus::diagnostics::{Ask, Job, Step, StepResult},
@@ -74,7 +74,7 @@ async fn scan_at_once(line: &LineDef, steps: &[Step], progress: &mut impl FnMut(
 /// A link of its own to a line that is not polled; `None` if it cannot be opened.
 pub async fn open(line: &LineDef) -> Option<Link> {
     let opened = Connector::Real(line.transport.clone()).open().await.ok()?;
-    Some(Link::new(opened, line, Clock::real(), Memory::new(line, Clock::real())))
+    Some(Link::new(opened, line, Clock::real(), LineMemory::new(line, Clock::real())))
 }
 
 /// Waits for the answers that were given up.
@@ -133,7 +133,7 @@ pub fn settings_for(line: &LineDef, step: &Step) -> LineDef {
 /// Runs a diagnostic to its end on a line that is not polled; `progress` sees every step and may stop it by `false`.
 pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&DiagnosticRun) -> bool) -> DiagnosticRun {
     let mut connector = Connector::Real(line.transport.clone());
-    let mut memory = Memory::new(line, Clock::real());
+    let mut memory = LineMemory::new(line, Clock::real());
     let mut open: Option<(LineDef, Link)> = None;
     let scans = matches!(job.run().diagnostic, Diagnostic::Scan(_)) && line.transport.framing() == Framing::Mbap;
     let mut at_once: VecDeque<Option<StepResult>> = match scans {

@@ -29,7 +29,7 @@ const STRAY_MAX: usize = 4 * frame::MESSAGE_MAX;
 
 /// What a line remembers from one opening of its port to the next.
 #[derive(Debug, Clone)]
-pub struct Memory {
+pub struct LineMemory {
     /// Totals; `utilisation`, `opens` and `missed` are the task's.
     pub counters: LineCounters,
     /// Outstanding replies of each unit.
@@ -37,11 +37,11 @@ pub struct Memory {
     born: Instant,
 }
 
-impl Memory {
+impl LineMemory {
     /// Nothing has gone over the line yet.
-    pub fn new(line: &LineDef, clock: Clock) -> Memory {
+    pub fn new(line: &LineDef, clock: Clock) -> LineMemory {
         let seed = to_u16(clock.now().as_microsecond().rem_euclid(0x1_0000));
-        Memory {
+        LineMemory {
             counters: LineCounters::default(),
             replies: LineReplies::new(line.timeout, seed),
             born: Instant::now(),
@@ -49,7 +49,7 @@ impl Memory {
     }
 
     /// These blocks will be asked for.
-    pub fn expect(mut self, blocks: &[Block]) -> Memory {
+    pub fn expect(mut self, blocks: &[Block]) -> LineMemory {
         self.replies.expect(blocks);
         self
     }
@@ -89,8 +89,8 @@ pub struct Wire {
 
 impl Wire {
     /// A freshly opened port; `memory` goes on from an earlier opening.
-    pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: Memory) -> Wire {
-        let Memory { counters, mut replies, born } = memory;
+    pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: LineMemory) -> Wire {
+        let LineMemory { counters, mut replies, born } = memory;
         replies.set_timeout(line.timeout);
         let (char_time, silent_interval) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
@@ -138,8 +138,8 @@ impl Wire {
     }
 
     /// What is remembered until the next opening.
-    pub fn memory(&self) -> Memory {
-        Memory { counters: self.counters, replies: self.replies.clone(), born: self.born }
+    pub fn memory(&self) -> LineMemory {
+        LineMemory { counters: self.counters, replies: self.replies.clone(), born: self.born }
     }
 
     /// Nothing is sent for this long (real time).

@@ -27,7 +27,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let run = run(&line, diagnostic, |finding| match finding {
         Finding::Exchange(exchange) if args.of.verbose => exchange_lines(exchange),
         Finding::Failed { what, fault } if !args.of.verbose => vec![format!("{what}: {fault}")],
-        Finding::Verdict(words) => vec![words.clone()],
+        Finding::Conclusion(words) => vec![words.clone()],
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Failed { .. }

@@ -40,7 +40,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         | Finding::Written(_)
         | Finding::Bytes { .. }
         | Finding::Unit { .. }
-        | Finding::Verdict(_) => Vec::new(),
+        | Finding::Conclusion(_) => Vec::new(),
     })?;
     let found = |finding: &Finding| matches!(finding, Finding::Object { .. } | Finding::Values { .. });
     if run.findings.iter().any(found) {

@@ -69,7 +69,7 @@ pub fn describe(finding: &Finding) -> Vec<String> {
             let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
             vec![format!("unit {unit:3}{settings}: {words}")]
         }
-        Finding::Verdict(words) => vec![words.clone()],
+        Finding::Conclusion(words) => vec![words.clone()],
         Finding::Failed { what, fault } => vec![format!("{what} ({fault})")],
         Finding::Exchange(_)
         | Finding::Written(_)

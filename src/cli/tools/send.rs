@@ -81,7 +81,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         | Finding::Object { .. }
         | Finding::Values { .. }
         | Finding::Failed { .. }
-        | Finding::Verdict(_) => Vec::new(),
+        | Finding::Conclusion(_) => Vec::new(),
     })?;
     let answer = run.findings.iter().find_map(|finding| match finding {
         Finding::Bytes { bytes, .. } if !bytes.is_empty() => Some(bytes),

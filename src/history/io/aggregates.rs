@@ -20,7 +20,7 @@ use super::{
 use crate::{
     history::{
         ArchiveFile, HistoryError,
-        tiers::{Aggregate, Part, Tier, pieces},
+        tiers::{Aggregate, CurvePart, Tier, pieces},
     },
     plant::def::TagId,
     report::{
@@ -37,7 +37,7 @@ impl Store {
         tags: &[TagId],
         (from, to): (Timestamp, Timestamp),
         widest: Tier,
-        mut each: impl FnMut(usize, Part),
+        mut each: impl FnMut(usize, CurvePart),
     ) -> Result<Vec<Gap>, HistoryError> {
         let avoided = self.avoided.borrow().clone();
         let files = self.files(None)?;
@@ -60,12 +60,12 @@ impl Store {
             let mut steps = vec![StepSeries::new(from, to); tags.len()];
             gaps.extend(self.each_sample(tags, from, to, |place, sample| {
                 if let Some(held) = steps[place].next(sample) {
-                    each(place, Part::Held(held));
+                    each(place, CurvePart::Held(held));
                 }
             })?);
             for (place, steps) in steps.into_iter().enumerate() {
                 if let Some(held) = steps.end() {
-                    each(place, Part::Held(held));
+                    each(place, CurvePart::Held(held));
                 }
             }
         }
@@ -77,7 +77,7 @@ impl Store {
         tags: &[TagId],
         tier: Tier,
         (from, to): (Timestamp, Timestamp),
-        each: &mut impl FnMut(usize, Part),
+        each: &mut impl FnMut(usize, CurvePart),
     ) -> Result<(), HistoryError> {
         let wanted = self.wanted(tags);
         let files = self.files(Some((tier, from.as_microsecond()..to.as_microsecond())))?;
@@ -118,7 +118,7 @@ impl Store {
         files: &[ArchiveFile],
         wanted: &Wanted,
         (from, to): (Timestamp, Timestamp),
-        each: &mut impl FnMut(usize, Part),
+        each: &mut impl FnMut(usize, CurvePart),
     ) -> Result<(), HistoryError> {
         if files.is_empty() {
             return Ok(());
@@ -149,7 +149,7 @@ fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>) -> Vec<Ra
 }
 
 /// Hands over the rows of a batch; `None` if its columns are not those of aggregates.
-fn hand_over(batch: &StructArray, wanted: &Wanted, each: &mut impl FnMut(usize, Part)) -> Option<()> {
+fn hand_over(batch: &StructArray, wanted: &Wanted, each: &mut impl FnMut(usize, CurvePart)) -> Option<()> {
     let [utc, tags, min, max, mean, first, last, gain, good, samples] = batch.columns() else { return None };
     let micros = utc.as_primitive_opt::<TimestampMicrosecondType>()?.values();
     let tags = tags.as_primitive_opt::<UInt16Type>()?.values();
@@ -165,7 +165,7 @@ fn hand_over(batch: &StructArray, wanted: &Wanted, each: &mut impl FnMut(usize, 
         let seconds = f64::from(good[row]) / 1_000.0;
         let stats = IntervalStats { min: min[row], max: max[row], mean: mean[row], last: last[row], seconds };
         let aggregate = Aggregate { at: micros[row], stats, first: first[row], gain: gain[row], samples: samples[row] };
-        each(place, Part::Aggregate(aggregate));
+        each(place, CurvePart::Aggregate(aggregate));
     }
     Some(())
 }

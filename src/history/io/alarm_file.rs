@@ -28,7 +28,7 @@ pub fn beside(history: &Path) -> PathBuf {
 
 /// What was found when it was opened.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Found {
+pub struct RestoredAlarms {
     /// The events to restore, oldest first; `None` where the file does not say: the journal of the history is used
     /// then.
     pub events: Option<Vec<AlarmRecord>>,
@@ -43,12 +43,12 @@ pub struct AlarmFile {
     events: LatestEvents,
     /// Steps that the file does not hold yet; gone after a failure, when the whole file is due.
     unwritten: Vec<AlarmRecord>,
-    file: Option<Written>,
+    file: Option<OpenFile>,
 }
 
 /// The file as it was left after the last sync.
 #[derive(Debug)]
-struct Written {
+struct OpenFile {
     file: File,
     bytes: u64,
     lines: usize,
@@ -56,17 +56,17 @@ struct Written {
 
 impl AlarmFile {
     /// Opens the file. One that is damaged is set aside, never deleted.
-    pub fn open(path: &Path, now: Timestamp) -> (AlarmFile, Found) {
+    pub fn open(path: &Path, now: Timestamp) -> (AlarmFile, RestoredAlarms) {
         let mut alarms =
             AlarmFile { path: path.to_owned(), events: LatestEvents::default(), unwritten: Vec::new(), file: None };
         let name = path.display();
         let found = match read(path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Found::default(),
-            Err(error) => Found { events: None, trouble: Some(format!("{name} cannot be read: {error}")) },
+            Err(error) if error.kind() == io::ErrorKind::NotFound => RestoredAlarms::default(),
+            Err(error) => RestoredAlarms { events: None, trouble: Some(format!("{name} cannot be read: {error}")) },
             Ok(bytes) => match parse_whole(&bytes) {
                 Ok(events) => {
                     alarms.events = events;
-                    Found { events: Some(alarms.events.iter().cloned().collect()), trouble: None }
+                    RestoredAlarms { events: Some(alarms.events.iter().cloned().collect()), trouble: None }
                 }
                 Err(why) => {
                     let aside = path.with_extension(format!("damaged-{}", now.strftime("%Y%m%dT%H%M%SZ")));
@@ -75,7 +75,7 @@ impl AlarmFile {
                         Err(error) => format!("cannot be set aside: {error}"),
                     };
                     let why = format!("the state of the alarms is damaged ({name}: {why}), {kept}");
-                    Found { events: None, trouble: Some(format!("{why}; taken from the journal instead")) }
+                    RestoredAlarms { events: None, trouble: Some(format!("{why}; taken from the journal instead")) }
                 }
             },
         };
@@ -105,14 +105,14 @@ impl AlarmFile {
     }
 
     /// A power failure leaves the old file or the new one.
-    fn write_whole(&self) -> io::Result<Written> {
+    fn write_whole(&self) -> io::Result<OpenFile> {
         let text: String = std::iter::once(HEADER.to_owned()).chain(self.events.iter().map(line)).collect();
         let file = atomic::write_placed(&self.path, text.as_bytes(), 0o640, |_, new| fs::rename(new, &self.path))?;
-        Ok(Written { file, bytes: text.len() as u64, lines: self.events.len() })
+        Ok(OpenFile { file, bytes: text.len() as u64, lines: self.events.len() })
     }
 }
 
-impl Written {
+impl OpenFile {
     /// Is it still the file that was left, and not too long?
     fn may_grow(&self, path: &Path, live: usize) -> bool {
         let same = fs::symlink_metadata(path).is_ok_and(|there| {
@@ -122,11 +122,11 @@ impl Written {
         same && self.lines <= 2 * live + SPARE_LINES
     }
 
-    fn append(mut self, events: &[AlarmRecord]) -> io::Result<Written> {
+    fn append(mut self, events: &[AlarmRecord]) -> io::Result<OpenFile> {
         let text: String = events.iter().map(line).collect();
         self.file.write_all(text.as_bytes())?;
         self.file.sync_data()?;
-        Ok(Written { bytes: self.bytes + text.len() as u64, lines: self.lines + events.len(), ..self })
+        Ok(OpenFile { bytes: self.bytes + text.len() as u64, lines: self.lines + events.len(), ..self })
     }
 }
 
@@ -161,7 +161,7 @@ mod tests {
     }
 
     /// What the next station finds.
-    fn found(path: &Path) -> Found {
+    fn found(path: &Path) -> RestoredAlarms {
         AlarmFile::open(path, Timestamp::from_second(1_000_000).unwrap()).1
     }
 
@@ -169,7 +169,7 @@ mod tests {
     fn alarm_states_are_read_back_and_the_file_stays_small() {
         let folder = tempfile::tempdir().unwrap();
         let path = beside(&folder.path().join("tank.duckdb"));
-        assert_eq!(found(&path), Found::default(), "no file yet");
+        assert_eq!(found(&path), RestoredAlarms::default(), "no file yet");
         let (mut alarms, _) = AlarmFile::open(&path, Timestamp::UNIX_EPOCH);
         alarms.on_events([event(1, AlarmEvent::Raised)]);
         alarms.write().unwrap();
@@ -182,7 +182,7 @@ mod tests {
         alarms.write().unwrap();
         let last = [2_997, 2_998, 2_999]
             .map(|number| [AlarmEvent::Raised, AlarmEvent::ReturnedToNormal].map(|kind| event(number, kind)));
-        assert_eq!(found(&path), Found { events: Some(last.concat()), trouble: None });
+        assert_eq!(found(&path), RestoredAlarms { events: Some(last.concat()), trouble: None });
         let lines = fs::read_to_string(&path).unwrap().lines().count();
         assert!(lines < 2 * SPARE_LINES, "{lines} lines for 6 events");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside");
@@ -228,7 +228,7 @@ mod tests {
         alarms.write().unwrap();
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("T-1", "T-7", 1)).unwrap();
-        let Found { events, trouble } = found(&path);
+        let RestoredAlarms { events, trouble } = found(&path);
         assert_eq!(events, None);
         assert!(trouble.unwrap().contains("line 2 is not as it was written"));
         assert!(!path.exists() && folder.path().join("tank.alarms.damaged-19700112T134640Z").exists());
@@ -236,12 +236,12 @@ mod tests {
         let large = File::options().write(true).create(true).truncate(true).open(&path).unwrap();
         (&large).write_all(text.as_bytes()).unwrap();
         large.set_len(BYTES_MAX + 1).unwrap();
-        let Found { events, trouble } = found(&path);
+        let RestoredAlarms { events, trouble } = found(&path);
         assert_eq!(events, None);
         assert!(trouble.unwrap().contains("larger than 64 MiB"));
         // The beginning of a line that was never confirmed is no damage.
         fs::write(&path, &text[..text.len() - 9]).unwrap();
-        let Found { events, trouble } = found(&path);
+        let RestoredAlarms { events, trouble } = found(&path);
         assert_eq!((events.map(|events| events.len()), trouble), (Some(1), None));
     }
 }

@@ -176,7 +176,7 @@ impl Store {
         span: Range<i64>,
         rows: &str,
         order: &str,
-    ) -> Result<Option<Written>, HistoryError> {
+    ) -> Result<Option<NewFile>, HistoryError> {
         let folder = self.archive_folder();
         let path = free_path(&folder, tier, &span);
         let (last, new) = (folder.join(&path), folder.join(format!("{path}{UNFINISHED}")));
@@ -199,7 +199,7 @@ impl Store {
         }
         let (bytes, sha256) = sync_and_hash(&new).map_err(|error| wrong(&new, &error))?;
         let Range { start: from, end: to } = span;
-        Ok(Some(Written { file: ArchiveFile { tier, path, from, to, rows: written.0, bytes, sha256 }, new, last }))
+        Ok(Some(NewFile { file: ArchiveFile { tier, path, from, to, rows: written.0, bytes, sha256 }, new, last }))
     }
 
     /// Removes files that the manifest does not name any more. One that stays is removed at the next start.
@@ -231,13 +231,13 @@ impl Store {
 }
 
 /// A file that is whole, under the name that it has until it is renamed.
-struct Written {
+struct NewFile {
     file: ArchiveFile,
     new: PathBuf,
     last: PathBuf,
 }
 
-impl Written {
+impl NewFile {
     fn rename(self) -> Result<ArchiveFile, HistoryError> {
         fs::rename(&self.new, &self.last)
             .and_then(|()| sync_folder(&self.last))

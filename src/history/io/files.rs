@@ -138,7 +138,7 @@ pub const LOGS: [&str; 3] = [".wal", ".wal.checkpoint", ".wal.recovery"];
 
 /// What is set aside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum SetAside {
     /// The log alone: the file stays, as it was at its last checkpoint.
     Log,
     /// The file and its log.
@@ -152,7 +152,7 @@ pub fn has_log(db: &Path) -> bool {
 
 /// Moves a database and its log, or the log alone, aside under the time of day; returns the new path of the database
 /// (the log's is the same with `.wal`). Nothing is ever deleted.
-pub fn set_aside(db: &Path, part: Part, now: Timestamp) -> Result<PathBuf, HistoryError> {
+pub fn set_aside(db: &Path, part: SetAside, now: Timestamp) -> Result<PathBuf, HistoryError> {
     let stamp = now.to_zoned(TimeZone::UTC).strftime("%Y%m%dT%H%M%SZ").to_string();
     let target = (1..)
         .map(|n| match n {
@@ -163,8 +163,8 @@ pub fn set_aside(db: &Path, part: Part, now: Timestamp) -> Result<PathBuf, Histo
         .expect("some number is free");
     // The logs first: a database without its log is merely older, a log that meets a new database would be replayed.
     let file = match part {
-        Part::Log => None,
-        Part::Everything => Some(""),
+        SetAside::Log => None,
+        SetAside::Everything => Some(""),
     };
     for suffix in LOGS.into_iter().chain(file) {
         let (from, to) = (with_suffix(db, suffix), with_suffix(&target, suffix));
@@ -323,7 +323,7 @@ mod tests {
         for text in ["one", "two"] {
             fs::write(&db, text).unwrap();
             fs::write(with_suffix(&db, ".wal"), text).unwrap();
-            targets.push(set_aside(&db, Part::Everything, at("2026-11-21T06:00:00Z")).unwrap());
+            targets.push(set_aside(&db, SetAside::Everything, at("2026-11-21T06:00:00Z")).unwrap());
         }
         assert!(targets[0].ends_with("x.duckdb.damaged-20261121T060000Z"));
         for (target, text) in targets.iter().zip(["one", "two"]) {

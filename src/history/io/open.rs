@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use super::{
     alarm_metrics::Recent,
     compact,
-    files::{self, Failure, Opening, Part},
+    files::{self, Failure, Opening, SetAside},
     last::{self, LastCommit, Noted},
     restore, sql,
     store::{Store, after, engine},
@@ -109,20 +109,20 @@ impl Store {
             files::remove(path);
         }
         let mut trouble = None;
-        let mut set_aside = |part: Part, why: &str| -> Result<(), HistoryError> {
+        let mut set_aside = |part: SetAside, why: &str| -> Result<(), HistoryError> {
             tracing::error!(why, ?part, "the history is damaged");
             let target = files::set_aside(path, part, now)?;
             let what = match part {
-                Part::Log => "the last minutes of the history are",
-                Part::Everything => "the history is",
+                SetAside::Log => "the last minutes of the history are",
+                SetAside::Everything => "the history is",
             };
             trouble = Some(format!("{what} damaged ({}) and set aside as {}", plain(why), target.display()));
             Ok(())
         };
         match opening.failed {
             0..files::FAILED_OPENS_MAX => {}
-            files::FAILED_OPENS_MAX if files::has_log(path) => set_aside(Part::Log, "opening it never ended")?,
-            _ => set_aside(Part::Everything, "opening it never ended")?,
+            files::FAILED_OPENS_MAX if files::has_log(path) => set_aside(SetAside::Log, "opening it never ended")?,
+            _ => set_aside(SetAside::Everything, "opening it never ended")?,
         }
         let try_open = || {
             let unclean = files::has_log(path);
@@ -135,9 +135,9 @@ impl Store {
             Ok((store, archive, read))
         };
         let mut opened = try_open();
-        for part in [Part::Log, Part::Everything] {
+        for part in [SetAside::Log, SetAside::Everything] {
             let Err(Failure::Damaged(why)) = &opened else { break };
-            if part == Part::Everything || files::has_log(path) && !engine_error::is_of_database(why) {
+            if part == SetAside::Everything || files::has_log(path) && !engine_error::is_of_database(why) {
                 set_aside(part, why)?;
                 opened = try_open();
             }

@@ -42,7 +42,7 @@ pub type Answerer = Arc<dyn Fn(&Store, &Query, Timestamp) -> Result<Answer, Hist
 
 /// What the reader asks of the writer.
 #[derive(Debug)]
-pub enum Request {
+pub enum WriterRequest {
     /// Store what is pending, and say when that is done.
     Commit(oneshot::Sender<()>),
     /// Report to the operator what cannot be read.
@@ -54,7 +54,7 @@ pub struct Reader {
     /// A store to clone connections from after every opening, `None` before it is closed. Ends with the writer.
     pub stores: mpsc::Receiver<Option<Store>>,
     /// To the writer.
-    pub writer: mpsc::Sender<Request>,
+    pub writer: mpsc::Sender<WriterRequest>,
     /// Plant time.
     pub clock: Clock,
     /// How queries are answered.
@@ -132,7 +132,7 @@ impl Reader {
                 Ok(Ok((answer, unreadable))) => {
                     if let Some(what) = unreadable {
                         // If the writer is too busy, the next query reports it.
-                        let _ = writer.try_send(Request::Unreadable(what));
+                        let _ = writer.try_send(WriterRequest::Unreadable(what));
                     }
                     if let Err(error @ HistoryError::Engine(_)) = &answer {
                         tracing::warn!(?error, "a query has no reply");
@@ -189,9 +189,9 @@ fn counts_a_period(query: &Query) -> bool {
 }
 
 /// Waits until what is pending is stored; a writer that is too busy for it is not waited for.
-async fn commit_first(writer: &mpsc::Sender<Request>) {
+async fn commit_first(writer: &mpsc::Sender<WriterRequest>) {
     let (done, committed) = oneshot::channel();
-    if writer.try_send(Request::Commit(done)).is_ok() {
+    if writer.try_send(WriterRequest::Commit(done)).is_ok() {
         let _ = timeout(COMMIT_MAX, committed).await;
     }
 }

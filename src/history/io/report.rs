@@ -18,7 +18,7 @@ use super::{
 use crate::{
     history::{
         HistoryError,
-        tiers::{Aggregate, Part, Tier},
+        tiers::{Aggregate, CurvePart, Tier},
     },
     plant::{PlantDef, def::TagId, record::AlarmRecord, time::elapsed},
     report::{
@@ -35,10 +35,10 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn add(&mut self, part: Part) {
+    fn add(&mut self, part: CurvePart) {
         let (first, stats, gain) = match part {
-            Part::Held(held) => (held.value, held.into(), 0.0),
-            Part::Aggregate(Aggregate { stats, first, gain, .. }) => (first, stats, gain),
+            CurvePart::Held(held) => (held.value, held.into(), 0.0),
+            CurvePart::Aggregate(Aggregate { stats, first, gain, .. }) => (first, stats, gain),
         };
         if let Some(figures) = &mut self.figures {
             figures.add(first, stats, gain);

@@ -13,7 +13,7 @@ use super::{
     archiver::Archiver,
     files,
     open::{Opened, Restored},
-    reader::{Answerer, QUESTIONS_MAX, Reader, Request},
+    reader::{Answerer, QUESTIONS_MAX, Reader, WriterRequest},
     store::Store,
     writer::Writer,
 };
@@ -149,7 +149,7 @@ async fn run(
     clock: Clock,
     commit_every: Duration,
     mut records: mpsc::Receiver<Vec<Record>>,
-    mut requests: mpsc::Receiver<Request>,
+    mut requests: mpsc::Receiver<WriterRequest>,
     mut backups: mpsc::Receiver<BackupRequest>,
     outputs: &mut Outputs,
 ) -> Option<Opening> {
@@ -189,13 +189,13 @@ async fn run(
             }
             Some(request) = backups.recv() => archiver.back_up(request),
             Some(request) = requests.recv() => match request {
-                Request::Commit(done) => {
+                WriterRequest::Commit(done) => {
                     writer.commit(clock.utc());
                     outputs.publish(writer);
                     // The query may have been cancelled meanwhile.
                     let _ = done.send(());
                 }
-                Request::Unreadable(what) => {
+                WriterRequest::Unreadable(what) => {
                     writer.unreadable(what);
                     outputs.publish(writer);
                 }

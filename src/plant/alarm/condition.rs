@@ -139,7 +139,7 @@ pub struct Facts {
 
 /// What a condition that looks back remembers. Instants are of the manager's own clock, which never goes back.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Memory {
+pub struct ConditionMemory {
     /// Earlier values, or earlier changes, oldest first.
     points: VecDeque<(Duration, f64)>,
     /// The value that "no change" counts from.
@@ -153,11 +153,11 @@ pub struct Memory {
     changed: bool,
 }
 
-impl Memory {
+impl ConditionMemory {
     /// Starts over.
     pub fn clear(&mut self) {
         self.points.clear();
-        *self = Memory { points: std::mem::take(&mut self.points), ..Memory::default() };
+        *self = ConditionMemory { points: std::mem::take(&mut self.points), ..ConditionMemory::default() };
     }
 
     /// The rate in units per minute over about this window; `None` until the window is full.
@@ -211,9 +211,15 @@ impl Memory {
 /// Whether the condition holds; while an alarm is already active the limit moves inwards by the deadband, so that
 /// a value that hovers at the limit does not chatter. `None`: it cannot be evaluated, nothing changes. `now` is an instant of
 /// the manager's own clock.
-pub fn holds(condition: Condition, facts: Facts, active: bool, memory: &mut Memory, now: Duration) -> Option<bool> {
+pub fn holds(
+    condition: Condition,
+    facts: Facts,
+    active: bool,
+    memory: &mut ConditionMemory,
+    now: Duration,
+) -> Option<bool> {
     let back = |deadband: f64| if active { deadband } else { 0.0 };
-    let passed = |memory: &mut Memory| now.saturating_sub(memory.asked.replace(now).unwrap_or(now));
+    let passed = |memory: &mut ConditionMemory| now.saturating_sub(memory.asked.replace(now).unwrap_or(now));
     match condition {
         Condition::Limit { level: Level::High | Level::HighHigh, limit, deadband } => {
             facts.value.map(|value| limit - back(deadband) < value)

@@ -9,7 +9,7 @@ use std::{
 use jiff::Timestamp;
 
 use super::{
-    condition::{Facts, Memory, holds},
+    condition::{ConditionMemory, Facts, holds},
     lists::Lists,
     state::{AlarmDelays, AlarmState, AlarmStateMachine},
 };
@@ -29,7 +29,7 @@ pub struct AlarmManager {
     pub(super) def: Arc<PlantDef>,
     pub(super) machines: Vec<AlarmStateMachine>,
     /// What conditions that look back remember, by [`AlarmId`].
-    memories: Vec<Memory>,
+    memories: Vec<ConditionMemory>,
     /// Since when it is unknown whether an alarm is enabled, on the manager's own clock, by [`AlarmId`].
     unknown: Vec<Option<Duration>>,
     /// The manager's own clock: what has passed while it was evaluated. It never goes back, whatever the station's clock does.
@@ -49,7 +49,7 @@ impl AlarmManager {
     pub fn new(def: Arc<PlantDef>) -> AlarmManager {
         AlarmManager {
             machines: vec![AlarmStateMachine::default(); def.alarms.len()],
-            memories: vec![Memory::default(); def.alarms.len()],
+            memories: vec![ConditionMemory::default(); def.alarms.len()],
             unknown: vec![None; def.alarms.len()],
             def,
             ran: Duration::ZERO,

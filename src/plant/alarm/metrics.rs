@@ -183,7 +183,7 @@ pub const METRIC_TARGETS: [MetricTarget; 14] = {
 keyword_enum! {
     /// How a figure stands.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-    pub enum Verdict: "verdict" {
+    pub enum TargetStatus: "verdict" {
         /// As it should be.
         Good => "good",
         /// Beyond the target.
@@ -218,19 +218,19 @@ impl std::fmt::Display for Bound {
 
 impl MetricTarget {
     /// How a figure stands against it; `None` is a figure that could not be formed.
-    pub fn verdict(&self, figures: &PeriodMetrics) -> Verdict {
+    pub fn verdict(&self, figures: &PeriodMetrics) -> TargetStatus {
         if self.measure.kind() == MetricKind::Rate && figures.watched < WATCHED_MIN {
-            return Verdict::InsufficientData;
+            return TargetStatus::InsufficientData;
         }
-        let Some(value) = figures.value(self.measure) else { return Verdict::InsufficientData };
+        let Some(value) = figures.value(self.measure) else { return TargetStatus::InsufficientData };
         if self.measure.kind() == MetricKind::Share && figures.annunciated() < SHARED_MIN {
-            Verdict::InsufficientData
+            TargetStatus::InsufficientData
         } else if self.target.holds(value) {
-            Verdict::Good
+            TargetStatus::Good
         } else if self.limit.is_some_and(|limit| !limit.holds(value)) {
-            Verdict::Over
+            TargetStatus::Over
         } else {
-            Verdict::Beyond
+            TargetStatus::Beyond
         }
     }
 }
@@ -276,18 +276,18 @@ mod tests {
         PeriodMetrics { by_priority, until, windows: 144, watched, ..PeriodMetrics::default() }
     }
 
-    fn verdict(figures: &PeriodMetrics, measure: Metric) -> Verdict {
+    fn verdict(figures: &PeriodMetrics, measure: Metric) -> TargetStatus {
         METRIC_TARGETS.iter().find(|goal| goal.measure == measure).expect("every measure has a goal").verdict(figures)
     }
 
     #[test]
     fn a_rate_is_good_up_to_its_target_and_over_beyond_its_limit() {
         for (a_day, expect) in [
-            (0, Verdict::Good),
-            (144, Verdict::Good),
-            (151, Verdict::Beyond),
-            (300, Verdict::Beyond),
-            (301, Verdict::Over),
+            (0, TargetStatus::Good),
+            (144, TargetStatus::Good),
+            (151, TargetStatus::Beyond),
+            (300, TargetStatus::Beyond),
+            (301, TargetStatus::Over),
         ] {
             assert_eq!(verdict(&figures([0, 0, 0, a_day]), Metric::PerDay), expect, "{a_day}");
         }
@@ -300,30 +300,30 @@ mod tests {
         let hours =
             |hours: u64| PeriodMetrics { watched: Duration::from_secs(hours * 3_600), ..figures([0, 0, 0, 24]) };
         assert_eq!(hours(2).value(Metric::PerHour), Some(12.0));
-        assert_eq!(verdict(&hours(1), Metric::PerHour), Verdict::Over);
+        assert_eq!(verdict(&hours(1), Metric::PerHour), TargetStatus::Over);
         let short = PeriodMetrics { watched: Duration::from_secs(3_599), ..hours(1) };
-        assert_eq!(verdict(&short, Metric::PerHour), Verdict::InsufficientData);
-        assert_eq!(verdict(&short, Metric::Most), Verdict::Good, "that much is certain");
-        assert_eq!(verdict(&hours(0), Metric::PerDay), Verdict::InsufficientData);
+        assert_eq!(verdict(&short, Metric::PerHour), TargetStatus::InsufficientData);
+        assert_eq!(verdict(&short, Metric::Most), TargetStatus::Good, "that much is certain");
+        assert_eq!(verdict(&hours(0), Metric::PerDay), TargetStatus::InsufficientData);
     }
 
     #[test]
     fn the_split_is_judged_from_a_handful_of_alarms_up() {
         let split = figures([0, 5, 15, 80]);
         for priority in Priority::ALL {
-            assert_eq!(verdict(&split, Metric::Share(priority)), Verdict::Good, "{}", priority.word());
+            assert_eq!(verdict(&split, Metric::Share(priority)), TargetStatus::Good, "{}", priority.word());
         }
         let urgent = figures([2, 10, 10, 10]);
         for priority in Priority::ALL {
-            assert_eq!(verdict(&urgent, Metric::Share(priority)), Verdict::Beyond, "{}", priority.word());
+            assert_eq!(verdict(&urgent, Metric::Share(priority)), TargetStatus::Beyond, "{}", priority.word());
         }
-        assert_eq!(verdict(&figures([0, 19, 0, 0]), Metric::Share(Priority::High)), Verdict::InsufficientData);
-        assert_eq!(verdict(&figures([0; 4]), Metric::Share(Priority::Low)), Verdict::InsufficientData);
+        assert_eq!(verdict(&figures([0, 19, 0, 0]), Metric::Share(Priority::High)), TargetStatus::InsufficientData);
+        assert_eq!(verdict(&figures([0; 4]), Metric::Share(Priority::Low)), TargetStatus::InsufficientData);
     }
 
     #[test]
     fn few_stale_alarms_and_little_flood_are_good() {
-        for (stale, flood, expect) in [(4, 863, Verdict::Good), (5, 864, Verdict::Beyond)] {
+        for (stale, flood, expect) in [(4, 863, TargetStatus::Good), (5, 864, TargetStatus::Beyond)] {
             let figures = PeriodMetrics { stale, flood: Duration::from_secs(flood), ..figures([0; 4]) };
             assert_eq!([Metric::Stale, Metric::Flood].map(|measure| verdict(&figures, measure)), [expect; 2]);
         }

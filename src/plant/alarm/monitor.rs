@@ -43,7 +43,7 @@ const REFRESH_S: i64 = 10;
 /// Counts activations. Steps come in order of time.
 #[derive(Debug, Clone)]
 pub struct AlarmMonitor {
-    span: Span,
+    span: Counted,
     rate: Rate,
     alarms: BTreeMap<Named, AlarmHistory>,
     /// By the second in which they begin, oldest first: the only one of a period, or one an hour.
@@ -58,7 +58,7 @@ pub struct AlarmMonitor {
 
 /// What is counted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Span {
+enum Counted {
     /// The running hour and those before it.
     Running,
     /// What lies in a period.
@@ -93,18 +93,18 @@ struct Sum {
 impl AlarmMonitor {
     /// Counts from now on, for as long as the plant runs.
     pub fn running(at: Timestamp) -> AlarmMonitor {
-        AlarmMonitor::new(Span::Running, second(at))
+        AlarmMonitor::new(Counted::Running, second(at))
     }
 
     /// Counts what lies from `from` until before `until`. It is fed from `LEAD` before `from` on.
     pub fn of_period(from: Timestamp, until: Timestamp) -> AlarmMonitor {
         let start = second(from) - LEAD.as_secs() as i64;
-        let mut monitor = AlarmMonitor::new(Span::Period { from, until }, start);
+        let mut monitor = AlarmMonitor::new(Counted::Period { from, until }, start);
         monitor.sums.push_back((second(from), Sum::default()));
         monitor
     }
 
-    fn new(span: Span, start: i64) -> AlarmMonitor {
+    fn new(span: Counted, start: i64) -> AlarmMonitor {
         AlarmMonitor {
             span,
             rate: Rate::new(start),
@@ -159,7 +159,7 @@ impl AlarmMonitor {
         self.pass(at);
         let now = self.rate.now;
         let fresh = (0..REFRESH_S).contains(&(now - second(self.day.until)));
-        if self.span == Span::Running && !(fresh && self.day.windows > 0) {
+        if self.span == Counted::Running && !(fresh && self.day.windows > 0) {
             let from = now.div_euclid(HOUR_S) * HOUR_S - (HOURS - 1) * HOUR_S;
             if let (Ok(from), Ok(until)) = (Timestamp::from_second(from), Timestamp::from_second(now)) {
                 self.day = Arc::new(self.figures_of(from, until));
@@ -171,7 +171,7 @@ impl AlarmMonitor {
         for flooded in self.rate.advance(second(at)) {
             self.flooded(flooded);
         }
-        if self.span == Span::Running {
+        if self.span == Counted::Running {
             self.watched.insert(self.rate.now.div_euclid(WINDOW_S));
             self.forget();
         }
@@ -190,11 +190,11 @@ impl AlarmMonitor {
     /// The figures of the period, once every event of it has been taken.
     pub fn figures(mut self) -> PeriodMetrics {
         match self.span {
-            Span::Period { from, until } => {
+            Counted::Period { from, until } => {
                 self.advance(until);
                 self.figures_of(from, until)
             }
-            Span::Running => Arc::unwrap_or_clone(self.day),
+            Counted::Running => Arc::unwrap_or_clone(self.day),
         }
     }
 
@@ -242,11 +242,11 @@ impl AlarmMonitor {
     /// The sum that an instant belongs to; `None` outside the period.
     fn sum(&mut self, at: Timestamp) -> Option<&mut Sum> {
         match self.span {
-            Span::Period { from, until } => {
+            Counted::Period { from, until } => {
                 let inside = from <= at && at < until;
                 self.sums.back_mut().map(|(_, sum)| sum).filter(|_| inside)
             }
-            Span::Running => Some(self.hour(second(at))),
+            Counted::Running => Some(self.hour(second(at))),
         }
     }
 
@@ -262,13 +262,13 @@ impl AlarmMonitor {
     /// Counts a span of seconds (from, until) in which there was a flood.
     fn flooded(&mut self, (from, until): (i64, i64)) {
         match self.span {
-            Span::Period { from: first, until: end } => {
+            Counted::Period { from: first, until: end } => {
                 let inside = until.min(second(end)) - from.max(second(first));
                 if let Some((_, sum)) = self.sums.back_mut() {
                     sum.flood_s += u64::try_from(inside).unwrap_or(0);
                 }
             }
-            Span::Running => {
+            Counted::Running => {
                 let mut from = from;
                 while from < until {
                     let next = until.min((from.div_euclid(HOUR_S) + 1) * HOUR_S);

@@ -16,7 +16,7 @@ use crate::plant::{
 
 /// One write of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Change {
+pub struct PlannedChange {
     /// What.
     pub tag: TagId,
     /// In the device when the plan was made.
@@ -64,7 +64,7 @@ pub fn plan(
     device: DeviceId,
     set: &ParameterSet,
     trusted: Trusted,
-) -> Result<Vec<Change>, Vec<Problem>> {
+) -> Result<Vec<PlannedChange>, Vec<Problem>> {
     let own = &def.device(device).profile;
     if *own != set.profile {
         return Err(vec![Problem::OtherProfile { set: set.profile.clone(), device: own.clone() }]);
@@ -80,7 +80,7 @@ pub fn plan(
             // Without the old value the change is unknown.
             (Some(_), None) => problems.push(Problem::Unknown(row.short)),
             (Some(tag), Some(_)) if carries(def, device, tag.id) => problems.push(Problem::Ground(tag.short.clone())),
-            (Some(tag), Some(old)) => changes.push(Change { tag: tag.id, old, new }),
+            (Some(tag), Some(old)) => changes.push(PlannedChange { tag: tag.id, old, new }),
         }
     }
     let after: BTreeMap<TagId, f64> = changes.iter().map(|change| (change.tag, change.new)).collect();
@@ -141,7 +141,12 @@ fn carries(def: &PlantDef, device: DeviceId, tag: TagId) -> bool {
 }
 
 /// Why a value cannot be in the device when all is written.
-fn unfit(def: &PlantDef, change: &Change, then: &dyn Fn(TagId) -> Option<f64>, trusted: Trusted) -> Option<Problem> {
+fn unfit(
+    def: &PlantDef,
+    change: &PlannedChange,
+    then: &dyn Fn(TagId) -> Option<f64>,
+    trusted: Trusted,
+) -> Option<Problem> {
     let tag = def.tag(change.tag);
     if !tag.enum_labels.is_empty() && tag.label_of(change.new).is_none() {
         return Some(Problem::NotAChoice { tag: tag.short.clone(), value: change.new });
@@ -176,15 +181,15 @@ fn as_sample(trusted: Option<f64>) -> Sample {
 fn in_order(
     def: &PlantDef,
     device: DeviceId,
-    mut left: Vec<Change>,
+    mut left: Vec<PlannedChange>,
     trusted: Trusted,
-) -> Result<Vec<Change>, Vec<Change>> {
+) -> Result<Vec<PlannedChange>, Vec<PlannedChange>> {
     let mut now: BTreeMap<TagId, f64> = BTreeMap::new();
     let mut sorted = Vec::with_capacity(left.len());
     while !left.is_empty() {
         let value = |tag: TagId| now.get(&tag).copied().or_else(|| trusted(tag));
-        let own = |change: &Change| inside(def.tag(change.tag), change.new, &value);
-        let kind = |change: &Change| {
+        let own = |change: &PlannedChange| inside(def.tag(change.tag), change.new, &value);
+        let kind = |change: &PlannedChange| {
             let then = |tag: TagId| if tag == change.tag { Some(change.new) } else { value(tag) };
             def.tags_of(device).all(|tag| match trusted(tag.id).and(value(tag.id)) {
                 // A value that was outside before is not this change's doing.

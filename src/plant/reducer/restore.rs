@@ -117,7 +117,7 @@ impl Plant {
         &self,
         device: DeviceId,
         set: &parameter_set::ParameterSet,
-        confirmed: impl IntoIterator<Item = &'a parameter_set::Change>,
+        confirmed: impl IntoIterator<Item = &'a parameter_set::PlannedChange>,
     ) -> Option<Refusal> {
         match parameter_set::plan(&self.def, device, set, &trusted(&self.image)) {
             Err(problems) => Some(Refusal::NotFit(first_of(&problems))),

@@ -8,7 +8,7 @@ use crate::plant::{
     PlantDef,
     def::{DeviceDef, Framing, LineId, TagId, Transport},
 };
-use crate::sim::rig::{Part, SIMULATION, part};
+use crate::sim::rig::{RigDevice, SIMULATION, part};
 
 /// What a fault is injected into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -93,8 +93,9 @@ pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: InjectedFa
         };
         return Some(format!("`{fault}` is a fault of {belongs}, not of {name}"));
     }
-    let is_controller =
-        |line, unit| device_at(def, line, unit).is_some_and(|device| part(def, device.id) == Some(Part::Controller));
+    let is_controller = |line, unit| {
+        device_at(def, line, unit).is_some_and(|device| part(def, device.id) == Some(RigDevice::Controller))
+    };
     let why = match (target, fault) {
         (FaultTarget::Line(line), _) if over_mbap(def, line) => {
             "is not a serial line: TCP itself repairs what the wire corrupts"

@@ -26,7 +26,7 @@ pub struct Values {
 
 /// What a unit has answered, as far as a fault needs it.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Memory {
+pub struct AnswerMemory {
     /// The first answer since values are stuck, by table and address.
     held: BTreeMap<(Table, u16), u16>,
     /// The answer before this one, by table and address.
@@ -66,7 +66,13 @@ impl Values {
 
     /// The answer with what these faults make of it. `request` and `answer` are PDUs; what is no read of the four tables
     /// passes as it is.
-    pub fn corrupt(&self, faults: &[InjectedFault], memory: &mut Memory, request: &[u8], answer: Vec<u8>) -> Vec<u8> {
+    pub fn corrupt(
+        &self,
+        faults: &[InjectedFault],
+        memory: &mut AnswerMemory,
+        request: &[u8],
+        answer: Vec<u8>,
+    ) -> Vec<u8> {
         let Some(mut cells) = Cells::parse(request, &answer) else { return answer };
         let now = cells.clone();
         for fault in faults.iter().filter_map(|fault| fault.of_values()) {
@@ -81,7 +87,7 @@ impl Values {
         cells.into_answer(answer)
     }
 
-    fn hold(&self, cells: &mut Cells, memory: &mut Memory) {
+    fn hold(&self, cells: &mut Cells, memory: &mut AnswerMemory) {
         for at in self.measured.iter().flat_map(|point| words_of(*point)) {
             if let Some(cell) = cells.get(at) {
                 *cell = *memory.held.entry(at).or_insert(*cell);
@@ -89,7 +95,7 @@ impl Values {
         }
     }
 
-    fn tear(&self, cells: &mut Cells, now: &Cells, memory: &Memory) {
+    fn tear(&self, cells: &mut Cells, now: &Cells, memory: &AnswerMemory) {
         for point in &self.pairs {
             let second = (point.table, point.address.wrapping_add(1));
             let whole = now.has((point.table, point.address));
@@ -118,7 +124,7 @@ impl Values {
     }
 }
 
-impl Memory {
+impl AnswerMemory {
     /// Forgets what was held: the next answer is the one that stays.
     pub fn let_go(&mut self) {
         self.held.clear();
@@ -215,7 +221,7 @@ mod tests {
     }
 
     fn check(fault: InjectedFault, expect: [u16; 4]) {
-        let mut memory = Memory::default();
+        let mut memory = AnswerMemory::default();
         let before = values().corrupt(&[fault], &mut memory, &READ, answer([0x428B, 0xFAE1, 500, 270]));
         assert_eq!(before.len(), 10);
         let now = values().corrupt(&[fault], &mut memory, &READ, answer([0x428C, 0x0A3D, 700, 280]));
@@ -234,8 +240,8 @@ mod tests {
 
     #[test]
     fn bits_are_stuck_as_well_and_let_go() {
-        let (values, mut memory) = (values(), Memory::default());
-        let read = |memory: &mut Memory, bit| {
+        let (values, mut memory) = (values(), AnswerMemory::default());
+        let read = |memory: &mut AnswerMemory, bit| {
             values.corrupt(&[InjectedFault::Stuck], memory, &[2, 0, 0, 0, 2], vec![2, 1, bit])
         };
         assert_eq!(read(&mut memory, 0b01), [2, 1, 0b01]);
@@ -258,7 +264,7 @@ mod tests {
             request in prop::collection::vec(any::<u8>(), 0..8),
             answer in prop::collection::vec(any::<u8>(), 0..12),
         ) {
-            let mut memory = Memory::default();
+            let mut memory = AnswerMemory::default();
             let corrupt = values().corrupt(&InjectedFault::all().collect::<Vec<_>>(), &mut memory, &request, answer.clone());
             prop_assert_eq!(corrupt.len(), answer.len());
             if answer.first().is_some_and(|function| *function >= 0x80) {

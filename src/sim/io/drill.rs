@@ -21,7 +21,7 @@ use crate::{
         faults::{AvailableFaults, available_faults},
         scenario::{
             FaultEvent, Scenario, ScenarioEvent,
-            judge::{Judge, Verdict},
+            judge::{DrillResult, Judge},
         },
     },
 };
@@ -93,7 +93,7 @@ pub struct Trainer {
 
 impl Trainer {
     /// Starts the task. It ends when the station does, or in a drill without a person when the drill is over.
-    pub fn spawn(self) -> (Port, tokio::task::JoinHandle<Option<Verdict>>) {
+    pub fn spawn(self) -> (Port, tokio::task::JoinHandle<Option<DrillResult>>) {
         let (commands, inbox) = mpsc::channel(COMMANDS_MAX);
         let began = self.simulator.clock().now();
         let judge = self.scenario.clone().map(|scenario| Judge::new(scenario, self.def.clone(), began));
@@ -121,7 +121,7 @@ impl Task {
         mut self,
         mut inbox: mpsc::Receiver<SimCommand>,
         publish: watch::Sender<Arc<Status>>,
-    ) -> Option<Verdict> {
+    ) -> Option<DrillResult> {
         let clock = self.trainer.simulator.clock();
         loop {
             let event = self

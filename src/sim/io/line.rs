@@ -16,7 +16,7 @@ use super::LineHandle;
 use crate::bus::io::clock::Clock;
 use crate::plant::def::Serial;
 use crate::sim::faults::Answer;
-use crate::sim::wire::{FrameReceiver, Request};
+use crate::sim::wire::{FrameReceiver, SlaveRequest};
 
 /// Requests and answers under way at once; a request beyond that is dropped.
 const JOBS_MAX: usize = 8;
@@ -144,8 +144,8 @@ impl Line {
         }
     }
 
-    fn accept(&mut self, frame: Option<Request>) {
-        let Some(Request { message, characters }) = frame else {
+    fn accept(&mut self, frame: Option<SlaveRequest>) {
+        let Some(SlaveRequest { message, characters }) = frame else {
             self.corrupt += 1;
             return;
         };

@@ -23,9 +23,9 @@ use crate::plant::number::to_i16;
 use alarm::{Alarm, Setup};
 use control::{Control, Law, Settings};
 use program::{Mode, Plan, Program, ProgramCommand, Segment};
-use rule::Found;
+use rule::PidSettings;
 use selftune::SelfTuner;
-use tuning::{Tuner, Verdict};
+use tuning::{Tuner, TuningStatus};
 
 /// The controller samples, computes and outputs once in this time (data sheet).
 pub const SAMPLE: Duration = Duration::from_millis(500);
@@ -266,9 +266,9 @@ impl Pxr {
         // The low-PV type tunes 10 % of the range below SV, for processes that must not overshoot.
         let target_c = if command == 2 { sv_c - 0.1 * span_c } else { sv_c };
         match self.tuner.get_or_insert_with(|| Tuner::new(target_c, span_c)).step(SAMPLE_S, self.pv_c) {
-            Verdict::Running(output) => return Some(if self.cools() { 100.0 - output } else { output }),
-            Verdict::Failed => {}
-            Verdict::Done(found) => self.set_pid(found),
+            TuningStatus::Running(output) => return Some(if self.cools() { 100.0 - output } else { output }),
+            TuningStatus::Failed => {}
+            TuningStatus::Done(found) => self.set_pid(found),
         }
         self.stop_tuning();
         self.control = Control::default();
@@ -283,7 +283,7 @@ impl Pxr {
         }
         let (sv_c, pv_c, span_c) = (self.sv_c, self.pv_c, self.span_c());
         let band_k = self.tenths(map::P) / 100.0 * span_c;
-        let now = Found { band_k, i_s: self.tenths(map::I), d_s: self.tenths(map::D) };
+        let now = PidSettings { band_k, i_s: self.tenths(map::I), d_s: self.tenths(map::D) };
         let watcher = self.self_tuner.get_or_insert_default();
         let found = watcher.step(SAMPLE_S, sv_c, pv_c, span_c, now);
         let pushing = watcher.pushing();
@@ -293,7 +293,7 @@ impl Pxr {
         pushing
     }
 
-    fn set_pid(&mut self, found: Found) {
+    fn set_pid(&mut self, found: PidSettings) {
         let tenths = |value: f64, max: f64| to_i16((value * 10.0).round().clamp(1.0, max));
         self.settings[map::P] = tenths(100.0 * found.band_k / self.span_c(), 9_999.0);
         self.settings[map::I] = tenths(found.i_s, 32_000.0);

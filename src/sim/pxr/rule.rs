@@ -12,7 +12,7 @@ const D: f64 = 0.58;
 
 /// P, I and D in physical units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct PidSettings {
     /// Width of the proportional band in K.
     pub band_k: f64,
     /// Integral time.
@@ -22,6 +22,6 @@ pub struct Found {
 }
 
 /// Settings for a process that answers full output after `delay_s` with `slope_k_per_s`.
-pub fn settings(slope_k_per_s: f64, delay_s: f64) -> Found {
-    Found { band_k: BAND * slope_k_per_s * delay_s, i_s: I * delay_s, d_s: D * delay_s }
+pub fn settings(slope_k_per_s: f64, delay_s: f64) -> PidSettings {
+    PidSettings { band_k: BAND * slope_k_per_s * delay_s, i_s: I * delay_s, d_s: D * delay_s }
 }

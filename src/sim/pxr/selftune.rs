@@ -9,7 +9,7 @@
 //!
 //! The manufacturer does not publish the rule; these two are ours.
 
-use super::rule::{self, Found};
+use super::rule::{self, PidSettings};
 
 /// SV must have moved this far, as a share of the range, or PV be this far from it at power-on.
 const MOVED: f64 = 0.03;
@@ -61,7 +61,7 @@ impl SelfTuner {
     }
 
     /// One sample of a process that is heated; `now` are the settings in use.
-    pub fn step(&mut self, dt_s: f64, sv_c: f64, pv_c: f64, span_c: f64, now: Found) -> Option<Found> {
+    pub fn step(&mut self, dt_s: f64, sv_c: f64, pv_c: f64, span_c: f64, now: PidSettings) -> Option<PidSettings> {
         self.recent_c.push(pv_c);
         if self.recent_c.len() > SLOPE_OVER + 1 {
             self.recent_c.remove(0);
@@ -89,7 +89,7 @@ impl SelfTuner {
 
 impl Approach {
     /// `None` while it goes on; then what was found, if anything.
-    fn step(&mut self, dt_s: f64, pv_c: f64, slope_k_per_s: f64) -> Option<Option<Found>> {
+    fn step(&mut self, dt_s: f64, pv_c: f64, slope_k_per_s: f64) -> Option<Option<PidSettings>> {
         self.elapsed_s += dt_s;
         self.steepest_k_per_s = self.steepest_k_per_s.max(slope_k_per_s);
         let risen_k = pv_c - self.start_c;
@@ -107,7 +107,7 @@ impl Approach {
 }
 
 impl Swings {
-    fn step(&mut self, dt_s: f64, above_k: f64, least_k: f64, now: Found) -> Option<Found> {
+    fn step(&mut self, dt_s: f64, above_k: f64, least_k: f64, now: PidSettings) -> Option<PidSettings> {
         self.elapsed_s += dt_s;
         let (height_k, length_s) = (self.highest_k - self.lowest_k, self.elapsed_s);
         let crossed = !self.above && above_k > 0.0;
@@ -123,7 +123,7 @@ impl Swings {
             return None;
         }
         self.before_k = 0.0;
-        Some(Found { band_k: now.band_k * WIDER, i_s: now.i_s.max(length_s / 2.0), d_s: now.d_s })
+        Some(PidSettings { band_k: now.band_k * WIDER, i_s: now.i_s.max(length_s / 2.0), d_s: now.d_s })
     }
 }
 
@@ -131,7 +131,7 @@ impl Swings {
 mod tests {
     use super::*;
 
-    const NOW: Found = Found { band_k: 2.0, i_s: 20.0, d_s: 5.0 };
+    const NOW: PidSettings = PidSettings { band_k: 2.0, i_s: 20.0, d_s: 5.0 };
 
     #[test]
     fn a_step_response_of_known_slope_and_delay_gives_its_settings() {

@@ -11,7 +11,7 @@
 //! `on` and `off` are the times with full and without power, ±h the hysteresis that keeps eddies at the probe from
 //! switching. Slope and delay do not depend on how fast the process cools, so both types of tuning find the same.
 
-use super::rule::{self, Found};
+use super::rule::{self, PidSettings};
 
 /// Tuning gives up after this time, as nothing may wait for ever.
 const LONGEST_S: f64 = 4.0 * 3600.0;
@@ -42,11 +42,11 @@ struct Swing {
 
 /// What came out of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Verdict {
+pub enum TuningStatus {
     /// Still swinging, with this output in percent.
     Running(f64),
     /// The new settings.
-    Done(Found),
+    Done(PidSettings),
     /// No two swings within the longest time.
     Failed,
 }
@@ -66,10 +66,10 @@ impl Tuner {
     }
 
     /// One sample.
-    pub fn step(&mut self, dt_s: f64, pv_c: f64) -> Verdict {
+    pub fn step(&mut self, dt_s: f64, pv_c: f64) -> TuningStatus {
         self.elapsed_s += dt_s;
         if self.elapsed_s > LONGEST_S {
-            return Verdict::Failed;
+            return TuningStatus::Failed;
         }
         let above_k = pv_c - self.target_c;
         let was_heating = self.heating;
@@ -85,9 +85,9 @@ impl Tuner {
         }
         if self.measured.len() == SWINGS {
             let mean = |part: fn(&(f64, f64)) -> f64| self.measured.iter().map(part).sum::<f64>() / SWINGS as f64;
-            return Verdict::Done(rule::settings(mean(|swing| swing.0), mean(|swing| swing.1)));
+            return TuningStatus::Done(rule::settings(mean(|swing| swing.0), mean(|swing| swing.1)));
         }
-        Verdict::Running(if self.heating { 100.0 } else { 0.0 })
+        TuningStatus::Running(if self.heating { 100.0 } else { 0.0 })
     }
 }
 
@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     /// A process that rises by `up` and falls by `down`, seen `late` samples late, tuned around 70 °C.
-    fn tuned(up: f64, down: f64, late: usize) -> Verdict {
+    fn tuned(up: f64, down: f64, late: usize) -> TuningStatus {
         let mut tuner = Tuner::new(70.0, 185.0);
         let (mut c, mut line, mut output) = (65.0, std::collections::VecDeque::from(vec![65.0; late]), 100.0);
         (0..28_802)
@@ -112,20 +112,22 @@ mod tests {
                 c += 0.5 * if output > 50.0 { up } else { -down };
                 line.push_back(c);
                 match tuner.step(0.5, line.pop_front().unwrap_or(c)) {
-                    Verdict::Running(percent) => {
+                    TuningStatus::Running(percent) => {
                         output = percent;
                         None
                     }
                     verdict => Some(verdict),
                 }
             })
-            .unwrap_or(Verdict::Failed)
+            .unwrap_or(TuningStatus::Failed)
     }
 
     #[test]
     fn slope_and_delay_of_a_known_process_are_found() {
         for down in [0.003, 0.006, 0.03] {
-            let Verdict::Done(found) = tuned(0.07 - down, down, 60) else { panic!("tuning did not end at {down} K/s") };
+            let TuningStatus::Done(found) = tuned(0.07 - down, down, 60) else {
+                panic!("tuning did not end at {down} K/s")
+            };
             let expect = rule::settings(0.07, 30.0);
             for (found, expect) in [(found.band_k, expect.band_k), (found.i_s, expect.i_s), (found.d_s, expect.d_s)] {
                 assert!((found / expect - 1.0).abs() < 0.06, "{found} instead of {expect} at {down} K/s");
@@ -135,6 +137,6 @@ mod tests {
 
     #[test]
     fn tuning_of_a_dead_process_gives_up() {
-        assert_eq!(tuned(0.0, 0.0, 1), Verdict::Failed);
+        assert_eq!(tuned(0.0, 0.0, 1), TuningStatus::Failed);
     }
 }

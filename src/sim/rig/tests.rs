@@ -249,7 +249,7 @@ fn after_a_power_cut_the_plant_stands_still() {
 
 #[test]
 fn only_the_first_device_of_a_profile_belongs_to_the_rig() {
-    let check = |simulation: Option<&str>, profiles: [&str; 2], expect: [Option<Part>; 2]| {
+    let check = |simulation: Option<&str>, profiles: [&str; 2], expect: [Option<RigDevice>; 2]| {
         let mut def = crate::plant::fixture::plant();
         def.simulation = simulation.map(str::to_owned);
         for (device, profile) in def.devices.iter_mut().zip(profiles) {
@@ -261,9 +261,9 @@ fn only_the_first_device_of_a_profile_belongs_to_the_rig() {
         let Ok(simulator) = super::super::simulator::Simulator::new(&def) else { panic!("{simulation:?} is known") };
         let answers: Vec<_> =
             def.devices.iter().map(|device| simulator.is_controller(device.line, device.unit)).collect();
-        assert_eq!(answers, expect.map(|part| part == Some(Part::Controller)));
+        assert_eq!(answers, expect.map(|part| part == Some(RigDevice::Controller)));
     };
-    let (controller, plc) = (Some(Part::Controller), Some(Part::Plc));
+    let (controller, plc) = (Some(RigDevice::Controller), Some(RigDevice::Plc));
     check(Some("tank"), [CONTROLLER, PLC], [controller, plc]);
     check(Some("tank"), [CONTROLLER, CONTROLLER], [controller, None]);
     check(Some("tank"), [PLC, PLC], [plc, None]);

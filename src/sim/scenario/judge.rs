@@ -67,7 +67,7 @@ pub struct Row {
 
 /// How a drill stands or ended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct DrillResult {
     /// Title of the scenario.
     pub title: String,
     /// One for each expectation.
@@ -168,7 +168,7 @@ impl Judge {
     }
 
     /// How it stands; `over` once the time of the scenario has passed.
-    pub fn verdict(&self) -> Verdict {
+    pub fn verdict(&self) -> DrillResult {
         let over = self.is_over();
         let rows: Vec<Row> = self
             .scenario
@@ -182,7 +182,7 @@ impl Judge {
             })
             .collect();
         let met = rows.iter().filter(|row| matches!(row.status, ExpectationStatus::Met(_)));
-        Verdict {
+        DrillResult {
             title: self.scenario.title.clone(),
             points: met.map(|row| row.points).sum(),
             of: self.scenario.points(),
@@ -271,7 +271,7 @@ impl Mark {
     }
 }
 
-impl Verdict {
+impl DrillResult {
     /// Whether the points suffice. Lost alarm events are never passed.
     pub fn passed(&self) -> bool {
         self.lost == 0 && self.points * 100 >= self.pass_percent * self.of

@@ -166,7 +166,7 @@ fn refused_writes_are_unrecorded_until_the_disk_is_back() {
     let history_file = folder.path().join("later").join("tank.duckdb");
     let (history, mut rows) = mpsc::channel(64);
     let (mut recorder, found) = Recorder::new(&history_file, clock(), history);
-    assert_eq!(found, Found::default());
+    assert_eq!(found, RestoredAlarms::default());
     recorder.open();
     recorder.on_batch(batch(&["start", "acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
     recorder.write();

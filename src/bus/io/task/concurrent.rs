@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use super::{
     LinkExit, Task,
-    poll::{Outcome, parse},
+    poll::{ReadResult, parse},
 };
 use crate::{
     bus::{
@@ -123,7 +123,7 @@ impl Task<'_> {
                 self.stats.served(index, served.jitter, served.missed);
                 self.keep_gap(link, schedule, &block, ended);
             }
-            let outcome = Outcome { began, ended, took, answer, exchange: Some(exchange) };
+            let outcome = ReadResult { began, ended, took, answer, exchange: Some(exchange) };
             self.finish_poll(link, schedule, index, &block, outcome).await?;
         }
         self.note_late(link, schedule);

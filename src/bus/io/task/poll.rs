@@ -30,7 +30,7 @@ use crate::{
 const UNANSWERED_MAX: u32 = 5;
 
 /// How a read has ended.
-pub(super) struct Outcome {
+pub(super) struct ReadResult {
     pub began: Timestamp,
     pub ended: Timestamp,
     /// The time of the line that it took.
@@ -77,7 +77,8 @@ impl Task<'_> {
         // If only time could resynchronise, nothing was sent and `last` is the previous exchange.
         let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
         let took = elapsed(began, ended);
-        self.finish_poll(link, schedule, Some(index), &block, Outcome { began, ended, took, answer, exchange }).await?;
+        self.finish_poll(link, schedule, Some(index), &block, ReadResult { began, ended, took, answer, exchange })
+            .await?;
         Ok(())
     }
 
@@ -114,7 +115,7 @@ impl Task<'_> {
         schedule: &mut Schedule,
         index: Option<usize>,
         block: &Block,
-        Outcome { began, ended: at, took, answer, exchange }: Outcome,
+        ReadResult { began, ended: at, took, answer, exchange }: ReadResult,
     ) -> Result<(), LinkExit> {
         let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
         if let Some(exchange) = &exchange {

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// What became of a write.
-enum Written {
+enum WriteEnd {
     /// It ended, well or not.
     Ended(WriteResult),
     /// The port closed; the result to report, and why it closed.
@@ -35,7 +35,7 @@ enum Unlocked {
     /// The write may be sent.
     Yes,
     /// The write ends without having been sent.
-    No(Written),
+    No(WriteEnd),
 }
 
 impl Task<'_> {
@@ -61,12 +61,12 @@ impl Task<'_> {
         };
         let result = match written {
             // It waits again, unless the stop is one of its tag.
-            Written::Ended(WriteResult::Superseded) => {
+            WriteEnd::Ended(WriteResult::Superseded) => {
                 self.requests.defer(BusRequest::Write(*job));
                 return Ok(());
             }
-            Written::Ended(result) => result,
-            Written::PortClosed(result, why) => {
+            WriteEnd::Ended(result) => result,
+            WriteEnd::PortClosed(result, why) => {
                 self.publish_write_result(id, result).await?;
                 return Err(LinkExit::Lost(why));
             }
@@ -113,11 +113,11 @@ impl Task<'_> {
     ) -> Result<Unlocked, LinkExit> {
         // A key of another device would be written to an address of this one.
         if key.device != self.def.tag(job.tag).device {
-            return Ok(Unlocked::No(Written::Ended(WriteResult::NotSent(Fault::NotANumber))));
+            return Ok(Unlocked::No(WriteEnd::Ended(WriteResult::NotSent(Fault::NotANumber))));
         }
         let sent = self.send_number(link, schedule, key, raw, job.urgent).await;
         if let Ok(ended @ (WriteResult::NotSent(_) | WriteResult::Superseded)) = sent {
-            return Ok(Unlocked::No(Written::Ended(ended)));
+            return Ok(Unlocked::No(WriteEnd::Ended(ended)));
         }
         let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
         self.publish(Event::Unlocked { at: self.clock.now(), id: job.id, key: key.id, result }).await?;
@@ -127,9 +127,9 @@ impl Task<'_> {
             // A stop is tried all the same: a key without a reply may have arrived.
             Ok(WriteResult::Lost(_)) if job.urgent => Unlocked::Yes,
             // The value itself was never on the wire.
-            Ok(WriteResult::Lost(fault)) => Unlocked::No(Written::Ended(WriteResult::NotSent(fault))),
-            Ok(refused) => Unlocked::No(Written::Ended(refused)),
-            Err(why) => Unlocked::No(Written::PortClosed(WriteResult::NotSent(Fault::NotConnected), why)),
+            Ok(WriteResult::Lost(fault)) => Unlocked::No(WriteEnd::Ended(WriteResult::NotSent(fault))),
+            Ok(refused) => Unlocked::No(WriteEnd::Ended(refused)),
+            Err(why) => Unlocked::No(WriteEnd::PortClosed(WriteResult::NotSent(Fault::NotConnected), why)),
         })
     }
 
@@ -176,14 +176,14 @@ impl Task<'_> {
         link: &mut Link,
         schedule: &mut Schedule,
         &WriteJob { tag, raw, verify, urgent, .. }: &WriteJob,
-    ) -> Written {
+    ) -> WriteEnd {
         let def = self.def.clone();
         let tag = def.tag(tag);
         match self.send_number(link, schedule, tag, raw, urgent).await {
             Ok(WriteResult::Accepted) => {}
-            Ok(ended) => return Written::Ended(ended),
+            Ok(ended) => return WriteEnd::Ended(ended),
             // It may or may not have arrived.
-            Err(why) => return Written::PortClosed(WriteResult::Lost(Fault::NotConnected), why),
+            Err(why) => return WriteEnd::PortClosed(WriteResult::Lost(Fault::NotConnected), why),
         }
         let device = def.device(tag.device);
         // An action such as saving to non-volatile memory wants the device left alone, not the line.
@@ -192,10 +192,10 @@ impl Task<'_> {
             schedule.hold_off(tag.device, self.clock.now() + action.settle);
         }
         if !verify {
-            return Written::Ended(WriteResult::Accepted);
+            return WriteEnd::Ended(WriteResult::Accepted);
         }
         let block = plan::single(device, tag);
-        Written::Ended(match self.read_unless_stopped(link, &block, None).await {
+        WriteEnd::Ended(match self.read_unless_stopped(link, &block, None).await {
             Some(Ok(values)) => match value_of(tag, &block, &values) {
                 Some(back) => WriteResult::ReadBack(back),
                 None => WriteResult::NotRead(Fault::NotANumber),

@@ -4,7 +4,7 @@ use std::{collections::HashMap, ops::Range};
 
 use duckdb::params;
 
-use super::{Steps, Written, overlapping};
+use super::{NewFile, Steps, overlapping};
 use crate::{
     history::{
         ArchiveFile, HistoryError,
@@ -50,7 +50,7 @@ impl Store {
         self.write_tags()?;
         // The samples last: with their file an hour is whole, see `adopt`.
         new.reverse();
-        let new: Vec<ArchiveFile> = new.into_iter().map(Written::rename).collect::<Result<_, _>>()?;
+        let new: Vec<ArchiveFile> = new.into_iter().map(NewFile::rename).collect::<Result<_, _>>()?;
         steps("renamed")?;
         let within = [span.start, span.end].map(|at| instant(at).map(utc));
         self.enter(&new, &old, || {
@@ -113,7 +113,7 @@ impl Store {
         formed: &Range<i64>,
         replaced: &[ArchiveFile],
         replace: fn(Tier, &str, &Range<i64>) -> String,
-    ) -> Result<Vec<Written>, HistoryError> {
+    ) -> Result<Vec<NewFile>, HistoryError> {
         let mut written = Vec::new();
         for file in replaced {
             let within = formed.start.max(file.from)..formed.end.min(file.to);

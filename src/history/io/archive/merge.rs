@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::{Steps, Written};
+use super::{NewFile, Steps};
 use crate::history::{
     ArchiveFile, HistoryError,
     io::{
@@ -32,7 +32,7 @@ impl Store {
         };
         let new = self.write_file(tier, span, &rows, "")?;
         steps("merged file written")?;
-        let new: Vec<ArchiveFile> = new.map(Written::rename).transpose()?.into_iter().collect();
+        let new: Vec<ArchiveFile> = new.map(NewFile::rename).transpose()?.into_iter().collect();
         steps("merged file renamed")?;
         self.enter(&new, &old, || Ok(()))?;
         steps("merged file entered")?;

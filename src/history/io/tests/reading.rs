@@ -9,7 +9,7 @@ use crate::history::{
     QUERY_TIME_MAX,
     io::{
         read::ROWS_MAX,
-        reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, Request},
+        reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, WriterRequest},
         thread::COMMIT_EVERY,
     },
 };
@@ -120,7 +120,7 @@ fn alarms_and_actions_fit_when_samples_fill_the_queue() {
 struct Alone {
     stores: mpsc::Sender<Option<Store>>,
     queries: mpsc::Sender<(u32, QueryRequest)>,
-    requests: mpsc::Receiver<Request>,
+    requests: mpsc::Receiver<WriterRequest>,
 }
 
 fn alone(answer: Answerer) -> Alone {
@@ -180,7 +180,7 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
         let (reply, mut answer) = oneshot::channel();
         let period = Period::free(sec(0), sec(10));
         reader.queries.send((1, QueryRequest { query: Query::Report { period }, reply })).await.unwrap();
-        let Some(Request::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
+        let Some(WriterRequest::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
         assert!(answer.try_recv().is_err(), "answered before the commit");
         if answers {
             done.send(()).unwrap();

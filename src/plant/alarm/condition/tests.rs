@@ -8,7 +8,7 @@ fn sec(seconds: u64) -> Duration {
 
 /// The verdicts over values at instants, in seconds.
 fn over_time(condition: Condition, values: &[(u64, Option<f64>)]) -> Vec<Option<bool>> {
-    let (mut memory, mut active) = (Memory::default(), false);
+    let (mut memory, mut active) = (ConditionMemory::default(), false);
     let verdict = |(second, value): &(u64, Option<f64>)| {
         let facts = Facts { value: *value, ..Facts::default() };
         let holds = holds(condition, facts, active, &mut memory, sec(*second));
@@ -43,7 +43,7 @@ fn a_condition_holds_beyond_its_limit_and_clears_by_deadband() {
         (Condition::Bit { bit: 2 }, None, true, None),
     ] {
         let facts = Facts { value, reference: Some(70.0), ..Facts::default() };
-        let holds = holds(condition, facts, active, &mut Memory::default(), Duration::ZERO);
+        let holds = holds(condition, facts, active, &mut ConditionMemory::default(), Duration::ZERO);
         assert_eq!(holds, expect, "{condition:?} at {value:?}, active {active}");
     }
 }
@@ -52,14 +52,14 @@ fn a_condition_holds_beyond_its_limit_and_clears_by_deadband() {
 fn a_deviation_from_an_unknown_set_value_is_unknown() {
     let facts = Facts { value: Some(99.0), ..Facts::default() };
     let deviation = Condition::Deviation { from: TagId(1), limit: 5.0, deadband: 0.0 };
-    assert_eq!(holds(deviation, facts, false, &mut Memory::default(), Duration::ZERO), None);
+    assert_eq!(holds(deviation, facts, false, &mut ConditionMemory::default(), Duration::ZERO), None);
 }
 
 #[test]
 fn silence_is_judged_by_the_device_alone() {
     for ill in [Some(true), Some(false), None] {
         let facts = Facts { ill, ..Facts::default() };
-        assert_eq!(holds(Condition::NotResponding, facts, false, &mut Memory::default(), Duration::ZERO), ill);
+        assert_eq!(holds(Condition::NotResponding, facts, false, &mut ConditionMemory::default(), Duration::ZERO), ill);
     }
 }
 
@@ -108,7 +108,7 @@ fn a_chattering_signal_is_in_alarm_until_it_calms_down() {
 fn a_restored_alarm_clears_only_by_what_was_measured_since() {
     let (no, yes) = (Some(false), Some(true));
     let check = |condition, values: &[(u64, f64, Option<bool>)]| {
-        let mut memory = Memory::default();
+        let mut memory = ConditionMemory::default();
         for (second, value, expect) in values {
             let facts = Facts { value: Some(*value), ..Facts::default() };
             assert_eq!(holds(condition, facts, true, &mut memory, sec(*second)), *expect, "at {second} s");
@@ -125,7 +125,7 @@ fn a_restored_alarm_clears_only_by_what_was_measured_since() {
 #[test]
 fn what_has_been_is_forgotten_when_an_alarm_is_enabled_again() {
     let stuck = Condition::NoChange { lasts: sec(60), deadband: 0.2 };
-    let (mut memory, facts) = (Memory::default(), Facts { value: Some(20.0), ..Facts::default() });
+    let (mut memory, facts) = (ConditionMemory::default(), Facts { value: Some(20.0), ..Facts::default() });
     assert_eq!(holds(stuck, facts, false, &mut memory, sec(0)), Some(false));
     memory.clear();
     assert_eq!(holds(stuck, facts, false, &mut memory, sec(60)), Some(false));

@@ -7,7 +7,7 @@ use crate::ui::modal::sheet::Row;
 use crate::{
     bus::{
         codec,
-        source_frame::{self, Found},
+        source_frame::{self, TagBytes},
     },
     plant::{
         def::TagId,
@@ -31,7 +31,7 @@ pub(super) fn value_rows(
     cx: &ViewContext,
     def: &TagDef,
     exchange: Option<&Exchange>,
-    found: Option<&Found>,
+    found: Option<&TagBytes>,
 ) -> Vec<Row> {
     let sample = cx.snapshot.sample(def.id);
     let shown = value::show(cx, def.id);
@@ -66,7 +66,7 @@ fn because(
     def: &TagDef,
     cause: Cause,
     exchange: Option<&Exchange>,
-    found: Option<&Found>,
+    found: Option<&TagBytes>,
 ) -> Option<String> {
     let line = cx.def().device(def.device).line;
     let words_of =
@@ -141,7 +141,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
 }
 
 /// `5058 5234 = "PXR4", blanks at the end left out`.
-fn text(cx: &ViewContext, def: &TagDef, found: Option<&Found>) -> String {
+fn text(cx: &ViewContext, def: &TagDef, found: Option<&TagBytes>) -> String {
     let in_answer = found.and_then(|found| codec::decode_text(def.point, &found.words));
     match (in_answer, found, cx.snapshot.text(def.id)) {
         (Some(text), Some(found), _) => {
@@ -156,7 +156,7 @@ fn text(cx: &ViewContext, def: &TagDef, found: Option<&Found>) -> String {
 }
 
 /// `raw 724 (02D4) × 10^-1 = 72.4 °C, decimals from TIC-1.DP`.
-pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>, found: Option<&Found>) -> String {
+pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>, found: Option<&TagBytes>) -> String {
     if def.is_text() {
         return text(cx, def, found);
     }

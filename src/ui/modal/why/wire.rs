@@ -9,7 +9,7 @@ use crate::ui::modal::sheet::Row;
 use crate::{
     bus::{
         dissect::{self, Direction, Dissection},
-        source_frame::Found,
+        source_frame::TagBytes,
     },
     plant::{
         def::DeviceDef,
@@ -29,7 +29,7 @@ pub(super) fn exchange_rows(
     cx: &ViewContext,
     def: &TagDef,
     exchange: &Exchange,
-    found: Option<&Found>,
+    found: Option<&TagBytes>,
     room: u16,
     rows: &mut Vec<Row>,
 ) -> (Dissection, Dissection) {
@@ -78,7 +78,7 @@ pub(super) fn every_byte(
     cx: &ViewContext,
     exchange: &Exchange,
     (request, answer): &(Dissection, Dissection),
-    found: Option<&Found>,
+    found: Option<&TagBytes>,
     room: u16,
 ) -> Vec<Row> {
     let mut rows = Vec::new();

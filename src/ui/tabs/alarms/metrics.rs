@@ -6,7 +6,7 @@ use crate::{
     plant::{
         alarm::{
             PeriodMetrics,
-            metrics::{METRIC_TARGETS, Verdict},
+            metrics::{METRIC_TARGETS, TargetStatus},
         },
         snapshot::ActiveAlarm,
     },
@@ -102,10 +102,10 @@ impl Metrics {
             let value = row.value.map_or("–".into(), |value| format!("{value:.*}", usize::from(row.decimals)));
             let text = line(cx.theme, [translate(row.measure), &value, &row.target, &row.limit, translate(row.result)]);
             let style = match goal.verdict(figures) {
-                Verdict::Good => cx.theme.normal(),
-                Verdict::Beyond => cx.theme.strong(),
-                Verdict::Over => cx.theme.trouble(),
-                Verdict::InsufficientData => cx.theme.dim(),
+                TargetStatus::Good => cx.theme.normal(),
+                TargetStatus::Beyond => cx.theme.strong(),
+                TargetStatus::Over => cx.theme.trouble(),
+                TargetStatus::InsufficientData => cx.theme.dim(),
             };
             lines.push((text, style));
         }

@@ -10,7 +10,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     bus::names,
     plant::{
-        admission::Verdict,
+        admission::Schedulability,
         line_report::{LineReport, PollReport},
         tag::{Poll, Table},
     },
@@ -155,7 +155,7 @@ fn ill(poll: &PollReport) -> bool {
     poll.stats.failed_last() && 0 < poll.stats.requests
 }
 
-/// Blocks, load, and the verdict of the admission test; `true` if they do not fit.
+/// Blocks, load, and the schedulability of the admission test; `true` if they do not fit.
 fn summary(report: &LineReport) -> (String, bool) {
     let (blocks, admission) = (report.polls.len(), &report.admission);
     let load = admission.utilisation * 100.0;
@@ -171,10 +171,10 @@ fn summary(report: &LineReport) -> (String, bool) {
             t!("; {count} {plural} refused by the device", count, plural = plural(count, t!("tag is"), t!("tags are")))
         }
     };
-    match &admission.verdict {
-        Verdict::Fits => (t!("{words}: all periods are kept{refused}", words, refused), false),
-        Verdict::TooMuch { .. } => (t!("! {words}: OVERLOADED, polls skipped{refused}", words, refused), true),
-        Verdict::Blocked(overload) => {
+    match &admission.schedulability {
+        Schedulability::Fits => (t!("{words}: all periods are kept{refused}", words, refused), false),
+        Schedulability::TooMuch { .. } => (t!("! {words}: OVERLOADED, polls skipped{refused}", words, refused), true),
+        Schedulability::Blocked(overload) => {
             let blocker = &overload.blocker.name;
             (t!("! {words}: some are delayed by {blocker}{refused}", words, blocker, refused), true)
         }

@@ -64,7 +64,7 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
                 let (words, trouble) = outcome_words(outcome);
                 rows.push(plain(words, if trouble { theme.trouble() } else { theme.strong() }));
             }
-            Finding::Verdict(words) => rows.push(plain(words.clone(), theme.strong())),
+            Finding::Conclusion(words) => rows.push(plain(words.clone(), theme.strong())),
         }
     }
     rows

@@ -283,7 +283,7 @@ fn loopback_and_identification_are_described() {
         }))
     };
     let diagnostic = Diagnostic::Loopback { unit: 1, data: 0xA537, count: 2 };
-    let verdict = Finding::Verdict("1 of 2 came back, 12.0 to 12.0 ms".to_owned());
+    let verdict = Finding::Conclusion("1 of 2 came back, 12.0 to 12.0 ms".to_owned());
     let findings = vec![exchange(Ok(())), exchange(Err(Fault::Timeout)), verdict];
     fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 2, 2, findings));
     let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::sets::Source;
 use crate::plant::{
     def::PlantDef,
-    parameter_set::{Change, ParameterSet},
+    parameter_set::{ParameterSet, PlannedChange},
     restore::RestoreRequest,
     tag::{Confidence, TagDef},
 };
@@ -22,7 +22,7 @@ pub fn query(
     device: &DeviceDef,
     source: &Source,
     set: Arc<ParameterSet>,
-    changes: Vec<Change>,
+    changes: Vec<PlannedChange>,
 ) -> Confirm {
     let from: Arc<str> = source.words(cx).into();
     let count = if changes.len() == 1 { t!("1 value").to_owned() } else { t!("{count} values", count = changes.len()) };
@@ -46,14 +46,14 @@ pub fn query(
     Confirm::command(title, query, CommandKind::Restore(Box::new(request))).with_notes(notes).with_reauthentication(cx)
 }
 
-fn change_text(cx: &ViewContext, change: &Change) -> String {
+fn change_text(cx: &ViewContext, change: &PlannedChange) -> String {
     let text = |value| cx.snapshot.format(change.tag, value);
     let (short, unit) = (&cx.def().tag(change.tag).short, cx.snapshot.unit(change.tag));
     format!("{short}  {} → {} {unit}", text(change.old), text(change.new)).trim_end().to_owned()
 }
 
 /// What a write of each would be asked with, each text once, as lines that the window has room for.
-fn warnings(def: &PlantDef, changes: &[Change]) -> Vec<String> {
+fn warnings(def: &PlantDef, changes: &[PlannedChange]) -> Vec<String> {
     let tags: Vec<&TagDef> = changes.iter().map(|change| def.tag(change.tag)).collect();
     let unsure = tags.iter().filter(|tag| matches!(tag.confidence, Confidence::Medium | Confidence::Low));
     let unsure: Vec<&str> = unsure.map(|tag| tag.short.as_str()).collect();

@@ -7,7 +7,7 @@ use super::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        parameter_set::{self, Change, Compared, Problem},
+        parameter_set::{self, Compared, PlannedChange, Problem},
         restore::{Restore, State},
     },
     ui::chrome::outcome_words,
@@ -25,7 +25,7 @@ pub struct Compare {
 }
 
 /// What can be written, or why not.
-type Plan = Result<Vec<Change>, Vec<Problem>>;
+type Plan = Result<Vec<PlannedChange>, Vec<Problem>>;
 
 impl Compare {
     /// A source against the device.

@@ -17,7 +17,7 @@ use crate::{
         sample::{Cause, Sample},
         snapshot::{ActiveAlarm, DeviceState},
         tag::Confidence,
-        tuning::{Found, Tuning},
+        tuning::{TunedParameter, Tuning},
     },
     ui::{
         Effect, Model, Msg,
@@ -92,7 +92,8 @@ fn tuning(fixture: &Fixture, ended: bool) -> Tuning {
     if ended {
         tuning.ended = Some(fixture::now() - SignedDuration::from_secs(4));
         let new = [1.2, 70.0, 13.5];
-        tuning.found = tuning.found.iter().zip(new).map(|(found, new)| Found { new: Some(new), ..*found }).collect();
+        tuning.found =
+            tuning.found.iter().zip(new).map(|(found, new)| TunedParameter { new: Some(new), ..*found }).collect();
     }
     tuning
 }

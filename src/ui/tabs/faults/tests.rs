@@ -9,7 +9,7 @@ use crate::{
     sim::{
         drill::{Progress, SimCommand, Status},
         faults::{ActiveFault, AvailableFaults, FaultTarget, InjectedFault, TargetKind},
-        scenario::judge::{ExpectationStatus, Row, Verdict},
+        scenario::judge::{DrillResult, ExpectationStatus, Row},
     },
     ui::{
         Effect, Model, Msg,
@@ -58,7 +58,7 @@ fn drill(over: bool) -> Progress {
         ),
     ];
     let points = if over { 40 } else { 20 };
-    let verdict = Verdict {
+    let verdict = DrillResult {
         title: "Sensor burnout while heating".to_owned(),
         rows,
         points,

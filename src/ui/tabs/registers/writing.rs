@@ -24,7 +24,7 @@ const WRITES_MAX: usize = 200;
 
 /// A write that has ended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Written {
+pub struct ListedWrite {
     id: CommandId,
     at: Timestamp,
     write: RegisterWrite,
@@ -37,7 +37,7 @@ pub struct Writing {
     /// The operator has enabled it.
     pub enabled: bool,
     /// Oldest first.
-    list: Vec<Written>,
+    list: Vec<ListedWrite>,
 }
 
 impl Writing {
@@ -53,7 +53,7 @@ impl Writing {
         if self.list.len() == WRITES_MAX {
             self.list.remove(0);
         }
-        self.list.push(Written { id: run.id, at: run.started, write: write.clone(), outcome });
+        self.list.push(ListedWrite { id: run.id, at: run.started, write: write.clone(), outcome });
     }
 
     /// The last write in words, and whether its reader should worry.
@@ -76,7 +76,7 @@ impl Writing {
 
     /// Function 15 or 16 also for one: as the last write of one there, unless the unit does not know that function.
     fn multiple(&self, unit: u8, table: Table) -> bool {
-        let same = |written: &&Written| {
+        let same = |written: &&ListedWrite| {
             let write = &written.write;
             (write.unit, write.table, write.words.len()) == (unit, table, 1)
         };
@@ -221,7 +221,7 @@ fn change(names: &Names, write: &RegisterWrite) -> String {
     said.unwrap_or(raw)
 }
 
-fn words(cx: &ViewContext, names: &Names, written: &Written) -> String {
+fn words(cx: &ViewContext, names: &Names, written: &ListedWrite) -> String {
     let at = clock(written.at, &cx.def().time_zone);
     format!("{at} {}  {}", change(names, &written.write), outcome_words(&written.outcome).0)
 }

@@ -11,7 +11,7 @@ pub enum Action {
     /// All fields of the selected entry.
     Open,
     /// Search words, a user, an action, a time.
-    Search(Part),
+    Search(SearchField),
     /// Search nothing.
     Everything,
     /// The list of users.
@@ -20,7 +20,7 @@ pub enum Action {
 
 /// What can be searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum SearchField {
     /// Words anywhere.
     Words,
     /// Who.
@@ -34,10 +34,10 @@ pub enum Part {
 /// Keys of the audit list.
 const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "open", "entry details", Action::Open),
-    Key::new(char('/'), "search", "only rows with some words", Action::Search(Part::Words)),
-    Key::new(char('b'), "by", "only actions of a user", Action::Search(Part::Who)),
-    Key::new(char('w'), "what", "only an action: write, login …", Action::Search(Part::Action)),
-    Key::new(char('t'), "time", "another day or period", Action::Search(Part::Time)),
+    Key::new(char('/'), "search", "only rows with some words", Action::Search(SearchField::Words)),
+    Key::new(char('b'), "by", "only actions of a user", Action::Search(SearchField::Who)),
+    Key::new(char('w'), "what", "only an action: write, login …", Action::Search(SearchField::Action)),
+    Key::new(char('t'), "time", "another day or period", Action::Search(SearchField::Time)),
     Key::new(char('c'), "all", "clear the search, show the last 7 days", Action::Everything),
     Key::new(char('j'), "users", "the list of users", Action::Back),
 ];
@@ -66,7 +66,7 @@ pub struct Audit {
     action: String,
     period: Option<Period>,
     /// What the open window asks for.
-    asking: Option<Part>,
+    asking: Option<SearchField>,
 }
 
 impl Audit {
@@ -93,14 +93,14 @@ impl Audit {
             Action::Search(part) => {
                 self.asking = Some(part);
                 let (title, hint, text) = match part {
-                    Part::Words => (t!("search"), t!("words of any column; empty for all"), self.words.as_str()),
-                    Part::Who => {
+                    SearchField::Words => (t!("search"), t!("words of any column; empty for all"), self.words.as_str()),
+                    SearchField::Who => {
                         (t!("only by"), t!("name of a user, or a part of it; empty for all"), self.who.as_str())
                     }
-                    Part::Action => {
+                    SearchField::Action => {
                         (t!("only this action"), t!("write, acknowledge, login …; empty for all"), &*self.action)
                     }
-                    Part::Time => (t!("time"), period::FORMS, ""),
+                    SearchField::Time => (t!("time"), period::FORMS, ""),
                 };
                 return open(Modal::Prompt(Prompt::new(title, hint, text)));
             }
@@ -114,11 +114,11 @@ impl Audit {
     pub fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<(), String> {
         let text = text.trim().to_owned();
         match self.asking {
-            Some(Part::Words) => self.words = text,
-            Some(Part::Who) => self.who = text,
-            Some(Part::Action) => self.action = text,
-            Some(Part::Time) if text.is_empty() => self.period = None,
-            Some(Part::Time) => self.period = Some(period::typed(cx.def(), &text, cx.now)?),
+            Some(SearchField::Words) => self.words = text,
+            Some(SearchField::Who) => self.who = text,
+            Some(SearchField::Action) => self.action = text,
+            Some(SearchField::Time) if text.is_empty() => self.period = None,
+            Some(SearchField::Time) => self.period = Some(period::typed(cx.def(), &text, cx.now)?),
             None => return Ok(()),
         }
         self.asking = None;

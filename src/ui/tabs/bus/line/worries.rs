@@ -11,8 +11,8 @@ pub(super) fn worries(cx: &ViewContext, at: &LineView) -> Vec<String> {
     let Some(report) = at.report else { return worries };
     if let Some(strain) = &report.strain {
         worries.push(t!("{strain}. Poll less often, or increase the baud rate", strain));
-    } else if !report.admission.verdict.fits() {
-        worries.push(report.admission.verdict.to_string());
+    } else if !report.admission.schedulability.fits() {
+        worries.push(report.admission.schedulability.to_string());
     }
     if report.strain.is_none() && missed_lately(report) {
         worries.push(t!(

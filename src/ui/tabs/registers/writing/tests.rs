@@ -27,10 +27,10 @@ fn a_named_value_is_typed_as_it_is_shown() {
     assert_eq!((next_step(&sv(), &[700], 1), next_step(&sv(), &[0x7FFF], 1)), (Some(vec![701]), None));
 }
 
-fn write(old: u16, new: u16, multiple: bool, outcome: Outcome) -> Written {
+fn write(old: u16, new: u16, multiple: bool, outcome: Outcome) -> ListedWrite {
     let write =
         RegisterWrite { unit: 1, table: Table::Holding, address: 5, words: vec![new], expected: vec![old], multiple };
-    Written { id: CommandId::default(), at: Timestamp::UNIX_EPOCH, write, outcome }
+    ListedWrite { id: CommandId::default(), at: Timestamp::UNIX_EPOCH, write, outcome }
 }
 
 #[test]
