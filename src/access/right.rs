@@ -73,9 +73,11 @@ fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
         Diagnostic::Send(_) | Diagnostic::Write(_) => Right::Engineer,
         // While other settings are tried the line is not polled.
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
-        Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
-            Right::Operate
-        }
+        Diagnostic::Scan(_)
+        | Diagnostic::Sweep(_)
+        | Diagnostic::Loopback { .. }
+        | Diagnostic::Identify { .. }
+        | Diagnostic::Read { .. } => Right::Operate,
     }
 }
 

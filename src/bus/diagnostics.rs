@@ -1,6 +1,7 @@
 //! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
 mod scan;
+mod sweep;
 mod write;
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
@@ -13,6 +14,7 @@ use crate::plant::{
     def::Serial,
     diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, RegisterWrite},
     event::Fault,
+    live::AddressSpan,
     number::{to_u16, to_u32},
     tag::Table,
     traffic::Exchange,
@@ -63,12 +65,17 @@ pub struct Job {
     corrupt_units: Vec<(u8, Option<Serial>, Fault)>,
     /// The response to a write, once it was sent.
     written: Result<(), Fault>,
+    sweep: Option<sweep::SweepJob>,
 }
 
 impl Job {
     /// Ready for its first step.
     pub fn new(id: CommandId, by: Arc<str>, diagnostic: Diagnostic, at: Timestamp) -> Job {
         let planned = steps_in(&diagnostic);
+        let sweep = match &diagnostic {
+            Diagnostic::Sweep(sweep) => Some(sweep::SweepJob::new(*sweep)),
+            _ => None,
+        };
         let run = DiagnosticRun {
             id,
             by,
@@ -81,7 +88,7 @@ impl Job {
             findings: Vec::new(),
         };
         let (queued, corrupt_units) = (VecDeque::new(), Vec::new());
-        let mut job = Job { run, step: None, queued, made: 0, planned, corrupt_units, written: Ok(()) };
+        let mut job = Job { run, step: None, queued, made: 0, planned, corrupt_units, written: Ok(()), sweep };
         job.advance();
         job.update_now();
         job
@@ -95,6 +102,22 @@ impl Job {
     /// Does it need the line for itself, because it tries other serial parameters?
     pub fn is_exclusive(&self) -> bool {
         matches!(&self.run.diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty())
+    }
+
+    /// Does it ask so much that other questions must not wait for its end?
+    pub fn is_long(&self) -> bool {
+        matches!(self.run.diagnostic, Diagnostic::Sweep(_) | Diagnostic::Scan(_) | Diagnostic::Loopback { .. })
+    }
+
+    /// May it take no more of the line's time than live reads?
+    pub fn is_sweep(&self) -> bool {
+        self.sweep.is_some()
+    }
+
+    /// Addresses that a unit turned out not to have, since the last call.
+    pub fn take_holes(&mut self) -> Option<(u8, Vec<AddressSpan>)> {
+        let Diagnostic::Sweep(sweep) = &self.run.diagnostic else { return None };
+        Some((sweep.unit, self.sweep.as_mut()?.take_holes()))
     }
 
     /// All steps that need no answer of an earlier one.
@@ -121,6 +144,7 @@ impl Job {
         match (&self.run.diagnostic, result) {
             (_, StepResult::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
             (Diagnostic::Scan(_), StepResult::Answer(answer, _)) => self.add_unit(&step, answer),
+            (Diagnostic::Sweep(_), StepResult::Answer(answer, _)) => return self.on_swept(&step, answer),
             // It only had an adapter with echo give itself away.
             (Diagnostic::Loopback { .. }, StepResult::Answer(..)) if self.run.done == 1 => {}
             (Diagnostic::Write(write), StepResult::Answer(answer, exchange)) => {
@@ -144,6 +168,11 @@ impl Job {
 
     /// Makes the step that is next.
     fn advance(&mut self) {
+        if let (Diagnostic::Sweep(sweep), Some(job)) = (&self.run.diagnostic, &self.sweep) {
+            let unit = sweep.unit;
+            self.step = job.next().map(|span| step(read(unit, span.table, span.address, span.count)));
+            return;
+        }
         self.step = self.queued.pop_front().or_else(|| {
             let step = (self.made < self.planned).then(|| planned_step(&self.run.diagnostic, self.made));
             self.made += u32::from(step.is_some());
@@ -236,6 +265,7 @@ impl Job {
                     count => format!("{count} answers"),
                 }
             }
+            Diagnostic::Sweep(_) => self.sweep.as_ref().map_or(String::new(), sweep::SweepJob::conclusion),
             Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_) => {
                 return;
             }
@@ -269,6 +299,7 @@ fn steps_in(diagnostic: &Diagnostic) -> u32 {
         Diagnostic::Identify { .. } => 2,
         Diagnostic::Write(_) => write::STEPS,
         Diagnostic::Scan(scan) => scan::steps_in(scan),
+        Diagnostic::Sweep(sweep) => sweep.addresses(),
     }
 }
 
@@ -289,6 +320,8 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
         Diagnostic::Write(write) => write::step_of(write, n),
         Diagnostic::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
         Diagnostic::Scan(scan) => scan::step_of(scan, n),
+        // Each of its steps follows from the response to the one before.
+        Diagnostic::Sweep(sweep) => step(read(sweep.unit, sweep.table, sweep.first, sweep.block())),
     }
 }
 

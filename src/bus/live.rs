@@ -29,6 +29,11 @@ impl KnownHoles {
         self.most.retain(|(other, _), _| *other != unit);
     }
 
+    /// These addresses do not exist.
+    pub fn add(&mut self, unit: u8, span: AddressSpan) {
+        self.holes.extend(span.range().map(|address| (unit, span.table, address)));
+    }
+
     /// The requests that read a span around its holes.
     fn requests(&self, unit: u8, span: AddressSpan) -> impl Iterator<Item = AddressSpan> {
         let most =

@@ -235,6 +235,7 @@ fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
         | Finding::Values { .. }
         | Finding::Failed { .. }
         | Finding::Written(_)
+        | Finding::Swept(_)
         | Finding::Conclusion(_) => None,
     })
 }
@@ -250,6 +251,7 @@ fn trace(run: &DiagnosticRun) -> Option<String> {
         | Finding::Object { .. }
         | Finding::Values { .. }
         | Finding::Written(_)
+        | Finding::Swept(_)
         | Finding::Conclusion(_) => None,
     })
 }

@@ -11,6 +11,7 @@ use super::{
     event::Fault,
     line::Serial,
     line_check::{TIMEOUT_MIN, WAIT_MAX},
+    sweep::{Sweep, SweptRange},
     tag::Table,
     traffic::Exchange,
 };
@@ -56,6 +57,8 @@ pub enum Diagnostic {
     },
     /// Looks for units.
     Scan(Scan),
+    /// Looks for what answers in a table of a unit.
+    Sweep(Sweep),
     /// Writes registers or bits once, and reads them back.
     Write(RegisterWrite),
 }
@@ -78,6 +81,7 @@ impl Diagnostic {
                 if last <= 0xFFFF { Ok(()) } else { Err(format!("address {last}: the last is 65535")) }
             }
             Diagnostic::Scan(scan) => scan.check(),
+            Diagnostic::Sweep(sweep) => sweep.check(),
             Diagnostic::Write(write) => write.check(),
         }
     }
@@ -105,6 +109,10 @@ impl std::fmt::Display for Diagnostic {
                     0 => Ok(()),
                     count => f.write_str(&t!(" at {count} settings", count)),
                 }
+            }
+            Diagnostic::Sweep(Sweep { unit, table, first, last, .. }) => {
+                let table = translate(table.word());
+                f.write_str(&t!("sweep of unit {unit} {table} {first} to {last}", unit, table, first, last))
             }
             Diagnostic::Write(RegisterWrite { unit, table, address, words, expected, .. }) => {
                 let text = |words: &[u16]| words.iter().map(u16::to_string).collect::<Vec<_>>().join(" ");
@@ -280,6 +288,8 @@ pub enum Finding {
     },
     /// How a write has ended.
     Written(Outcome),
+    /// Addresses that a sweep has found to have the same outcome.
+    Swept(SweptRange),
     /// A step failed.
     Failed {
         /// What was asked: `unit 3, loopback 08/00`.

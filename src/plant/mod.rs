@@ -47,6 +47,7 @@ pub(crate) mod ne107;
 pub(crate) mod tuning;
 pub mod restore;
 pub mod station;
+pub mod sweep;
 pub mod snapshot;
 pub mod past;
 pub(crate) mod totalizer;

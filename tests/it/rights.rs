@@ -17,6 +17,7 @@ use sightglass::{
         parameter_set::ParameterSet,
         restore::RestoreRequest,
         role::Role,
+        sweep::Sweep,
         tag::Table,
     },
     report::Period,
@@ -85,9 +86,9 @@ fn of_command(kind: &CommandKind) -> Row {
         CommandKind::Configure(_) => row("configure", "---S--"),
         CommandKind::SaveSettings(_) => row("save settings", "---S--"),
         CommandKind::Test(_, diagnostic) => match diagnostic {
-            Diagnostic::Send(_) | Diagnostic::Write(_) => row("test", "---S--"),
-            Diagnostic::Scan(Scan { serials, .. }) if !serials.is_empty() => row("test", "---S--"),
-            Diagnostic::Scan(_)
+            Diagnostic::Scan(Scan { serials, .. }) if serials.is_empty() => row("test", "--TS--"),
+            Diagnostic::Send(_) | Diagnostic::Write(_) | Diagnostic::Scan(_) => row("test", "---S--"),
+            Diagnostic::Sweep(_)
             | Diagnostic::Loopback { .. }
             | Diagnostic::Identify { .. }
             | Diagnostic::Read { .. } => row("test", "--TS--"),
@@ -114,10 +115,10 @@ fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
         by: "tom".into(),
         given: Vec::new(),
         values: Vec::new(),
-        units: Default::default(),
         missing: Vec::new(),
+        units: Default::default(),
     };
-    let (from, changes) = ("none".into(), Vec::new());
+    let (from, changes, table) = ("none".into(), Vec::new(), Table::Holding);
     vec![
         CommandKind::Write { tag: def.tag_named("TIC-1.SV").unwrap(), value: 60.0 + person as f64 },
         CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, annunciated_at: at }),
@@ -133,6 +134,7 @@ fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
         CommandKind::TakeOver,
         CommandKind::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
         CommandKind::Test(line, Diagnostic::Identify { unit: 1 }),
+        CommandKind::Test(line, Diagnostic::Sweep(Sweep { unit: 1, table, first: 0, last: 9, every: 8 })),
         CommandKind::Test(line, Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
         CommandKind::Test(line, scan(Vec::new())),
         CommandKind::Test(line, scan(vec![Serial::USUAL])),

@@ -2,6 +2,7 @@
 
 mod concurrent;
 mod confirm;
+mod exit;
 mod live;
 mod poll;
 mod test;
@@ -10,12 +11,13 @@ mod write;
 
 use std::{convert::Infallible, sync::Arc, time::Duration};
 
+use exit::LinkExit;
 use jiff::Timestamp;
 use tokio::sync::{mpsc, watch};
 
 use super::{
     clock::Clock,
-    link::{Link, LinkError},
+    link::Link,
     live_reads::LiveReads,
     requests::{Closed, Requests},
     transport::{Connector, Opened},
@@ -77,41 +79,12 @@ pub async fn run(
         closed_at: clock.now(),
         job: None,
         polls_since_step: 0,
+        stepped: false,
         line,
         def,
     };
     // It returns only when the station ends, and then no receiver is left.
     let _ = task.connect_loop().await;
-}
-
-/// Why a port is left.
-enum LinkExit {
-    /// An operator closed the line.
-    Closed,
-    /// The port or connection failed.
-    Lost(String),
-    /// It is opened again at once, with other settings.
-    Reopen,
-    /// A diagnostic needs the port for itself.
-    Diagnostic,
-    /// The station is ending.
-    Shutdown,
-}
-
-impl From<Closed> for LinkExit {
-    fn from(Closed: Closed) -> LinkExit {
-        LinkExit::Shutdown
-    }
-}
-
-impl From<LinkError> for LinkExit {
-    /// Of a request without a caller only the end of the port matters.
-    fn from(error: LinkError) -> LinkExit {
-        match error {
-            LinkError::Gone(why) => LinkExit::Lost(why),
-            LinkError::Fault(fault) => LinkExit::Lost(fault.to_string()),
-        }
-    }
 }
 
 struct Task<'a> {
@@ -146,6 +119,8 @@ struct Task<'a> {
     /// The running diagnostic.
     job: Option<Job>,
     polls_since_step: u32,
+    /// The last step beside polls was one of the diagnostic.
+    stepped: bool,
 }
 
 impl Task<'_> {
@@ -257,6 +232,7 @@ impl Task<'_> {
     /// Nothing is due: drops unsolicited bytes until something is.
     async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Result<(), LinkExit> {
         let (clock, live_from) = (self.clock, self.live_from());
+        let until = self.diagnostic_from().map_or(until, |from| until.min(from));
         let live = async {
             clock.sleep_until(live_from).await;
             self.live.due(clock).await;

@@ -30,6 +30,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Conclusion(words) => vec![words.clone()],
         Finding::Exchange(_)
         | Finding::Written(_)
+        | Finding::Swept(_)
         | Finding::Failed { .. }
         | Finding::Bytes { .. }
         | Finding::Unit { .. }

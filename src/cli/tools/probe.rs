@@ -38,6 +38,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Failed { what, fault } => vec![format!("{what}: {fault}")],
         Finding::Exchange(_)
         | Finding::Written(_)
+        | Finding::Swept(_)
         | Finding::Bytes { .. }
         | Finding::Unit { .. }
         | Finding::Conclusion(_) => Vec::new(),

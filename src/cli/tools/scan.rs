@@ -73,6 +73,7 @@ pub fn describe(finding: &Finding) -> Vec<String> {
         Finding::Failed { what, fault } => vec![format!("{what} ({fault})")],
         Finding::Exchange(_)
         | Finding::Written(_)
+        | Finding::Swept(_)
         | Finding::Bytes { .. }
         | Finding::Object { .. }
         | Finding::Values { .. } => Vec::new(),

@@ -77,6 +77,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         }
         Finding::Exchange(_)
         | Finding::Written(_)
+        | Finding::Swept(_)
         | Finding::Unit { .. }
         | Finding::Object { .. }
         | Finding::Values { .. }

@@ -81,7 +81,8 @@ pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
     };
     match &status.state {
         LineState::Connected => {
-            let replies = recent(counters.last_rx);
+            // Without a request no reply is missed.
+            let replies = recent(counters.last_rx) || counters.last_tx <= counters.last_rx;
             let busy = counters.utilisation * 100.0;
             let overloaded = is_overloaded(status);
             let style = if replies && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
@@ -110,4 +111,32 @@ pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
 
 pub(super) fn is_overloaded(line: &LineStatus) -> bool {
     line.report.as_ref().is_some_and(|report| report.strain.is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use jiff::SignedDuration;
+
+    use super::*;
+    use crate::ui::fixture::{Fixture, with_cx};
+
+    #[test]
+    fn only_a_line_with_requests_misses_replies() {
+        let check = |sent_s: i64, replied_s: i64, silent: bool| {
+            let mut fixture = Fixture::normal();
+            let at = |ago: i64| Some(crate::ui::fixture::now() - SignedDuration::from_secs(ago));
+            let (sent, replied) = (at(sent_s), at(replied_s));
+            let counters = &mut fixture.line.counters;
+            (counters.last_tx, counters.last_rx) = (sent, replied);
+            with_cx(&fixture.snapshot(), |cx| {
+                let (words, _) = line_words(cx, &cx.def().lines[0]);
+                assert_eq!(words.contains("no reply"), silent, "sent {sent_s} s, replied {replied_s} s ago: {words}");
+            });
+        };
+        check(1, 1, false);
+        check(10, 10, false);
+        check(10, 9, false);
+        check(1, 10, true);
+        check(5, 10, true);
+    }
 }

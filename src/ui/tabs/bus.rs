@@ -17,6 +17,7 @@ mod tests;
 
 use std::path::PathBuf;
 
+pub use request::ask_sweep;
 pub use window::Window;
 
 use self::keys::{Action, table};

@@ -46,6 +46,7 @@ use crate::{
     ui::{
         Effect,
         keys::{find, hints},
+        tabs::bus,
     },
 };
 
@@ -216,6 +217,7 @@ impl TabView for Registers {
             }
             Action::Unit => return self.ask_unit(cx),
             Action::Compare => return self.toggle_comparison(),
+            Action::Sweep => return bus::ask_sweep(cx, self.line, self.unit, self.table),
             Action::Find => {
                 let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
                 return self.ask_text(Asking::Value, t!("find a value in what was read"), hint);

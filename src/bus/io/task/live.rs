@@ -36,7 +36,7 @@ impl Task<'_> {
 
     /// One request of the live read that is due, and its answer after the last.
     pub(super) async fn live_step(&mut self, link: &mut Link) -> Result<(), LinkExit> {
-        self.polls_since_step = 0;
+        (self.polls_since_step, self.stepped) = (0, false);
         let Some((job, request)) = &mut self.live.job else { return Ok(()) };
         if let Some(span) = job.next() {
             let unit = request.read.unit;

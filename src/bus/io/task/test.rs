@@ -2,10 +2,12 @@
 
 use std::{pin::pin, sync::Arc};
 
+use jiff::Timestamp;
+
 use super::{LinkExit, Task};
 use crate::{
     bus::{
-        diagnostics::{Ask, Step, StepResult},
+        diagnostics::{Ask, Job, Step, StepResult},
         frame::{self, Mbap},
         io::{
             link::{Link, LinkError},
@@ -18,6 +20,7 @@ use crate::{
         def::Framing,
         diagnostics::DiagnosticState,
         event::{Event, Fault, WriteResult},
+        time::elapsed,
     },
 };
 
@@ -25,21 +28,40 @@ use crate::{
 pub(super) const POLLS_BETWEEN: u32 = 4;
 
 impl Task<'_> {
-    pub(super) fn is_turn_of_diagnostic(&self, next: Next) -> bool {
+    pub(super) fn is_turn_of_diagnostic(&mut self, next: Next) -> bool {
         let idle = !matches!(next, Next::Run(_));
-        self.job.as_ref().is_some_and(|job| job.next().is_some()) && (idle || POLLS_BETWEEN <= self.polls_since_step)
+        let is_due = self.diagnostic_from().is_some_and(|from| from <= self.clock.now())
+            && (idle || POLLS_BETWEEN <= self.polls_since_step);
+        // A long one takes turns with live reads.
+        let yields = self.stepped && self.job.as_ref().is_some_and(Job::is_long);
+        is_due && !(yields && self.is_turn_of_live_read(next))
+    }
+
+    /// From when on the diagnostic may have the line, if it has a next step: a sweep has the share of live reads.
+    pub(super) fn diagnostic_from(&self) -> Option<Timestamp> {
+        let job = self.job.as_ref().filter(|job| job.next().is_some())?;
+        Some(if job.is_sweep() { self.live_from() } else { Timestamp::MIN })
     }
 
     /// One step of the diagnostic, between polls.
     pub(super) async fn diagnostic_step(&mut self, link: &mut Link) -> Result<(), LinkExit> {
-        self.polls_since_step = 0;
+        (self.polls_since_step, self.stepped) = (0, true);
         let Some(step) = self.job.as_ref().and_then(|job| job.next().cloned()) else { return Ok(()) };
+        let started = self.clock.now();
         let Some(result) = self.step_unless_cut(link, &step, false).await? else { return Ok(()) };
+        let ended = self.clock.now();
         match (result, &mut self.job) {
             (Ok(result), Some(job)) => {
-                let in_sync = stays_in_sync(link.framing(), &step.ask, &result);
+                let (in_sync, done) = (stays_in_sync(link.framing(), &step.ask, &result), job.run().done);
                 job.on_result(result);
-                self.publish_diagnostic().await?;
+                if let Some((unit, holes)) = job.take_holes() {
+                    self.live_budget.spent(elapsed(started, ended), ended);
+                    holes.into_iter().for_each(|hole| self.live.known.add(unit, hole));
+                }
+                // The steps of a sweep are many, and not each of them shows something new.
+                if done != job.run().done || job.run().state != DiagnosticState::Running {
+                    self.publish_diagnostic().await?;
+                }
                 if in_sync { Ok(()) } else { Err(LinkExit::Reopen) }
             }
             (Err(LinkError::Gone(why)), _) => Err(LinkExit::Lost(why)),

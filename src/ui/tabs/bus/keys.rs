@@ -67,6 +67,7 @@ const TEST_KEYS: &[Key<Action>] = &[
     Key::new(char('l'), "", "loopback", Action::Try(Tried::Loopback)),
     Key::new(char('i'), "", "identify a device", Action::Try(Tried::Identify)),
     Key::new(char('s'), "", "scan for units", Action::Try(Tried::Scan)),
+    Key::new(char('m'), "", "map of the addresses that a unit answers at", Action::Try(Tried::Sweep)),
     Key::new(char('r'), "again", "repeat the last test", Action::Again).needs(Role::Technician),
     Key::new(char('x'), "stop", "stop the running test", Action::Stop).needs(Role::Technician),
 ];

@@ -2,17 +2,19 @@
 
 mod fields;
 mod functions;
+mod sweep;
 
 use fields::{all_settings, number};
 use functions::FUNCTIONS;
 use std::ops::RangeInclusive;
+pub use sweep::ask_sweep;
 
 use ratatui::Frame as Screen;
 
 use super::{
-    LineView, Window,
+    Bus, LineView, Page, Window,
     line::ms,
-    test::{self, Bench, TRANSACTION, Tried},
+    test::{self, TRANSACTION, Tried},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -78,6 +80,7 @@ impl Form {
             |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0), range: String::new() };
         let unit = text(t!("unit"), &unit.to_string());
         let fields = match tried {
+            Tried::Sweep => sweep::fields(unit),
             Tried::Bytes | Tried::Request => {
                 let function = choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec());
                 [vec![unit, function], functions::fields(FUNCTIONS[0], &[])].concat()
@@ -105,11 +108,15 @@ impl Form {
     }
 
     /// A key; what is filled in is kept for the next time.
-    pub fn on_key(mut self, cx: &ViewContext, bench: &mut Bench, event: KeyEvent) -> Next {
+    pub fn on_key(mut self, cx: &ViewContext, bus: &mut Bus, event: KeyEvent) -> Next {
+        let bench = &mut bus.test;
         let last = self.fields.len() - 1;
         if keys::code(KeyCode::Enter).is(event) {
             self.problem = match self.start(cx) {
-                Ok(acts) => {
+                Ok(mut acts) => {
+                    // It may have been opened on another tab.
+                    acts.push(UiAction::Show(Tab::Bus));
+                    (bus.line, bus.page) = (self.line, Page::Test);
                     (bench.form, bench.first) = (Some(self), None);
                     return Next::Do(acts);
                 }
@@ -208,6 +215,7 @@ impl Form {
                 (Diagnostic::Identify { unit }, vec![words])
             }
             Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?)?,
+            Tried::Sweep => self.build_sweep(unit(0)?)?,
         })
     }
 
@@ -286,6 +294,7 @@ impl Form {
             Tried::Loopback => t!("loopback"),
             Tried::Identify => t!("identify a device"),
             Tried::Scan => t!("scan for units"),
+            Tried::Sweep => t!("map of addresses"),
         }
     }
 }

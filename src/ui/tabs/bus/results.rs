@@ -10,7 +10,11 @@ use super::{
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
 use crate::{
     bus::dissect::{self, Direction},
-    plant::diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
+    plant::{
+        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
+        event::Fault,
+        sweep::{SweptOutcome, SweptRange},
+    },
 };
 
 /// The last test of a line, or how to begin.
@@ -64,7 +68,13 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
                 let (words, trouble) = outcome_words(outcome);
                 rows.push(plain(words, if trouble { theme.trouble() } else { theme.strong() }));
             }
-            Finding::Conclusion(words) => rows.push(plain(words.clone(), theme.strong())),
+            Finding::Swept(range) => {
+                let answers = range.outcome == SweptOutcome::Answers;
+                rows.push(plain(swept(range), if answers { theme.strong() } else { theme.dim() }));
+            }
+            Finding::Conclusion(words) => {
+                rows.extend(wrap(words, room).into_iter().map(|line| plain(line, theme.strong())));
+            }
         }
     }
     rows
@@ -86,6 +96,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. }
         | Diagnostic::Write(_)
+        | Diagnostic::Sweep(_)
         | Diagnostic::Scan(_)) => diagnostic.to_string(),
     };
     let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
@@ -98,8 +109,24 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
     rows
 }
 
+/// `1000 to 1029 / 0x03E8 to 0x0405   answer`.
+fn swept(range: &SweptRange) -> String {
+    let SweptRange { first, last, outcome } = *range;
+    let words = outcome_label(outcome);
+    format!("{first:>5} – {last:<5}  0x{first:04X} – 0x{last:04X}   {words}")
+}
+
+/// What became of an address, in words.
+pub fn outcome_label(outcome: SweptOutcome) -> String {
+    match outcome {
+        SweptOutcome::Answers => t!("answers").to_owned(),
+        SweptOutcome::Refused(code) => t!("refused: {fault}", fault = Fault::Exception(code)),
+        SweptOutcome::Silent(fault) => t!("not known: {fault}", fault),
+    }
+}
+
 /// Time left, if the steps to come take as long as those before.
-fn remaining(cx: &ViewContext, run: &DiagnosticRun) -> Option<std::time::Duration> {
+pub fn remaining(cx: &ViewContext, run: &DiagnosticRun) -> Option<std::time::Duration> {
     let spent = elapsed(run.started, cx.now).as_secs_f64() / cx.snapshot.speed.clamp(0.01, 1e6);
     let each = spent / f64::from((0 < run.done).then_some(run.done)?);
     SignedDuration::try_from_secs_f64(each * f64::from(run.total.saturating_sub(run.done))).ok()?.try_into().ok()
@@ -132,6 +159,7 @@ fn came_back(
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. }
         | Diagnostic::Write(_)
+        | Diagnostic::Sweep(_)
         | Diagnostic::Scan(_) => None,
     };
     let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());

@@ -42,10 +42,12 @@ pub enum Tried {
     Identify,
     /// Which units answer.
     Scan,
+    /// Which addresses of a unit answer.
+    Sweep,
 }
 
 impl Tried {
-    const ALL: [Tried; 5] = [Tried::Bytes, Tried::Request, Tried::Loopback, Tried::Identify, Tried::Scan];
+    const ALL: [Tried; 6] = [Tried::Bytes, Tried::Request, Tried::Loopback, Tried::Identify, Tried::Scan, Tried::Sweep];
 
     /// Its key, its name and what it is for.
     fn words(self) -> [&'static str; 3] {
@@ -57,6 +59,7 @@ impl Tried {
             Tried::Loopback => ["l", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
             Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
             Tried::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
+            Tried::Sweep => ["m", t!("map of addresses"), t!("which of the addresses 0 to 65535 a unit answers at")],
         }
     }
 }
@@ -92,7 +95,7 @@ impl Bench {
                 bare: self.bare,
                 problem: None,
             }),
-            Tried::Request | Tried::Loopback | Tried::Identify | Tried::Scan => {
+            Tried::Request | Tried::Loopback | Tried::Identify | Tried::Scan | Tried::Sweep => {
                 let last = self.form.take_if(|form| form.is(at.id, tried));
                 Window::Form(last.unwrap_or_else(|| Form::new(cx, at, tried)))
             }
@@ -146,7 +149,7 @@ impl Bench {
 /// long is followed at its end.
 fn begin(at: &LineView) -> usize {
     match at.status.test.as_ref().map(|run| &run.diagnostic) {
-        Some(Diagnostic::Loopback { .. } | Diagnostic::Scan(_)) => usize::MAX,
+        Some(Diagnostic::Loopback { .. } | Diagnostic::Scan(_) | Diagnostic::Sweep(_)) => usize::MAX,
         Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_))
         | None => 0,
     }
@@ -187,9 +190,11 @@ fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
             "Polling of {name} pauses while other settings are tested, and its alarms are not evaluated. Start the scan?",
             name = at.settings.name
         )),
-        Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Identify { .. } | Diagnostic::Read { .. } => {
-            None
-        }
+        Diagnostic::Scan(_)
+        | Diagnostic::Sweep(_)
+        | Diagnostic::Loopback { .. }
+        | Diagnostic::Identify { .. }
+        | Diagnostic::Read { .. } => None,
         Diagnostic::Write(_) => {
             Some(t!("{diagnostic}. This bypasses all limits of the plant file. Write it?", diagnostic))
         }

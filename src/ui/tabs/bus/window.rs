@@ -45,7 +45,7 @@ impl Window {
         match self {
             Window::Text(text) => text.on_key(event),
             Window::Send(send) => send.on_key(cx, &mut tabs.bus.test, event),
-            Window::Form(form) => form.on_key(cx, &mut tabs.bus.test, event),
+            Window::Form(form) => form.on_key(cx, &mut tabs.bus, event),
         }
     }
 

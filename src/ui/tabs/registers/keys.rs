@@ -27,6 +27,8 @@ pub enum Action {
     Faster,
     /// A longer one.
     Slower,
+    /// Asks for a sweep: which addresses answer.
+    Sweep,
     /// Asks again for what was refused.
     Relearn,
     /// Names of the profile that the unit looks like.
@@ -103,6 +105,7 @@ pub(super) const KEYS: &[Key<Action>] = &[
         "compare with another unit, or with this moment later; again to end it",
         Action::Compare,
     ),
+    Key::new(char('m'), "map", "map of the addresses that answer, 0 to 65535", Action::Sweep).needs(Role::Technician),
     Key::new(char('r'), "", "ask again for what the unit has refused", Action::Relearn),
 ];
 
@@ -137,6 +140,7 @@ impl Action {
             | Action::Faster
             | Action::Slower
             | Action::Relearn
+            | Action::Sweep
             | Action::Graph
             | Action::Watch
             | Action::Name => true,

@@ -2,6 +2,7 @@
 
 mod compare;
 mod keep;
+mod map;
 mod watch;
 
 use std::sync::Arc;

@@ -13,6 +13,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     bus::interpret,
     plant::{
+        diagnostics::{Diagnostic, DiagnosticState},
         event::LineState,
         live::TABLES,
         number::{to_f32, to_u32},
@@ -133,6 +134,10 @@ pub fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
         requests = last.requests,
         reads = tab.reads
     );
+    let sweep = line.and_then(|line| line.test.as_ref()).filter(|run| run.state == DiagnosticState::Running);
+    if let Some(run) = sweep.filter(|run| matches!(run.diagnostic, Diagnostic::Sweep(_))) {
+        return (words + &t!("   map {percent} %", percent = 100 * run.done / run.total.max(1)), true);
+    }
     let timeout = cx.def().lines.get(tab.line.index()).map(|line| line.timeout);
     match tab.replies.timeout().filter(|learned| timeout.is_some_and(|timeout| *learned < timeout)) {
         Some(learned) => (words + &t!("   timeout {ms} ms is enough", ms = learned.as_millis()), true),

@@ -1,0 +1,34 @@
+//! Why the task of a line leaves its port.
+
+use super::Closed;
+use crate::bus::io::link::LinkError;
+
+/// Why a port is left.
+pub(super) enum LinkExit {
+    /// An operator closed the line.
+    Closed,
+    /// The port or connection failed.
+    Lost(String),
+    /// It is opened again at once, with other settings.
+    Reopen,
+    /// A diagnostic needs the port for itself.
+    Diagnostic,
+    /// The station is ending.
+    Shutdown,
+}
+
+impl From<Closed> for LinkExit {
+    fn from(Closed: Closed) -> LinkExit {
+        LinkExit::Shutdown
+    }
+}
+
+impl From<LinkError> for LinkExit {
+    /// Of a request without a caller only the end of the port matters.
+    fn from(error: LinkError) -> LinkExit {
+        match error {
+            LinkError::Gone(why) => LinkExit::Lost(why),
+            LinkError::Fault(fault) => LinkExit::Lost(fault.to_string()),
+        }
+    }
+}
