@@ -1,7 +1,7 @@
 //! **sightglass**: the control room of a small plant in a terminal.
 //!
 //! A plant has Modbus controllers on an RS-485 line or on TCP. sightglass polls them, evaluates alarms, keeps everything
-//! in DuckDB, draws the process as a living mimic, sets controllers with verified writes and writes shift reports.
+//! in DuckDB, draws the process as a live mimic, sets controllers with verified writes and writes shift reports.
 //! It never shows a wrong value as a right one.
 //!
 //! # One binary, five ways to run it
@@ -48,8 +48,8 @@
 //! What is deleted when is a [decision](history::retention) over the list of files. A [past](plant::past) instant becomes a
 //! snapshot like a live one; SQL of others is answered by an [engine of its own](history::io::tables), never by the station.
 //!
-//! There is exactly one awaited send in the station (link → plant). Everything else is `try_send` or `watch`, so the
-//! plant task never blocks and deadlock is ruled out by shape. Shutdown runs downstream: the links stop, the plant ends
+//! The plant task never waits to send: links wait for it, everything else that it sends is `try_send` or `watch`. So it
+//! never blocks, and no deadlock is possible by design. Shutdown runs downstream: the links stop, the plant ends
 //! because no sender is left, the history thread drains, flushes and ends.
 //!
 //! # Laws
@@ -60,13 +60,13 @@
 //!    outcome comes back inside a later snapshot.
 //! 3. **Three pure reducers**: [`plant::Plant`] for facts, [`access::AccessControl`] for users and sessions, [`ui::update`] for the view.
 //!    Everything asynchronous is a thin loop around one of them.
-//! 4. **The outside world is spelled `io`.** Only `io` files, the station and the command line may name tokio, DuckDB,
+//! 4. **The outside world is in `io`.** Only `io` files, the station and the command line may name tokio, DuckDB,
 //!    files, sockets, the terminal or a clock. Time is an argument everywhere else.
 //! 5. **A value never travels alone**: [`plant::sample::Sample`] is value, quality and time, on screen, in alarms, in the
-//!    history and in CSV. Never a silent last value, never 0 for "no answer".
+//!    history and in exports; a figure of a report has its share of good time. Never a silent last value, never 0 for "no answer".
 //! 6. **A write is never retried by itself and always read back.** Its outcome is a state in the snapshot.
 //! 7. Every queue, list, wait and retry has a bound, and an overflow that an operator can see.
-//! 8. UTC microseconds are stored; local time is a matter of display and of reports.
+//! 8. UTC is stored, samples in whole milliseconds, events in microseconds; local time is a matter of display and of reports.
 //!
 //! # Glossary
 //!
@@ -77,7 +77,8 @@
 //! | sample, quality | value with quality and time; good, uncertain or bad (OPC UA) |
 //! | snapshot | everything that is true now, immutable, for terminals and the history |
 //! | bench, live read | one device without tags, for `open`; a read of its registers beside the polls |
-//! | hole | an address that a device does not have |
+//! | hole | an address that a device does not have, found by a live read, a sweep or a refused block |
+//! | hold | how long a stored value counts without a successor |
 //! | source frame | the request and response that a sample was decoded from |
 //! | command | what an operator asks of the plant, with a status from pending to verified, refused, failed or not confirmed |
 //! | session request | what a user asks of access control: log in, log out, change users, lock |
@@ -91,14 +92,14 @@
 //! | poll class | critical, normal or background: which polls an overloaded line skips last |
 //! | backoff | a device that does not answer is asked at growing intervals |
 //! | outstanding reply, in sync | a response that may still come after its timeout; it is never taken for another |
-//! | gap registers | registers read only because they stand between two blocks |
+//! | gap registers | registers read only because they lie between two tags of a block |
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
 //! | batch, phase | what the plant makes between two conditions of its file; a value of its phase tag |
 //! | total | what an expression adds up to: an integral, hours, starts |
 //! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
 //! | tier, archive, manifest | samples, minutes or hours; the files of closed hours; the table that names these |
-//! | fault, injected fault | why a request or the station failed; what a trainer puts into the simulated plant
+//! | fault, injected fault | why a request or the station failed; what a trainer puts into the simulated plant |
 //! | scenario, drill | a scripted plant for tests; one that evaluates an operator |
 //!
 //! # Recipes

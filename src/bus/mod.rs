@@ -8,14 +8,15 @@
 //!   values <── codec <── task <── framing <─ ascii, frame <── port        answered
 //! ```
 //!
-//! | room | what is decided there |
+//! | module | what is decided there |
 //! |---|---|
 //! | [`frame`], [`ascii`], [`framing`] | where a frame begins and ends, whether its check fits, whether it answers what was asked |
 //! | [`late_reply`] | which replies are outstanding, and what may be asked meanwhile |
-//! | [`codec`] | words to numbers and back |
+//! | `pdu` | the fields of every function |
+//! | [`codec`], [`interpret`] | words to numbers and back; everything that words may mean |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`line_stats`] | what is counted |
-//! | [`diagnostics`], [`live`] | the steps of a diagnostic, and of a live read |
+//! | [`diagnostics`], [`live`], [`recognise`] | the steps of a diagnostic and of a live read; which device it looks like |
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 

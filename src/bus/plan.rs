@@ -4,7 +4,7 @@
 //!   tags ──> groups ──────────────> runs ──────────────────> blocks
 //!            device, table, period  cheapest cut (cheapest)  one request each (cost)
 //!                                        ▲
-//!                                   unreadable: what the device refused (unreadable)
+//!                                   unreadable: what the device refused (gaps)
 //! ```
 //!
 //! Tags of different [`PollClass`] share blocks, and the block has the most important of them: a word that is read along costs

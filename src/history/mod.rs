@@ -54,7 +54,7 @@ pub enum Query {
         /// Columns.
         buckets: usize,
     },
-    /// Steps of alarms, newest first.
+    /// Alarm events, newest first.
     Journal {
         /// From.
         from: Timestamp,
@@ -153,7 +153,7 @@ pub enum Query {
 pub enum Answer {
     /// One series a tag.
     Series(Vec<Series>),
-    /// Steps of alarms.
+    /// Alarm events.
     Journal(Vec<AlarmRecord>),
     /// Operator actions.
     Actions(Vec<ActionRecord>),

@@ -73,7 +73,7 @@ pub struct Plant {
     run: u64,
     image: ProcessImage,
     alarm_manager: AlarmManager,
-    /// Counts the steps of alarms; `alarm_metrics` are its latest.
+    /// Counts the alarm events; `alarm_metrics` are its latest.
     alarm_monitor: AlarmMonitor,
     alarm_metrics: AlarmMetrics,
     commands: CommandTracker,

@@ -116,7 +116,8 @@ impl Quality {
     }
 }
 
-/// A value with its quality and the instant at which the device said it.
+/// A value with its quality and the instant at which the device gave it; of what is stored again, or is not good, that at
+/// which the station says so.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
     /// In the tag's unit; bits are 0 or 1, enumerations their number. `None` exactly when the quality is bad; a tag that

@@ -19,5 +19,5 @@ keyword_enum! {
     }
 }
 
-/// A value without a successor for longer is not known any more, see the hold of `report`: no longer interval can be.
+/// The longest interval: well within the hold of `report`, after which a value without a successor is not known any more.
 pub const STORE_EVERY_MAX: Duration = Duration::from_secs(60);

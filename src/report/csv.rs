@@ -77,7 +77,7 @@ pub(super) fn text(cell: &str) -> String {
     }
 }
 
-/// A cell of our own making: a number, a time, a word.
+/// A cell that the program makes itself: a number, a time, a word.
 pub(super) fn plain(cell: impl Into<String>) -> String {
     cell.into()
 }

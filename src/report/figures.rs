@@ -144,14 +144,18 @@ pub fn suppressed(
     from: Timestamp,
     until: Timestamp,
 ) -> Vec<SuppressedSummary> {
-    let mut alarms: BTreeMap<(&str, &str), Quiet> = BTreeMap::new();
+    let mut alarms: BTreeMap<(&str, &str), SuppressionTracker> = BTreeMap::new();
     let annunciated: HashSet<(&str, &str)> = standing.iter().map(|step| (&*step.subject, &*step.message)).collect();
     for step in active {
         let name = (&*step.subject, &*step.message);
-        alarms.entry(name).or_insert_with(|| Quiet::new(step)).set(true, !annunciated.contains(&name), from);
+        alarms.entry(name).or_insert_with(|| SuppressionTracker::new(step)).set(
+            true,
+            !annunciated.contains(&name),
+            from,
+        );
     }
     for step in steps {
-        let alarm = alarms.entry((&step.subject, &step.message)).or_insert_with(|| Quiet::new(step));
+        let alarm = alarms.entry((&step.subject, &step.message)).or_insert_with(|| SuppressionTracker::new(step));
         let (active, quiet) = match step.event {
             AlarmEvent::Raised => (true, false),
             AlarmEvent::RaisedSuppressed => (true, true),
@@ -171,18 +175,18 @@ pub fn suppressed(
 }
 
 /// Follows an alarm through a period.
-struct Quiet {
+struct SuppressionTracker {
     active: bool,
     quiet: bool,
     since: Timestamp,
     found: SuppressedSummary,
 }
 
-impl Quiet {
-    fn new(step: &AlarmRecord) -> Quiet {
+impl SuppressionTracker {
+    fn new(step: &AlarmRecord) -> SuppressionTracker {
         let (subject, message) = (step.subject.clone(), step.message.clone());
         let found = SuppressedSummary { subject, message, priority: step.priority, raised: 0, active: Duration::ZERO };
-        Quiet { active: false, quiet: false, since: step.at, found }
+        SuppressionTracker { active: false, quiet: false, since: step.at, found }
     }
 
     fn set(&mut self, active: bool, quiet: bool, at: Timestamp) {

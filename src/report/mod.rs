@@ -174,13 +174,13 @@ pub struct ShiftReport {
     pub batches: Vec<batch::BatchReport>,
     /// Alarms that were active while they were suppressed, shelved or out of service.
     pub suppressed: Vec<SuppressedSummary>,
-    /// Steps of alarms in the period, oldest first.
+    /// Alarm events in the period, oldest first.
     pub alarms: Vec<AlarmRecord>,
     /// How good the alarm system was in the period.
     pub alarm_metrics: PeriodMetrics,
     /// Operator actions in the period, oldest first.
     pub actions: Vec<ActionRecord>,
-    /// The thesis's raw record at a fixed interval.
+    /// The record of one controller at a fixed interval: the data log of the thesis.
     pub record: Vec<RecordRow>,
     /// Name and unit of the controller of `record`.
     pub record_of: Option<(String, String)>,
@@ -226,12 +226,12 @@ pub struct SuppressedSummary {
     pub active: Duration,
 }
 
-/// One row of the thesis's record: `er = sv − pv`.
+/// One row of the record: `er = sv − pv`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RecordRow {
     /// When.
     pub at: Timestamp,
-    /// Setpoint, if good.
+    /// Setpoint in use, if good.
     pub sv: Option<f64>,
     /// Process value, if good.
     pub pv: Option<f64>,

@@ -1,4 +1,4 @@
-//! The thesis's record alone as CSV: date, time with offset, SV, PV, ER = SV − PV; one header row.
+//! The record alone as CSV: date, time with offset, SV in use, PV, ER = SV − PV; one header row.
 
 use jiff::tz::TimeZone;
 

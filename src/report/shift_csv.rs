@@ -31,8 +31,8 @@ impl ReportFormat for ShiftCsv {
     }
 }
 
-/// The whole report: facts, tags, what could not be read, alarm counts, suppressed alarms, alarm metrics, alarm list,
-/// operator actions, raw record. Every section has a title row, a header row and its rows; every row has as many columns
+/// The whole report: facts, tags, batches, what could not be read, alarm counts, suppressed alarms, alarm metrics, alarms
+/// to investigate, alarm list, operator actions, record. Every section has a title row, a header row and its rows; every row has as many columns
 /// as the widest. The same report gives the same bytes.
 fn shift_csv(report: &ShiftReport, def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
     let zone = &def.time_zone;

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::plant::sample::{Quality, Sample};
 
-/// The plant stores every change of value or quality at once, and an unchanged value at least every 60 s. A value
+/// The plant stores every change of quality, and of value beyond the deadband, at once, and an unchanged value at least every 60 s. A value
 /// without a successor for longer than this was therefore not stored any more: from here on it is not known.
 pub const HOLD_MAX: Duration = Duration::from_secs(150);
 

@@ -8,7 +8,7 @@ use crate::{history::io::open::Restored, plant::record::AlarmRecord};
 
 /// Where the journal alone knows the state of the alarms, the plant waits this long before it evaluates any.
 pub const WAIT_MAX: Duration = Duration::from_millis(500);
-/// Steps of alarms that are kept for the figures of the last day until the history is open.
+/// Alarm events that are kept for the figures of the last day until the history is open.
 const EARLY_MAX: usize = 10_000;
 
 /// What is still to come of the time before the start.
@@ -18,7 +18,7 @@ pub struct Past {
     restored: Option<oneshot::Receiver<Restored>>,
     /// The state of the alarms comes from the journal.
     pub from_journal: bool,
-    /// Steps of alarms since the start.
+    /// Alarm events since the start.
     early: Vec<AlarmRecord>,
 }
 

@@ -6,8 +6,8 @@
 //!  submit(message), flush() ─────────────────────────┘           MBAP: transaction ids; several under way
 //! ```
 //!
-//! PDUs are made and read by tokio-modbus, with a fresh context for every request on one end of a pipe; what travels on
-//! the port is ours.
+//! Writes are made, and answers read, by tokio-modbus, with a fresh context for every request on one end of a pipe; the PDU
+//! of a poll is its block's, and what travels on the port is ours.
 
 mod raw;
 mod receive;
@@ -176,7 +176,7 @@ impl Link {
                 let age = self.wire.age();
                 self.wire.replies.answered(message, answer, proof, age);
             }
-            Err(fault) => self.account(message, *fault),
+            Err(fault) => self.count_fault(message, *fault),
         }
         self.note_silence(matches!(received.answer, Err(Fault::Timeout)));
         self.remember_exchange(frame, received, sent_at).map_err(LinkError::Fault)
@@ -193,7 +193,7 @@ impl Link {
     }
 
     /// A stop is sent next: it waits for what is just coming in, not for what may still come.
-    pub fn hurry(&mut self) {
+    pub fn shorten_hold_off(&mut self) {
         self.wire.limit_hold_off(self.frame_timeout);
         let latest = Instant::now() + self.frame_timeout;
         self.gaps.iter_mut().for_each(|(_, until)| *until = (*until).min(latest));
@@ -226,7 +226,7 @@ impl Link {
         self.timeout
     }
 
-    /// Another time from now on, for a diagnostic in a hurry.
+    /// Another time from now on, for a diagnostic in a shorten_hold_off.
     pub fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;
     }
@@ -242,7 +242,7 @@ impl Link {
     }
 
     /// Nothing is sent to a unit for this long (plant time): it wants a gap between two requests.
-    pub fn rest_unit(&mut self, unit: u8, plant: Duration) {
+    pub fn set_unit_gap(&mut self, unit: u8, plant: Duration) {
         let now = Instant::now();
         self.gaps.retain(|(other, until)| *other != unit && now < *until);
         self.gaps.push((unit, now + self.wire.clock().real_span(plant)));
@@ -344,7 +344,7 @@ impl Link {
 
     /// Counts a fault. On a line without transaction ids the reply becomes outstanding, and the line pauses until the longest
     /// late frame has passed.
-    fn account(&mut self, message: &[u8], fault: Fault) {
+    fn count_fault(&mut self, message: &[u8], fault: Fault) {
         let Some(unit) = message.first() else { return };
         let mbap = self.framing() == Framing::Mbap;
         match fault.kind() {

@@ -34,7 +34,7 @@ pub struct LineMemory {
     pub counters: LineCounters,
     /// Outstanding replies of each unit.
     replies: LineReplies,
-    born: Instant,
+    created_at: Instant,
 }
 
 impl LineMemory {
@@ -44,7 +44,7 @@ impl LineMemory {
         LineMemory {
             counters: LineCounters::default(),
             replies: LineReplies::new(line.timeout, seed),
-            born: Instant::now(),
+            created_at: Instant::now(),
         }
     }
 
@@ -70,7 +70,7 @@ pub struct Wire {
     quiet_until: Instant,
     /// When the last byte sent has left.
     left_at: Instant,
-    born: Instant,
+    created_at: Instant,
     /// Outstanding replies of each unit.
     pub replies: LineReplies,
     /// Bytes that no request waits for, until silence shows that their frame has ended.
@@ -90,7 +90,7 @@ pub struct Wire {
 impl Wire {
     /// A freshly opened port; `memory` goes on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: LineMemory) -> Wire {
-        let LineMemory { counters, mut replies, born } = memory;
+        let LineMemory { counters, mut replies, created_at } = memory;
         replies.set_timeout(line.timeout);
         let (char_time, silent_interval) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
@@ -111,7 +111,7 @@ impl Wire {
             timeout: line.timeout,
             quiet_until: Instant::now() + if may_come { line.timeout } else { Duration::ZERO },
             left_at: Instant::now(),
-            born,
+            created_at,
             replies,
             stray: Vec::new(),
             frame_timeout: clock.real_span(silent_interval).max(line.frame_timeout),
@@ -134,12 +134,12 @@ impl Wire {
 
     /// Time since the line began.
     pub fn age(&self) -> Duration {
-        self.born.elapsed()
+        self.created_at.elapsed()
     }
 
     /// What is remembered until the next opening.
     pub fn memory(&self) -> LineMemory {
-        LineMemory { counters: self.counters, replies: self.replies.clone(), born: self.born }
+        LineMemory { counters: self.counters, replies: self.replies.clone(), created_at: self.created_at }
     }
 
     /// Nothing is sent for this long (real time).
@@ -151,7 +151,7 @@ impl Wire {
     }
 
     /// Until when nothing is to be sent, if that is not over.
-    pub fn rests_until(&self) -> Option<Instant> {
+    pub fn hold_off_until(&self) -> Option<Instant> {
         Some(self.quiet_until).filter(|until| Instant::now() < *until)
     }
 

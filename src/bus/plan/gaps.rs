@@ -1,4 +1,4 @@
-//! What a device refused to read, and how the culprit in a refused block is found with few requests.
+//! What a device refused to read, and how the refused register in a refused block is found with few requests.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::plant::{
     tag::{Table, TagDef},
 };
 
-/// Addresses that a device does not have, although the plan would read (over) them. An empty range is a seam: both sides
+/// Addresses that a device does not have, although the plan would read (over) them. An empty range is a split boundary: both sides
 /// can be read, but not with one request.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct UnreadableRanges {
@@ -56,8 +56,8 @@ impl UnreadableRanges {
 
 /// The two smaller blocks to read instead of one that was refused, and the registers between them; `None` for one value.
 ///
-/// A register between tags is the usual culprit, so it is cut at a gap as long as there is one: the middle one, because
-/// each further answer then halves the suspects. Then between neighbours, down to single values.
+/// A register between tags is the usual refused register, so it is cut at a gap as long as there is one: the middle one, because
+/// each further answer then halves the candidates. Then between neighbours, down to single values.
 pub fn split(def: &PlantDef, block: &Block) -> Option<([Block; 2], (u32, u32))> {
     let mut tags: Vec<&TagDef> = block.tags.iter().map(|tag| def.tag(*tag)).collect();
     tags.sort_by_key(|tag| (tag.point.address, tag.point.len(), tag.id));
@@ -89,7 +89,7 @@ pub struct RangeBisection {
     cuts: Vec<(AddressRange, AddressRange)>,
     found: Vec<AddressRange>,
     /// Found once: unreadable if the next read that contains them is refused too.
-    suspects: Vec<AddressRange>,
+    candidates: Vec<AddressRange>,
 }
 
 /// Addresses of a table, from the first to before the last.
@@ -120,7 +120,7 @@ impl RangeBisection {
         }
         self.open.retain(|open| open != block);
         let parts = split(def, block);
-        let confirmed = self.suspects.iter().any(|suspect| whole.contains(suspect));
+        let confirmed = self.candidates.iter().any(|candidate| whole.contains(candidate));
         match parts {
             Some((parts, between)) if !confirmed => {
                 self.cuts.push((whole, AddressRange::new(block, between)));
@@ -128,7 +128,7 @@ impl RangeBisection {
                 Some(parts.into())
             }
             Some((parts, _)) => {
-                self.found.extend(self.suspects.iter().filter(|suspect| whole.contains(suspect)));
+                self.found.extend(self.candidates.iter().filter(|candidate| whole.contains(candidate)));
                 Some(parts.into())
             }
             None => {
@@ -144,7 +144,7 @@ impl RangeBisection {
     pub fn answered(&mut self, block: &Block) {
         let whole = AddressRange::new(block, block.range());
         self.open.retain(|open| open != block);
-        self.suspects.retain(|suspect| !whole.contains(suspect));
+        self.candidates.retain(|candidate| !whole.contains(candidate));
     }
 
     /// When every part has answered, or is a gap itself: adds what was confirmed to `unreadable`. `true` if the plan must be
@@ -159,9 +159,9 @@ impl RangeBisection {
             }
         }
         let (confirmed, new): (Vec<AddressRange>, Vec<AddressRange>) =
-            self.found.drain(..).partition(|found| self.suspects.contains(found));
-        self.suspects.retain(|suspect| !confirmed.contains(suspect));
-        self.suspects.extend(new);
+            self.found.drain(..).partition(|found| self.candidates.contains(found));
+        self.candidates.retain(|candidate| !confirmed.contains(candidate));
+        self.candidates.extend(new);
         confirmed.iter().for_each(|gap| unreadable.add(gap.device, gap.table, gap.start, gap.end));
         true
     }

@@ -27,7 +27,7 @@ const CHUNK: Duration = Duration::from_secs(86_400);
 const WINDOW: i64 = 600_000_000;
 /// Windows that are read one by one: two days.
 const LOOKED_INTO_MAX: i64 = 288;
-/// Steps of alarms behind the figures of one answer: years of a plant that is run well.
+/// Alarm events behind the figures of one answer: years of a plant that is run well.
 const EVENTS_MAX: u64 = 2_000_000;
 
 /// What the monitor of a plant that starts again must know.

@@ -26,7 +26,7 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 const RETRY_AFTER: Duration = Duration::from_secs(600);
 
 /// What became of a look.
-pub enum Looked {
+pub enum ArchiveOutcome {
     /// A job was due, and is done.
     Did(Job),
     /// Nothing was due; this is missing of the archive.
@@ -35,7 +35,7 @@ pub enum Looked {
     BackedUp,
 }
 
-type Done = Result<Looked, (Option<Job>, HistoryError)>;
+type Done = Result<ArchiveOutcome, (Option<Job>, HistoryError)>;
 
 /// Works on the archive of one store after the other.
 pub struct Archiver {
@@ -85,10 +85,10 @@ impl Archiver {
         let work = move || {
             let nothing = |error| (None, error);
             let Some(job) = store.archive_due(now, &left).map_err(nothing)? else {
-                return store.missing_files().map(Looked::Idle).map_err(nothing);
+                return store.missing_files().map(ArchiveOutcome::Idle).map_err(nothing);
             };
             match store.archive(&job, &mut |_| Ok(())) {
-                Ok(()) => Ok(Looked::Did(job)),
+                Ok(()) => Ok(ArchiveOutcome::Did(job)),
                 Err(error) => Err((Some(job), error)),
             }
         };
@@ -121,29 +121,29 @@ impl Archiver {
             }
             // Who has left needs no answer.
             let _ = reply.send(written);
-            Ok(Looked::BackedUp)
+            Ok(ArchiveOutcome::BackedUp)
         };
         self.running = Some((spawn_blocking(work), interrupt));
     }
 
     /// Waits for the end of a look, for ever without one. Returns what came of it, or why the archive stands still.
-    pub async fn ended(&mut self) -> Result<Looked, HistoryError> {
+    pub async fn ended(&mut self) -> Result<ArchiveOutcome, HistoryError> {
         let Some((work, _)) = &mut self.running else { return std::future::pending().await };
         let done = work.await;
         self.running = None;
         let (again, looked) = match done {
-            Ok(Ok(Looked::Did(job))) => {
+            Ok(Ok(ArchiveOutcome::Did(job))) => {
                 tracing::info!(?job, "archived");
-                (pause(&job), Ok(Looked::Did(job)))
+                (pause(&job), Ok(ArchiveOutcome::Did(job)))
             }
-            Ok(Ok(Looked::Idle(missing))) => {
+            Ok(Ok(ArchiveOutcome::Idle(missing))) => {
                 if self.left.merges.is_empty() && self.left.before.is_none() {
                     self.skipped = None;
                 }
                 self.left.merges.clear();
-                (LOOK_EVERY, Ok(Looked::Idle(missing)))
+                (LOOK_EVERY, Ok(ArchiveOutcome::Idle(missing)))
             }
-            Ok(Ok(Looked::BackedUp)) => (Duration::ZERO, Ok(Looked::BackedUp)),
+            Ok(Ok(ArchiveOutcome::BackedUp)) => (Duration::ZERO, Ok(ArchiveOutcome::BackedUp)),
             Ok(Err((Some(Job::Hour(hour)), error))) if error.is_damage() => {
                 self.left.before = instant(hour + HOUR);
                 self.skipped = Some(error.clone());

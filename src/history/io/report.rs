@@ -1,4 +1,4 @@
-//! The report of a period: figures from hours, minutes and samples, of which the names and units that a device chooses come
+//! The report of a period: figures from hours, minutes and samples, of which the units and decimals that a device chooses come
 //! too, and the record from the samples of its controller.
 
 use std::{
@@ -160,10 +160,10 @@ impl Store {
     ) -> Result<Vec<RecordRow>, HistoryError> {
         let Recorded { sv, pv, instants, .. } = recorded;
         let tags = if sv == pv { vec![*sv] } else { vec![*sv, *pv] };
-        let mut stood: Vec<ValuesAt> = tags.iter().map(|_| ValuesAt::new(instants.clone())).collect();
-        self.each_sample(&tags, from, until, |place, sample| stood[place].next(sample))?;
-        let stood: Vec<_> = stood.into_iter().map(ValuesAt::end).collect();
-        let [sv, pv] = [stood.first(), stood.last()].map(|stood| stood.map_or(&[][..], Vec::as_slice));
+        let mut values_at: Vec<ValuesAt> = tags.iter().map(|_| ValuesAt::new(instants.clone())).collect();
+        self.each_sample(&tags, from, until, |place, sample| values_at[place].next(sample))?;
+        let values_at: Vec<_> = values_at.into_iter().map(ValuesAt::end).collect();
+        let [sv, pv] = [values_at.first(), values_at.last()].map(|values_at| values_at.map_or(&[][..], Vec::as_slice));
         Ok(figures::record(instants, sv, pv))
     }
 
@@ -180,9 +180,10 @@ impl Store {
         if ROWS_MAX < rows {
             return Err(HistoryError::TooManyRows { rows, max: ROWS_MAX, asked: Some(elapsed(from, until).as_secs()) });
         }
-        self.bounded(if face.sv == face.pv { 1 } else { 2 }, from, until, now, SAMPLES_MAX)?;
+        let sv = face.sv_to_show();
+        self.bounded(if sv == face.pv { 1 } else { 2 }, from, until, now, SAMPLES_MAX)?;
         let instants = figures::record_grid(interval, &self.def.time_zone, from, until).into();
-        Ok(Some(Recorded { name: device.name.clone(), sv: face.sv, pv: face.pv, instants }))
+        Ok(Some(Recorded { name: device.name.clone(), sv, pv: face.pv, instants }))
     }
 }
 

@@ -283,7 +283,7 @@ impl Store {
         Ok(Some((self.rows_about()? as f64, (last - first).max(1) as f64)))
     }
 
-    /// Rows of samples, as the engine believes, and as the manifest knows.
+    /// Rows of samples, as the engine estimates, and as the manifest knows.
     fn rows_about(&self) -> Result<u64, HistoryError> {
         self.db.query_row(sql::ROWS_ABOUT, [], |row| row.get(0)).map_err(engine)
     }

@@ -104,7 +104,7 @@ impl Store {
     }
 
     /// Ends every curve at an instant: from here on the station is off.
-    pub fn end_curves(&self, at: Timestamp) -> Result<(), HistoryError> {
+    pub fn mark_station_off(&self, at: Timestamp) -> Result<(), HistoryError> {
         let Some((_, last)) = self.extent() else { return Ok(()) };
         // Each tag has a row in every hour.
         let since = last.checked_sub(jiff::SignedDuration::from_hours(1)).unwrap_or(Timestamp::MIN);
@@ -120,7 +120,7 @@ impl Store {
         let Some((_, last)) = self.extent() else { return Ok(()) };
         let Some(end) = after(last) else { return Ok(()) };
         // Not after the first rows to come; if the clock went back, those rows lie elsewhere anyway.
-        self.end_curves(if now > last { end.min(now) } else { end })
+        self.mark_station_off(if now > last { end.min(now) } else { end })
     }
 
     /// Writes the log into the file.

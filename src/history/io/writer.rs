@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use tokio::sync::mpsc;
 
 use super::{
-    archiver::Looked,
+    archiver::ArchiveOutcome,
     files,
     open::{Opened, Restored},
     store::Store,
@@ -248,11 +248,11 @@ impl Writer {
     }
 
     /// Notes how a look at the archive ended.
-    pub fn archived(&mut self, looked: Result<Looked, HistoryError>) {
+    pub fn archived(&mut self, looked: Result<ArchiveOutcome, HistoryError>) {
         match looked {
-            Ok(Looked::Did(_)) => self.unarchived = None,
-            Ok(Looked::BackedUp) => {}
-            Ok(Looked::Idle(missing)) => (self.missing, self.unarchived) = (missing, None),
+            Ok(ArchiveOutcome::Did(_)) => self.unarchived = None,
+            Ok(ArchiveOutcome::BackedUp) => {}
+            Ok(ArchiveOutcome::Idle(missing)) => (self.missing, self.unarchived) = (missing, None),
             Err(error) => self.unarchived = Some(format!("it is not archived: {}", error.words())),
         }
         self.describe();
@@ -276,7 +276,7 @@ impl Writer {
         }
         self.status.lost += self.pending.len() as u64;
         self.pending.clear();
-        if let Err(error) = self.store().and_then(|store| store.end_curves(now)) {
+        if let Err(error) = self.store().and_then(|store| store.mark_station_off(now)) {
             self.fail(&error);
         }
         self.checkpoint();

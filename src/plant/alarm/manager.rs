@@ -81,7 +81,7 @@ impl AlarmManager {
     }
 
     /// Restores the alarms from the journal after a restart: of each alarm at least the last event of every
-    /// kind, oldest first. Steps of alarms that the plant no longer has are passed over.
+    /// kind, oldest first. Alarm events that the plant no longer has are passed over.
     pub fn restore(&mut self, events: &[AlarmRecord]) {
         let name = |alarm: &AlarmDef| (subject_name(&self.def, alarm.subject).to_owned(), alarm.message.clone());
         let known: HashMap<(String, String), AlarmId> =

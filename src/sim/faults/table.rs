@@ -133,7 +133,7 @@ pub(super) const ROWS: [Row; 18] = [
         "The unit was replaced or set to another word order.",
         "The bits are good and mean another number. It is refused only where it is not a number or outside of the range \
          of the tag; what happens to be inside is shown as good.",
-        "After a replacement compare one value with the face of the unit; set `order` in the profile.",
+        "After a replacement compare one value with the front panel of the unit; set `order` in the profile.",
     ),
     row(
         InjectedFault::SensorBurnout,

@@ -81,7 +81,7 @@ pub struct Trainer {
     pub simulator: SimulatorHandle,
     /// What is shown.
     pub snapshots: watch::Receiver<Arc<Snapshot>>,
-    /// Steps of alarms.
+    /// Alarm events.
     pub journal: Journal,
     /// The drill, if there is one.
     pub scenario: Option<Arc<Scenario>>,

@@ -9,7 +9,7 @@ pub const COUNT: usize = 83;
 pub const FIX: usize = 0;
 /// 41002: 0 PID, 1 fuzzy, 2 self-tuning.
 pub const CONTROL: usize = 1;
-/// 41003: setpoint on the face.
+/// 41003: setpoint on the front panel.
 pub const SV: usize = 2;
 /// 41004: 1 standby.
 pub const STANDBY: usize = 3;

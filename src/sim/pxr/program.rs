@@ -5,7 +5,7 @@ use crate::plant::number::to_u16;
 /// What register 41082 asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProgramCommand {
-    /// No programme: the SV of the face holds.
+    /// No programme: the SV of the front panel holds.
     Off,
     /// Run from the beginning, or on from a halt.
     Run,
@@ -42,7 +42,7 @@ pub struct Plan {
 pub struct Mode {
     /// Bit 0: standby when the programme has ended; else the last SV holds.
     pub standby_at_end: bool,
-    /// Bit 1: standby when the programme is switched off; else the SV of the face holds.
+    /// Bit 1: standby when the programme is switched off; else the SV of the front panel holds.
     pub standby_at_off: bool,
     /// Bit 2: begin again at the end.
     pub repeat: bool,
@@ -71,7 +71,7 @@ pub struct Program {
 const END: u16 = 17;
 
 impl Program {
-    /// The setpoint in use, or `None` when the SV of the face holds. The first ramp begins at PV.
+    /// The setpoint in use, or `None` when the SV of the front panel holds. The first ramp begins at PV.
     pub fn step(&mut self, dt_s: f64, command: ProgramCommand, plan: &Plan, pv_c: f64) -> Option<f64> {
         match command {
             ProgramCommand::Off => *self = Program::default(),

@@ -1,4 +1,4 @@
-//! Judges a drill by what became true: steps of alarms, commands of operators, values shown and values that are really so.
+//! Judges a drill by what became true: alarm events, commands of operators, values shown and values that are really so.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -27,7 +27,7 @@ pub struct Judge {
     began: Timestamp,
     now: Duration,
     marks: Vec<Mark>,
-    /// Steps of alarms that never came here.
+    /// Alarm events that never came here.
     lost: u64,
 }
 
@@ -108,7 +108,7 @@ impl Judge {
         }
     }
 
-    /// So many steps of alarms have been lost by now.
+    /// So many alarm events have been lost by now.
     pub fn on_lost(&mut self, lost: u64) {
         self.lost = self.lost.max(lost);
     }

@@ -213,7 +213,7 @@ impl Link {
         if self.transactions.outbox.is_empty() {
             return Ok(());
         }
-        while let Some(rests_until) = self.wire.rests_until() {
+        while let Some(rests_until) = self.wire.hold_off_until() {
             self.collect(rests_until).await?;
         }
         let bytes = std::mem::take(&mut self.transactions.outbox);
@@ -370,7 +370,7 @@ impl Link {
         let sent_at = request.sent_at.unwrap_or(now);
         match &answer {
             Ok(_) => self.wire.counters.ok += 1,
-            Err(fault) => self.account(&request.message, *fault),
+            Err(fault) => self.count_fault(&request.message, *fault),
         }
         let reply = (!frame.is_empty()).then(|| now.saturating_duration_since(sent_at));
         if reply.is_some() {

@@ -104,7 +104,7 @@ impl Task<'_> {
         let gap = self.def.device(block.device).gap;
         if !gap.is_zero() {
             schedule.keep_gap(block.device, ended + gap);
-            link.rest_unit(block.unit, gap);
+            link.set_unit_gap(block.unit, gap);
         }
     }
 
@@ -183,14 +183,14 @@ impl Task<'_> {
         block: &Block,
         index: Option<usize>,
     ) -> Option<Result<Answer, LinkError>> {
-        let mut cured = None;
+        let mut retried_fault = None;
         let read = if self.requests.stop_waits() {
             None
         } else {
-            self.requests.unless_stopped(read_in_sync(&self.blocks, link, block, &mut cured)).await
+            self.requests.unless_stopped(read_in_sync(&self.blocks, link, block, &mut retried_fault)).await
         };
         // A retry that cures it must not hide it.
-        if let Some(fault) = cured {
+        if let Some(fault) = retried_fault {
             self.stats.polled(index, block.device, Err(fault), None, 1);
         }
         if read.is_none() {
@@ -251,7 +251,7 @@ impl Task<'_> {
 }
 
 /// What came in between may have shown that the unit sends what it was not asked for.
-fn proven(link: &Link, block: &Block) -> Result<(), LinkError> {
+fn check_in_sync(link: &Link, block: &Block) -> Result<(), LinkError> {
     if link.is_ambiguous(&block.request()) { Err(Fault::OutOfSync.into()) } else { Ok(()) }
 }
 
@@ -280,13 +280,13 @@ async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Resu
         match link.exchange(&probe).await {
             // The device does not read parts of a block, or this answers an older request: neither proves anything.
             Err(LinkError::Fault(Fault::Exception(_))) => {}
-            Ok(_) => return proven(link, block),
+            Ok(_) => return check_in_sync(link, block),
             Err(error) => return Err(error),
         }
     }
     match link.loopback(block.unit).await {
         Err(LinkError::Fault(_)) if link.forget_outstanding(block.unit).is_none() => Ok(()),
-        Ok(()) => proven(link, block),
+        Ok(()) => check_in_sync(link, block),
         Err(error) => Err(error),
     }
 }

@@ -49,7 +49,7 @@ impl Task<'_> {
         let def = self.def.clone();
         let (id, tag) = (job.id, def.tag(job.tag));
         if job.urgent {
-            link.hurry();
+            link.shorten_hold_off();
         }
         let unlocked = match job.unlock {
             Some((key, raw)) => self.unlock(link, schedule, def.tag(key), raw, job).await?,
@@ -230,7 +230,7 @@ impl Task<'_> {
             link.hold_off(device.write_gap);
         } else if !device.write_gap.is_zero() {
             schedule.keep_gap(device.id, self.clock.now() + device.write_gap);
-            link.rest_unit(device.unit, device.write_gap);
+            link.set_unit_gap(device.unit, device.write_gap);
         }
     }
 

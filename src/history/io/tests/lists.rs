@@ -84,6 +84,20 @@ fn a_shift_report_has_figures_alarms_and_actions() {
 }
 
 #[test]
+fn the_record_has_the_setpoint_that_is_in_use() {
+    let (_folder, db) = folder();
+    let mut def = crate::report::testing::plant("Asia/Bangkok", &THREE);
+    // A program has moved it away from what the operator has set.
+    const USED: TagId = TagId(2);
+    def.devices[0].faceplate.as_mut().unwrap().sv_used = Some(USED);
+    let store = Store::open(&db, &Arc::new(def), sec(0)).unwrap().store;
+    store.append(&[good(PV, 0, 40.0), good(SV, 0, 70.0), good(USED, 0, 45.0)]).unwrap();
+    let query = Query::Report { period: Period::free(sec(10), sec(60)) };
+    let Answer::Report(report) = store.answer(&query, sec(50)).unwrap() else { panic!("not a report") };
+    assert_eq!(report.record.first().map(|row| (row.sv, row.er)), Some((Some(45.0), Some(5.0))));
+}
+
+#[test]
 fn a_report_has_the_last_entry_of_the_audit_log_before_its_end() {
     let (_folder, db) = folder();
     let store = open(&db, 0);

@@ -149,7 +149,7 @@ fn a_past_instant_is_as_it_was_seen() {
     check(&open(), "after a start");
     // From here on the station is off, whatever its devices said last.
     let store = open();
-    store.end_curves(sec(END)).unwrap();
+    store.mark_station_off(sec(END)).unwrap();
     let off = past(&store, sec(END + 60), END + 60);
     assert!(off.samples.iter().all(|sample| *sample == Sample::bad(Cause::StationOff, sec(END))), "{:?}", off.samples);
     assert_eq!(off.devices[TIC.index()].state, DeviceState::Unknown);

@@ -52,10 +52,10 @@ fn a_failing_archive_and_a_missing_file_are_said_once_each() {
     writer.archived(Err(HistoryError::Engine("no space left".into())));
     assert!(writer.status().unarchived.as_ref().is_some_and(|words| words.starts_with("it is not archived: ")));
     let damaged = |writer: &Writer| writer.status().damaged.clone().unwrap_or_default();
-    writer.archived(Ok(Looked::Idle(Some("missing of its archive: raw/1".into()))));
+    writer.archived(Ok(ArchiveOutcome::Idle(Some("missing of its archive: raw/1".into()))));
     assert_eq!((writer.status().unarchived.as_ref(), &*damaged(&writer)), (None, "missing of its archive: raw/1"));
-    writer.archived(Ok(Looked::Idle(Some("missing of its archive: m1/2".into()))));
+    writer.archived(Ok(ArchiveOutcome::Idle(Some("missing of its archive: m1/2".into()))));
     assert_eq!(damaged(&writer), "missing of its archive: m1/2; missing of its archive: raw/1");
-    writer.archived(Ok(Looked::Idle(None)));
+    writer.archived(Ok(ArchiveOutcome::Idle(None)));
     assert_eq!(damaged(&writer), "missing of its archive: raw/1");
 }

@@ -1,4 +1,4 @@
-//! The journal: steps of alarms and actions of operators in one list, searched by words and by time.
+//! The journal: alarm events and actions of operators in one list, searched by words and by time.
 
 use super::span;
 use crate::ui::tabs::prelude::*;
