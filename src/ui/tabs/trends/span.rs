@@ -32,8 +32,9 @@ const YEAR: i64 = 366 * DAY;
 /// How often the history may be queried, milliseconds.
 pub const RATES: [u64; 5] = [500, 1_000, 2_000, 5_000, 10_000];
 
-/// A living view of a short window moves so seldom.
-const HOP: SignedDuration = SignedDuration::from_millis(2_500);
+/// A living view of a short window moves so seldom, but never by more than an eighth of it.
+const HOP: SignedDuration = SignedDuration::from_secs(10);
+const HOPS_MIN: i64 = 8;
 
 /// A stretch of time cut into columns of equal width, on a grid that does not move with the clock: so a curve travels
 /// by whole columns and does not shimmer.
@@ -41,7 +42,7 @@ const HOP: SignedDuration = SignedDuration::from_millis(2_500);
 pub struct View {
     /// Left edge.
     pub from: Timestamp,
-    /// Right edge; for a living view up to one column, or [`HOP`], after now.
+    /// Right edge; for a living view up to one column, or a hop, after now.
     pub to: Timestamp,
     /// Number of columns.
     pub columns: usize,
@@ -60,11 +61,12 @@ impl View {
         View { from: instant(to - step * columns as i64), to: instant(to), columns }
     }
 
-    /// The view of `seconds` in which `now` is one of the last columns. It moves by [`HOP`] or by a column: each move sends
-    /// every cell of the curves again.
+    /// The view of `seconds` with `now` near its right edge. It moves by a hop or by a column, and in between the curves
+    /// grow: each move sends every cell of them again.
     pub fn live(now: Timestamp, seconds: i64, columns: usize) -> View {
         let step = View::ending(now, seconds, columns).step().as_micros().max(1);
-        let hop = step * (HOP.as_micros() / step).max(1);
+        let hop = HOP.as_micros().min(i128::from(seconds.max(1) * 1_000_000 / HOPS_MIN));
+        let hop = step * (hop / step).max(1);
         let last = (i128::from(now.as_microsecond()).div_euclid(hop) + 1) * hop - 1;
         View::ending(instant(i64::try_from(last).unwrap_or(i64::MAX)), seconds, columns)
     }
@@ -164,12 +166,15 @@ mod tests {
 
     #[test]
     fn a_living_view_holds_now_and_moves_seldom() {
-        for (seconds, columns, most) in [(60, 120, 25), (60, 7, 25), (600, 120, 13), (86_400, 120, 2)] {
+        for (seconds, columns, most) in [(60, 120, 9), (60, 7, 9), (120, 60, 7), (600, 120, 7), (86_400, 120, 2)] {
             let views: Vec<View> = (0..600)
                 .map(|n| at("06:00:00") + SignedDuration::from_millis(100 * n))
                 .map(|now| {
                     let view = View::live(now, seconds, columns);
-                    assert!(view.holds(now) && view.to <= now + HOP.max(view.step()), "{now}: {view:?}");
+                    assert!(
+                        view.holds(now) && view.to <= now + HOP.min(view.width() / 8).max(view.step()),
+                        "{now}: {view:?}"
+                    );
                     view
                 })
                 .collect();
