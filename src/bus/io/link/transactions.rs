@@ -338,7 +338,7 @@ impl Link {
         let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
         if frame::is_out_of_sync(&bytes) {
             self.wire.record(false, bytes.into(), FrameResult::wrong("no MBAP header"));
-            return Err(LinkError::Gone("the stream is out of sync".into()));
+            return Err(LinkError::Gone("bytes came that are no Modbus TCP frame".into()));
         }
         while let Mbap::Whole { transaction, end } = frame::mbap(&bytes[start..]) {
             let frame = &bytes[start..start + end];

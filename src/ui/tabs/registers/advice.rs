@@ -2,15 +2,18 @@
 
 use super::Registers;
 use crate::plant::{
-    def::Transport,
-    event::{Fault, FaultKind},
+    def::{Framing, Transport},
+    event::{Fault, FaultKind, LineState},
 };
 use crate::ui::tabs::prelude::*;
 
 /// Lines of advice, while no register of the unit was ever read; none once something was, or nothing is known yet.
 pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<String> {
+    if !tab.cells.is_blank() {
+        return Vec::new();
+    }
     let fault = tab.last.as_ref().and_then(|last| last.parts.first()?.words.as_ref().err().copied());
-    let Some(fault) = fault.filter(|_| tab.cells.is_blank()) else { return Vec::new() };
+    let Some(fault) = fault else { return of_connection(cx, tab.line) };
     let serial = matches!(cx.def().lines[tab.line.index()].transport, Transport::Serial { .. });
     let mut lines: Vec<String> = of_fault(fault, serial).into_iter().map(str::to_owned).collect();
     if let Fault::WrongUnit { got, .. } = fault {
@@ -20,6 +23,25 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<String> {
         lines.insert(0, t!("local echo: the adapter gives back what it sends (removed from answers)").to_owned());
     }
     lines
+}
+
+/// Where nothing was asked, because the connection does not come about or does not last.
+fn of_connection(cx: &ViewContext, line: LineId) -> Vec<String> {
+    let (state, transport) = (&cx.snapshot.line(line).state, &cx.def().line(line).transport);
+    let (LineState::Waiting { .. }, Transport::Tcp { framing, .. }) = (state, transport) else {
+        return Vec::new();
+    };
+    let other = match framing {
+        Framing::Mbap => t!("Modbus RTU over TCP: quit, and open with --mode rtu-over-tcp"),
+        Framing::Rtu | Framing::Ascii => t!("Modbus TCP: quit, and open with --mode tcp"),
+    };
+    let lines = [
+        t!("no Modbus server there, or another protocol on this TCP port; 502 is usual"),
+        other,
+        t!("the device takes one connection, and another program has it"),
+        t!("a firewall, or a device that answers certain hosts only"),
+    ];
+    lines.map(str::to_owned).to_vec()
 }
 
 fn of_fault(fault: Fault, serial: bool) -> Vec<&'static str> {

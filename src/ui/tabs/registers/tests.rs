@@ -319,6 +319,10 @@ fn where_nothing_answers_the_tab_says_what_to_check() {
         bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
         bench.screen(80, 24)
     };
+    bench.snapshot(0, LineState::Waiting { why: "closed by the other side".into(), retry_at: now() });
+    let shown = bench.screen(80, 24);
+    assert!(shown.contains("--mode rtu-over-tcp") && shown.contains("another program has it"), "{shown}");
+    bench.snapshot(0, LineState::Connected);
     let shown = silent(&mut bench, Fault::Timeout);
     assert!(shown.contains("another unit address") && shown.contains("response timeout"), "{shown}");
     let shown = silent(&mut bench, Fault::Exception(ExceptionCode(0x0B)));
