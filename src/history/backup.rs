@@ -4,13 +4,14 @@
 //!   backup.json                                        the manifest: a folder without it is no backup
 //!   history.0f3a….duckdb                               the database
 //!   audit.77c1….jsonl                                  the audit log
+//!   users.4d02….toml, sets/summer.b81e….toml           users and parameter sets
 //!   archive/raw/date=2026-11-23/day.9b2e….parquet      the archive
 //! ```
 //!
 //! No file is ever changed: the next backup to the same folder adds what is new, replaces the manifest, and then removes what
 //! that no longer names. Whatever interrupts it, the manifest that is there names whole files.
 
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,10 @@ pub const DATABASE: &str = "history.duckdb";
 pub const ARCHIVE: &str = "archive";
 /// The audit log, in the manifest.
 pub const AUDIT_LOG: &str = "audit.jsonl";
+/// The users, in the manifest.
+pub const USERS: &str = "users.toml";
+/// The folder of the parameter sets, in the manifest.
+pub const SETS: &str = "sets";
 /// What the name of a file ends with until it is whole.
 pub const UNFINISHED: &str = ".new";
 /// The version of the manifest.
@@ -31,7 +36,7 @@ pub const VERSION: u32 = 1;
 /// Letters of the hash in a name.
 const HASH_LETTERS: usize = 16;
 /// What a backup consists of.
-const ENDINGS: [&str; 3] = ["duckdb", "jsonl", "parquet"];
+const ENDINGS: [&str; 4] = ["duckdb", "jsonl", "parquet", "toml"];
 
 /// A backup, as its manifest has it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +53,15 @@ pub struct Backup {
     pub files: Vec<BackupFile>,
     /// Files of the archive that were missing or damaged in the history itself.
     pub missing: Vec<String>,
+}
+
+/// A file that goes with the history.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BackupSource {
+    /// Where it lies.
+    pub from: PathBuf,
+    /// What it is in the manifest.
+    pub path: String,
 }
 
 /// A file of a backup.
@@ -88,7 +102,9 @@ impl BackupFile {
     /// Whether its path is one that a backup has; one from elsewhere could lead anywhere.
     pub fn is_sound(&self) -> bool {
         let plain = Path::new(&self.path).components().all(|part| matches!(part, Component::Normal(_)));
-        let known = [DATABASE, AUDIT_LOG].contains(&self.path.as_str()) || self.in_archive().is_some();
+        let is_set = self.path.strip_prefix(SETS).and_then(|path| path.strip_prefix('/'));
+        let is_set = is_set.is_some_and(|name| !name.contains('/') && name.ends_with(".toml"));
+        let known = [DATABASE, AUDIT_LOG, USERS].contains(&self.path.as_str()) || is_set || self.in_archive().is_some();
         plain && known && self.sha256.len() == 64 && self.sha256.bytes().all(|letter| letter.is_ascii_hexdigit())
     }
 
@@ -125,6 +141,8 @@ mod tests {
         for (path, stored) in [
             (DATABASE, "history.0123456789abcdef.duckdb"),
             (AUDIT_LOG, "audit.0123456789abcdef.jsonl"),
+            (USERS, "users.0123456789abcdef.toml"),
+            ("sets/summer.toml", "sets/summer.0123456789abcdef.toml"),
             ("archive/raw/date=2026-11-23/13-2.parquet", "archive/raw/date=2026-11-23/13-2.0123456789abcdef.parquet"),
         ] {
             let file = file(path);
@@ -135,7 +153,15 @@ mod tests {
                 assert!(is_of_backup(&name), "{name}");
             }
         }
-        for path in ["/etc/passwd", "archive/../../x.parquet", "../history.duckdb", "tank.duckdb", "archive"] {
+        for path in [
+            "/etc/passwd",
+            "archive/../../x.parquet",
+            "../history.duckdb",
+            "tank.duckdb",
+            "archive",
+            "sets/../users.toml",
+            "sets/a/b.toml",
+        ] {
             assert!(!file(path).is_sound(), "{path}");
         }
         assert!(!BackupFile { sha256: "../../etc".into(), ..file(DATABASE) }.is_sound());

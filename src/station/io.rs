@@ -10,10 +10,7 @@ use tokio::{
 use crate::{
     access::{
         AccessControl, Peer, Users,
-        io::{
-            audit_log::{self, Opened},
-            own_user, recorder, users, users_beside,
-        },
+        io::{audit_log::Opened, own_user, recorder, users, users_beside},
     },
     bus::io::{clock::Clock, transport::Connector},
     history::{
@@ -116,7 +113,7 @@ fn begin(
     let mut history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
-    let backups = (history.backups.clone(), audit_log::beside(&path));
+    let backups = (history.backups.clone(), path.clone());
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
     let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
     let mut audit_queue = AuditQueue::new(&recorder);
@@ -167,7 +164,7 @@ pub fn start_transient(
 /// What runs beside the tasks.
 struct Threads {
     queries: mpsc::Sender<(u32, QueryRequest)>,
-    /// To the history, and the file of the audit log.
+    /// To the history, and its file.
     backups: (mpsc::Sender<BackupRequest>, PathBuf),
     history: Option<history::Handle>,
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
@@ -185,7 +182,7 @@ fn assemble(
     threads: Threads,
     guarded: Option<(AccessControl, PathBuf)>,
 ) -> Station {
-    let Threads { queries, backups: (backups, audit_log), history, audit_writer } = threads;
+    let Threads { queries, backups: (backups, history_file), history, audit_writer } = threads;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
@@ -224,8 +221,16 @@ fn assemble(
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
-    let outputs =
-        Outputs { commands: commands.clone(), queries, live, backups, audit_log, audit, lifecycle: lifecycle_sender };
+    let outputs = Outputs {
+        commands: commands.clone(),
+        queries,
+        live,
+        backups,
+        history: history_file,
+        plant: def.name.clone(),
+        audit,
+        lifecycle: lifecycle_sender,
+    };
     let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(

@@ -33,6 +33,7 @@ mod past;
 mod plant_task;
 pub mod liveness;
 mod sets;
+pub mod companions;
 mod supervisor;
 pub mod event_log;
 mod blocking_jobs;

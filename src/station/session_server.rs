@@ -19,6 +19,7 @@ use tokio::{
 use super::{
     audit_queue::AuditMessage,
     blocking_jobs::{BlockingJobs, Done},
+    companions,
     session::{Request, Session},
 };
 use crate::{
@@ -71,8 +72,10 @@ pub struct Outputs {
     pub live: Vec<mpsc::Sender<LiveRequest>>,
     /// Backups, to the history.
     pub backups: mpsc::Sender<BackupRequest>,
-    /// The file of the audit log.
-    pub audit_log: PathBuf,
+    /// The file of the history, beside which its companions lie.
+    pub history: PathBuf,
+    /// The name of the plant.
+    pub plant: String,
     /// To the audit log.
     pub audit: mpsc::Sender<AuditMessage>,
     /// To the owner of the station.
@@ -331,11 +334,14 @@ impl SessionServer {
     }
 
     fn back_up(&mut self, ticket: u64, folder: String) {
-        let (reply, answer) = oneshot::channel();
-        let request = BackupRequest { to: folder.into(), audit_log: self.outputs.audit_log.clone(), reply };
-        // Refused by dropping the reply.
-        let _ = self.outputs.backups.try_send(request);
+        let (history, plant) = (self.outputs.history.clone(), self.outputs.plant.clone());
+        let outputs = self.outputs.backups.clone();
         self.backups.spawn(async move {
+            let (reply, answer) = oneshot::channel();
+            let companions =
+                tokio::task::spawn_blocking(move || companions::companions(&history, &plant)).await.unwrap_or_default();
+            // Refused by dropping the reply.
+            let _ = outputs.try_send(BackupRequest { to: folder.into(), companions, reply });
             let done = answer.await.unwrap_or(Err(HistoryError::NotOpen));
             (ticket, done.map(|backup| backup.summary()).map_err(|error| error.to_string()))
         });

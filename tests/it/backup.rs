@@ -1,6 +1,6 @@
 //! Backups as a person makes them: beside a station that records, and in its place.
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, os::unix::fs::PermissionsExt, path::Path, process::Command};
 
 use crate::support::{Process, folder, sightglass, simulated_tank, sockets};
 
@@ -37,6 +37,14 @@ fn a_backup_of_a_running_station_is_restored() {
     let mut station = Process::start(home.command().args(["run", "tank", "--port", &line]));
     station.wait_for("(unit 2): responding");
     let to = home.folder.path().join("backup");
+    // What a person has lost with the disk, and what is there still.
+    let own = |path: &str| home.folder.path().join("sightglass").join(path);
+    let (users, set, other) = (own("tank.users.toml"), own("sets/tank/summer.toml"), own("sets/tank/winter.toml"));
+    fs::create_dir_all(set.parent().unwrap()).unwrap();
+    fs::write(&users, "# none yet\n").unwrap();
+    fs::set_permissions(&users, fs::Permissions::from_mode(0o600)).unwrap();
+    fs::write(&set, "# summer\n").unwrap();
+    fs::write(&other, "# winter\n").unwrap();
     let (code, said) = home.history("backup", &to);
     assert!(code == Some(0) && said.starts_with("backed up to "), "{said}");
     let (code, said) = home.history("restore", &to);
@@ -45,8 +53,15 @@ fn a_backup_of_a_running_station_is_restored() {
     assert!(code == Some(3) && said.contains("is in use by"), "{said}");
     let (code, said) = home.said(home.command().args(["stop", "tank"]));
     assert_eq!((code, station.end()), (Some(0), Some(0)), "{said}");
+    fs::remove_file(&users).unwrap();
+    fs::remove_file(&set).unwrap();
+    fs::write(&other, "# changed since\n").unwrap();
     let (code, said) = home.history("restore", &to);
     assert!(code == Some(0) && said.contains("; the history before it is in "), "{said}");
+    assert!(said.contains("users and parameter sets: 2 files restored, 1 there already and kept"), "{said}");
+    let texts = [&users, &set, &other].map(|path| fs::read_to_string(path).unwrap());
+    assert_eq!(texts, ["# none yet\n", "# summer\n", "# changed since\n"]);
+    assert_eq!(fs::metadata(&users).unwrap().permissions().mode() & 0o777, 0o600);
     // The station goes on, and completes its history from the audit log.
     let mut station = Process::start(home.command().args(["run", "tank", "--port", &line, "--for", "3s"]));
     assert_eq!(station.end(), Some(0));

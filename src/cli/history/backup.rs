@@ -9,7 +9,7 @@ use jiff::Timestamp;
 
 use super::StoredPlant;
 use crate::{
-    access::{SessionRequest, io::audit_log},
+    access::SessionRequest,
     cli::{
         CliError, client, in_runtime,
         progress::{Progress, cancelled_by_ctrl_c},
@@ -17,9 +17,10 @@ use crate::{
     },
     history::{
         HistoryError,
-        backup::Backup,
+        backup::{Backup, BackupSource},
         io::{backup::read_manifest, store::Store},
     },
+    station::companions::companions,
 };
 
 /// Arguments of `history backup`.
@@ -41,7 +42,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         match station.history.is_none() && client::find_station(Some(&def.name)).await.is_ok() {
             false => {
                 let store = Store::open_read_only(&path, &def)?;
-                from_file(&store, &to, &audit_log::beside(&path)).map(Some)
+                from_file(&store, &to, &companions(&path, &def.name)).map(Some)
             }
             true => {
                 let session = client::attach(Some(&def.name), &args.plant.login).await?;
@@ -57,14 +58,14 @@ pub fn main(args: &Args) -> Result<(), CliError> {
 }
 
 /// Ctrl-C ends it at its next step, and nothing new is left of it.
-fn from_file(store: &Store, to: &Path, audit_log: &Path) -> Result<Backup, CliError> {
+fn from_file(store: &Store, to: &Path, companions: &[BackupSource]) -> Result<Backup, CliError> {
     let files: Vec<u64> = store.files(None)?.iter().map(|file| file.bytes).collect();
     let (mut done, mut files_done) = (0, files.iter());
     let mut progress = Progress::new(store.file_bytes() + files.iter().sum::<u64>());
     let interrupt = store.interrupt_handle();
     let cancelled = cancelled_by_ctrl_c(move || interrupt.interrupt());
     let is_cancelled = || cancelled.load(Ordering::Relaxed);
-    let written = store.back_up(to, Some(audit_log), Timestamp::now(), &mut |step| {
+    let written = store.back_up(to, companions, Timestamp::now(), &mut |step| {
         done += match step {
             "database copied" => store.file_bytes(),
             "file copied" => files_done.next().copied().unwrap_or(0),

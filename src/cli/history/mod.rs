@@ -43,7 +43,7 @@ enum Command {
     Compact(compact::Args),
     /// Fill gaps with the samples of a CSV file, marked as imported; not while the station runs
     Import(import::Args),
-    /// Write a backup of database, archive and audit log, while the station runs or without it
+    /// Write a backup of database, archive, audit log, users and parameter sets, while the station runs or without it
     Backup(backup::Args),
     /// Put a backup in the place of the history, which is set aside; not while the station runs
     Restore(restore::Args),

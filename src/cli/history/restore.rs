@@ -1,6 +1,9 @@
 //! `sightglass history restore PLANT DIR`: a backup in the place of the history, which is set aside.
 
-use std::path::{Path, PathBuf};
+use std::{
+    os::unix::fs::PermissionsExt,
+    path::{Path, PathBuf},
+};
 
 use jiff::Timestamp;
 
@@ -9,10 +12,12 @@ use crate::{
     access::io::audit_log,
     cli::{CliError, run, say},
     history::{
-        backup::AUDIT_LOG,
+        backup::{AUDIT_LOG, Backup},
         io::{files::Exclusive, restore},
     },
     plant::record::RESTORE,
+    profile::io::atomic::write_atomic,
+    station::companions,
 };
 
 /// Arguments of `history restore`.
@@ -55,6 +60,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     if let Some(log) = &mut kept {
         record(log, RESTORE, &target, &outcome("begun"), now)?;
     }
+    let (restored, present) = restore_companions(&args.from, &sound.backup, &db, &def.name)?;
     restore::commit(&db)?;
     restore::finish(&db)?;
     let mut log = kept.map_or_else(|| open_log(&log), Ok)?;
@@ -64,10 +70,34 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         args.from.display(),
         if aside.exists() { set_aside(&aside) } else { String::new() }
     ));
+    if restored + present != 0 {
+        say(&format!("users and parameter sets: {restored} files restored, {present} there already and kept"));
+    }
     if !is_kept {
         say("its audit log is restored with it, because the present one is missing or that of another history");
     }
     Ok(())
+}
+
+/// Users and parameter sets are restored where they are missing, and never replaced: a role that was taken away since does
+/// not come back. How many were restored, and how many were there.
+fn restore_companions(from: &Path, backup: &Backup, db: &Path, plant: &str) -> Result<(usize, usize), CliError> {
+    let (mut restored, mut present) = (0, 0);
+    for file in &backup.files {
+        let Some(to) = companions::place(db, plant, &file.path) else { continue };
+        if to.exists() {
+            present += 1;
+            continue;
+        }
+        let stored = from.join(file.stored());
+        let copied = to.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| {
+            let mode = std::fs::metadata(&stored)?.permissions().mode();
+            write_atomic(&to, &std::fs::read(&stored)?, mode & 0o777)
+        });
+        copied.map_err(CliError::io(to.display().to_string()))?;
+        restored += 1;
+    }
+    Ok((restored, present))
 }
 
 fn set_aside(aside: &Path) -> String {

@@ -105,7 +105,7 @@ impl Archiver {
     }
 
     fn begin_backup(&mut self, store: Option<&Store>, request: BackupRequest, now: Timestamp) {
-        let BackupRequest { to, audit_log, reply } = request;
+        let BackupRequest { to, companions, reply } = request;
         let store = match store.ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
             Ok(store) => store,
             // Who has left needs no answer.
@@ -114,7 +114,7 @@ impl Archiver {
         let (interrupt, stopped) = (store.interrupt_handle(), Arc::clone(&self.stopped));
         let work = move || {
             let mut step = |_| if stopped.load(Ordering::Relaxed) { Err(HistoryError::NotOpen) } else { Ok(()) };
-            let written = store.back_up(&to, Some(&audit_log), now, &mut step);
+            let written = store.back_up(&to, &companions, now, &mut step);
             match &written {
                 Ok(backup) => tracing::info!(to = %to.display(), what = backup.summary(), "backed up"),
                 Err(error) => tracing::error!(?error, to = %to.display(), "not backed up"),

@@ -18,7 +18,8 @@ use crate::{
     history::{
         ArchiveFile, HistoryError,
         backup::{
-            ARCHIVE, AUDIT_LOG, Backup, BackupFile, DATABASE, MANIFEST, UNFINISHED, VERSION, hashed, is_of_backup,
+            ARCHIVE, AUDIT_LOG, Backup, BackupFile, BackupSource, DATABASE, MANIFEST, SETS, UNFINISHED, VERSION,
+            hashed, is_of_backup,
         },
     },
     profile::io::atomic::{sync_folder, with_suffix, write_atomic},
@@ -42,13 +43,13 @@ impl Store {
     pub fn back_up(
         &self,
         to: &Path,
-        audit_log: Option<&Path>,
+        companions: &[BackupSource],
         now: Timestamp,
         steps: Steps,
     ) -> Result<Backup, HistoryError> {
         let target = self.target(to)?;
         let mut new = Vec::new();
-        let written = self.write_backup(&target, audit_log, now, &mut new, steps);
+        let written = self.write_backup(&target, companions, now, &mut new, steps);
         match &written {
             Ok(backup) => sweep(&target.folder, &backup.files),
             Err(_) => {
@@ -67,7 +68,7 @@ impl Store {
     #[cfg(test)]
     pub(super) fn write_killed(&self, to: &Path, now: Timestamp, steps: Steps) -> Result<Backup, HistoryError> {
         let target = self.target(to)?;
-        self.write_backup(&target, None, now, &mut Vec::new(), steps)
+        self.write_backup(&target, &[], now, &mut Vec::new(), steps)
     }
 
     /// Checks the folder of a backup, makes it where it is missing, and locks it.
@@ -120,7 +121,7 @@ impl Store {
     fn write_backup(
         &self,
         target: &Target,
-        audit_log: Option<&Path>,
+        companions: &[BackupSource],
         now: Timestamp,
         new: &mut Vec<PathBuf>,
         steps: Steps,
@@ -147,10 +148,9 @@ impl Store {
             }
             steps("file copied")?;
         }
-        let tags = self.archive_folder().join(TAGS);
-        for (from, path) in [(Some(tags.as_path()), format!("{ARCHIVE}/{TAGS}")), (audit_log, AUDIT_LOG.to_owned())] {
-            let Some(from) = from.filter(|from| from.exists()) else { continue };
-            files.push(copy_growing(from, folder, &path, new)?);
+        let tags = BackupSource { from: self.archive_folder().join(TAGS), path: format!("{ARCHIVE}/{TAGS}") };
+        for BackupSource { from, path } in [&tags].into_iter().chain(companions).filter(|source| source.from.exists()) {
+            files.push(copy_growing(from, folder, path, new)?);
         }
         steps("side files copied")?;
         let (identity, until) = (last.identity, last.at);
@@ -292,12 +292,13 @@ fn sweep(folder: &Path, files: &[BackupFile]) {
 fn foreign(folder: &Path) -> Option<String> {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let is_foreign = |path: &PathBuf| match path.is_dir() {
-        true => *path != folder.join(ARCHIVE),
+        true => ![ARCHIVE, SETS].contains(&name(path).as_str()),
         false => !is_of_backup(&name(path)),
     };
     // What else lies in the folder may be a whole disk: it is not searched.
-    let archive = || all_files(&folder.join(ARCHIVE)).into_iter().find(|path| !is_of_backup(&name(path)));
-    entries(folder).into_iter().find(is_foreign).or_else(archive).map(|path| name(&path))
+    let below = [ARCHIVE, SETS].into_iter().flat_map(|below| all_files(&folder.join(below)));
+    let mut below = below.filter(|path| !is_of_backup(&name(path)));
+    entries(folder).into_iter().find(is_foreign).or_else(|| below.next()).map(|path| name(&path))
 }
 
 /// What the disk says of a file of the backup.

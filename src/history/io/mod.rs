@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use tokio::sync::oneshot;
 
-use super::{Answer, HistoryError, Query, backup::Backup};
+use super::{
+    Answer, HistoryError, Query,
+    backup::{Backup, BackupSource},
+};
 
 /// A query on its way to the history, with the place for its answer.
 /// A dropped answer means: the store has gone.
@@ -21,8 +24,8 @@ pub struct QueryRequest {
 pub struct BackupRequest {
     /// The folder that it goes to.
     pub to: PathBuf,
-    /// The audit log, which is part of it.
-    pub audit_log: PathBuf,
+    /// The other files that are part of it.
+    pub companions: Vec<BackupSource>,
     /// Where the answer goes.
     pub reply: oneshot::Sender<Result<Backup, HistoryError>>,
 }

@@ -196,7 +196,7 @@ fn back_up(handle: &history::Handle, to: &Path, counts: &Counts) -> (Vec<Duratio
     while !counts.stop.load(Ordering::Relaxed) {
         let (reply, answer) = oneshot::channel();
         let began = Instant::now();
-        let request = BackupRequest { to: to.to_owned(), audit_log: to.join("none"), reply };
+        let request = BackupRequest { to: to.to_owned(), companions: Vec::new(), reply };
         handle.backups.blocking_send(request).expect("asked");
         failed.extend(answer.blocking_recv().expect("answered").err().map(|error| error.to_string()));
         times.push(began.elapsed());

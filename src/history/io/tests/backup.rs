@@ -32,7 +32,7 @@ fn history(db: &Path) -> Store {
 }
 
 fn back_up(store: &Store, to: &Path) -> Result<crate::history::backup::Backup, HistoryError> {
-    store.back_up(to, None, sec(HOURS * HOUR_S), &mut steps())
+    store.back_up(to, &[], sec(HOURS * HOUR_S), &mut steps())
 }
 
 /// All that can be asked of a history.
@@ -211,7 +211,7 @@ fn folders_that_are_no_place_for_a_backup_are_refused() {
     drop(lock);
     // A failure in between leaves nothing behind.
     let place = two.path().join("place");
-    store.back_up(&place, None, sec(0), &mut killed_at(5)).unwrap_err();
+    store.back_up(&place, &[], sec(0), &mut killed_at(5)).unwrap_err();
     assert!(!place.exists());
 }
 
