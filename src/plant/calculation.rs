@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     def::PlantDef,
+    delay::{Delay, DelayTimer},
     expr::Expr,
     id::TagId,
     sample::{Cause, Quality, Sample},
@@ -16,17 +17,49 @@ use super::{
 pub struct Calculation {
     /// As it is written.
     pub text: String,
-    /// What of the expression is totalled; `None` where it is the value itself.
-    pub total: Option<Total>,
+    /// What becomes of the expression over time; `None` where it is the value itself.
+    pub over_time: Option<OverTime>,
     /// What that means.
     pub expr: Expr,
+}
+
+/// What becomes of an expression over time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum OverTime {
+    /// It is totalled.
+    Total(Total),
+    /// It is a condition that is delayed.
+    Delay(Delay),
+}
+
+/// That at work.
+#[derive(Debug, Clone)]
+enum State {
+    Total(Totalizer),
+    Delay(DelayTimer),
+}
+
+impl State {
+    fn new(over_time: OverTime) -> State {
+        match over_time {
+            OverTime::Total(total) => State::Total(Totalizer::new(total)),
+            OverTime::Delay(delay) => State::Delay(DelayTimer::new(delay)),
+        }
+    }
+
+    fn add(&mut self, input: Sample) -> Sample {
+        match self {
+            State::Total(total) => total.add(input),
+            State::Delay(timer) => timer.add(input),
+        }
+    }
 }
 
 /// A calculated tag and those that it needs.
 type Inputs = (TagId, Vec<TagId>);
 
-/// A calculated tag, those that it needs, and its total if it is one.
-type Step = (TagId, Vec<TagId>, Option<Totalizer>);
+/// A calculated tag, those that it needs, and what it keeps over time.
+type Step = (TagId, Vec<TagId>, Option<State>);
 
 /// The calculated tags, each after those that it needs.
 #[derive(Debug, Clone, Default)]
@@ -37,16 +70,18 @@ pub struct Calculator {
 impl Calculator {
     /// Of tags without a cycle; those of a cycle are never calculated.
     pub fn new(tags: &[TagDef]) -> Calculator {
-        let total = |tag: TagId| tags[tag.index()].calculation.as_ref().and_then(|calculation| calculation.total);
-        let step = |(tag, inputs): Inputs| (tag, inputs, total(tag).map(Totalizer::new));
+        let over_time =
+            |tag: TagId| tags[tag.index()].calculation.as_ref().and_then(|calculation| calculation.over_time);
+        let step = |(tag, inputs): Inputs| (tag, inputs, over_time(tag).map(State::new));
         Calculator { order: order(tags).0.into_iter().map(step).collect() }
     }
 
     /// Lets every total go on from its last stored value, or from 0; gives the tags that are totals.
     pub fn restore_totals(&mut self, stored: &[(TagId, f64)]) -> Vec<TagId> {
-        let totals = self.order.iter_mut().filter_map(|(tag, _, total)| {
+        let totals = self.order.iter_mut().filter_map(|(tag, _, state)| {
+            let Some(State::Total(total)) = state else { return None };
             let value = stored.iter().find(|(stored, _)| stored == tag).map_or(0.0, |(_, value)| *value);
-            total.as_mut()?.restore(value);
+            total.restore(value);
             Some(*tag)
         });
         totals.collect()
@@ -61,13 +96,13 @@ impl Calculator {
         let mut is_changed = vec![false; samples.len()];
         touched.iter().for_each(|tag| is_changed[tag.index()] = true);
         let mut changed = Vec::new();
-        for (tag, inputs, total) in &mut self.order {
+        for (tag, inputs, state) in &mut self.order {
             let is_due = inputs.iter().any(|input| is_changed[input.index()]) || is_changed[tag.index()];
             if let Some(calculation) = def.tag(*tag).calculation.as_ref().filter(|_| is_due) {
                 let at = samples[tag.index()].at;
                 let sample =
                     calculate(&calculation.expr, inputs, |of| samples[of.index()], Sample::bad(Cause::NotRead, at));
-                let sample = total.as_mut().map_or(sample, |total| total.add(sample));
+                let sample = state.as_mut().map_or(sample, |state| state.add(sample));
                 (samples[tag.index()], is_changed[tag.index()]) = (sample, true);
                 changed.push((*tag, sample));
             }
@@ -167,7 +202,7 @@ mod tests {
         for (id, expr) in [double, deviation].into_iter().zip(exprs) {
             let tag = TagDef { id, ..def.tags[PV.index()].clone() };
             def.tags.push(TagDef {
-                calculation: Some(Arc::new(Calculation { text: String::new(), total: None, expr })),
+                calculation: Some(Arc::new(Calculation { text: String::new(), over_time: None, expr })),
                 ..tag
             });
         }
@@ -211,7 +246,7 @@ mod tests {
         assert_eq!(order(&def.tags).1, None);
         let expr = arithmetic(double, Operator::Add, PV);
         def.tags[deviation.index()].calculation =
-            Some(Arc::new(Calculation { text: String::new(), total: None, expr }));
+            Some(Arc::new(Calculation { text: String::new(), over_time: None, expr }));
         assert_eq!(order(&def.tags).1, Some(vec![double, deviation]));
     }
 }

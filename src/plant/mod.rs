@@ -51,6 +51,7 @@ pub mod sweep;
 pub mod snapshot;
 pub mod past;
 pub(crate) mod totalizer;
+pub(crate) mod delay;
 pub(crate) mod calculation;
 pub(crate) mod clock_step;
 pub(crate) mod process_image;

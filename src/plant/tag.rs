@@ -142,7 +142,9 @@ impl TagDef {
     }
     /// Is it the total of an expression?
     pub fn is_total(&self) -> bool {
-        self.calculation.as_ref().is_some_and(|calculation| calculation.total.is_some())
+        self.calculation
+            .as_ref()
+            .is_some_and(|calculation| matches!(calculation.over_time, Some(super::calculation::OverTime::Total(_))))
     }
 
     /// Is it stored in the history?

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{diagnostic::Problems, expr, names::Defs, reader::At};
 use crate::plant::{
-    calculation,
+    calculation::{self, OverTime},
     def::TagId,
     tag::{Calculation, TagDef},
 };
@@ -16,11 +16,13 @@ pub(super) fn calculate(exprs: Vec<(TagId, At<String>)>, tags: &mut [TagDef], de
         // A name of a device has no dot.
         let device = tags[id.index()].name.split_once('.').map(|(device, _)| device);
         let calculated = expr::calculated(words, device, &Defs { tags: &*tags, ..defs }, problems);
-        found.extend(calculated.map(|(total, expr)| (*id, Calculation { text: words.value.clone(), total, expr })));
+        found.extend(
+            calculated.map(|(over_time, expr)| (*id, Calculation { text: words.value.clone(), over_time, expr })),
+        );
     }
     for (id, calculation) in found {
         let tag = &mut tags[id.index()];
-        if calculation.total.is_some() {
+        if let Some(OverTime::Total(_)) = calculation.over_time {
             // A report gives how far it went, not its mean.
             tag.counter = tag.counter.or(Some(true));
             if !tag.is_stored()

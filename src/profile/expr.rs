@@ -1,14 +1,19 @@
 //! Reads an expression over tags: `PLC-1.HEATER = ON and (PLC-1.LT-1 > 5 cm or not PLC-1.AUTO = AUTO)`,
 //! `max(TIC-1.PV, TIC-2.PV) - 5`. A name may hold `-`, `+` and `/`, so that these are operators only between spaces.
 
+mod over_time;
+
+use over_time::is_over_time;
+
 use super::{
     diagnostic::{Problems, Span},
     names::{Defs, check_number, number_of},
     reader::{At, Choice},
 };
 use crate::plant::{
+    calculation::OverTime,
+    delay::Edge,
     expr::{Compare, Expr, Function, Operator},
-    keyword::Keyword,
     tag::TagDef,
     totalizer::Total,
 };
@@ -28,21 +33,30 @@ const COMPARES: [(&str, Compare); 6] = [
 /// The condition that is written in a string. `None` after the problem was added.
 pub(super) fn expr(words: &At<String>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
     let expr = read(words, None, defs, problems, |reader| reader.any())?;
-    if matches!(expr, Expr::Number(_) | Expr::Tag(_) | Expr::Arithmetic(..) | Expr::Call(..)) {
-        problems.add(words.at, "this is a number, not a condition").label("expected `=`, `!=`, `<`, `<=`, `>` or `>=`");
+    if !is_condition(&expr) {
+        no_condition(words.at, problems);
         return None;
     }
     Some(expr)
 }
 
-/// What a calculated tag is: an expression, or a total of one. The tags of `device` may be named without it.
+/// Is it true or false?
+fn is_condition(expr: &Expr) -> bool {
+    !matches!(expr, Expr::Number(_) | Expr::Tag(_) | Expr::Arithmetic(..) | Expr::Call(..))
+}
+
+fn no_condition(at: Span, problems: &mut Problems) {
+    problems.add(at, "this is a number, not a condition").label("expected `=`, `!=`, `<`, `<=`, `>` or `>=`");
+}
+
+/// What a calculated tag is: an expression, or what becomes of one over time. The tags of `device` may be named without it.
 pub(super) fn calculated(
     words: &At<String>,
     device: Option<&str>,
     defs: &Defs,
     problems: &mut Problems,
-) -> Option<(Option<Total>, Expr)> {
-    read(words, device, defs, problems, |reader| reader.total())
+) -> Option<(Option<OverTime>, Expr)> {
+    read(words, device, defs, problems, |reader| reader.over_time())
 }
 
 /// All that is written in a string.
@@ -130,18 +144,6 @@ impl<'a> Reader<'a, '_> {
         let found = self.peek().is_some_and(|token| token.value == word);
         self.next += usize::from(found);
         found
-    }
-
-    /// `integral(…)`, or an expression.
-    fn total(&mut self) -> Option<(Option<Total>, Expr)> {
-        let name = self.peek().map_or("", |token| token.value);
-        let opens = self.tokens.get(1).is_some_and(|next| next.value == "(");
-        let Some(total) = Total::from_word(name).filter(|_| opens) else { return Some((None, self.any()?)) };
-        let name = self.take()?;
-        self.next += 1;
-        let of = self.nested(Self::any)?;
-        self.close(name.at)?;
-        Some((Some(total), of))
     }
 
     fn any(&mut self) -> Option<Expr> {
@@ -241,14 +243,15 @@ impl<'a> Reader<'a, '_> {
     }
 
     fn call(&mut self, name: At<&'a str>) -> Option<Expr> {
-        if Total::from_word(name.value).is_some() {
+        if is_over_time(name.value) {
             let message = format!("`{}` cannot be part of an expression", name.value);
             self.problems.add(name.at, message).label("expected a calculated tag of its own, and its name here");
             return None;
         }
         let Some(function) = Function::ALL.into_iter().find(|function| function.word() == name.value) else {
             let problem = self.problems.add(name.at, format!("unknown function `{}`", name.value));
-            let known = [Function::ALL.map(Function::word).as_slice(), &Total::ALL.map(Total::word)].concat();
+            let (totals, edges) = (Total::ALL.map(Total::word), Edge::ALL.map(Edge::word));
+            let known = [Function::ALL.map(Function::word).as_slice(), &totals, &edges].concat();
             problem.label(format!("expected one of {}", known.join(", "))).suggest(name.value, known);
             return None;
         };

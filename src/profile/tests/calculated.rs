@@ -1,7 +1,11 @@
 //! Calculated tags of plant files.
 
 use super::*;
-use crate::plant::totalizer::Total;
+use crate::plant::{
+    calculation::OverTime,
+    delay::{Delay, Edge},
+    totalizer::Total,
+};
 
 #[test]
 fn errors_of_a_calculated_tag_are_shown_at_their_place() {
@@ -22,10 +26,31 @@ fn errors_of_a_calculated_tag_are_shown_at_their_place() {
     ] {
         let def = with(&format!("expr = '{words}'{counter}")).unwrap_or_else(|errors| panic!("{words}: {errors}"));
         let tag = def.tag(def.tag_named("D1.DEV").expect("it is there"));
-        assert_eq!(tag.calculation.as_ref().map(|calculation| calculation.total), Some(Some(total)));
+        assert_eq!(
+            tag.calculation.as_ref().map(|calculation| calculation.over_time),
+            Some(Some(OverTime::Total(total)))
+        );
         assert_eq!(tag.counter, Some(counter.is_empty()), "a report gives its difference");
     }
+    for (words, edge, ms) in
+        [("on_delay(T > 5, 10 s)", Edge::On, 10_000), ("off_delay(MODE = on, 500ms)", Edge::Off, 500)]
+    {
+        let def = with(&format!("expr = '{words}'")).unwrap_or_else(|errors| panic!("{words}: {errors}"));
+        let tag = def.tag(def.tag_named("D1.DEV").expect("it is there"));
+        let delay = Delay { edge, time: std::time::Duration::from_millis(ms) };
+        assert_eq!(
+            tag.calculation.as_ref().and_then(|calculation| calculation.over_time),
+            Some(OverTime::Delay(delay))
+        );
+        assert_eq!(tag.counter, None, "{words}");
+    }
     for (keys, expect) in [
+        ("expr = 'on_delay(T > 5)'", "`,` and a time are missing"),
+        ("expr = 'on_delay(T > 5, soon)'", "`soon` is not a time"),
+        ("expr = 'on_delay(T > 5, 10 s'", "a parenthesis is not closed"),
+        ("expr = 'on_delay(T, 10 s)'", "this is a number, not a condition"),
+        ("expr = 'not off_delay(T > 5, 10 s)'", "`off_delay` cannot be part of an expression"),
+        ("expr = 'on_delai(T > 5, 10 s)'", "did you mean `on_delay`?"),
         ("expr = 'T -'", "a tag is missing"),
         ("expr = 'T - Q'", "unknown tag `Q` in D1"),
         ("expr = 'T - D1.TT'", "did you mean `D1.T`?"),

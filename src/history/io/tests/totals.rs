@@ -15,7 +15,11 @@ fn def() -> (Arc<PlantDef>, TagId) {
     let mut def = fixture::plant();
     let id = TagId(u16::try_from(def.tags.len()).unwrap());
     let expr = Expr::test(RUN, Compare::Equal, 1.0);
-    let calculation = Calculation { text: String::new(), total: Some(Total::OnTime), expr };
+    let calculation = Calculation {
+        text: String::new(),
+        over_time: Some(crate::plant::calculation::OverTime::Total(Total::OnTime)),
+        expr,
+    };
     let tag = def.tags[RUN.index()].clone();
     let tag = crate::plant::tag::TagDef { id, name: "PLC-1.HOURS".into(), ..tag };
     def.tags.push(crate::plant::tag::TagDef { calculation: Some(Arc::new(calculation)), deadband: Some(0.0), ..tag });
