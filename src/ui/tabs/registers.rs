@@ -6,6 +6,7 @@
 mod advice;
 mod cells;
 mod compare;
+mod detail;
 mod find;
 mod import;
 mod keys;

@@ -353,3 +353,19 @@ fn a_bench_has_no_alarms_that_could_not_be_evaluated() {
     let shown = bench.screen(80, 24);
     assert!(shown.contains("no plant file") && !shown.contains("not evaluated"), "{shown}");
 }
+
+#[test]
+fn a_time_stamp_is_whole_on_a_small_screen() {
+    let mut bench = Bench::new();
+    let seconds: jiff::Timestamp = "2026-11-21T07:00:00Z".parse().expect("a time");
+    let words = seconds.as_second().to_be_bytes();
+    bench.answer(0, |address| match address {
+        0 => Some(u16::from_be_bytes([words[4], words[5]])),
+        1 => Some(u16::from_be_bytes([words[6], words[7]])),
+        _ => Some(0),
+    });
+    for (width, height) in [(80, 24), (120, 40)] {
+        let shown = bench.screen(width, height);
+        assert!(shown.contains("ABCD 2026-11-21T07:00:00Z"), "{shown}");
+    }
+}
