@@ -74,7 +74,14 @@ impl Stand {
         let (count, present) = watch::channel(0);
         let (ask, asked) = watch::channel(0);
         let (acceptor, mut attach_requests, mut requests) = SessionAcceptor::new(snapshots);
-        let mut listener = listen(&folder.path().join("tank.sock")).unwrap();
+        // Between fork and exec a process that another test starts holds a copy of the lock that was just given up.
+        let mut tries = 0..100_000;
+        let mut listener = loop {
+            match (listen(&folder.path().join("tank.sock")), tries.next()) {
+                (Err(ListenError::Running { .. }), Some(_)) => std::thread::yield_now(),
+                (listener, _) => break listener.unwrap(),
+            }
+        };
         let serving = tokio::spawn(async move { listener.serve(&acceptor).await });
         let commands = publish.clone();
         let server = tokio::spawn(async move {
