@@ -32,7 +32,7 @@ pub enum OverTime {
     Delay(Delay),
 }
 
-/// That at work.
+/// It at work, with what it has kept so far.
 #[derive(Debug, Clone)]
 enum State {
     Total(Totalizer),

@@ -24,9 +24,9 @@ enum Stage {
     /// A whole block.
     Block,
     /// Single addresses of a refused block.
-    Samples,
-    /// What stands around samples that answered; refused spans are halved.
-    Cells,
+    Probes,
+    /// The rest of the chunks around probes that answered; refused spans are halved.
+    Chunks,
 }
 
 /// A sweep at work.
@@ -45,7 +45,7 @@ pub struct SweepJob {
     /// The request was made twice, and a request that has been answered before is made to see whether the unit still does.
     tries: u8,
     /// A request that was answered, or refused.
-    alive: Option<AddressSpan>,
+    answered: Option<AddressSpan>,
     silent_blocks: u32,
     ranges: Vec<SweptRange>,
     ended: Option<String>,
@@ -63,7 +63,7 @@ impl SweepJob {
             queue: VecDeque::new(),
             block: sweep.block(),
             tries: 0,
-            alive: None,
+            answered: None,
             silent_blocks: 0,
             ranges: Vec::new(),
             ended: None,
@@ -74,8 +74,8 @@ impl SweepJob {
 
     /// The next request; `None` when it is done.
     pub fn next(&self) -> Option<AddressSpan> {
-        match (self.tries, self.alive) {
-            (2, Some(alive)) => Some(alive),
+        match (self.tries, self.answered) {
+            (2, Some(answered)) => Some(answered),
             _ => self.queue.front().copied(),
         }
     }
@@ -95,8 +95,8 @@ impl SweepJob {
         std::mem::take(&mut self.holes)
     }
 
-    /// Takes the outcome of the request that was next.
-    pub fn take(&mut self, outcome: Result<(), Fault>) {
+    /// Handles the outcome of the request that was next.
+    pub fn on_outcome(&mut self, outcome: Result<(), Fault>) {
         let Some(span) = self.queue.front().copied() else { return };
         let silent = match outcome {
             Ok(()) => None,
@@ -109,7 +109,7 @@ impl SweepJob {
             (2, None) => self.pass_over(self.silent_fault()),
             (tries, Some(fault)) => self.on_silence(tries, fault),
             (_, None) => {
-                self.alive = Some(span);
+                self.answered = Some(span);
                 self.queue.pop_front();
                 self.tries = 0;
                 self.on_answer(span, outcome);
@@ -133,7 +133,7 @@ impl SweepJob {
                     code = Fault::Exception(code)
                 ));
             }
-            (Err(Fault::Exception(code)), Stage::Cells) if 1 < span.count => {
+            (Err(Fault::Exception(code)), Stage::Chunks) if 1 < span.count => {
                 let half = span.count / 2;
                 let address = to_u16(u32::from(span.address) + u32::from(half));
                 self.queue.push_front(AddressSpan { address, count: span.count - half, ..span });
@@ -153,7 +153,7 @@ impl SweepJob {
             return;
         }
         self.mark(span, SweptOutcome::Silent(fault));
-        if self.alive.is_some() {
+        if self.answered.is_some() {
             self.tries = 2;
             return;
         }
@@ -184,7 +184,7 @@ impl SweepJob {
             }
         }
         self.queue.clear();
-        (self.tries, self.stage) = (0, Stage::Cells);
+        (self.tries, self.stage) = (0, Stage::Chunks);
     }
 
     fn end_silent(&mut self, span: AddressSpan) {
@@ -227,20 +227,20 @@ impl SweepJob {
         match self.stage {
             Stage::Block if self.outcomes.iter().any(refused) && 1 < count => {
                 // With the first behind it: a range may begin right before that.
-                let samples = (0..count + u32::from(1 < every))
+                let probes = (0..count + u32::from(1 < every))
                     .step_by(every as usize)
                     .filter(|at| self.start + at <= u32::from(self.sweep.last));
-                self.queue = samples.map(|at| self.span(self.start + at, 1)).collect();
-                self.stage = Stage::Samples;
+                self.queue = probes.map(|at| self.span(self.start + at, 1)).collect();
+                self.stage = Stage::Probes;
             }
-            Stage::Samples => {
+            Stage::Probes => {
                 let answers = |at: u32| self.outcomes.get(at as usize) == Some(&Some(SweptOutcome::Answers));
-                let cells = (0..count).step_by(every as usize).filter(|at| answers(*at) || answers(at + every));
+                let chunks = (0..count).step_by(every as usize).filter(|at| answers(*at) || answers(at + every));
                 let rest = |at: u32| self.span(self.start + at + 1, (every - 1).min(count - at - 1));
-                self.queue = cells.map(rest).filter(|span| span.count != 0).collect();
-                self.stage = Stage::Cells;
+                self.queue = chunks.map(rest).filter(|span| span.count != 0).collect();
+                self.stage = Stage::Chunks;
             }
-            Stage::Block | Stage::Cells => {
+            Stage::Block | Stage::Chunks => {
                 self.finish_block();
                 if self.start <= u32::from(self.sweep.last) {
                     self.begin_block();
@@ -251,7 +251,7 @@ impl SweepJob {
 
     /// Adds the outcomes of the block to the ranges.
     fn finish_block(&mut self) {
-        let refined = self.stage == Stage::Cells;
+        let refined = self.stage == Stage::Chunks;
         let count = self.count();
         let behind = self.outcomes.pop().flatten();
         let outcomes = std::mem::take(&mut self.outcomes);
@@ -284,15 +284,15 @@ impl SweepJob {
         self.outcomes = vec![None];
     }
 
-    /// In cells with an answer, or in front of one, each address was asked.
+    /// In chunks with an answer, or in front of one, each address was asked.
     fn learn_holes(&mut self, outcomes: &[Option<SweptOutcome>], behind: Option<SweptOutcome>) {
         let every = usize::from(self.sweep.every.max(1));
         let answers = |outcome: Option<SweptOutcome>| outcome == Some(SweptOutcome::Answers);
-        for (n, cell) in outcomes.chunks(every).enumerate() {
+        for (n, chunk) in outcomes.chunks(every).enumerate() {
             let next = outcomes.get((n + 1) * every).copied().unwrap_or(behind);
-            if every == 1 || cell.first().is_some_and(|first| answers(*first)) || answers(next) {
+            if every == 1 || chunk.first().is_some_and(|first| answers(*first)) || answers(next) {
                 let missing = Some(SweptOutcome::Refused(ExceptionCode::ILLEGAL_ADDRESS));
-                let holes = cell.iter().enumerate().filter(|(_, outcome)| **outcome == missing);
+                let holes = chunk.iter().enumerate().filter(|(_, outcome)| **outcome == missing);
                 let span = |at: usize| self.span(self.start + to_u32(n * every + at), 1);
                 let holes: Vec<AddressSpan> = holes.map(|(at, _)| span(at)).collect();
                 self.holes.extend(holes);
@@ -345,7 +345,7 @@ impl Job {
     pub(super) fn on_swept(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
         let (Ask::Message(request), Some(job)) = (&step.ask, &mut self.sweep) else { return };
         let values = |answer: Vec<u8>| pdu::values_read(&request[1..], answer.get(1..)?);
-        job.take(answer.and_then(|answer| values(answer).map(drop).ok_or(Fault::WrongEcho)));
+        job.on_outcome(answer.and_then(|answer| values(answer).map(drop).ok_or(Fault::WrongEcho)));
         self.run.done = job.done();
         // Of the ranges found before only the last one grows.
         self.run.findings.pop();

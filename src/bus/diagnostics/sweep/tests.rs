@@ -14,7 +14,7 @@ fn run(sweep: Sweep, unit: impl Fn(AddressSpan, usize) -> Result<(), Fault>) -> 
     let (mut job, mut requests) = (SweepJob::new(sweep), 0);
     while let Some(span) = job.next() {
         assert!(requests < 200_000, "it never ends");
-        job.take(unit(span, requests));
+        job.on_outcome(unit(span, requests));
         requests += 1;
     }
     (job, requests)
