@@ -112,7 +112,7 @@ impl std::fmt::Display for Diagnostic {
             }
             Diagnostic::Sweep(Sweep { unit, table, first, last, .. }) => {
                 let table = translate(table.word());
-                f.write_str(&t!("sweep of unit {unit} {table} {first} to {last}", unit, table, first, last))
+                f.write_str(&t!("map of unit {unit} {table} {first} to {last}", unit, table, first, last))
             }
             Diagnostic::Write(RegisterWrite { unit, table, address, words, expected, .. }) => {
                 let text = |words: &[u16]| words.iter().map(u16::to_string).collect::<Vec<_>>().join(" ");

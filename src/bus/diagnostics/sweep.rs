@@ -191,7 +191,7 @@ impl SweepJob {
         self.pass_over(self.silent_fault());
         let address = span.address;
         self.finish_block();
-        self.ended = Some(t!("silent since address {address}: what comes behind it is not known", address));
+        self.ended = Some(t!("no more answers, last asked at address {address}: the rest is not known", address));
     }
 
     /// Addresses of the block at work.

@@ -161,7 +161,7 @@ impl Confirm {
             Intent::Command(CommandKind::Configure(_)) => t!("apply these settings"),
             Intent::Command(CommandKind::SaveSettings(_)) => t!("save"),
             Intent::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => t!("scan"),
-            Intent::Command(CommandKind::Test(_, Diagnostic::Sweep(_))) => t!("sweep"),
+            Intent::Command(CommandKind::Test(_, Diagnostic::Sweep(_))) => t!("map"),
             Intent::Command(CommandKind::Test(_, Diagnostic::Write(_))) => t!("write and verify"),
             Intent::Command(CommandKind::Test(..)) => t!("send"),
             Intent::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => t!("stop"),

@@ -86,7 +86,7 @@ fn a_unit_that_falls_silent_ends_the_sweep_there() {
     let (job, requests) =
         run(sweep(0, 65_535, 8), |_, request| if request < 10 { Ok(()) } else { Err(Fault::Timeout) });
     assert_eq!((answering(&job), requests), (vec![(0, 1_199)], 13));
-    assert!(job.conclusion().starts_with("silent since address 1200"), "{}", job.conclusion());
+    assert!(job.conclusion().starts_with("no more answers, last asked at address 1200"), "{}", job.conclusion());
     let silent = SweptRange { first: 1_200, last: 1_319, outcome: SweptOutcome::Silent(Fault::Timeout) };
     assert_eq!(job.ranges().last(), Some(&silent));
 }

@@ -24,7 +24,7 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     let Some(run) = &at.status.test else {
         return vec![plain(t!("no test run yet: ⏎ starts the selected test; polling continues"), theme.dim())];
     };
-    let mut rows = heading(cx, run);
+    let mut rows = heading(cx, run, room);
     let bare = matches!(run.diagnostic, Diagnostic::Send(_));
     if let Diagnostic::Send(bytes) = &run.diagnostic {
         let framing = at.settings.transport.framing();
@@ -81,14 +81,14 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
 }
 
 /// What, by whom, when, how it stands; and how far it has come.
-fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
+fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
     let theme = cx.theme;
     let at = clock(run.started, &cx.def().time_zone);
     let (state, style) = match &run.state {
         DiagnosticState::Running => (t!("running").to_owned(), theme.strong()),
         DiagnosticState::Done => (t!("done").to_owned(), theme.normal()),
         DiagnosticState::Cancelled => (t!("STOPPED").to_owned(), theme.trouble()),
-        DiagnosticState::Failed(why) => (t!("FAILED: {why}", why), theme.trouble()),
+        DiagnosticState::Failed(_) => (t!("FAILED").to_owned(), theme.trouble()),
     };
     let what = match &run.diagnostic {
         Diagnostic::Send(_) => t!("sent").to_owned(),
@@ -100,6 +100,9 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun) -> Vec<Row> {
         | Diagnostic::Scan(_)) => diagnostic.to_string(),
     };
     let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
+    if let DiagnosticState::Failed(why) = &run.state {
+        rows.extend(wrap(why, room).into_iter().map(|line| plain(line, theme.trouble())));
+    }
     if run.state == DiagnosticState::Running && 1 < run.total {
         let share = f64::from(run.done) / f64::from(run.total);
         let left = remaining(cx, run).map_or(String::new(), |left| t!(", {ms} left", ms = ms(left)));

@@ -283,8 +283,8 @@ fn loopback_and_identification_are_described() {
         }))
     };
     let diagnostic = Diagnostic::Loopback { unit: 1, data: 0xA537, count: 2 };
-    let verdict = Finding::Conclusion("1 of 2 came back, 12.0 to 12.0 ms".to_owned());
-    let findings = vec![exchange(Ok(())), exchange(Err(Fault::Timeout)), verdict];
+    let conclusion = Finding::Conclusion("1 of 2 came back, 12.0 to 12.0 ms".to_owned());
+    let findings = vec![exchange(Ok(())), exchange(Err(Fault::Timeout)), conclusion];
     fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 2, 2, findings));
     let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
     for words in ["✓ returned after 12 ms", "✗ response timeout", "1 of 2 came back"] {
@@ -300,7 +300,7 @@ fn no_size_breaks_a_page_or_a_window() {
     let mut fixture = Fixture::traffic_trouble();
     let scan = Scan { first: 1, last: 9, serials: vec![], timeout: Duration::from_millis(100) };
     fixture.line.test = Some(run(Diagnostic::Scan(scan), DiagnosticState::Running, 3, 9, Vec::new()));
-    for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "R", "Ts"] {
+    for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "R", "Ts", "Tm"] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         for (width, height) in [(60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)] {
             assert!(screen(&mut model, width, height).lines().count() <= usize::from(height));
@@ -311,7 +311,7 @@ fn no_size_breaks_a_page_or_a_window() {
 #[test]
 fn windows_on_the_smallest_screen_say_what_they_cut() {
     let fixture = Fixture::traffic();
-    for (name, keys) in [("request", "Tf"), ("scan", "Ts"), ("send", "Tt01 03 03 EA 00 01")] {
+    for (name, keys) in [("request", "Tf"), ("scan", "Ts"), ("map", "Tm"), ("send", "Tt01 03 03 EA 00 01")] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         insta::assert_snapshot!(format!("small_{name}"), screen(&mut model, 60, 16));
     }

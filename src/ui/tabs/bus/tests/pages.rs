@@ -129,3 +129,24 @@ fn running_frames_are_taken_in_every_two_seconds() {
     }
     assert!(screen(&mut model, 80, 24).contains("07 D0 00 01"));
 }
+
+#[test]
+fn a_map_that_fails_shows_its_ranges_and_the_whole_reason() {
+    use crate::plant::{
+        event::ExceptionCode,
+        sweep::{Sweep, SweptOutcome, SweptRange},
+    };
+    let mut fixture = Fixture::traffic();
+    let range = |first, last, outcome| Finding::Swept(SweptRange { first, last, outcome });
+    let refused = SweptOutcome::Refused(ExceptionCode::ILLEGAL_ADDRESS);
+    let findings = vec![range(0, 1001, refused), range(1002, 1031, SweptOutcome::Answers)];
+    let sweep = Sweep { unit: 1, table: crate::plant::tag::Table::Holding, first: 0, last: 0xFFFF, every: 8 };
+    let failed = DiagnosticState::Failed("the port was closed by the other side, and is opened again".to_owned());
+    fixture.line.test = Some(run(Diagnostic::Sweep(sweep), failed, 1_032, 65_536, findings));
+    for (width, height) in [(80, 24), (120, 40)] {
+        insta::assert_snapshot!(
+            format!("map_failed_{width}x{height}"),
+            screen(&mut bus(&fixture, Theme::FULL, "T"), width, height)
+        );
+    }
+}
