@@ -1,6 +1,6 @@
 //! The access-control state machine: takes the requests of terminals and returns what is permitted. Rights are decided here only.
 
-mod backup;
+mod history_jobs;
 mod commands;
 mod login;
 mod audit_entries;
@@ -34,7 +34,12 @@ use super::{
 };
 use crate::{
     history::Query,
-    plant::{PlantDef, command::CommandStatus, record::ActionRecord, role::Role},
+    plant::{
+        PlantDef,
+        command::CommandStatus,
+        record::{ActionRecord, BACKUP, IMPORT},
+        role::Role,
+    },
 };
 
 pub use jobs::{JobId, JobOutcome, PasswordJob};
@@ -89,8 +94,10 @@ pub enum Effect {
     Stop,
     /// Reload the plant file; the reply is sent when that is done.
     Reload(u64),
-    /// Write a backup into this folder, then call [`AccessControl::on_backed_up`].
+    /// Write a backup into this folder, then call [`AccessControl::on_history_job_done`].
     Backup(u64, String),
+    /// Import this file into the history, then the same.
+    Import(u64, String),
     /// This terminal may not stay.
     HangUp(u32, String),
 }
@@ -121,8 +128,8 @@ pub struct AccessControl {
     next: Option<(Asker, UserChange)>,
     /// A last login is not saved yet.
     unsaved: bool,
-    /// The entries of backups that are being written.
-    backups: BTreeMap<u64, ActionRecord>,
+    /// The entries of backups and imports that are under way.
+    history_jobs: BTreeMap<u64, ActionRecord>,
 }
 
 impl AccessControl {
@@ -268,7 +275,8 @@ impl AccessControl {
                 let new = Some(clean(&sha256).into());
                 self.record_and_reply(asker, "export", &file, new, at)
             }
-            SessionRequest::Backup { folder } => self.begin_backup(asker, folder, at),
+            SessionRequest::Backup { folder } => self.begin_history_job(asker, BACKUP, folder, Effect::Backup, at),
+            SessionRequest::Import { file } => self.begin_history_job(asker, IMPORT, file, Effect::Import, at),
             SessionRequest::Stop => {
                 let mut effects = self.record_and_reply(asker, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
@@ -290,13 +298,19 @@ impl AccessControl {
         }
     }
 
-    /// Stopping the station, reloading its plant file or a backup need no login of those who can do so with the means of the
+    /// Stopping the station, reloading its plant file, a backup or an import need no login of those who can do so with the means of the
     /// operating system (its init system, for one), whatever role they have here without a password. Who logged in acts as that user.
     fn could_anyway(&self, terminal: u32, request: &SessionRequest) -> bool {
         let without_login = |session: &&SessionState| (session.who.is_none() || session.trusted) && !session.peer.own;
         let session = self.sessions.get(&terminal).filter(without_login);
-        matches!(request, SessionRequest::Stop | SessionRequest::Reload | SessionRequest::Backup { .. })
-            && session.is_some_and(|session| self.is_host(&session.peer))
+        let of_station = matches!(
+            request,
+            SessionRequest::Stop
+                | SessionRequest::Reload
+                | SessionRequest::Backup { .. }
+                | SessionRequest::Import { .. }
+        );
+        of_station && session.is_some_and(|session| self.is_host(&session.peer))
     }
 
     fn plant_name(&self) -> Arc<str> {

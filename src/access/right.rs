@@ -122,7 +122,10 @@ pub fn needs_for_request(request: &SessionRequest) -> Option<Role> {
         | SessionRequest::DeleteUser { .. }
         | SessionRequest::ResetPassword { .. } => Right::ManageUsers,
         SessionRequest::Exported { .. } => Right::Export,
-        SessionRequest::Backup { .. } | SessionRequest::Stop | SessionRequest::Reload => Right::Station,
+        SessionRequest::Backup { .. }
+        | SessionRequest::Import { .. }
+        | SessionRequest::Stop
+        | SessionRequest::Reload => Right::Station,
     };
     Some(right.role())
 }
@@ -199,6 +202,7 @@ mod tests {
             SessionRequest::DeleteUser { user: user.clone() },
             SessionRequest::ResetPassword { user: user.clone(), password },
             SessionRequest::Backup { folder: user.clone() },
+            SessionRequest::Import { file: user.clone() },
             SessionRequest::Stop,
             SessionRequest::Reload,
         ];

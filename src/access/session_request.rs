@@ -102,6 +102,11 @@ pub enum SessionRequest {
         /// The folder that it goes to, absolute.
         folder: String,
     },
+    /// Fill gaps of the history with the samples of a CSV file.
+    Import {
+        /// The file, absolute.
+        file: String,
+    },
     /// End the station.
     Stop,
     /// Reload the plant file; on error keep the running configuration.

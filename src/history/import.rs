@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use jiff::{Timestamp, civil::DateTime};
+use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -48,6 +48,18 @@ pub struct Import {
     pub rows: u64,
 }
 
+impl Import {
+    /// One sentence for the operator and the audit log; of `rows` in the file the others are left out.
+    pub fn summary(&self, rows: u64, zone: &TimeZone) -> String {
+        let local = |at: Timestamp| at.to_zoned(zone.clone()).strftime("%Y-%m-%d %H:%M:%S").to_string();
+        let left_out = match rows.saturating_sub(self.rows) {
+            0 => String::new(),
+            count => format!("; {count} left out, where a value is stored already"),
+        };
+        format!("{} rows, {} to {}{left_out}", self.rows, local(self.from), local(self.to))
+    }
+}
+
 /// Where the cells of a row stand.
 struct Columns {
     tag: usize,
@@ -58,16 +70,18 @@ struct Columns {
     decimal_comma: bool,
 }
 
-/// Reads a file. `Err`: every problem with its line; nothing of it is used then. Times lie from `oldest` up to `now`.
-pub fn parse(def: &PlantDef, text: &[u8], oldest: Timestamp, now: Timestamp) -> Result<Rows, Vec<String>> {
-    let text = text.strip_prefix("\u{feff}".as_bytes()).unwrap_or(text);
-    let header = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let separator = if header.contains(&b';') { b';' } else { b',' };
-    let mut reader = csv::ReaderBuilder::new().delimiter(separator).trim(csv::Trim::All).from_reader(text);
-    let header = reader.headers().map_err(|error| vec![format!("line 1: {error}")])?;
-    let columns = columns(header, separator == b';').map_err(|why| vec![format!("line 1: {why}")])?;
+/// Reads the rows behind a header, whose cells stand between semicolons where the decimal mark is a comma. `Err`: every
+/// problem with its line; nothing of the file is used then. Times lie from `oldest` up to `now`.
+pub fn parse(
+    def: &PlantDef,
+    header: &csv::StringRecord,
+    decimal_comma: bool,
+    records: impl Iterator<Item = csv::Result<csv::StringRecord>>,
+    [oldest, now]: [Timestamp; 2],
+) -> Result<Rows, Vec<String>> {
+    let columns = columns(header, decimal_comma).map_err(|why| vec![format!("line 1: {why}")])?;
     let (mut rows, mut problems, mut wrong, mut count) = (Rows::new(), Vec::new(), 0, 0);
-    for record in reader.records() {
+    for record in records {
         let line = |record: &csv::StringRecord| record.position().map_or(0, csv::Position::line);
         let row = match &record {
             Ok(record) => columns.row(def, record, oldest, now).map_err(|why| format!("line {}: {why}", line(record))),
@@ -209,13 +223,23 @@ fn quality_of(found: &str) -> Option<Quality> {
 }
 
 /// Decides which rows of a tag fill a gap: those at which no stored value is in force. What a station recorded itself is
-/// never changed by a file.
+/// never changed by a file. The last sample of an earlier file is in force up to the next stored one, and without such a
+/// one not at all: a file that was split gives the same as the whole.
 #[derive(Debug, Default)]
 pub struct Filler {
     rows: Vec<Sample>,
     next: usize,
-    last: Option<Sample>,
+    last: Option<Stored>,
     accepted: Vec<Sample>,
+}
+
+/// A stored sample of the tag.
+#[derive(Debug, Clone, Copy)]
+pub struct Stored {
+    /// The sample.
+    pub sample: Sample,
+    /// It came from a file.
+    pub imported: bool,
 }
 
 impl Filler {
@@ -225,22 +249,29 @@ impl Filler {
     }
 
     /// The next stored sample of the tag.
-    pub fn stored(&mut self, sample: Sample) {
-        self.decide(|row| row.at < sample.at);
+    pub fn stored(&mut self, stored: Stored) {
+        let at = stored.sample.at;
+        self.decide(|row| row.at < at, Some(at));
         // There is one of this instant already.
-        self.next += usize::from(self.rows.get(self.next).is_some_and(|row| row.at == sample.at));
-        self.last = Some(sample);
+        self.next += usize::from(self.rows.get(self.next).is_some_and(|row| row.at == at));
+        self.last = Some(stored);
     }
 
     /// The rows that fill a gap; the others are of no use.
     pub fn end(mut self) -> Vec<Sample> {
-        self.decide(|_| true);
+        self.decide(|_| true, None);
         self.accepted
     }
 
-    fn decide(&mut self, is_due: impl Fn(&Sample) -> bool) {
+    /// Decides on the rows between the last stored sample and the next one.
+    fn decide(&mut self, is_due: impl Fn(&Sample) -> bool, next: Option<Timestamp>) {
+        let held = |last: Timestamp, at: Timestamp| elapsed(last, at) < HOLD_MAX;
+        let last = self.last.filter(|last| {
+            let at = last.sample.at;
+            last.sample.value.is_some() && (!last.imported || next.is_some_and(|next| held(at, next)))
+        });
         while let Some(row) = self.rows.get(self.next).filter(|row| is_due(row)) {
-            let in_force = self.last.is_some_and(|last| last.value.is_some() && elapsed(last.at, row.at) < HOLD_MAX);
+            let in_force = last.is_some_and(|last| held(last.sample.at, row.at));
             self.accepted.extend((!in_force).then_some(*row));
             self.next += 1;
         }

@@ -15,7 +15,7 @@ use crate::{
     bus::io::{clock::Clock, transport::Connector},
     history::{
         HistoryError,
-        io::{BackupRequest, QueryRequest, thread as history},
+        io::{JobRequest, QueryRequest, thread as history},
     },
     plant::{
         Plant, PlantDef,
@@ -113,7 +113,7 @@ fn begin(
     let mut history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
-    let backups = (history.backups.clone(), path.clone());
+    let jobs = (history.jobs.clone(), path.clone());
     let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
     let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
     let mut audit_queue = AuditQueue::new(&recorder);
@@ -128,7 +128,7 @@ fn begin(
     let past = Some(Past::new(history.restored.take(), from_journal));
     let persistence =
         Persistence { records: Some(records), store, past, audit: Some(audit_queue), sets: Some(sets), observer };
-    let threads = Threads { queries, backups, history: Some(history), audit_writer: Some(recorder.join) };
+    let threads = Threads { queries, jobs, history: Some(history), audit_writer: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
 }
 
@@ -154,10 +154,10 @@ pub fn start_transient(
     let plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
-    let (backups, _) = mpsc::channel(1);
+    let (jobs, _) = mpsc::channel(1);
     let persistence =
         Persistence { records: None, store, past: None, audit: None, sets: None, observer: Some(observer) };
-    let threads = Threads { queries, backups: (backups, PathBuf::new()), history: None, audit_writer: None };
+    let threads = Threads { queries, jobs: (jobs, PathBuf::new()), history: None, audit_writer: None };
     assemble(def, clock, connectors, plant, None, persistence, threads, None)
 }
 
@@ -165,7 +165,7 @@ pub fn start_transient(
 struct Threads {
     queries: mpsc::Sender<(u32, QueryRequest)>,
     /// To the history, and its file.
-    backups: (mpsc::Sender<BackupRequest>, PathBuf),
+    jobs: (mpsc::Sender<JobRequest>, PathBuf),
     history: Option<history::Handle>,
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
 }
@@ -182,7 +182,7 @@ fn assemble(
     threads: Threads,
     guarded: Option<(AccessControl, PathBuf)>,
 ) -> Station {
-    let Threads { queries, backups: (backups, history_file), history, audit_writer } = threads;
+    let Threads { queries, jobs: (history_jobs, history_file), history, audit_writer } = threads;
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
@@ -225,7 +225,7 @@ fn assemble(
         commands: commands.clone(),
         queries,
         live,
-        backups,
+        history_jobs,
         history: history_file,
         plant: def.name.clone(),
         audit,

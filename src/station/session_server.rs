@@ -27,7 +27,7 @@ use crate::{
     bus::io::{clock::Clock, live_reads::LiveRequest},
     history::{
         Answer, HistoryError, Query,
-        io::{BackupRequest, QueryRequest},
+        io::{HistoryJob, JobRequest, QueryRequest},
     },
     plant::{Snapshot, command::CommandStatus},
 };
@@ -70,8 +70,8 @@ pub struct Outputs {
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// Live reads, to each line.
     pub live: Vec<mpsc::Sender<LiveRequest>>,
-    /// Backups, to the history.
-    pub backups: mpsc::Sender<BackupRequest>,
+    /// Backups and imports, to the history.
+    pub history_jobs: mpsc::Sender<JobRequest>,
     /// The file of the history, beside which its companions lie.
     pub history: PathBuf,
     /// The name of the plant.
@@ -134,8 +134,8 @@ pub struct SessionServer {
     tickets: BTreeMap<u64, oneshot::Sender<Result<Durability, String>>>,
     /// Reloads whose outcome is awaited, with their tickets.
     reloads: JoinSet<(u64, Result<(), String>)>,
-    /// The same of backups.
-    backups: JoinSet<(u64, Result<String, String>)>,
+    /// The same of backups and imports.
+    history_jobs: JoinSet<(u64, Result<String, String>)>,
     last_ticket: u64,
     jobs: BlockingJobs,
     /// Actions that did not reach the audit log, not reported yet.
@@ -152,7 +152,7 @@ impl SessionServer {
             terminals: BTreeMap::new(),
             tickets: BTreeMap::new(),
             reloads: JoinSet::new(),
-            backups: JoinSet::new(),
+            history_jobs: JoinSet::new(),
             last_ticket: 0,
             jobs: BlockingJobs::new(users),
             lost: 0,
@@ -185,8 +185,8 @@ impl SessionServer {
                     self.apply_effects(effects);
                 }
                 Some(Ok((ticket, answer))) = self.reloads.join_next() => self.reply(ticket, answer, Record::Sent),
-                Some(Ok((ticket, done))) = self.backups.join_next() => {
-                    let effects = self.access.on_backed_up(ticket, done, self.clock.now());
+                Some(Ok((ticket, done))) = self.history_jobs.join_next() => {
+                    let effects = self.access.on_history_job_done(ticket, done, self.clock.now());
                     self.apply_effects(effects);
                 }
                 Some((terminal, request)) = requests.recv() => self.on_session_message(terminal, request),
@@ -316,6 +316,11 @@ impl SessionServer {
                     self.send_lifecycle(LifecycleRequest::Reload(reply));
                 }
                 Effect::Backup(ticket, folder) => self.back_up(ticket, folder),
+                Effect::Import(ticket, file) => {
+                    let jobs = self.outputs.history_jobs.clone();
+                    let job = HistoryJob::Import { file: file.into() };
+                    self.history_jobs.spawn(async move { (ticket, done_by_history(jobs, job).await) });
+                }
                 Effect::HangUp(terminal, why) => {
                     // The audit log holds it, in bounded rate; attempts without end must not fill this one.
                     tracing::debug!(terminal, why, "a terminal was disconnected");
@@ -335,15 +340,11 @@ impl SessionServer {
 
     fn back_up(&mut self, ticket: u64, folder: String) {
         let (history, plant) = (self.outputs.history.clone(), self.outputs.plant.clone());
-        let outputs = self.outputs.backups.clone();
-        self.backups.spawn(async move {
-            let (reply, answer) = oneshot::channel();
+        let jobs = self.outputs.history_jobs.clone();
+        self.history_jobs.spawn(async move {
             let companions =
                 tokio::task::spawn_blocking(move || companions::companions(&history, &plant)).await.unwrap_or_default();
-            // Refused by dropping the reply.
-            let _ = outputs.try_send(BackupRequest { to: folder.into(), companions, reply });
-            let done = answer.await.unwrap_or(Err(HistoryError::NotOpen));
-            (ticket, done.map(|backup| backup.summary()).map_err(|error| error.to_string()))
+            (ticket, done_by_history(jobs, HistoryJob::Backup { to: folder.into(), companions }).await)
         });
     }
 
@@ -373,4 +374,12 @@ impl SessionServer {
             tracing::error!(%error, "a lifecycle request was lost");
         }
     }
+}
+
+/// Waits for the outcome of a job, in words.
+async fn done_by_history(jobs: mpsc::Sender<JobRequest>, job: HistoryJob) -> Result<String, String> {
+    let (reply, done) = oneshot::channel();
+    // Refused by dropping the reply.
+    let _ = jobs.try_send(JobRequest { job, reply });
+    done.await.unwrap_or(Err(HistoryError::NotOpen)).map_err(|error| error.to_string())
 }

@@ -30,6 +30,40 @@ impl Home {
 }
 
 #[test]
+fn a_file_is_imported_while_the_station_records() {
+    let home = Home { folder: folder(), sockets: sockets() };
+    let (_devices, port) = simulated_tank();
+    let mut station = Process::start(home.command().args(["run", "tank", "--port", &format!("L1={port}")]));
+    station.wait_for("(unit 2): responding");
+    let file = home.folder.path().join("day.csv");
+    let rows: String = (0..45_000).map(|n| format!("TIC-1.PV,{}Z,{}\n", second(n), n % 100)).collect();
+    fs::write(&file, format!("tag,time,value\n{rows}TIC-9.PV,{}Z,1\n", second(0))).unwrap();
+    let (code, said) = home.history("import", &file);
+    let why = format!("{}: line 45002: found the tag `TIC-9.PV`", file.display());
+    assert!(code == Some(2) && said.contains(&why) && said.contains("nothing is imported"), "{said}");
+    fs::write(&file, format!("tag,time,value\n{rows}")).unwrap();
+    // The user of the station may do so without a login, and look only with one.
+    for _ in 0..2 {
+        let (code, said) = home.history("import", &file);
+        assert!(code == Some(0) && said.contains("imported of 45000 rows"), "{said}");
+    }
+    let (code, said) = home.said(home.command().args(["stop", "tank"]));
+    assert_eq!((code, station.end()), (Some(0), Some(0)), "{said}");
+    let (code, said) = home.history("import", &file);
+    assert!(code == Some(0) && said.contains("nothing to import: at each of 45000 rows"), "{said}");
+    let (_, overview) = home.said(home.command().args(["history", "tank"]));
+    assert!(overview.contains("day.csv"), "{overview}");
+    let log = fs::read_to_string(home.folder.path().join("sightglass/tank.audit.jsonl")).unwrap();
+    let expect = ["import samples", "permitted", "done: 45000 rows", "done: nothing: a value is stored already"];
+    assert!(expect.iter().all(|words| log.contains(words)), "{log}");
+}
+
+/// A time on the morning of a day that has passed.
+fn second(n: u32) -> String {
+    format!("2024-03-20T{:02}:{:02}:{:02}", n / 3_600, n / 60 % 60, n % 60)
+}
+
+#[test]
 fn a_backup_of_a_running_station_is_restored() {
     let home = Home { folder: folder(), sockets: sockets() };
     let (_devices, port) = simulated_tank();

@@ -242,6 +242,7 @@ fn of_request(request: &SessionRequest) -> (&'static str, Answers) {
         SessionRequest::ResetPassword { .. } => ("reset password", SUPERVISOR),
         SessionRequest::Exported { .. } => ("export", [LOG_IN, NOT_VIEWER, DONE, DONE, LOCKED, CHANGE]),
         SessionRequest::Backup { .. } => ("back up history", HOST),
+        SessionRequest::Import { .. } => ("import samples", HOST),
         SessionRequest::Stop => ("stop station", HOST),
         SessionRequest::Reload => ("reload", HOST),
     }
@@ -266,6 +267,7 @@ fn requests() -> Vec<SessionRequest> {
         SessionRequest::DeleteUser { user: user("paul") },
         SessionRequest::Exported { file: user("shift.csv"), sha256: user("00") },
         SessionRequest::Backup { folder: user(crate::support::sockets().join("backup").to_str().unwrap()) },
+        SessionRequest::Import { file: user(crate::support::samples_of("TIC-1.PV").to_str().unwrap()) },
         SessionRequest::Reload,
         SessionRequest::Stop,
     ]
@@ -335,11 +337,9 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
 /// A new query does not compile until it has a row here; put it into [`queries`] as well.
 fn of_question(query: &Query) -> Row {
     match query {
-        Query::Series { .. } => look("", "-VTSL-"),
-        Query::Journal { .. } | Query::Actions { .. } => look("", "-VTSL-"),
+        Query::Series { .. } | Query::Journal { .. } | Query::Actions { .. } => look("", "-VTSL-"),
         Query::LineMinutes { .. } | Query::Values { .. } => look("", "-VTSL-"),
-        Query::AlarmMetrics { .. } => look("", "-VTSL-"),
-        Query::Report { .. } => look("", "-VTSL-"),
+        Query::AlarmMetrics { .. } | Query::Report { .. } => look("", "-VTSL-"),
         Query::Past { .. } | Query::Batches { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     access::{SessionRequest, user},
     plant::{
-        record::{ActionRecord, BACKUP},
+        record::{ActionRecord, BACKUP, IMPORT},
         time::elapsed,
         visible::is_control_or_bidi,
     },
@@ -114,6 +114,7 @@ pub(super) fn words(request: &SessionRequest) -> (&'static str, Arc<str>) {
         SessionRequest::ResetPassword { user, .. } => ("reset password", name(user)),
         SessionRequest::Exported { file, .. } => ("export", clean(file).into()),
         SessionRequest::Backup { folder } => (BACKUP, clean(folder).into()),
+        SessionRequest::Import { file } => (IMPORT, clean(file).into()),
         SessionRequest::Stop => ("stop station", "".into()),
         SessionRequest::Reload => ("reload", "".into()),
     }

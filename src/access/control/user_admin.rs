@@ -64,6 +64,7 @@ impl AccessControl {
             | SessionRequest::Active
             | SessionRequest::Exported { .. }
             | SessionRequest::Backup { .. }
+            | SessionRequest::Import { .. }
             | SessionRequest::Stop
             | SessionRequest::Reload => return Vec::new(),
         };

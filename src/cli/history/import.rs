@@ -1,26 +1,37 @@
-//! `sightglass history import PLANT FILE`: samples of another program for the gaps of a history; not while its station runs.
+//! `sightglass history import PLANT FILE`: samples of another program for the gaps of a history, through the station while
+//! it runs, else into the file.
 
-use std::path::PathBuf;
+use std::{
+    path::{Path, PathBuf},
+    sync::{Arc, atomic::Ordering},
+};
 
 use jiff::Timestamp;
 
 use super::{StoredPlant, open_log, record};
 use crate::{
-    access::io::audit_log,
-    cli::{CliError, local, run, say},
-    history::{import::parse, io::store::Store},
-    plant::record::IMPORT,
+    access::{SessionRequest, io::audit_log},
+    cli::{
+        CliError, client, in_runtime,
+        progress::{Progress, cancelled_by_ctrl_c},
+        run, say,
+        source::query_station,
+    },
+    history::{
+        Answer, Query,
+        import::{Import, Rows},
+        io::{import::read_rows, store::Store},
+    },
+    plant::{PlantDef, record::IMPORT},
+    station::Session,
 };
-
-/// A file is read whole.
-const BYTES_MAX: u64 = 512 << 20;
 
 /// Arguments of `history import`.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "The first line names the columns: tag, time (or time_utc, time_local), value, and if there are such \
     quality and unit. Times have an offset, or are local times of the plant. Rows for which a value is in force already \
-    are left out; one error, and nothing is stored."
+    are left out; one error, and nothing is stored. An import that was interrupted is completed by the same command."
 )]
 pub struct Args {
     #[command(flatten)]
@@ -31,39 +42,87 @@ pub struct Args {
 
 /// Reads the file, stores what fills a gap, and puts that on record.
 pub fn main(args: &Args) -> Result<(), CliError> {
-    let def = args.plant.load()?;
-    let (path, now, file) = (run::history_file(&def, &args.plant.station), Timestamp::now(), args.file.display());
-    let failed = CliError::io(format!("cannot read {file}"));
-    if BYTES_MAX < std::fs::metadata(&args.file).map_err(&failed)?.len() {
-        return Err(CliError::Usage(format!("{file}: expected at most {} MiB: split the file", BYTES_MAX >> 20)));
+    let (def, station) = (args.plant.load()?, &args.plant.station);
+    let file = std::path::absolute(&args.file).map_err(CliError::io(args.file.display().to_string()))?;
+    in_runtime(async {
+        match station.history.is_none() && client::find_station(Some(&def.name)).await.is_ok() {
+            true => through_station(args, &def, &file).await,
+            false => into_file(&def, &run::history_file(&def, station), &file),
+        }
+    })
+}
+
+/// The station reads the file again; what is wrong with it is said before, to who may read it.
+async fn through_station(args: &Args, def: &Arc<PlantDef>, file: &Path) -> Result<(), CliError> {
+    let rows = count(&read_rows(file, def, Timestamp::UNIX_EPOCH, Timestamp::now()).map_err(refused)?);
+    let session = client::attach(Some(&def.name), &args.plant.login).await?;
+    let before = imports(&session).await.map(|imports| imports.len());
+    let request = SessionRequest::Import { file: file.display().to_string() };
+    let durability = session.request(request).await.map_err(CliError::Failed)?;
+    client::warn_not_recorded("imported", durability);
+    match imports(&session).await.zip(before) {
+        Some((imports, before)) => match imports[before..].iter().rfind(|import| Path::new(&import.file) == file) {
+            Some(import) => say(&format!("imported {}", import.summary(rows, &def.time_zone))),
+            None => nothing(rows),
+        },
+        None => say(&format!("imported of {rows} rows those without a stored value: the audit log has the figures")),
     }
-    let text = std::fs::read(&args.file).map_err(&failed)?;
-    let opened = Store::open(&path, &def, now)?;
+    Ok(())
+}
+
+/// What was imported so far, for who may look.
+async fn imports(session: &Session) -> Option<Vec<Import>> {
+    match query_station(session, Query::Overview).await {
+        Ok(Answer::Overview(overview)) => Some(overview.imports),
+        Ok(_) | Err(_) => None,
+    }
+}
+
+/// Ctrl-C ends it at its next piece.
+fn into_file(def: &Arc<PlantDef>, path: &Path, file: &Path) -> Result<(), CliError> {
+    let now = Timestamp::now();
+    let opened = Store::open(path, def, now)?;
     if let Some(trouble) = opened.trouble {
         say(&trouble);
     }
     let store = opened.store;
     // Before the first row of this start, as a station does.
     store.end_curves_left_behind(now)?;
-    let rows = parse(&def, &text, store.importable_from()?, now).map_err(|problems| {
-        let lines: Vec<String> = problems.iter().map(|problem| format!("{file}: {problem}")).collect();
-        CliError::Usage(format!("{}\nnothing is imported", lines.join("\n")))
-    })?;
-    let all: usize = rows.values().map(Vec::len).sum();
-    let mut log = open_log(&audit_log::beside(&path))?;
-    let Some(import) = store.import(rows, &file.to_string(), now)? else {
-        say(&format!("nothing to import: at each of {all} rows a value is stored already"));
+    let rows = read_rows(file, def, store.importable_from()?, now).map_err(refused)?;
+    let all = count(&rows);
+    let mut log = open_log(&audit_log::beside(path))?;
+    let Some(mut importing) = store.importing(rows, &file.display().to_string(), now)? else {
+        nothing(all);
         return Ok(());
     };
+    let mut progress = Progress::new(importing.import.rows);
+    let cancelled = cancelled_by_ctrl_c(|| {});
+    let mut put_on_record =
+        |outcome: String| record(&mut log, IMPORT, &file.display().to_string(), &outcome, Timestamp::now());
+    while store.import_piece(&mut importing)? {
+        progress.show(importing.done());
+        if cancelled.load(Ordering::Relaxed) {
+            let done = format!("cancelled: {} rows, the latest, are imported", importing.done());
+            put_on_record(done.clone())?;
+            return Err(CliError::Failed(format!("{done}; the same command imports the others")));
+        }
+    }
+    drop(progress);
     store.checkpoint()?;
-    let span = [import.from, import.to].map(|at| local(at, &def)).join(" to ");
-    let (rows, left_out) = (import.rows, all as u64 - import.rows);
-    let left_out = match left_out {
-        0 => String::new(),
-        count => format!("; {count} left out, where a value is stored already"),
-    };
-    let done = format!("{rows} rows, {span}{left_out}");
-    record(&mut log, IMPORT, &file.to_string(), &format!("done: {done}"), now)?;
+    let done = importing.summary(def);
+    put_on_record(format!("done: {done}"))?;
     say(&format!("imported {done}"));
     Ok(())
+}
+
+fn count(rows: &Rows) -> u64 {
+    rows.values().map(|rows| rows.len() as u64).sum()
+}
+
+fn nothing(rows: u64) {
+    say(&format!("nothing to import: at each of {rows} rows a value is stored already"));
+}
+
+fn refused(problems: Vec<String>) -> CliError {
+    CliError::Usage(format!("{}\nnothing is imported", problems.join("\n")))
 }

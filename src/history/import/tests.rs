@@ -12,7 +12,7 @@ fn read(text: &str) -> Result<Rows, Vec<String>> {
     let mut def = plant("Europe/Berlin", &THREE);
     def.tags[1].enum_labels = vec![(0, "OFF".into()), (1, "ON".into())];
     def.tags[2].point.kind = DataType::U16;
-    parse(&def, text.as_bytes(), Timestamp::UNIX_EPOCH, at(NOW))
+    crate::history::io::import::parse(&def, text.as_bytes(), Timestamp::UNIX_EPOCH, at(NOW))
 }
 
 fn names() -> [String; 3] {
@@ -88,22 +88,27 @@ fn what_is_wrong_is_said_with_line_and_expectation() {
 fn only_rows_without_a_value_in_force_are_accepted() {
     let hold = HOLD_MAX.as_secs() as i64;
     let row = |second: i64| Sample::good(second as f64, sec(second));
-    let decide = |stored: &[Sample], seconds: &[i64]| -> Vec<i64> {
+    let decide = |stored: &[Stored], seconds: &[i64]| -> Vec<i64> {
         let mut filler = Filler::new(seconds.iter().copied().map(row).collect());
-        stored.iter().for_each(|sample| filler.stored(*sample));
+        stored.iter().for_each(|stored| filler.stored(*stored));
         filler.end().iter().map(|sample| sample.at.as_second()).collect()
     };
-    let off = Sample::bad(Cause::StationOff, sec(100));
+    let recorded = |second: i64| Stored { sample: row(second), imported: false };
+    let imported = |second: i64| Stored { sample: row(second), imported: true };
+    let off = Stored { sample: Sample::bad(Cause::StationOff, sec(100)), imported: false };
     for (stored, seconds, expect) in [
         (vec![], vec![1, 2], vec![1, 2]),
-        (vec![row(10)], vec![9, 10, 11, 9 + hold, 10 + hold], vec![9, 10 + hold]),
-        (vec![row(90), off, row(200)], vec![95, 100, 101, 199, 200, 201], vec![101, 199]),
-        (vec![row(10), row(10)], vec![10, 12], vec![]),
+        (vec![recorded(10)], vec![9, 10, 11, 9 + hold, 10 + hold], vec![9, 10 + hold]),
+        (vec![recorded(90), off, recorded(200)], vec![95, 100, 101, 199, 200, 201], vec![101, 199]),
+        (vec![recorded(10), recorded(10)], vec![10, 12], vec![]),
+        (vec![imported(10), imported(20)], vec![9, 10, 15, 20, 21], vec![9, 21]),
+        (vec![imported(10), recorded(9 + hold)], vec![11, 8 + hold], vec![]),
+        (vec![imported(10), recorded(10 + hold)], vec![11, 9 + hold], vec![11, 9 + hold]),
     ] {
         assert_eq!(decide(&stored, &seconds), expect, "{seconds:?} beside {stored:?}");
-        let again: Vec<Sample> = expect.iter().copied().map(row).collect();
+        let again: Vec<Stored> = expect.iter().copied().map(imported).collect();
         let mut all = [stored, again].concat();
-        all.sort_by_key(|sample| sample.at);
+        all.sort_by_key(|stored| stored.sample.at);
         assert_eq!(decide(&all, &seconds), Vec::<i64>::new(), "once more");
     }
 }

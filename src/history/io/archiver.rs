@@ -1,6 +1,7 @@
 //! When the archive is worked on: one job at a time, on a connection of its own, while the writer goes on.
 
 use std::{
+    path::Path,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -10,11 +11,15 @@ use std::{
 
 use duckdb::InterruptHandle;
 use jiff::Timestamp;
-use tokio::task::{JoinHandle, spawn_blocking};
+use tokio::{
+    sync::oneshot,
+    task::{JoinHandle, spawn_blocking},
+};
 
 use super::{
-    BackupRequest,
+    HistoryJob, JobRequest,
     archive::{Job, LeftOut},
+    import::{Importing, read_rows},
     reader::stop,
     store::{Store, instant},
 };
@@ -31,17 +36,23 @@ pub enum ArchiveOutcome {
     Did(Job),
     /// Nothing was due; this is missing of the archive.
     Idle(Option<String>),
-    /// A backup was written, or not: who asked for it knows.
-    BackedUp,
+    /// A job that a station was asked for has ended: who asked for it knows how.
+    Answered,
+    /// These samples of a file are to be stored.
+    ToImport(Box<Importing>, JobReply),
 }
+
+type JobReply = oneshot::Sender<Result<String, HistoryError>>;
 
 type Done = Result<ArchiveOutcome, (Option<Job>, HistoryError)>;
 
 /// Works on the archive of one store after the other.
 pub struct Archiver {
     running: Option<(JoinHandle<Done>, Arc<InterruptHandle>)>,
-    /// A backup that begins next: the archive is not worked on while it is copied.
-    backup: Option<BackupRequest>,
+    /// What the station is asked for, to begin next: the archive is not worked on meanwhile.
+    asked: Option<JobRequest>,
+    /// An import that is being stored, a piece with each commit.
+    import: Option<(Box<Importing>, JobReply)>,
     /// A backup that is being written ends.
     stopped: Arc<AtomicBool>,
     /// Commits until the next look: a start is not the time for it.
@@ -59,7 +70,8 @@ impl Archiver {
     pub fn new(commit_every: Duration) -> Archiver {
         Archiver {
             running: None,
-            backup: None,
+            asked: None,
+            import: None,
             stopped: Arc::default(),
             wait: commits(LOOK_EVERY, commit_every),
             commit_every,
@@ -68,14 +80,17 @@ impl Archiver {
         }
     }
 
-    /// Begins the next job if it is time, on a connection of its own to the store.
+    /// Begins the next job if it is time, on a connection of its own to the store; stores the next piece of an import.
     pub fn begin(&mut self, store: Option<&Store>, now: Timestamp) {
         self.wait = self.wait.saturating_sub(1);
         if self.running.is_some() {
             return;
         }
-        if let Some(request) = self.backup.take() {
-            return self.begin_backup(store, request, now);
+        if let Some((importing, reply)) = self.import.take() {
+            return self.import_piece(store, importing, reply);
+        }
+        if let Some(request) = self.asked.take() {
+            return self.begin_asked(store, request, now);
         }
         if self.wait > 0 {
             return;
@@ -95,17 +110,16 @@ impl Archiver {
         self.running = Some((spawn_blocking(work), interrupt));
     }
 
-    /// Has a backup written with the next commit; one at a time.
-    pub fn back_up(&mut self, request: BackupRequest) {
-        if let Some(earlier) = self.backup.replace(request) {
-            let why = "another backup was asked for before this one began".to_owned();
+    /// Begins a job with the next commit; one at a time.
+    pub fn take_up(&mut self, request: JobRequest) {
+        if let Some(earlier) = self.asked.replace(request) {
+            let why = "another backup or import was asked for before this one began".to_owned();
             // Who has left needs no answer.
             let _ = earlier.reply.send(Err(HistoryError::Refused(why)));
         }
     }
 
-    fn begin_backup(&mut self, store: Option<&Store>, request: BackupRequest, now: Timestamp) {
-        let BackupRequest { to, companions, reply } = request;
+    fn begin_asked(&mut self, store: Option<&Store>, JobRequest { job, reply }: JobRequest, now: Timestamp) {
         let store = match store.ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
             Ok(store) => store,
             // Who has left needs no answer.
@@ -113,17 +127,42 @@ impl Archiver {
         };
         let (interrupt, stopped) = (store.interrupt_handle(), Arc::clone(&self.stopped));
         let work = move || {
-            let mut step = |_| if stopped.load(Ordering::Relaxed) { Err(HistoryError::NotOpen) } else { Ok(()) };
-            let written = store.back_up(&to, &companions, now, &mut step);
-            match &written {
-                Ok(backup) => tracing::info!(to = %to.display(), what = backup.summary(), "backed up"),
-                Err(error) => tracing::error!(?error, to = %to.display(), "not backed up"),
-            }
+            let ended = match job {
+                HistoryJob::Backup { to, companions } => {
+                    let mut step =
+                        |_| if stopped.load(Ordering::Relaxed) { Err(HistoryError::NotOpen) } else { Ok(()) };
+                    let written = store.back_up(&to, &companions, now, &mut step);
+                    log(&written.map(|backup| backup.summary()), "backup", &to)
+                }
+                HistoryJob::Import { file } => match to_import(&store, &file, now) {
+                    Ok(Some(importing)) => return Ok(ArchiveOutcome::ToImport(Box::new(importing), reply)),
+                    Ok(None) => Ok("nothing: a value is stored already at each of its rows".to_owned()),
+                    Err(error) => log(&Err(error), "import", &file),
+                },
+            };
             // Who has left needs no answer.
-            let _ = reply.send(written);
-            Ok(ArchiveOutcome::BackedUp)
+            let _ = reply.send(ended);
+            Ok(ArchiveOutcome::Answered)
         };
         self.running = Some((spawn_blocking(work), interrupt));
+    }
+
+    /// On the connection that writes: two would not see each other's last commit.
+    fn import_piece(&mut self, store: Option<&Store>, mut importing: Box<Importing>, reply: JobReply) {
+        let ended = match store.ok_or(HistoryError::NotOpen).and_then(|store| {
+            let more = store.import_piece(&mut importing)?;
+            Ok((more, importing.summary(&store.def)))
+        }) {
+            Ok((true, _)) => {
+                self.import = Some((importing, reply));
+                return;
+            }
+            Ok((false, summary)) => Ok(summary),
+            Err(error) => Err(error),
+        };
+        let ended = log(&ended, "import", importing.import.file.as_ref());
+        // Who has left needs no answer.
+        let _ = reply.send(ended);
     }
 
     /// Waits for the end of a look, for ever without one. Returns what came of it, or why the archive stands still.
@@ -143,7 +182,11 @@ impl Archiver {
                 self.left.merges.clear();
                 (LOOK_EVERY, Ok(ArchiveOutcome::Idle(missing)))
             }
-            Ok(Ok(ArchiveOutcome::BackedUp)) => (Duration::ZERO, Ok(ArchiveOutcome::BackedUp)),
+            Ok(Ok(ArchiveOutcome::ToImport(importing, reply))) => {
+                self.import = Some((importing, reply));
+                (Duration::ZERO, Ok(ArchiveOutcome::Answered))
+            }
+            Ok(Ok(ArchiveOutcome::Answered)) => (Duration::ZERO, Ok(ArchiveOutcome::Answered)),
             Ok(Err((Some(Job::Hour(hour)), error))) if error.is_damage() => {
                 self.left.before = instant(hour + HOUR);
                 self.skipped = Some(error.clone());
@@ -174,6 +217,21 @@ impl Archiver {
             stop(work, || interrupt.interrupt()).await;
         }
     }
+}
+
+/// Reads a file and decides what of it fills a gap.
+fn to_import(store: &Store, file: &Path, now: Timestamp) -> Result<Option<Importing>, HistoryError> {
+    let refused = |problems: Vec<String>| HistoryError::Refused(problems.join("; "));
+    let rows = read_rows(file, &store.def, store.importable_from()?, now).map_err(refused)?;
+    store.importing(rows, &file.display().to_string(), now)
+}
+
+fn log(ended: &Result<String, HistoryError>, job: &str, path: &Path) -> Result<String, HistoryError> {
+    match ended {
+        Ok(done) => tracing::info!(job, path = %path.display(), done, "done"),
+        Err(error) => tracing::error!(job, path = %path.display(), ?error, "not done"),
+    }
+    ended.clone()
 }
 
 /// Until the next look. A full disk may have another cause, and an alarm stands: an operator has time to free the

@@ -1,6 +1,11 @@
 //! Stores samples of a file, marked as such.
 
-use std::collections::HashMap;
+use std::{
+    collections::{HashMap, HashSet},
+    fs::File,
+    io::{BufRead, BufReader, Read},
+    path::Path,
+};
 
 use duckdb::params;
 use jiff::Timestamp;
@@ -12,11 +17,64 @@ use super::{
 use crate::{
     history::{
         HistoryError,
-        import::{Filler, Import, Rows},
+        import::{self, Filler, Import, Rows, Stored},
         tiers::Tier,
     },
-    plant::sample::Sample,
+    plant::{def::PlantDef, sample::Sample},
+    report::step_series::HOLD_MAX,
 };
+
+/// Longest file.
+const BYTES_MAX: u64 = 512 << 20;
+/// Rows of an import that are stored with one commit: a station records meanwhile.
+const IMPORT_PIECE: usize = 20_000;
+
+/// An import that is being stored.
+#[derive(Debug)]
+pub struct Importing {
+    /// What it will be.
+    pub import: Import,
+    /// Rows of the file.
+    pub in_file: u64,
+    /// The rows that are not stored yet, in order of time.
+    rows: Vec<(u16, Sample)>,
+}
+
+impl Importing {
+    /// How many rows are stored.
+    pub fn done(&self) -> u64 {
+        self.import.rows - self.rows.len() as u64
+    }
+
+    /// One sentence for the operator and the audit log.
+    pub fn summary(&self, def: &PlantDef) -> String {
+        self.import.summary(self.in_file, &def.time_zone)
+    }
+}
+
+/// Reads a file of samples with times from `oldest` to `now`. `Err`: every problem, with file and line.
+pub fn read_rows(path: &Path, def: &PlantDef, oldest: Timestamp, now: Timestamp) -> Result<Rows, Vec<String>> {
+    let named = |problem: String| format!("{}: {problem}", path.display());
+    let failed = |error: std::io::Error| vec![named(error.to_string())];
+    let file = File::open(path).map_err(failed)?;
+    if BYTES_MAX < file.metadata().map_err(failed)?.len() {
+        return Err(vec![named(format!("expected at most {} MiB: split the file", BYTES_MAX >> 20))]);
+    }
+    let text = BufReader::new(file.take(BYTES_MAX));
+    parse(def, text, oldest, now).map_err(|problems| problems.into_iter().map(named).collect())
+}
+
+/// The same of what is in a file, row by row.
+pub fn parse(def: &PlantDef, mut text: impl BufRead, oldest: Timestamp, now: Timestamp) -> Result<Rows, Vec<String>> {
+    let mut first = Vec::new();
+    let first_line = |why: String| vec![format!("line 1: {why}")];
+    text.read_until(b'\n', &mut first).map_err(|error| first_line(error.to_string()))?;
+    let first = first.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&first);
+    let separator = if first.contains(&b';') { b';' } else { b',' };
+    let mut reader = csv::ReaderBuilder::new().delimiter(separator).trim(csv::Trim::All).from_reader(first.chain(text));
+    let header = reader.headers().map_err(|error| first_line(error.to_string()))?.clone();
+    import::parse(def, &header, separator == b';', reader.records(), [oldest, now])
+}
 
 impl Store {
     /// The first instant of which samples can be imported: what was deleted before it would be deleted again, and the
@@ -25,42 +83,58 @@ impl Store {
         Ok(self.deleted_until(Tier::Raw)?.unwrap_or_default().max(Timestamp::UNIX_EPOCH))
     }
 
-    /// Stores the samples of a file that fill a gap, all of them or none; returns what was stored, `None` for nothing. They
-    /// are archived with the hours that they belong to.
-    pub fn import(&self, rows: Rows, file: &str, now: Timestamp) -> Result<Option<Import>, HistoryError> {
+    /// Decides which samples of a file fill a gap; `None` for none of them.
+    pub fn importing(&self, rows: Rows, file: &str, now: Timestamp) -> Result<Option<Importing>, HistoryError> {
         let times = || rows.values().flatten().map(|sample| sample.at);
         let (Some(from), Some(to)) = (times().min(), times().max()) else { return Ok(None) };
+        let in_file = times().count() as u64;
         let mut fillers: HashMap<u16, Filler> = HashMap::new();
         for (tag, rows) in rows {
             fillers.extend(self.id(tag).map(|id| (id, Filler::new(rows))));
         }
         let end = to.checked_add(jiff::Span::new().microseconds(1)).unwrap_or(to);
+        // Up to the next stored sample after the last row: where that of an earlier file ends depends on it.
+        let end = end.checked_add(HOLD_MAX).unwrap_or(end);
+        let mut earlier = HashSet::new();
+        self.each_imported(from, end, |tag, sample| _ = earlier.insert((tag, sample.at)))?;
         let gaps = self.each_stored(from, end, |tag: u16, sample: Sample| {
             if let Some(filler) = fillers.get_mut(&tag) {
-                filler.stored(sample);
+                filler.stored(Stored { sample, imported: earlier.contains(&(tag, sample.at)) });
             }
         })?;
         if let Some(gap) = gaps.first() {
             let why = format!("{:.0} to {:.0} cannot be read, so what to import there is unknown", gap.from, gap.to);
             return Err(HistoryError::Refused(why));
         }
-        let accepted: Vec<(u16, Vec<Sample>)> = fillers.into_iter().map(|(id, filler)| (id, filler.end())).collect();
-        let samples = || accepted.iter().flat_map(|(id, samples)| samples.iter().map(move |sample| (*id, *sample)));
-        let times = || samples().map(|(_, sample)| sample.at);
-        let (Some(from), Some(to)) = (times().min(), times().max()) else { return Ok(None) };
-        let import = Import { at: now, file: file.to_owned(), from, to, rows: samples().count() as u64 };
-        self.commit(times(), self.epoch(), || {
+        let of_tag = |(id, filler): (u16, Filler)| filler.end().into_iter().map(move |sample| (id, sample));
+        let mut rows: Vec<(u16, Sample)> = fillers.into_iter().flat_map(of_tag).collect();
+        rows.sort_by_key(|(id, sample)| (sample.at, *id));
+        let (Some((_, first)), Some((_, last))) = (rows.first(), rows.last()) else { return Ok(None) };
+        let import = Import { at: now, file: file.to_owned(), from: first.at, to: last.at, rows: rows.len() as u64 };
+        Ok(Some(Importing { import, in_file, rows }))
+    }
+
+    /// Stores the next piece of an import, in one commit; `false` after the last one. The latest rows go first: whether a
+    /// row fills a gap depends on what is stored before it, so an import that was interrupted is completed by the next one
+    /// of the same file. Rows are archived with the hours that they belong to.
+    pub fn import_piece(&self, importing: &mut Importing) -> Result<bool, HistoryError> {
+        let left = importing.rows.len().saturating_sub(IMPORT_PIECE);
+        let piece = &importing.rows[left..];
+        self.commit(piece.iter().map(|(_, sample)| sample.at), self.epoch(), || {
             let mut appender = self.db.appender("sample")?;
-            for (id, Sample { at, value, quality }) in samples() {
-                appender.append_row((utc(at), id, value, quality.code(), sql::IMPORTED))?;
+            for (id, Sample { at, value, quality }) in piece {
+                appender.append_row((utc(*at), *id, *value, quality.code(), sql::IMPORTED))?;
             }
             appender.flush()?;
             drop(appender);
-            let Import { at, file, from, to, rows } = &import;
-            self.db.execute(sql::ENTER_IMPORT, params![utc(*at), file, utc(*from), utc(*to), rows])?;
+            if left == 0 {
+                let Import { at, file, from, to, rows } = &importing.import;
+                self.db.execute(sql::ENTER_IMPORT, params![utc(*at), file, utc(*from), utc(*to), rows])?;
+            }
             Ok(true)
         })?;
-        Ok(Some(import))
+        importing.rows.truncate(left);
+        Ok(left > 0)
     }
 
     /// What was imported, the oldest import first.

@@ -4,10 +4,7 @@ use std::path::PathBuf;
 
 use tokio::sync::oneshot;
 
-use super::{
-    Answer, HistoryError, Query,
-    backup::{Backup, BackupSource},
-};
+use super::{Answer, HistoryError, Query, backup::BackupSource};
 
 /// A query on its way to the history, with the place for its answer.
 /// A dropped answer means: the store has gone.
@@ -19,15 +16,31 @@ pub struct QueryRequest {
     pub reply: oneshot::Sender<Result<Answer, HistoryError>>,
 }
 
-/// A backup that is asked of a running station.
+/// What a running station is asked to do with its history as a whole.
 #[derive(Debug)]
-pub struct BackupRequest {
-    /// The folder that it goes to.
-    pub to: PathBuf,
-    /// The other files that are part of it.
-    pub companions: Vec<BackupSource>,
-    /// Where the answer goes.
-    pub reply: oneshot::Sender<Result<Backup, HistoryError>>,
+pub enum HistoryJob {
+    /// Write a backup.
+    Backup {
+        /// The folder that it goes to.
+        to: PathBuf,
+        /// The other files that are part of it.
+        companions: Vec<BackupSource>,
+    },
+    /// Fill gaps with the samples of a CSV file.
+    Import {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+/// A job on its way to the history, with the place for its outcome: what was done, in a sentence.
+/// A dropped outcome means: the store has gone.
+#[derive(Debug)]
+pub struct JobRequest {
+    /// The job.
+    pub job: HistoryJob,
+    /// Where the outcome goes.
+    pub reply: oneshot::Sender<Result<String, HistoryError>>,
 }
 
 pub mod alarm_file;
@@ -46,7 +59,7 @@ pub mod aggregates;
 mod copy;
 pub mod backup;
 pub mod restore;
-mod import;
+pub mod import;
 pub mod compact;
 pub mod report;
 pub mod alarm_metrics;

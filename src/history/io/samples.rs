@@ -82,7 +82,7 @@ enum Piece {
 /// Which stored numbers of tags are read, and where each stands among them.
 pub(super) struct Wanted {
     places: Vec<u32>,
-    /// The condition in SQL.
+    /// The condition in SQL, of these tags or of other columns.
     pub(super) tags: String,
 }
 
@@ -119,9 +119,29 @@ impl Store {
         &self,
         from: Timestamp,
         to: Timestamp,
+        each: impl FnMut(u16, Sample),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        self.each_where(sql::of_tags(None), from, to, each)
+    }
+
+    /// The same of those that came from files.
+    pub(super) fn each_imported(
+        &self,
+        from: Timestamp,
+        to: Timestamp,
+        each: impl FnMut(u16, Sample),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        self.each_where(format!(" AND epoch = {}", sql::IMPORTED), from, to, each)
+    }
+
+    fn each_where(
+        &self,
+        condition: String,
+        from: Timestamp,
+        to: Timestamp,
         mut each: impl FnMut(u16, Sample),
     ) -> Result<Vec<Gap>, HistoryError> {
-        let all = Wanted { places: (0..=u32::from(u16::MAX)).collect(), tags: sql::of_tags(None) };
+        let all = Wanted { places: (0..=u32::from(u16::MAX)).collect(), tags: condition };
         self.each_row(&all, from, to, |read| {
             if let Read::Sample(place, sample) = read {
                 each(u16::try_from(place).unwrap_or(u16::MAX), sample);

@@ -9,7 +9,7 @@ use tokio::{
 };
 
 use super::{
-    BackupRequest, QueryRequest,
+    JobRequest, QueryRequest,
     archiver::Archiver,
     files,
     open::{Opened, Restored},
@@ -31,8 +31,8 @@ const KEPT_FOR_EVENTS: usize = 128;
 pub const QUERIES_MAX: usize = 64;
 /// Requests of queries on their way to the writer: each that is being answered has one at most.
 const REQUESTS_MAX: usize = 2 * QUESTIONS_MAX;
-/// Backups that wait; more are refused.
-const BACKUPS_MAX: usize = 2;
+/// Jobs that wait; more are refused.
+const JOBS_MAX: usize = 2;
 /// Real time between two commits: what a power failure may cost.
 pub(super) const COMMIT_EVERY: Duration = Duration::from_secs(1);
 
@@ -43,8 +43,8 @@ pub struct Handle {
     pub records: mpsc::Sender<Vec<Record>>,
     /// Queries, each with the number of its terminal; those that can no longer be answered are dropped with their reply.
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
-    /// Backups to be written.
-    pub backups: mpsc::Sender<BackupRequest>,
+    /// Backups to be written, files to be imported.
+    pub jobs: mpsc::Sender<JobRequest>,
     /// How the store stands, after every commit.
     pub status: watch::Receiver<HistoryStatus>,
     /// What the plant restores from its history, as soon as it is open for the first time.
@@ -56,8 +56,8 @@ pub struct Handle {
 impl Handle {
     /// Drops this end and waits until everything is stored. Blocks for as long as other senders of records exist.
     pub fn stop(self) {
-        let Handle { records, queries, backups, status, restored: _, join } = self;
-        drop((records, queries, backups, status));
+        let Handle { records, queries, jobs, status, restored: _, join } = self;
+        drop((records, queries, jobs, status));
         // A panic of the thread has already been reported by the panic hook.
         let _ = join.join();
     }
@@ -92,7 +92,7 @@ pub(super) fn start_with(
     let mut writer = Writer::new(path.to_owned(), def, clock.utc());
     let (records, records_in) = mpsc::channel(RECORDS_MAX);
     let (queries, queries_in) = mpsc::channel(QUERIES_MAX);
-    let (backups, backups_in) = mpsc::channel(BACKUPS_MAX);
+    let (jobs, jobs_in) = mpsc::channel(JOBS_MAX);
     let (status_out, status) = watch::channel(writer.status().clone());
     let (restored_out, restored) = oneshot::channel();
     let mut outputs = Outputs { status: status_out, restored: Some(restored_out) };
@@ -101,7 +101,7 @@ pub(super) fn start_with(
     let reader = Reader { stores: writer.stores(), writer: requests, clock, answer };
     let reading = spawn("history-reader", || reader.run(queries_in)).map_err(trouble)?;
     let writing = move || async move {
-        let opening = run(&mut writer, clock, commit_every, records_in, requests_in, backups_in, &mut outputs).await;
+        let opening = run(&mut writer, clock, commit_every, records_in, requests_in, jobs_in, &mut outputs).await;
         writer.end_reading();
         // A panic of the thread has already been reported by the panic hook.
         let _ = reading.join();
@@ -113,7 +113,7 @@ pub(super) fn start_with(
         outputs.publish(&mut writer);
     };
     let join = spawn("history", writing).map_err(trouble)?;
-    Ok(Handle { records, queries, backups, status, restored: Some(restored), join })
+    Ok(Handle { records, queries, jobs, status, restored: Some(restored), join })
 }
 
 /// A thread with a runtime of its own, only to wait for queues and times at once.
@@ -150,7 +150,7 @@ async fn run(
     commit_every: Duration,
     mut records: mpsc::Receiver<Vec<Record>>,
     mut requests: mpsc::Receiver<WriterRequest>,
-    mut backups: mpsc::Receiver<BackupRequest>,
+    mut jobs: mpsc::Receiver<JobRequest>,
     outputs: &mut Outputs,
 ) -> Option<Opening> {
     let mut opening = None;
@@ -187,7 +187,7 @@ async fn run(
                     outputs.publish(writer);
                 }
             }
-            Some(request) = backups.recv() => archiver.back_up(request),
+            Some(request) = jobs.recv() => archiver.take_up(request),
             Some(request) = requests.recv() => match request {
                 WriterRequest::Commit(done) => {
                     writer.commit(clock.utc());

@@ -251,7 +251,7 @@ impl Writer {
     pub fn archived(&mut self, looked: Result<ArchiveOutcome, HistoryError>) {
         match looked {
             Ok(ArchiveOutcome::Did(_)) => self.unarchived = None,
-            Ok(ArchiveOutcome::BackedUp) => {}
+            Ok(ArchiveOutcome::Answered | ArchiveOutcome::ToImport(..)) => {}
             Ok(ArchiveOutcome::Idle(missing)) => (self.missing, self.unarchived) = (missing, None),
             Err(error) => self.unarchived = Some(format!("it is not archived: {}", error.words())),
         }

@@ -19,7 +19,7 @@ use sightglass::{
     bus::io::clock::Clock,
     history::{
         Answer, Query,
-        io::{BackupRequest, QueryRequest, store::Store, thread as history},
+        io::{HistoryJob, JobRequest, QueryRequest, store::Store, thread as history},
     },
     plant::{PlantDef, def::TagId, record::Record, sample::Sample},
     report::Period,
@@ -196,8 +196,8 @@ fn back_up(handle: &history::Handle, to: &Path, counts: &Counts) -> (Vec<Duratio
     while !counts.stop.load(Ordering::Relaxed) {
         let (reply, answer) = oneshot::channel();
         let began = Instant::now();
-        let request = BackupRequest { to: to.to_owned(), companions: Vec::new(), reply };
-        handle.backups.blocking_send(request).expect("asked");
+        let job = HistoryJob::Backup { to: to.to_owned(), companions: Vec::new() };
+        handle.jobs.blocking_send(JobRequest { job, reply }).expect("asked");
         failed.extend(answer.blocking_recv().expect("answered").err().map(|error| error.to_string()));
         times.push(began.elapsed());
     }

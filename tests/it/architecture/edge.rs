@@ -87,7 +87,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("src/cli/drill.rs", &["channels", "tasks", "process"]),
     ("src/cli/history/backup.rs", &["clock"]),
     ("src/cli/history/compact.rs", &["files", "clock"]),
-    ("src/cli/history/import.rs", &["files", "clock"]),
+    ("src/cli/history/import.rs", &["clock"]),
     ("src/cli/history/mod.rs", &["files"]),
     ("src/cli/history/restore.rs", &["files", "clock"]),
     ("src/cli/init.rs", &["clock", "process"]),

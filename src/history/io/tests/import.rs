@@ -6,7 +6,10 @@ use super::{
     archive::{HOUR_S, archive_all, content, rows},
     *,
 };
-use crate::history::{import::Rows, tiers::in_milliseconds};
+use crate::history::{
+    import::{Import, Rows},
+    tiers::in_milliseconds,
+};
 
 /// The samples of records, by tag.
 fn by_tag(records: &[Record]) -> Rows {
@@ -19,6 +22,14 @@ fn by_tag(records: &[Record]) -> Rows {
     // A file has one row for each instant of a tag.
     rows.values_mut().for_each(|rows| rows.dedup_by_key(|sample| sample.at));
     rows
+}
+
+/// All pieces of an import.
+fn import_all(store: &Store, rows: Rows, file: &str, now: Timestamp) -> Option<Import> {
+    let mut importing = store.importing(rows, file, now).unwrap()?;
+    while store.import_piece(&mut importing).unwrap() {}
+    assert_eq!(importing.done(), importing.import.rows);
+    Some(importing.import)
 }
 
 fn overview(store: &Store) -> crate::history::Overview {
@@ -43,14 +54,14 @@ fn an_imported_day_is_as_if_it_had_been_recorded() {
         let records: Vec<Record> = samples.iter().map(|sample| Record::Sample(*tag, *sample)).collect();
         plain.append(&records).unwrap();
     }
-    let import = store.import(day.clone(), "logger.csv", sec(60 * HOUR_S)).unwrap().unwrap();
+    let import = import_all(&store, day.clone(), "logger.csv", sec(60 * HOUR_S)).unwrap();
     assert_eq!(import.rows as usize, day.values().map(Vec::len).sum::<usize>());
     assert!(content(&store) == content(&plain), "before it is archived");
-    assert_eq!(store.import(day.clone(), "logger.csv", sec(60 * HOUR_S)).unwrap(), None, "the second time");
+    assert_eq!(import_all(&store, day.clone(), "logger.csv", sec(60 * HOUR_S)), None, "the second time");
     archive_all(&store, 60);
     assert_eq!(overview(&store).samples, 0);
     assert!(content(&store) == content(&plain), "archived");
-    assert_eq!(store.import(day, "other.csv", sec(60 * HOUR_S)).unwrap(), None, "out of the archive too");
+    assert_eq!(import_all(&store, day, "other.csv", sec(60 * HOUR_S)), None, "out of the archive too");
     assert_eq!(overview(&store).imports, std::slice::from_ref(&import));
     for (from, to, buckets) in [(0, 26 * HOUR_S, 26), (5 * HOUR_S, 5 * HOUR_S + 600, 60)] {
         let [got, expect] = [&store, &plain].map(|store| series(store, PV, from, to, buckets));
@@ -75,7 +86,7 @@ fn what_was_recorded_is_not_changed_by_a_file() {
     let file: Vec<Record> = [5, 10, -1, 1_200].map(|at| good(PV, at, -7.0)).into();
     let mut file = by_tag(&file);
     file.values_mut().for_each(|rows| rows.sort_by_key(|sample| sample.at));
-    assert_eq!(store.import(file, "x.csv", sec(5_000)).unwrap().unwrap().rows, 2);
+    assert_eq!(import_all(&store, file, "x.csv", sec(5_000)).unwrap().rows, 2);
     let after = content(&store);
     let recorded: Vec<_> = after.iter().filter(|(_, sample)| sample.value != Some(-7.0)).copied().collect();
     assert!(recorded == before);
@@ -87,7 +98,7 @@ fn an_import_is_no_time_at_which_alarms_were_watched() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
     let file: Vec<Record> = (0..2 * HOUR_S / 60).map(|n| good(PV, 60 * n, 1.0)).collect();
-    store.import(by_tag(&file), "x.csv", sec(5 * HOUR_S)).unwrap().unwrap();
+    import_all(&store, by_tag(&file), "x.csv", sec(5 * HOUR_S)).unwrap();
     let watched = |store: &Store| {
         let period = Period::free(sec(0), sec(2 * HOUR_S));
         match store.answer(&Query::Report { period }, sec(3 * HOUR_S)).unwrap() {
@@ -98,4 +109,49 @@ fn an_import_is_no_time_at_which_alarms_were_watched() {
     let hot = watched(&store);
     archive_all(&store, 5);
     assert_eq!((hot, watched(&store)), (Duration::ZERO, Duration::ZERO));
+}
+
+#[test]
+fn a_file_in_parts_is_imported_as_the_whole_in_any_order() {
+    let whole: Vec<Record> = (0..200).map(|n| good(PV, 10 * n, n as f64)).collect();
+    let parts = [&whole[..100], &whole[100..]];
+    let imported = |parts: &[&[Record]], archived: bool| {
+        let (_folder, db) = folder();
+        let store = open(&db, 0);
+        store.append(&[good(PV, -3 * HOUR_S, 0.0), good(PV, 3 * HOUR_S, 0.0)]).unwrap();
+        for part in parts {
+            import_all(&store, by_tag(part), "x.csv", sec(5 * HOUR_S)).unwrap();
+            if archived {
+                archive_all(&store, 60);
+            }
+        }
+        content(&store)
+    };
+    let expect = imported(&[&whole], false);
+    assert_eq!(expect.len(), 201, "all, and the recorded sample after them");
+    assert!(imported(&[parts[1], parts[0]], false) == expect, "the later part first");
+    assert!(imported(&parts, false) == expect, "the earlier part first");
+    assert!(imported(&parts, true) == expect, "the earlier part first, and archived");
+}
+
+#[test]
+fn an_import_that_was_killed_is_completed_by_the_next() {
+    let file: Vec<Record> = (0..50_000).map(|n| good(if n % 3 == 0 { SV } else { PV }, n / 2, n as f64)).collect();
+    let ((_one, db), (_two, other)) = (folder(), folder());
+    let expect = {
+        let store = open(&other, 0);
+        store.append(&[good(PV, 9_000, -1.0), good(SV, 9_060, -1.0)]).unwrap();
+        import_all(&store, by_tag(&file), "x.csv", sec(9 * HOUR_S)).unwrap();
+        content(&store)
+    };
+    let store = open(&db, 0);
+    store.append(&[good(PV, 9_000, -1.0), good(SV, 9_060, -1.0)]).unwrap();
+    let mut importing = store.importing(by_tag(&file), "x.csv", sec(9 * HOUR_S)).unwrap().unwrap();
+    assert!(store.import_piece(&mut importing).unwrap(), "there is more");
+    let rest = importing.import.rows - importing.done();
+    drop((store, importing));
+    let opened = Store::open(&db, &def(), sec(9 * HOUR_S)).unwrap();
+    let second = import_all(&opened.store, by_tag(&file), "x.csv", sec(9 * HOUR_S)).unwrap();
+    assert!(rest > 0 && second.rows == rest, "{} of {rest}", second.rows);
+    assert!(content(&opened.store) == expect);
 }
