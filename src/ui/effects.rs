@@ -33,6 +33,13 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 });
                 effects.extend(show(model, Tab::Trends));
             }
+            UiAction::ShowSpanOnTrends(tag, from, to) => {
+                with_tabs(model, |tabs, cx| {
+                    tabs.trends.show_span(cx, tag, (from, to));
+                    Vec::new()
+                });
+                effects.extend(show(model, Tab::Trends));
+            }
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
             UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
             UiAction::SessionRequest(tab, request) => {
@@ -67,6 +74,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowParameter(_)
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
+        | UiAction::ShowSpanOnTrends(..)
         | UiAction::Command(_)
         | UiAction::SendCommand(..)
         | UiAction::SessionRequest(..) => None,

@@ -131,6 +131,8 @@ pub enum UiAction {
     ShowOnMimic(Vec<TagId>),
     /// Show the curve of a tag with the cursor at a moment.
     ShowOnTrends(TagId, Timestamp),
+    /// Show the curve of a tag over a stretch of time.
+    ShowSpanOnTrends(TagId, Timestamp, Timestamp),
     /// Give a command and watch its outcome.
     Command(CommandKind),
     /// The same with the confirmed value and the credentials.

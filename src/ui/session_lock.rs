@@ -182,6 +182,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             | UiAction::ShowParameter(_)
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
+            | UiAction::ShowSpanOnTrends(..)
             | UiAction::SessionRequest(..)
             | UiAction::Do(_) => rest.push(action),
         }

@@ -216,6 +216,15 @@ impl Trends {
         (self.accumulate, self.since, self.end, self.cursor) = (false, None, end, Some(at));
         self.moved();
     }
+
+    /// Shows the curve of a tag over a whole stretch of time, with a little before and after it.
+    pub fn show_span(&mut self, cx: &ViewContext, tag: TagId, span: (Timestamp, Timestamp)) {
+        self.open_tag(cx, tag);
+        let (window, end) = span::around(span);
+        (self.accumulate, self.since, self.cursor) = (false, None, None);
+        (self.window, self.end) = (window, Some(end).filter(|end| *end < cx.now));
+        self.moved();
+    }
 }
 
 impl Trends {

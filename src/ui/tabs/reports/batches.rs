@@ -75,13 +75,12 @@ impl Batches {
         self.selected.on(motion, labels, room);
     }
 
-    /// The first pen of its rule, and the middle of its time.
+    /// The first pen of its rule, over its whole time.
     pub fn trend(&self, cx: &ViewContext) -> Option<UiAction> {
         let report = self.rows().get(self.place())?;
         let rule = cx.def().batches.iter().find(|rule| rule.name == report.batch.name)?;
         let tag = *rule.tags.first().or(rule.energy.as_ref()).or(rule.phase.as_ref())?;
-        let half = report.until.duration_since(report.batch.from) / 2;
-        Some(UiAction::ShowOnTrends(tag, report.batch.from + half))
+        Some(UiAction::ShowSpanOnTrends(tag, report.batch.from, report.until))
     }
 
     /// Asks the history when it is time to.

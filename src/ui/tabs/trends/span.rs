@@ -115,6 +115,14 @@ pub fn nearest(span: SignedDuration) -> usize {
     WINDOWS.iter().position(|window| *window >= seconds).unwrap_or(WINDOWS.len() - 1)
 }
 
+/// The window that shows a stretch of time with a sixteenth of it or more on either side, and where it ends.
+pub fn around((from, to): (Timestamp, Timestamp)) -> (usize, Timestamp) {
+    let span = to.duration_since(from).max(SignedDuration::ZERO);
+    let window = nearest(span + span / 8);
+    let spare = SignedDuration::from_secs(WINDOWS[window]) - span;
+    (window, to.checked_add(spare.max(SignedDuration::ZERO) / 2).unwrap_or(to))
+}
+
 /// The last local midnight; a day that begins later (clocks change at midnight) begins then.
 pub fn midnight(now: Timestamp, zone: &TimeZone) -> Timestamp {
     now.to_zoned(zone.clone()).start_of_day().map_or(now, |start| start.timestamp())
@@ -207,6 +215,22 @@ mod tests {
             ("06:50:00", minutes(60), None),
         ] {
             assert_eq!(pan(at(end), by, now), expect.map(at), "{end}");
+        }
+    }
+
+    #[test]
+    fn a_batch_is_shown_from_its_begin_to_its_end() {
+        for (from, to, window, end) in [
+            ("06:00:00", "06:10:00", 900, "06:12:30"),
+            ("06:00:00", "06:08:00", 600, "06:09:00"),
+            ("06:00:00", "06:00:00", 60, "06:00:30"),
+            ("00:00:00", "23:00:00", 2 * DAY, "23:00:00"),
+        ] {
+            let (place, shown) = around((at(from), at(to)));
+            assert_eq!(WINDOWS[place], window, "{from} {to}");
+            let view = View::ending(shown, window, 120);
+            assert!(view.from <= at(from) && view.holds(at(to)), "{from} {to}: {view:?}");
+            assert!(window == 2 * DAY || shown == at(end), "{from} {to}: {shown}");
         }
     }
 

@@ -16,7 +16,7 @@ use crate::{
     plant::{def::Priority, sample::Sample},
     ui::{
         Effect, Model, Msg, QueryId,
-        fixture::{Fixture, now},
+        fixture::{Fixture, now, with_cx},
         theme::Theme,
         update, view,
     },
@@ -343,4 +343,19 @@ fn figures_keep_their_utc_times_after_the_clock_was_set() {
         stand.screen()
     };
     assert_eq!(screen(SignedDuration::from_hours(24 * 365 * 56)), screen(SignedDuration::ZERO));
+}
+
+#[test]
+fn a_span_is_shown_whole_and_alive_while_it_lasts() {
+    let tag = Fixture::normal().def.trends[0].pens[0].tag;
+    with_cx(&Fixture::normal().snapshot(), |cx| {
+        for (begin, end, alive) in [(300, 270, false), (30, 10, false), (30, 0, true), (20, 1, true)] {
+            let ago = |minutes: i64| cx.now - SignedDuration::from_mins(minutes);
+            let mut trends = Trends::new(cx.snapshot);
+            trends.show_span(cx, tag, (ago(begin), ago(end)));
+            let view = trends.span(cx);
+            assert!(view.from <= ago(begin) && view.holds(ago(end)), "{begin} {end}: {view:?}");
+            assert_eq!((trends.end.is_none(), trends.cursor), (alive, None), "{begin} {end}");
+        }
+    });
 }
