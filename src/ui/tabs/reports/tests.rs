@@ -1,5 +1,7 @@
 //! The reports tab in the whole terminal, with a made-up report behind it.
 
+mod batches;
+
 use std::sync::Arc;
 
 use crossterm::event::{KeyEvent, KeyModifiers};
@@ -32,7 +34,11 @@ struct Stand {
 
 impl Stand {
     fn new(theme: Theme, width: u16, height: u16) -> Stand {
-        let model = Model::new(Fixture::normal().snapshot(), theme, 1, crate::ui::fixture::session());
+        Stand::of(&Fixture::normal(), theme, width, height)
+    }
+
+    fn of(fixture: &Fixture, theme: Theme, width: u16, height: u16) -> Stand {
+        let model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::session());
         let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), reply: Ok(Durability::Recorded) };
         stand.send(Msg::Resize(width, height));
         stand.press("5");
