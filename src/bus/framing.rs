@@ -34,16 +34,13 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
         _ => false,
     };
     for start in 0..buffer.len() {
-        let rest = &buffer[start..];
-        let Some(length) = pdu::response_length(rest).known().filter(|length| length + 2 <= rest.len()) else {
-            continue;
-        };
-        let Ok(answer) = frame::without_crc(&rest[..length + 2]) else { continue };
+        let Some(Ok(answer)) = full_frame(&buffer[start..]).map(frame::without_crc) else { continue };
+        let end = start + answer.len() + 2;
         match frame::check_answer(message, answer) {
-            Ok(()) | Err(Fault::Exception(_)) => return FrameMatch::Answer(start..start + length + 2),
+            Ok(()) | Err(Fault::Exception(_)) => return FrameMatch::Answer(start..end),
             // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
             Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}
-            Err(fault) => return FrameMatch::Foreign(start + length + 2, fault),
+            Err(fault) => return FrameMatch::Foreign(end, fault),
         }
     }
     // No good frame yet. Is there one of the right beginning and full length, but corrupt?
@@ -52,10 +49,25 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
         return FrameMatch::Nothing;
     }
     let corrupt = beginnings.find_map(|rest| {
-        let frame = rest.get(..pdu::response_length(rest).known()? + 2)?;
-        frame::without_crc(frame).err()
+        let frame = full_frame(rest)?;
+        let fault = frame::without_crc(frame).err()?;
+        // The answer was cut short, and a late one of another unit came right behind it.
+        let is_good = |late: &[u8]| full_frame(late) == Some(late) && frame::without_crc(late).is_ok();
+        let cut = (2..frame.len()).find(|cut| is_good(&rest[*cut..]));
+        let expected = expected_length(Framing::Rtu, message);
+        Some(cut.map_or(fault, |got| Fault::Truncated { got: to_u16(got), expected: to_u16(expected) }))
     });
     corrupt.map_or(FrameMatch::Begun, FrameMatch::Corrupt)
+}
+
+/// The frame that bytes begin with, check included, if they have its full length.
+fn full_frame(bytes: &[u8]) -> Option<&[u8]> {
+    bytes.get(..pdu::response_length(bytes).known()? + 2)
+}
+
+/// Length of the frame that answers a message.
+fn expected_length(framing: Framing, message: &[u8]) -> usize {
+    frame::wrapped_length(framing, frame::shape_of(message).map_or(3, |shape| shape.length()))
 }
 
 /// Names what is left at the deadline.
@@ -66,7 +78,7 @@ pub fn left_over(framing: Framing, message: &[u8], buffer: &[u8]) -> Fault {
     if buffer.is_empty() {
         return Fault::Timeout;
     }
-    let expected = frame::wrapped_length(framing, frame::shape_of(message).map_or(3, |shape| shape.length()));
+    let expected = expected_length(framing, message);
     if buffer.len() < expected {
         return Fault::Truncated { got: to_u16(buffer.len()), expected: to_u16(expected) };
     }
@@ -114,6 +126,16 @@ mod tests {
         let mut corrupt = answer();
         corrupt[4] ^= 1;
         assert!(matches!(find_answer(Framing::Rtu, &REQUEST, &corrupt), FrameMatch::Corrupt(Fault::Crc { .. })));
+    }
+
+    #[test]
+    fn a_cut_answer_is_named_also_before_a_late_one() {
+        let late = with_crc(&[2, 3, 2, 0, 200]);
+        for cut in 2..answer().len() {
+            let bytes = [&answer()[..cut], &late[..]].concat();
+            let fault = Fault::Truncated { got: cut as u16, expected: 9 };
+            check(&bytes, FrameMatch::Corrupt(fault));
+        }
     }
 
     #[test]
