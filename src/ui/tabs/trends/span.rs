@@ -115,10 +115,11 @@ pub fn nearest(span: SignedDuration) -> usize {
     WINDOWS.iter().position(|window| *window >= seconds).unwrap_or(WINDOWS.len() - 1)
 }
 
-/// The window that shows a stretch of time with a sixteenth of it or more on either side, and where it ends.
+/// The window that shows a stretch of time with a sixteenth of the window or more on either side, and where it ends.
 pub fn around((from, to): (Timestamp, Timestamp)) -> (usize, Timestamp) {
     let span = to.duration_since(from).max(SignedDuration::ZERO);
-    let window = nearest(span + span / 8);
+    // A living view of it ends up to an eighth of the window after now.
+    let window = nearest(span + span / 7 + SignedDuration::from_secs(1));
     let spare = SignedDuration::from_secs(WINDOWS[window]) - span;
     (window, to.checked_add(spare.max(SignedDuration::ZERO) / 2).unwrap_or(to))
 }
@@ -220,17 +221,26 @@ mod tests {
 
     #[test]
     fn a_batch_is_shown_from_its_begin_to_its_end() {
-        for (from, to, window, end) in [
-            ("06:00:00", "06:10:00", 900, "06:12:30"),
-            ("06:00:00", "06:08:00", 600, "06:09:00"),
-            ("06:00:00", "06:00:00", 60, "06:00:30"),
-            ("00:00:00", "23:00:00", 2 * DAY, "23:00:00"),
+        for (from, to, window, after) in [
+            ("06:00:00", "06:10:00", 900, 150),
+            ("06:00:00", "06:08:00", 600, 60),
+            ("06:00:00", "06:00:00", 60, 30),
+            ("00:00:00", "23:00:00", 2 * DAY, 45_000),
         ] {
             let (place, shown) = around((at(from), at(to)));
-            assert_eq!(WINDOWS[place], window, "{from} {to}");
-            let view = View::ending(shown, window, 120);
-            assert!(view.from <= at(from) && view.holds(at(to)), "{from} {to}: {view:?}");
-            assert!(window == 2 * DAY || shown == at(end), "{from} {to}: {shown}");
+            assert_eq!((WINDOWS[place], shown.duration_since(at(to)).as_secs()), (window, after), "{from} {to}");
+        }
+    }
+
+    #[test]
+    fn a_batch_is_whole_while_it_runs_and_after_it() {
+        for (lasted, tenths) in (0..400).flat_map(|lasted| (0..110).map(move |tenths| (lasted, tenths))) {
+            let from = at("06:00:00") + SignedDuration::from_millis(100 * tenths);
+            let to = from + SignedDuration::from_secs(lasted);
+            let (window, end) = around((from, to));
+            for view in [View::live(to, WINDOWS[window], 120), View::ending(end, WINDOWS[window], 120)] {
+                assert!(view.from <= from && view.holds(to), "{from} to {to}: {view:?}");
+            }
         }
     }
 
