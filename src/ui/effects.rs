@@ -26,16 +26,9 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 });
                 effects.extend(show(model, Tab::Mimic));
             }
-            UiAction::ShowOnTrends(tag, at) => {
+            UiAction::ShowOnTrends(tag, span) => {
                 with_tabs(model, |tabs, cx| {
-                    tabs.trends.show(cx, tag, at);
-                    Vec::new()
-                });
-                effects.extend(show(model, Tab::Trends));
-            }
-            UiAction::ShowSpanOnTrends(tag, from, to) => {
-                with_tabs(model, |tabs, cx| {
-                    tabs.trends.show_span(cx, tag, (from, to));
+                    tabs.trends.show(cx, tag, span);
                     Vec::new()
                 });
                 effects.extend(show(model, Tab::Trends));
@@ -74,7 +67,6 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowParameter(_)
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
-        | UiAction::ShowSpanOnTrends(..)
         | UiAction::Command(_)
         | UiAction::SendCommand(..)
         | UiAction::SessionRequest(..) => None,

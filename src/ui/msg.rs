@@ -129,10 +129,8 @@ pub enum UiAction {
     ShowParameter(TagId),
     /// Show the first of these tags that the mimic has there.
     ShowOnMimic(Vec<TagId>),
-    /// Show the curve of a tag with the cursor at a moment.
-    ShowOnTrends(TagId, Timestamp),
-    /// Show the curve of a tag over a stretch of time.
-    ShowSpanOnTrends(TagId, Timestamp, Timestamp),
+    /// Show the curve of a tag over a stretch of time; a moment, which begins as it ends, with the cursor on it.
+    ShowOnTrends(TagId, (Timestamp, Timestamp)),
     /// Give a command and watch its outcome.
     Command(CommandKind),
     /// The same with the confirmed value and the credentials.

@@ -182,7 +182,6 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             | UiAction::ShowParameter(_)
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
-            | UiAction::ShowSpanOnTrends(..)
             | UiAction::SessionRequest(..)
             | UiAction::Do(_) => rest.push(action),
         }

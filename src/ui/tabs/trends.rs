@@ -12,7 +12,7 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub use self::keys::{Action, KEYS};
-use self::span::{RATES, View, WINDOWS, midnight, nearest, pan};
+use self::span::{RATES, View, WINDOWS, around, midnight, nearest, pan};
 use crate::ui::tabs::{prelude::*, reports::period};
 use crate::{
     history::Series,
@@ -130,18 +130,13 @@ impl TabView for Trends {
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let asked = period::typed(cx.def(), text, cx.now)?;
-        self.accumulate = false;
         if asked.to < cx.now {
             self.window = nearest(asked.to.duration_since(asked.from));
-            self.end = Some(asked.to);
+            (self.accumulate, self.since, self.end) = (false, None, Some(asked.to));
+            self.moved();
         } else {
-            // A moment: a quarter of the window after it, and the cursor on it.
-            let after = SignedDuration::from_secs(WINDOWS[self.window]) / 4;
-            self.end = asked.from.checked_add(after).ok().filter(|end| *end < cx.now);
-            self.cursor = Some(asked.from);
+            self.go_to_moment(cx, asked.from);
         }
-        self.since = None;
-        self.moved();
         Ok(self.ask(cx))
     }
 
@@ -208,21 +203,23 @@ impl Trends {
         self.ask(cx)
     }
 
-    /// Shows the curve of a tag with the cursor at a moment, and a quarter of the window after it.
-    pub fn show(&mut self, cx: &ViewContext, tag: TagId, at: Timestamp) {
+    /// Shows the curve of a tag over a stretch of time, with a little before and after it; at a moment, with the cursor.
+    pub fn show(&mut self, cx: &ViewContext, tag: TagId, (from, to): (Timestamp, Timestamp)) {
         self.open_tag(cx, tag);
-        let after = SignedDuration::from_secs(WINDOWS[self.window]) / 4;
-        let end = at.checked_add(after).ok().filter(|end| *end < cx.now);
-        (self.accumulate, self.since, self.end, self.cursor) = (false, None, end, Some(at));
+        if from == to {
+            return self.go_to_moment(cx, from);
+        }
+        let (window, end) = around((from, to));
+        (self.accumulate, self.since, self.cursor) = (false, None, None);
+        (self.window, self.end) = (window, Some(end).filter(|end| *end < cx.now));
         self.moved();
     }
 
-    /// Shows the curve of a tag over a whole stretch of time, with a little before and after it.
-    pub fn show_span(&mut self, cx: &ViewContext, tag: TagId, span: (Timestamp, Timestamp)) {
-        self.open_tag(cx, tag);
-        let (window, end) = span::around(span);
-        (self.accumulate, self.since, self.cursor) = (false, None, None);
-        (self.window, self.end) = (window, Some(end).filter(|end| *end < cx.now));
+    /// Puts the cursor on a moment, and a quarter of the window after it.
+    fn go_to_moment(&mut self, cx: &ViewContext, at: Timestamp) {
+        let after = SignedDuration::from_secs(WINDOWS[self.window]) / 4;
+        let end = at.checked_add(after).ok().filter(|end| *end < cx.now);
+        (self.accumulate, self.since, self.end, self.cursor) = (false, None, end, Some(at));
         self.moved();
     }
 }

@@ -22,7 +22,7 @@ impl Alarms {
             (Subject::Device(device), Action::Mimic) => {
                 vec![UiAction::ShowOnMimic(cx.def().tags_of(device).map(|tag| tag.id).collect())]
             }
-            (Subject::Tag(tag), Action::Trend) => vec![UiAction::ShowOnTrends(tag, raised)],
+            (Subject::Tag(tag), Action::Trend) => vec![UiAction::ShowOnTrends(tag, (raised, raised))],
             (Subject::Tag(tag), Action::Controller) => vec![UiAction::ShowParameter(tag)],
             (Subject::Device(device), Action::Controller) => vec![UiAction::ShowDevice(device)],
             (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),

@@ -80,7 +80,7 @@ impl Batches {
         let report = self.rows().get(self.place())?;
         let rule = cx.def().batches.iter().find(|rule| rule.name == report.batch.name)?;
         let tag = *rule.tags.first().or(rule.energy.as_ref()).or(rule.phase.as_ref())?;
-        Some(UiAction::ShowSpanOnTrends(tag, report.batch.from, report.batch.until(cx.now)))
+        Some(UiAction::ShowOnTrends(tag, (report.batch.from, report.batch.until(cx.now))))
     }
 
     /// Asks the history when it is time to.

@@ -352,7 +352,7 @@ fn a_span_is_shown_whole_and_alive_while_it_lasts() {
         for (begin, end, alive) in [(300, 270, false), (30, 10, false), (30, 0, true), (20, 1, true)] {
             let ago = |minutes: i64| cx.now - SignedDuration::from_mins(minutes);
             let mut trends = Trends::new(cx.snapshot);
-            trends.show_span(cx, tag, (ago(begin), ago(end)));
+            trends.show(cx, tag, (ago(begin), ago(end)));
             let view = trends.span(cx);
             assert!(view.from <= ago(begin) && view.holds(ago(end)), "{begin} {end}: {view:?}");
             assert_eq!((trends.end.is_none(), trends.cursor), (alive, None), "{begin} {end}");
