@@ -75,7 +75,7 @@ impl CommitBarrier {
         let by_operators = || events.iter().filter(|event| event.by.is_some());
         if !actions.is_empty() || by_operators().next().is_some() {
             // The wait of an earlier batch goes on.
-            let since = if self.needed.batch == disk.batches { now } else { self.needed.since };
+            let since = if self.needed.is_recorded(disk) { now } else { self.needed.since };
             self.needed = Wait { batch: self.sent + 1, since };
         }
         let batch = self.needed.batch;
@@ -159,5 +159,17 @@ mod tests {
         assert!(!barrier.is_late(disk(1), second + half) && barrier.is_late(disk(1), 2 * second));
         assert!(!reply.is_over(disk(0), 2 * second) && reply.is_over(disk(0), 2 * second + half));
         assert!(reply.is_over(disk(1), second) && reply.is_recorded(disk(1)) && !reply.is_recorded(disk(0)));
+    }
+
+    #[test]
+    fn an_action_after_alarms_of_the_process_has_its_own_wait() {
+        let (second, action) = (Duration::from_secs(1), [stopped("tank", jiff::Timestamp::UNIX_EPOCH)]);
+        let disk = RecorderProgress { batches: 1, alive: true };
+        let mut barrier = CommitBarrier::new(Duration::ZERO);
+        // A batch of alarms that the process has raised: no snapshot waits for it.
+        barrier.sent();
+        barrier.put(&action, &[], disk, 10 * second);
+        assert_eq!(barrier.hold_until(disk), Some(11 * second));
+        assert!(!barrier.is_late(disk, 10 * second) && barrier.is_late(disk, 11 * second));
     }
 }
