@@ -116,19 +116,33 @@ impl ProcessImage {
         let def = self.def.clone();
         for tag in tags.iter().filter(|tag| def.tag(**tag).calculation.is_none()) {
             match effect_of(fault) {
-                // The last value of a device that is down is bad, not uncertain. The reading is marked all the same:
-                // what has made it bad may go before it is read again.
-                FaultEffect::Uncertain(cause) if self.sample(*tag).quality == Quality::Bad(Cause::NotRead) => {
-                    self.set(*tag, Sample::bad(cause, at));
-                }
-                FaultEffect::Uncertain(cause) if self.sample(*tag).quality.is_bad() => {
-                    if let Some(reading) = &mut self.raw[tag.index()] {
-                        reading.uncertain = Some(cause);
-                    }
-                }
-                FaultEffect::Uncertain(cause) => self.mark_uncertain(*tag, cause),
+                FaultEffect::Uncertain(cause) => self.doubt(*tag, cause, at),
                 FaultEffect::Gone(cause) => self.drop_value(*tag, cause, at),
             }
+        }
+    }
+
+    /// A tag was written and not read back, because of a fault or because nothing else was asked for: its value is uncertain
+    /// until it is read again.
+    pub fn written(&mut self, tag: TagId, fault: Option<Fault>, at: Timestamp) {
+        let cause = fault.map_or(Cause::NotReadBack, |fault| match effect_of(fault) {
+            // A write that failed does not say that there is no value.
+            FaultEffect::Uncertain(cause) | FaultEffect::Gone(cause) => cause,
+        });
+        self.doubt(tag, cause, at);
+    }
+
+    /// The last value of a device that is down is bad, not uncertain. The reading is marked all the same: what has made it bad
+    /// may go before it is read again.
+    fn doubt(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
+        match self.sample(tag).quality {
+            Quality::Bad(Cause::NotRead) => self.set(tag, Sample::bad(cause, at)),
+            Quality::Bad(_) => {
+                if let Some(reading) = &mut self.raw[tag.index()] {
+                    reading.uncertain = Some(cause);
+                }
+            }
+            Quality::Good | Quality::Uncertain(_) => self.mark_uncertain(tag, cause),
         }
     }
 

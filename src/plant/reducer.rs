@@ -21,7 +21,7 @@ use super::{
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::CommandTracker,
     def::{LineDef, LineId, PlantDef, TagId},
-    event::{Event, Fault, LineState, WriteResult},
+    event::{Event, LineState, WriteResult},
     interlock::ActuatorTracker,
     line_minute::LineMinuteTracker,
     parameter_set::StoredSet,
@@ -170,9 +170,7 @@ impl Plant {
                 (at, None)
             }
             Event::Unlocked { at, id, key, result } => {
-                if !matches!(result, WriteResult::Refused(_)) {
-                    self.image.failed(&[key], Fault::Timeout, at);
-                }
+                self.written(key, &result, at);
                 (at, self.commands.unlocked(id, key, &result, &self.image, at))
             }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
@@ -331,20 +329,25 @@ impl Plant {
         }
     }
 
-    /// A write ended. Unless it was read back or certainly had no effect, the present value becomes uncertain.
+    /// A write ended.
     fn wrote(&mut self, id: WriteId, result: WriteResult, at: Timestamp) -> Option<ActionRecord> {
-        let uncertain = match &result {
-            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => self.commands.tag_of(id),
+        if let Some(tag) = self.commands.tag_of(id) {
+            self.written(tag, &result, at);
+        }
+        self.commands.wrote(id, result, &self.image)
+    }
+
+    /// Unless a write was read back or certainly had no effect, the present value becomes uncertain.
+    fn written(&mut self, tag: TagId, result: &WriteResult, at: Timestamp) {
+        match result {
+            WriteResult::Accepted => self.image.written(tag, None, at),
+            WriteResult::NotRead(fault) | WriteResult::Lost(fault) => self.image.written(tag, Some(*fault), at),
             WriteResult::ReadBack(_)
             | WriteResult::Held(_)
             | WriteResult::Refused(_)
             | WriteResult::NotSent(_)
-            | WriteResult::Superseded => None,
-        };
-        if let Some(tag) = uncertain {
-            self.image.failed(&[tag], Fault::Timeout, at);
+            | WriteResult::Superseded => {}
         }
-        self.commands.wrote(id, result, &self.image)
     }
 
     /// Evaluates the alarms and gathers what must be stored.

@@ -52,6 +52,8 @@ keyword_enum! {
         Unreadable = 13 => "history damaged",
         /// The history does not keep it, see [`StorePolicy`](super::tag::StorePolicy). Never stored.
         NotStored = 14 => "not stored",
+        /// Written since it was read, and not read back.
+        NotReadBack = 15 => "written, not read back",
     }
 }
 

@@ -9,7 +9,7 @@ use crate::plant::{
     alarm::AlarmState,
     command::{Command, CommandId, NotConfirmed, Refusal, WriteJob},
     def::{ActionDef, AlarmDef, AlarmId, Condition, Subject},
-    event::ExceptionCode,
+    event::{ExceptionCode, Fault},
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
     interlock::{InterlockCondition, InterlockDef},
     line_report::LineReport,

@@ -206,3 +206,27 @@ fn a_write_over_a_value_that_has_changed_is_refused() {
     plant.on_command(write, at(3));
     assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::ChangedTo("80.0 °C".into())));
 }
+
+#[test]
+fn a_written_value_is_uncertain_for_the_true_cause() {
+    let crc = Fault::Crc { got: 1, computed: 2 };
+    let check = |result: WriteResult, expect: &str| {
+        let mut def = fixture::plant();
+        def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
+        let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+        plant.on_event(read(0, &[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
+        let effects = plant.on_command(shown(&plant, 1, SV, 71.0), at(1));
+        let BusRequest::Write(WriteJob { id, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
+        plant.on_event(Event::Unlocked { at: at(2), id, key: FAULT, result: result.clone() });
+        plant.on_event(Event::Wrote { at: at(2), id, result: result.clone() });
+        for tag in [SV, FAULT] {
+            assert_eq!(plant.snapshot().sample(tag).quality.word(), expect, "{result:?}");
+        }
+    };
+    check(WriteResult::Accepted, "uncertain: written, not read back");
+    check(WriteResult::NotRead(crc), "uncertain: corrupt response");
+    check(WriteResult::Lost(crc), "uncertain: corrupt response");
+    check(WriteResult::Lost(Fault::Timeout), "uncertain: response timeout");
+    check(WriteResult::Lost(Fault::Exception(ExceptionCode(4))), "uncertain: refused by the device");
+    check(WriteResult::Refused(ExceptionCode(3)), "good");
+}

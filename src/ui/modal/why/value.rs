@@ -102,7 +102,12 @@ fn because(
         },
         // The verdict on the last answer says it all.
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown | Cause::Undefined => None,
-        Cause::NotRead | Cause::StationOff | Cause::NotAuthorised | Cause::Unreadable | Cause::NotStored => None,
+        Cause::NotRead
+        | Cause::StationOff
+        | Cause::NotAuthorised
+        | Cause::Unreadable
+        | Cause::NotStored
+        | Cause::NotReadBack => None,
     }
 }
 
@@ -136,7 +141,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
         },
         Cause::NotAuthorised => Some(t!("log in: tab 0").to_owned()),
         Cause::Undefined => Some(t!("see its inputs: a division by zero, or a number that is too large").to_owned()),
-        Cause::StationOff | Cause::Unreadable | Cause::NotStored => None,
+        Cause::StationOff | Cause::Unreadable | Cause::NotStored | Cause::NotReadBack => None,
     }
 }
 
