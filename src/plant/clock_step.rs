@@ -90,6 +90,7 @@ impl Snapshot {
         move_by(&mut day.until, by);
         self.commands.iter_mut().for_each(|status| {
             move_by(&mut status.at, by);
+            move_by(&mut status.outcome_at, by);
             status.command.kind.move_from_utc(-by);
         });
         self.watch.times().for_each(|since| move_by(since, by));

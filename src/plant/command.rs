@@ -130,6 +130,8 @@ pub struct CommandStatus {
     pub old: Option<f64>,
     /// Its outcome so far.
     pub outcome: Outcome,
+    /// When it got this outcome; when the plant accepted it, while it is pending.
+    pub outcome_at: Timestamp,
     /// The audit entry of its outcome is on disk; meaningless while it is pending.
     pub recorded: bool,
 }
@@ -138,7 +140,7 @@ impl CommandStatus {
     /// A pending command.
     pub fn new(command: Command, by: impl Into<Arc<str>>, at: Timestamp) -> CommandStatus {
         let (by, from, outcome) = (by.into(), "".into(), Outcome::Pending);
-        CommandStatus { command, by, from, at, old: None, outcome, recorded: true }
+        CommandStatus { command, by, from, at, old: None, outcome, outcome_at: at, recorded: true }
     }
 
     /// Is it still without an outcome?

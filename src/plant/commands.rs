@@ -98,16 +98,22 @@ impl CommandTracker {
     }
 
     /// Ends a pending command.
-    pub fn end(&mut self, id: CommandId, outcome: Outcome, image: &ProcessImage) -> Option<ActionRecord> {
+    pub fn end(
+        &mut self,
+        id: CommandId,
+        outcome: Outcome,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> Option<ActionRecord> {
         let status = self.commands.iter_mut().find(|status| status.command.id == id && status.is_pending())?;
-        status.outcome = outcome;
+        (status.outcome, status.outcome_at) = (outcome, at);
         Some(record(&self.def, status, image))
     }
 
     /// A line is open (or trying to be) or closed: ends the command that asked for it.
-    pub fn connected(&mut self, line: LineId, open: bool, image: &ProcessImage) -> Option<ActionRecord> {
+    pub fn connected(&mut self, line: LineId, open: bool, image: &ProcessImage, at: Timestamp) -> Option<ActionRecord> {
         let id = self.pending(|status| status.command.kind == CommandKind::Connect(line, open))?;
-        self.end(id, Outcome::Verified, image)
+        self.end(id, Outcome::Verified, image, at)
     }
 
     /// The outcome of a command; `None` once it is forgotten.
@@ -145,7 +151,13 @@ impl CommandTracker {
     }
 
     /// Ends the command of a write that has ended on the bus.
-    pub fn wrote(&mut self, id: WriteId, result: WriteResult, image: &ProcessImage) -> Option<ActionRecord> {
+    pub fn wrote(
+        &mut self,
+        id: WriteId,
+        result: WriteResult,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> Option<ActionRecord> {
         let (command, job) = self.take_write(id)?;
         let def = self.def.tag(job.tag);
         let value = |back| scale::to_value(def, back, image.scaling_decimals(def).unwrap_or(0));
@@ -157,17 +169,29 @@ impl CommandTracker {
             WriteResult::Held(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
             unread => without_read_back(&unread),
         };
-        self.end(command, outcome, image)
+        self.end(command, outcome, image, at)
     }
 
     /// A line has taken a request: ends a command that waits for nothing else.
-    pub fn delivered(&mut self, line: LineId, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
+    pub fn delivered(
+        &mut self,
+        line: LineId,
+        request: &BusRequest,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> Option<ActionRecord> {
         let id = self.of_line(line, request)?;
-        self.end(id, Outcome::Verified, image)
+        self.end(id, Outcome::Verified, image, at)
     }
 
     /// The queue of a line was full: refuses the command of the request.
-    pub fn undeliverable(&mut self, line: LineId, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
+    pub fn undeliverable(
+        &mut self,
+        line: LineId,
+        request: &BusRequest,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> Option<ActionRecord> {
         let id = match request {
             BusRequest::Write(job) => self.take_write(job.id)?.0,
             BusRequest::Connect(open) => {
@@ -177,12 +201,12 @@ impl CommandTracker {
             BusRequest::Refresh { command, .. } => {
                 let command = (*command)?;
                 let status = self.commands.iter_mut().find(|status| status.command.id == command)?;
-                status.outcome = Outcome::Refused(Refusal::Busy);
+                (status.outcome, status.outcome_at) = (Outcome::Refused(Refusal::Busy), at);
                 return None;
             }
             BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => self.of_line(line, request)?,
         };
-        self.end(id, Outcome::Refused(Refusal::Busy), image)
+        self.end(id, Outcome::Refused(Refusal::Busy), image, at)
     }
 
     /// Ends commands without a result for too long. The bus waits in real time; `speed` is plant seconds per real second.
@@ -200,16 +224,16 @@ impl CommandTracker {
         let late = self.commands.iter().filter(late).map(|status| (status.command.id, outcome(status)));
         let late: Vec<(CommandId, Outcome)> = late.collect();
         self.writes.retain(|(command, _)| late.iter().all(|(id, _)| id != command));
-        late.into_iter().filter_map(|(id, outcome)| self.end(id, outcome, image)).collect()
+        late.into_iter().filter_map(|(id, outcome)| self.end(id, outcome, image, at)).collect()
     }
 
     /// The station stops: ends every pending command.
-    pub fn stop(&mut self, image: &ProcessImage) -> Vec<ActionRecord> {
+    pub fn stop(&mut self, image: &ProcessImage, at: Timestamp) -> Vec<ActionRecord> {
         self.writes.clear();
         let pending = self.commands.iter().rev().filter(|status| status.is_pending());
         let ids: Vec<CommandId> = pending.map(|status| status.command.id).collect();
         let stopped = || Outcome::NotConfirmed(NotConfirmed::StationStopped);
-        ids.into_iter().filter_map(|id| self.end(id, stopped(), image)).collect()
+        ids.into_iter().filter_map(|id| self.end(id, stopped(), image, at)).collect()
     }
 
     /// The record that a write is about to be sent, for the case that the station ends before its outcome.

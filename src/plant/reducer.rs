@@ -184,7 +184,7 @@ impl Plant {
 
     /// Accepts a command of an operator.
     pub fn on_command(&mut self, status: CommandStatus, at: Timestamp) -> Effects {
-        let status = CommandStatus { at, ..status };
+        let status = CommandStatus { at, outcome_at: at, ..status };
         let mut effects = Effects::default();
         if !status.is_pending() {
             let refused = self.commands.finish(&status, status.outcome.clone(), &self.image);
@@ -243,7 +243,7 @@ impl Plant {
 
     /// A line accepted a request.
     pub fn on_delivered(&mut self, line: LineId, request: &BusRequest) -> Effects {
-        Effects::of_actions(self.commands.delivered(line, request, &self.image))
+        Effects::of_actions(self.commands.delivered(line, request, &self.image, self.at))
     }
 
     /// The record that a write is about to be sent; none for other requests.
@@ -253,14 +253,14 @@ impl Plant {
 
     /// The station stops: ends all pending commands.
     pub fn on_stop(&mut self) -> Effects {
-        Effects::of_actions(self.commands.stop(&self.image))
+        Effects::of_actions(self.commands.stop(&self.image, self.at))
     }
 
     /// The queue to a line was full: the request was not sent.
     pub fn on_undeliverable(&mut self, line: LineId, request: &BusRequest) -> Effects {
         let action = match self.refuse_unread_restore(request) {
             true => None,
-            false => self.commands.undeliverable(line, request, &self.image),
+            false => self.commands.undeliverable(line, request, &self.image, self.at),
         };
         let mut effects = Effects::of_actions(action);
         self.advance_restores(self.at, &mut effects);
@@ -334,7 +334,7 @@ impl Plant {
         if let Some(tag) = self.commands.tag_of(id) {
             self.written(tag, &result, at);
         }
-        self.commands.wrote(id, result, &self.image)
+        self.commands.wrote(id, result, &self.image, at)
     }
 
     /// Unless a write was read back or certainly had no effect, the present value becomes uncertain.

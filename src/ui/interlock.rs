@@ -231,8 +231,8 @@ fn last_command<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a CommandS
 /// The latest command for a tag, while how it ended is news, and whether it went well.
 fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> {
     let status = last_command(cx, command)?;
-    let real = elapsed(status.at, cx.now).as_secs_f64();
-    let passed = real / cx.snapshot.speed.clamp(0.01, 1e6);
+    let plant_s = elapsed(status.outcome_at, cx.now).as_secs_f64();
+    let real_s = plant_s / cx.snapshot.speed.clamp(0.01, 1e6);
     let (well, lasts) = match status.outcome {
         Outcome::Pending => (None, f64::MAX),
         Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(NotConfirmed::NoReadBack) => {
@@ -240,7 +240,7 @@ fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option
         }
         Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => (Some(false), FAILED_S),
     };
-    (passed <= lasts).then_some((&status.outcome, well))
+    (real_s <= lasts).then_some((&status.outcome, well))
 }
 
 /// The mark of an actuator in the mimic, by its output: what does not obey, how the last command went, what is blocked.

@@ -67,7 +67,7 @@ impl Plant {
             LineState::Connecting | LineState::Connected => None,
         };
         self.lines[line.index()].state = state;
-        let action = self.commands.connected(line, open, &self.image);
+        let action = self.commands.connected(line, open, &self.image, at);
         let Some(device_state) = gone else { return action };
         for device in self.def.devices.iter().filter(|device| device.line == line) {
             let status = &mut self.devices[device.id.index()];

@@ -86,7 +86,7 @@ impl Plant {
 
     /// A set was written into the folder, or `Err` says why not.
     pub fn on_set_written(&mut self, command: CommandId, result: Result<(), String>) -> Effects {
-        Effects::of_actions(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image))
+        Effects::of_actions(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image, self.at))
     }
 
     /// Begins a restore by reading the device: the value of a tag that is polled seldom may be hours old.
@@ -190,7 +190,7 @@ impl Plant {
             effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
         }
         if let Some(outcome) = run.outcome(&self.def) {
-            let action = self.commands.end(run.id, outcome, &self.image);
+            let action = self.commands.end(run.id, outcome, &self.image, at);
             effects.records.extend(action.map(Record::Action));
         }
     }

@@ -241,3 +241,30 @@ fn the_mimic_shows_how_a_command_went() {
     fixture.set("PLC-1.TK-2", 19.5);
     check(&fixture, None, false, "⊘ blocked");
 }
+
+#[test]
+fn a_mark_counts_from_the_outcome_of_its_command() {
+    let mut fixture = Fixture::normal();
+    fixture.set("PLC-1.AUTO", 0.0);
+    let tag = fixture.tag("PLC-1.MAN.P-1");
+    let check = |outcome: Outcome, since: i64, expect: Option<&str>| {
+        let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
+        let kind = CommandKind::Write { tag, value: 1.0 };
+        // A slow line: accepted two minutes before.
+        let accepted_at = snapshot.at - SignedDuration::from_secs(121);
+        let status = CommandStatus::new(Command::new(0, CommandId::default(), kind), "b", accepted_at);
+        let outcome_at = snapshot.at - SignedDuration::from_secs(since);
+        snapshot.commands = vec![CommandStatus { outcome, outcome_at, ..status }];
+        let mut model = model(&fixture, Theme::FULL);
+        update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
+        let shown = screen(&mut model, 80, 24);
+        let marks = ["✗ not confirmed", "✓ done"];
+        let found = marks.into_iter().find(|mark| shown.contains(mark));
+        assert_eq!(found, expect, "{since} s:\n{shown}");
+    };
+    let expired = || Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout));
+    check(expired(), 1, Some("✗ not confirmed"));
+    check(expired(), 61, None);
+    check(Outcome::Verified, 1, Some("✓ done"));
+    check(Outcome::Verified, 6, None);
+}
