@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use crate::plant::{
     Snapshot,
-    command::{Command, CommandId, CommandStatus, NotConfirmed, Outcome, Refusal},
+    command::{Command, CommandId, CommandStatus, NotConfirmed, Outcome},
     diagnostics::DiagnosticRun,
 };
 
@@ -30,6 +30,8 @@ pub struct CommandIdMap {
     sent: VecDeque<CommandStatus>,
     /// Commands without a final status in any snapshot.
     lost: VecDeque<CommandStatus>,
+    /// Commands that did not reach the plant, and why; the latest last.
+    undelivered: VecDeque<(CommandId, Arc<str>)>,
     /// The station is there: what its snapshots say of a command under way is still true.
     connected: bool,
 }
@@ -43,6 +45,7 @@ impl CommandIdMap {
             numbers: [terminal].into(),
             sent: VecDeque::new(),
             lost: VecDeque::new(),
+            undelivered: VecDeque::new(),
             connected: true,
         }
     }
@@ -65,19 +68,22 @@ impl CommandIdMap {
     }
 
     /// A command did not leave this terminal.
-    pub fn refuse(&mut self, command: &Command, by: Arc<str>, at: Timestamp, why: &str) {
-        let outcome = Outcome::Refused(Refusal::NotPermitted(why.to_owned()));
-        push(&mut self.lost, status(command, by, at, outcome), COMMANDS_MAX);
+    pub fn refuse(&mut self, id: CommandId, why: &str) {
+        push(&mut self.undelivered, (id, why.into()), COMMANDS_MAX);
     }
 
-    /// The station says that it did not take a command.
-    pub fn on_undelivered(&mut self, id: CommandId, why: String) {
-        if let Some(place) = self.sent.iter().position(|status| status.command.id.number == id.number)
-            && let Some(status) = self.sent.remove(place)
-        {
-            let outcome = Outcome::Refused(Refusal::NotPermitted(why));
-            push(&mut self.lost, CommandStatus { outcome, ..status }, COMMANDS_MAX);
+    /// A command that was sent did not reach the plant.
+    pub fn on_undelivered(&mut self, id: CommandId, why: Arc<str>) {
+        if let Some(place) = self.sent.iter().position(|status| status.command.id.number == id.number) {
+            self.sent.remove(place);
+            let own = self.renumbered(id);
+            push(&mut self.undelivered, (own, why), COMMANDS_MAX);
         }
+    }
+
+    /// The commands that did not reach the plant, and why; the latest last.
+    pub fn undelivered(&self) -> Vec<(CommandId, Arc<str>)> {
+        self.undelivered.iter().cloned().collect()
     }
 
     /// The connection has ended: what was sent and not seen may or may not have been done.

@@ -3,7 +3,9 @@
 use std::{io::IsTerminal, time::Duration};
 
 use crate::{
-    access::{Credentials, Durability, SessionRequest, control::reauthentication, session_request::Secret},
+    access::{
+        Credentials, Durability, SessionRequest, SessionStatus, control::reauthentication, session_request::Secret,
+    },
     attach::io::{connect, find},
     plant::{
         Snapshot,
@@ -171,13 +173,23 @@ impl Actor {
         let ended = |snapshot: &Snapshot| {
             snapshot.commands.iter().find(|status| status.command.id == id && !status.is_pending()).cloned()
         };
+        let undelivered = |status: &SessionStatus| {
+            status.undelivered.iter().find(|(undelivered, _)| *undelivered == id).map(|(_, why)| why.clone())
+        };
+        let Session { snapshots, status, .. } = &mut self.session;
         let wait = async {
-            let snapshot = self.session.snapshots.wait_for(|snapshot| ended(snapshot).is_some()).await;
-            snapshot.ok().and_then(|snapshot| ended(&snapshot))
+            tokio::select! {
+                snapshot = snapshots.wait_for(|snapshot| ended(snapshot).is_some()) => {
+                    snapshot.ok().and_then(|snapshot| ended(&snapshot)).ok_or(CliError::StationGone)
+                }
+                status = status.wait_for(|status| undelivered(status).is_some()) => {
+                    let why = status.ok().and_then(|status| undelivered(&status));
+                    Err(why.map_or(CliError::StationGone, |why| CliError::Failed(format!("not sent: {why}"))))
+                }
+            }
         };
         match tokio::time::timeout(OUTCOME_MAX, wait).await {
-            Ok(Some(status)) => Ok(status),
-            Ok(None) => Err(CliError::StationGone),
+            Ok(ended) => ended,
             Err(_) => Err(CliError::Failed("no outcome yet; it may or may not take effect".to_owned())),
         }
     }

@@ -86,14 +86,15 @@ fn a_pending_command_is_uncertain_until_the_station_is_back() {
 }
 
 #[test]
-fn an_undelivered_command_is_refused_with_a_reason() {
+fn an_undelivered_command_is_listed_with_its_reason() {
     let mut id_map = CommandIdMap::new(1, 3);
     let id = send(&mut id_map, 1);
-    id_map.on_undelivered(id, "station too busy".to_owned());
-    let why = |why: &str| Outcome::Refused(Refusal::NotPermitted(why.to_owned()));
-    assert_eq!(seen(&mut id_map, &[]), [(3, 1, why("station too busy"))]);
-    id_map.refuse(&request(3, 2), "anna".into(), Fixture::normal().snapshot().at, GONE);
-    assert_eq!(seen(&mut id_map, &[]), [(3, 2, why(GONE)), (3, 1, why("station too busy"))]);
+    id_map.on_undelivered(id, "station too busy".into());
+    id_map.on_undelivered(id, "station too busy".into());
+    id_map.refuse(request(3, 2).id, GONE);
+    let undelivered = [(id, "station too busy".into()), (request(3, 2).id, GONE.into())];
+    assert_eq!(id_map.undelivered(), undelivered);
+    assert_eq!(seen(&mut id_map, &[]), [], "the plant has not seen them");
     for number in 3..200 {
         send(&mut id_map, number);
     }

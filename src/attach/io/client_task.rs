@@ -1,6 +1,6 @@
 //! Feeds a session from the socket, and reconnects when the station has gone.
 
-use std::{collections::HashMap, mem, path::PathBuf, sync::Arc, time::Duration};
+use std::{collections::HashMap, path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     net::unix::{OwnedReadHalf, OwnedWriteHalf},
@@ -23,7 +23,7 @@ use crate::{
         },
     },
     history::{Answer, HistoryError, io::QueryRequest},
-    plant::{PlantDef, Snapshot},
+    plant::{PlantDef, Snapshot, command::CommandId},
     station::Request,
 };
 
@@ -96,9 +96,7 @@ impl ClientTask {
             };
             let Disconnected::Gone(why) = end else { return };
             tracing::warn!(why, "the station is disconnected");
-            self.status_sender.send_modify(|status| {
-                *status = Arc::new(SessionStatus { gone: Some(why.into()), ..SessionStatus::clone(status) });
-            });
+            self.update_status(|status| status.gone = Some(why.into()));
             for (_, waiting) in self.waiting.drain() {
                 waiting.refuse(GONE);
             }
@@ -146,16 +144,11 @@ impl ClientTask {
                 self.assembly.on_snapshot(Arc::unwrap_or_clone(snapshot)).map_err(|error| error.to_string())?;
                 self.publish_snapshot();
             }
-            ServerMessage::SessionStatus(mut status) => {
-                // Under the numbers of this terminal they are among the commands of its snapshots.
-                let undelivered = mem::take(&mut status.undelivered);
-                for (id, why) in &undelivered {
-                    self.id_map.on_undelivered(*id, why.to_string());
+            ServerMessage::SessionStatus(session) => {
+                for (id, why) in &session.undelivered {
+                    self.id_map.on_undelivered(*id, why.clone());
                 }
-                if !undelivered.is_empty() {
-                    self.publish_snapshot();
-                }
-                self.status_sender.send_replace(Arc::new(*status));
+                self.update_status(|status| *status = *session);
             }
             ServerMessage::Answer { ticket, answer } => {
                 if let Some(Waiting::Ask(reply)) = self.waiting.remove(&ticket) {
@@ -169,12 +162,24 @@ impl ClientTask {
                     let _ = reply.send(answer);
                 }
             }
-            ServerMessage::Undelivered { id, why } => {
-                self.id_map.on_undelivered(id, why);
-                self.publish_snapshot();
-            }
+            ServerMessage::Undelivered { id, why } => self.on_undelivered(id, why.into()),
         }
         Ok(())
+    }
+
+    /// A command that was sent did not reach the plant.
+    fn on_undelivered(&mut self, id: CommandId, why: Arc<str>) {
+        self.id_map.on_undelivered(id, why);
+        self.update_status(|_| {});
+    }
+
+    /// Publishes the session status after a change, with the undelivered commands under the numbers of this terminal.
+    fn update_status(&self, change: impl FnOnce(&mut SessionStatus)) {
+        self.status_sender.send_modify(|status| {
+            let status = Arc::make_mut(status);
+            change(status);
+            status.undelivered = self.id_map.undelivered();
+        });
     }
 
     /// Publishes the latest snapshot, with what became of own commands.
@@ -191,8 +196,7 @@ impl ClientTask {
                 let command = self.id_map.send(command, by, at);
                 let id = command.id;
                 if let Err(why) = enqueue(&ClientMessage::Command(Box::new(command), credentials), out) {
-                    self.id_map.on_undelivered(id, why);
-                    self.publish_snapshot();
+                    self.on_undelivered(id, why.into());
                 }
             }
             Request::Ask(QueryRequest { query, reply }) => {
@@ -261,10 +265,7 @@ impl ClientTask {
                 }
                 Err(AttachError::NoStation { .. }) => {}
                 // It is there, but does not want this terminal: its operator should know why.
-                Err(error) => self.status_sender.send_modify(|status| {
-                    let gone = Some(error.to_string().into());
-                    *status = Arc::new(SessionStatus { gone, ..SessionStatus::clone(status) });
-                }),
+                Err(error) => self.update_status(|status| status.gone = Some(error.to_string().into())),
             }
         }
     }
@@ -272,9 +273,8 @@ impl ClientTask {
     fn refuse(&mut self, request: Request) {
         match request {
             Request::Command(command, _) => {
-                let (by, at) = (self.by(), self.assembly.latest().at);
-                self.id_map.refuse(&command, by, at, GONE);
-                self.publish_snapshot();
+                self.id_map.refuse(command.id, GONE);
+                self.update_status(|_| {});
             }
             Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),
             Request::SessionRequest(_, reply) => Waiting::SessionRequest(reply).refuse(GONE),
@@ -331,7 +331,13 @@ mod tests {
     use tokio::net::UnixStream;
 
     use super::*;
-    use crate::{history::Query, plant::fixture};
+    use crate::{
+        history::Query,
+        plant::{
+            command::{Command, CommandKind},
+            fixture,
+        },
+    };
 
     #[tokio::test]
     async fn an_abandoned_query_is_cancelled_at_the_station() {
@@ -362,5 +368,41 @@ mod tests {
         assert_eq!(asked().await, ClientMessage::Cancel { ticket: 1 }, "the second is waited for");
         let _third = ask();
         assert_eq!(asked().await, ClientMessage::Ask { ticket: 3, query: query.clone() }, "cancelled once");
+    }
+
+    /// As in the process of the station: in the session status, not among the commands that the station has checked.
+    #[tokio::test]
+    async fn an_undelivered_command_is_in_the_session_status() {
+        let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
+        let (status_sender, status) = watch::channel(Arc::new(SessionStatus::default()));
+        // The station knows it as terminal 5.
+        let mut id_map = CommandIdMap::new(1, 3);
+        id_map.on_connected(1, 5);
+        let assembly = Assembly::new(fixture::shared());
+        let mut task =
+            ClientTask::new(PathBuf::new(), TerminalOrigin::default(), id_map, assembly, publish, status_sender);
+        let (out, _outbound) = mpsc::channel(4);
+        let command = |number| {
+            let id = CommandId { terminal: 3, number };
+            Request::Command(Command::new(1, id, CommandKind::TakeOver), None)
+        };
+        let check = |expect: &[(u32, &str)]| {
+            let seen = status.borrow().undelivered.clone();
+            let seen: Vec<_> = seen.iter().map(|(id, why)| (id.terminal, id.number, &**why)).collect();
+            let expect: Vec<_> = expect.iter().map(|(number, why)| (3, *number, *why)).collect();
+            assert_eq!(seen, expect);
+            assert_eq!(snapshots.borrow().commands, [], "the plant has not seen it");
+        };
+        (1..=3).for_each(|number| task.send(command(number), &out));
+        let (at_station, why) = (|number| CommandId { terminal: 5, number }, "too many commands");
+        task.on_message(ServerMessage::Undelivered { id: at_station(1), why: why.to_owned() }).unwrap();
+        check(&[(1, why)]);
+        let undelivered = vec![(at_station(2), Arc::from("too late"))];
+        let told = SessionStatus { undelivered, ..SessionStatus::default() };
+        task.on_message(ServerMessage::SessionStatus(Box::new(told))).unwrap();
+        check(&[(1, why), (2, "too late")]);
+        task.on_message(ServerMessage::SessionStatus(Box::default())).unwrap();
+        task.refuse(command(4));
+        check(&[(1, why), (2, "too late"), (4, GONE)]);
     }
 }
