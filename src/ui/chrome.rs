@@ -122,7 +122,7 @@ fn too_small(model: &Model, cx: &ViewContext, frame: &mut Frame) {
     ];
     let fits = words.iter().find(|words| super::widgets::text::width(words) <= area.width);
     canvas.text(0, 1, fits.map_or(t!("too small"), String::as_str), cx.theme.normal());
-    // The query stands above the size where there are too few rows for both.
+    // The confirmation stands above the size where there are too few rows for both.
     match &model.modal {
         Some(Modal::Confirm(confirm)) if confirm.is_quit() => {
             let y = if area.height > 2 { 2 } else { area.height.saturating_sub(1) };

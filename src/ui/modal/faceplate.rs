@@ -93,7 +93,7 @@ impl Faceplate {
         Some((command, interlock::other_state(cx, command)?))
     }
 
-    /// The query for the other state; where the command would have no effect, the query for the state that it needs
+    /// The confirmation of the other state; where the command would have no effect, that of the state that it needs
     /// comes first, as a step of its own.
     fn asked(self, cx: &ViewContext) -> Option<Modal> {
         let (_, actuator) = cx.def().logic.actuator(self.tag())?;

@@ -183,11 +183,11 @@ impl Settings {
         rows
     }
 
-    /// The query, or what is wrong; and the keys.
+    /// The prompt, or what is wrong; and the keys.
     fn pinned(&self, cx: &ViewContext, used: &LineDef, room: u16) -> Vec<(String, Style)> {
         let theme = cx.theme;
         let (words, style) = match (&self.asking, &self.problem) {
-            (Some(action), _) => (self.query(cx, used, action), theme.strong()),
+            (Some(action), _) => (self.prompt(cx, used, action), theme.strong()),
             (None, Some(problem)) => (problem.clone(), theme.trouble()),
             (None, None) => (String::new(), theme.normal()),
         };
@@ -200,7 +200,7 @@ impl Settings {
         rows.chain([(fit_words(keys, room), theme.strong())]).collect()
     }
 
-    fn query(&self, cx: &ViewContext, used: &LineDef, action: &SettingsAction) -> String {
+    fn prompt(&self, cx: &ViewContext, used: &LineDef, action: &SettingsAction) -> String {
         let restart = t!("Polling restarts; values are bad until the devices respond.");
         match action {
             SettingsAction::Apply(new) => {

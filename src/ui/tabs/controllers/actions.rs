@@ -73,7 +73,7 @@ pub(super) fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
     open(tag.and_then(|tag| Modal::write(cx, tag)))
 }
 
-/// The query whether to write this value, unless nothing can be written now.
+/// The confirmation to write this value, unless nothing can be written now.
 pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction> {
     let device = cx.def().tag(tag).device;
     open(Notice::unreachable(cx, device).map_or_else(|| Modal::Confirm(Confirm::write(cx, tag, value)), Modal::Notice))

@@ -1,4 +1,4 @@
-//! The query before a restore: what would be written, and what the profile wants said before any of it is.
+//! The confirmation before a restore: what would be written, and what the profile wants said before any of it is.
 
 use std::sync::Arc;
 
@@ -16,8 +16,8 @@ const ROOM: u16 = 68;
 /// Lines of warnings that a window of 24 rows has room for.
 const WARNINGS_MAX: usize = 6;
 
-/// The query whether to write these changes.
-pub fn query(
+/// The confirmation to write these changes.
+pub fn confirm_restore(
     cx: &ViewContext,
     device: &DeviceDef,
     source: &Source,
@@ -26,7 +26,7 @@ pub fn query(
 ) -> Confirm {
     let from: Arc<str> = source.words(cx).into();
     let count = if changes.len() == 1 { t!("1 value").to_owned() } else { t!("{count} values", count = changes.len()) };
-    let query = t!(
+    let prompt = t!(
         "Write {count} to {name}, one after the other, each read back? The first failure stops it.",
         count,
         name = device.name
@@ -43,7 +43,7 @@ pub fn query(
     notes.extend(warnings);
     let title = format!("{from} → {}", device.name);
     let request = RestoreRequest { device: device.id, from, set, changes };
-    Confirm::command(title, query, CommandKind::Restore(Box::new(request))).with_notes(notes).with_reauthentication(cx)
+    Confirm::command(title, prompt, CommandKind::Restore(Box::new(request))).with_notes(notes).with_reauthentication(cx)
 }
 
 fn change_text(cx: &ViewContext, change: &PlannedChange) -> String {

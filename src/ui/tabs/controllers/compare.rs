@@ -69,7 +69,7 @@ impl Compare {
         self.scroll.on(motion, self.rows(cx, device).len(), room);
     }
 
-    /// The query whether to write the differences, or why they cannot be written.
+    /// The confirmation to write the differences, or why they cannot be written.
     pub fn restore(&self, cx: &ViewContext, device: &DeviceDef) -> Result<Confirm, Notice> {
         let words = |words: Vec<String>| Err(Notice::new(device.name.clone(), words));
         if let Some(notice) = Notice::unreachable(cx, device.id) {
@@ -90,7 +90,7 @@ impl Compare {
                 return words(lines);
             }
         };
-        Ok(ask::query(cx, device, &self.source, set, changes))
+        Ok(ask::confirm_restore(cx, device, &self.source, set, changes))
     }
 
     /// Draws the page.

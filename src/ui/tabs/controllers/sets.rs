@@ -127,7 +127,7 @@ fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) ->
     }
 }
 
-/// What a set would hold that was taken now, for the query for its name.
+/// What a set would hold that was taken now, for the prompt for its name.
 pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
     let set = parameter_set::capture(cx.def(), device, "", "".into(), cx.now, &trusted(cx));
     match set.missing.as_slice() {
@@ -139,7 +139,7 @@ pub fn save_hint(cx: &ViewContext, device: DeviceId) -> String {
     }
 }
 
-/// The query before a set is written over: whose it is, for it may be of another kind of device.
+/// The confirmation before a set is written over: whose it is, for it may be of another kind of device.
 pub fn replace_text(cx: &ViewContext, there: &StoredSet) -> String {
     let name = &there.name;
     match &there.set {

@@ -119,7 +119,7 @@ fn what_an_interlock_blocks_is_reported_and_not_sent() {
     assert!(shown.contains(reason) && shown.contains("Not sent"), "{shown}");
     assert!(!shown.contains("write and verify"), "no key is offered that does nothing");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎y")), None);
-    // The tank is emptied while the query stands: then it may be sent.
+    // The tank is emptied while the confirmation is open: then it may be sent.
     fixture.set("PLC-1.TK-2", 12.0);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     assert!(sent_kind(&type_keys(&mut model, "⏎")).is_some());
