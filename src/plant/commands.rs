@@ -237,7 +237,7 @@ impl CommandTracker {
     }
 
     /// The record that a write is about to be sent, for the case that the station ends before its outcome.
-    pub fn intent(&self, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
+    pub fn write_requested_record(&self, request: &BusRequest, image: &ProcessImage) -> Option<ActionRecord> {
         let BusRequest::Write(job) = request else { return None };
         let (command, _) = self.writes.iter().find(|(_, write)| write.id == job.id)?;
         let status = self.commands.iter().find(|status| status.command.id == *command)?;

@@ -180,7 +180,7 @@ pub const RESTORE: &str = "restore history";
 pub const IMPORT: &str = "import samples";
 
 /// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
-/// not for shift reports and curves. So it is with the intent of a write, whose outcome is there already.
+/// not for shift reports and curves. So it is with the request of a write, whose outcome is there already.
 pub const NOT_PROCESS_ACTIONS: [&str; 34] = [
     BACKUP,
     RESTORE,

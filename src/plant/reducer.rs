@@ -247,8 +247,8 @@ impl Plant {
     }
 
     /// The record that a write is about to be sent; none for other requests.
-    pub fn intent(&self, request: &BusRequest) -> Option<ActionRecord> {
-        self.commands.intent(request, &self.image)
+    pub fn write_requested_record(&self, request: &BusRequest) -> Option<ActionRecord> {
+        self.commands.write_requested_record(request, &self.image)
     }
 
     /// The station stops: ends all pending commands.

@@ -281,8 +281,8 @@ impl PlantTask {
 
     fn apply_effects(&mut self, effects: Effects) {
         // On the way to the log before it is sent; its outcome is shown once both are on disk.
-        let intents = effects.bus.iter().filter_map(|(_, request)| self.plant.intent(request));
-        self.dispatch(intents.map(Record::Action).collect());
+        let requested = effects.bus.iter().filter_map(|(_, request)| self.plant.write_requested_record(request));
+        self.dispatch(requested.map(Record::Action).collect());
         for (line, request) in effects.bus {
             self.send(line, request);
         }

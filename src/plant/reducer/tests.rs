@@ -162,16 +162,19 @@ fn a_line_is_closed_when_it_says_so() {
 fn a_write_is_recorded_before_it_is_sent() {
     let mut plant = running();
     let effects = plant.on_command(shown(&plant, 1, SV, 61.0), at(1));
-    let intent = plant.intent(&effects.bus[0].1).expect("a write is about to be sent");
-    assert_eq!((&*intent.action, &*intent.target, &*intent.outcome), ("write requested", "TIC-1.SV", "pending"));
+    let requested = plant.write_requested_record(&effects.bus[0].1).expect("a write is about to be sent");
+    assert_eq!(
+        (&*requested.action, &*requested.target, &*requested.outcome),
+        ("write requested", "TIC-1.SV", "pending")
+    );
     assert!(
-        crate::plant::record::NOT_PROCESS_ACTIONS.contains(&&*intent.action),
+        crate::plant::record::NOT_PROCESS_ACTIONS.contains(&&*requested.action),
         "a shift report has the outcome alone"
     );
-    assert_eq!(plant.intent(&BusRequest::StopTest), None);
+    assert_eq!(plant.write_requested_record(&BusRequest::StopTest), None);
     let ended = plant.on_stop().records;
     let [Record::Action(action)] = &ended[..] else { panic!("{ended:?}") };
-    assert_eq!((&*action.action, &action.new), ("write", &intent.new));
+    assert_eq!((&*action.action, &action.new), ("write", &requested.new));
     assert_eq!(&*action.outcome, "not confirmed: the station stopped; it may have taken effect");
     assert_eq!(plant.on_stop().records, []);
 }

@@ -1,4 +1,4 @@
-//! "Do it or not": the window that carries a finished intent.
+//! "Do it or not": the window that carries an action to confirm.
 
 use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
@@ -32,10 +32,10 @@ use crate::{
     },
 };
 
-/// A finished intent and what the operator is asked about it.
+/// An action to confirm and what the operator is asked about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confirm {
-    intent: Intent,
+    action: ConfirmAction,
     title: String,
     notes: Vec<String>,
     /// Where it was asked from, and where it leads back to.
@@ -52,7 +52,7 @@ pub struct Confirm {
 
 /// What a confirmed window does.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Intent {
+pub enum ConfirmAction {
     /// Leave the terminal.
     Quit,
     /// Give a command.
@@ -69,12 +69,12 @@ impl Confirm {
             Leaving::Log => t!("The log stays as it is."),
             Leaving::Terminal => t!("Only this terminal closes. Polling and alarms continue."),
         };
-        Confirm::new(Intent::Quit, t!("quit"), vec![t!("Quit?").to_owned(), ends.to_owned()])
+        Confirm::new(ConfirmAction::Quit, t!("quit"), vec![t!("Quit?").to_owned(), ends.to_owned()])
     }
 
-    fn new(intent: Intent, title: impl Into<String>, notes: Vec<String>) -> Confirm {
+    fn new(action: ConfirmAction, title: impl Into<String>, notes: Vec<String>) -> Confirm {
         Confirm {
-            intent,
+            action,
             title: title.into(),
             notes,
             back: None,
@@ -87,18 +87,18 @@ impl Confirm {
 
     /// Is it the confirmation to leave?
     pub fn is_quit(&self) -> bool {
-        self.intent == Intent::Quit
+        self.action == ConfirmAction::Quit
     }
 
-    /// Write this value, as the device will hold it? Old and new value are drawn from the intent, so they cannot differ from
+    /// Write this value, as the device will hold it? Old and new value are drawn from the action, so they cannot differ from
     /// what is sent.
     pub fn write(cx: &ViewContext, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let rounded = rounded_text(cx, tag, value);
         let value = if rounded.is_some() { cx.snapshot.held(tag, value) } else { value };
-        let intent = Intent::Command(CommandKind::Write { tag, value });
+        let action = ConfirmAction::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
-        let confirm = Confirm::new(intent, t!("write {name}", name = def.name), notes);
+        let confirm = Confirm::new(action, t!("write {name}", name = def.name), notes);
         Confirm { expected: Some(ConfirmedValue::new(cx, tag)), ..confirm }.with_reauthentication(cx)
     }
 
@@ -118,14 +118,14 @@ impl Confirm {
 
     /// Open or close a line, or any other command, with words of its own.
     pub fn command(title: impl Into<String>, words: impl Into<String>, kind: CommandKind) -> Confirm {
-        Confirm::new(Intent::Command(kind), title, vec![words.into()])
+        Confirm::new(ConfirmAction::Command(kind), title, vec![words.into()])
     }
 
     /// The same with reauthentication, if a tag that it writes requires it.
     pub fn with_reauthentication(self, cx: &ViewContext) -> Confirm {
-        let reauthentication = match &self.intent {
-            Intent::Command(kind) => reauthentication::required(cx.def(), kind).map(reauthentication_form),
-            Intent::Quit => None,
+        let reauthentication = match &self.action {
+            ConfirmAction::Command(kind) => reauthentication::required(cx.def(), kind).map(reauthentication_form),
+            ConfirmAction::Quit => None,
         };
         Confirm { reauthentication, ..self }
     }
@@ -143,10 +143,10 @@ impl Confirm {
 
     /// What Enter does.
     pub fn verb(&self) -> &'static str {
-        match &self.intent {
-            Intent::Quit => t!("quit"),
-            Intent::Command(CommandKind::Write { .. }) => t!("write and verify"),
-            Intent::Command(CommandKind::Alarm(alarm_command)) => match alarm_command {
+        match &self.action {
+            ConfirmAction::Quit => t!("quit"),
+            ConfirmAction::Command(CommandKind::Write { .. }) => t!("write and verify"),
+            ConfirmAction::Command(CommandKind::Alarm(alarm_command)) => match alarm_command {
                 AlarmCommand::Acknowledge { .. } | AlarmCommand::AcknowledgeAll { .. } => t!("acknowledge"),
                 AlarmCommand::Silence => t!("silence"),
                 AlarmCommand::Reset(_) => t!("reset"),
@@ -155,28 +155,28 @@ impl Confirm {
                 AlarmCommand::OutOfService(_) => t!("take out of service"),
                 AlarmCommand::InService(_) => t!("return to service"),
             },
-            Intent::Command(CommandKind::Refresh(_)) => t!("refresh"),
-            Intent::Command(CommandKind::Connect(_, true)) => t!("connect"),
-            Intent::Command(CommandKind::Connect(_, false)) => t!("disconnect"),
-            Intent::Command(CommandKind::Configure(_)) => t!("apply these settings"),
-            Intent::Command(CommandKind::SaveSettings(_)) => t!("save"),
-            Intent::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => t!("scan"),
-            Intent::Command(CommandKind::Test(_, Diagnostic::Sweep(_))) => t!("map"),
-            Intent::Command(CommandKind::Test(_, Diagnostic::Write(_))) => t!("write and verify"),
-            Intent::Command(CommandKind::Test(..)) => t!("send"),
-            Intent::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => t!("stop"),
-            Intent::Command(CommandKind::ReadSets) => t!("read"),
-            Intent::Command(CommandKind::HandOver) => t!("hand over"),
-            Intent::Command(CommandKind::TakeOver) => t!("take over"),
-            Intent::Command(CommandKind::SaveSet { replace: true, .. }) => t!("replace it"),
-            Intent::Command(CommandKind::SaveSet { replace: false, .. }) => t!("save"),
-            Intent::Command(CommandKind::Restore(_)) => t!("write and verify"),
+            ConfirmAction::Command(CommandKind::Refresh(_)) => t!("refresh"),
+            ConfirmAction::Command(CommandKind::Connect(_, true)) => t!("connect"),
+            ConfirmAction::Command(CommandKind::Connect(_, false)) => t!("disconnect"),
+            ConfirmAction::Command(CommandKind::Configure(_)) => t!("apply these settings"),
+            ConfirmAction::Command(CommandKind::SaveSettings(_)) => t!("save"),
+            ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => t!("scan"),
+            ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Sweep(_))) => t!("map"),
+            ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Write(_))) => t!("write and verify"),
+            ConfirmAction::Command(CommandKind::Test(..)) => t!("send"),
+            ConfirmAction::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => t!("stop"),
+            ConfirmAction::Command(CommandKind::ReadSets) => t!("read"),
+            ConfirmAction::Command(CommandKind::HandOver) => t!("hand over"),
+            ConfirmAction::Command(CommandKind::TakeOver) => t!("take over"),
+            ConfirmAction::Command(CommandKind::SaveSet { replace: true, .. }) => t!("replace it"),
+            ConfirmAction::Command(CommandKind::SaveSet { replace: false, .. }) => t!("save"),
+            ConfirmAction::Command(CommandKind::Restore(_)) => t!("write and verify"),
         }
     }
 
     /// What is sent to a line past all limits of the plant file comes behind an Enter: a second one must not send it.
     fn wants_y(&self) -> bool {
-        matches!(&self.intent, Intent::Command(CommandKind::Test(..)))
+        matches!(&self.action, ConfirmAction::Command(CommandKind::Test(..)))
     }
 
     /// The key that does it.
@@ -191,9 +191,9 @@ impl Confirm {
 
     /// Is it certainly without effect now?
     pub(super) fn is_refused(&self, cx: &ViewContext) -> bool {
-        match &self.intent {
-            Intent::Command(CommandKind::Write { tag, value }) => interlock::is_refused(cx, *tag, *value),
-            Intent::Command(_) | Intent::Quit => false,
+        match &self.action {
+            ConfirmAction::Command(CommandKind::Write { tag, value }) => interlock::is_refused(cx, *tag, *value),
+            ConfirmAction::Command(_) | ConfirmAction::Quit => false,
         }
     }
 
@@ -219,7 +219,7 @@ impl Confirm {
                 None => Next::Close,
             }
         } else {
-            let write = matches!(self.intent, Intent::Command(CommandKind::Write { .. }));
+            let write = matches!(self.action, ConfirmAction::Command(CommandKind::Write { .. }));
             let other = mimic::command_of(cx, event).filter(|_| write);
             Next::Stay(other.unwrap_or(Modal::Confirm(self)))
         }
@@ -235,9 +235,9 @@ impl Confirm {
             self.problem = Some(why);
             return Next::Stay(Modal::Confirm(self));
         }
-        let act = match &self.intent {
-            Intent::Quit => UiAction::Do(Effect::Quit),
-            Intent::Command(kind) => {
+        let act = match &self.action {
+            ConfirmAction::Quit => UiAction::Do(Effect::Quit),
+            ConfirmAction::Command(kind) => {
                 let expected = self.expected.as_ref().and_then(|expected| expected.shown(cx));
                 let credentials = self.reauthentication.as_ref().map(credentials);
                 UiAction::SendCommand(Command { expected_value: expected, ..kind.clone().into() }, credentials)
@@ -300,21 +300,21 @@ impl Confirm {
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let room = body.width.saturating_sub(8).min(68);
         let mut rows: Vec<(String, Style)> = Vec::new();
-        if let Intent::Command(CommandKind::Write { tag, value }) = &self.intent {
+        if let ConfirmAction::Command(CommandKind::Write { tag, value }) = &self.action {
             let change = old_and_new(cx, *tag, *value);
             let lines = if width(&change) <= room { vec![change] } else { wrap(&change, room) };
             rows.extend(lines.into_iter().map(|line| (line, cx.theme.strong())));
             rows.push((wire_text(cx.def().tag(*tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
-        if let Intent::Command(CommandKind::Write { tag, value }) = &self.intent {
+        if let ConfirmAction::Command(CommandKind::Write { tag, value }) = &self.action {
             // As it stands now: what was true when the window opened may have changed under it.
             let notes = interlock::before_write(cx, *tag, *value).into_iter();
             rows.extend(notes.flat_map(|(note, style)| wrap(&note, room).into_iter().map(move |line| (line, style))));
         }
-        let missing = match &self.intent {
-            Intent::Command(kind) => rights::missing(cx, kind),
-            Intent::Quit => None,
+        let missing = match &self.action {
+            ConfirmAction::Command(kind) => rights::missing(cx, kind),
+            ConfirmAction::Quit => None,
         };
         let news = self.expected.as_ref().and_then(|expected| expected.news(cx)).map(|words| cx.theme.enter(&words));
         let notes = news.into_iter().chain(missing);

@@ -1,4 +1,4 @@
-//! Windows on top of a tab: they get every key until they close, and carry the finished intent.
+//! Windows on top of a tab: they get every key until they close, and carry the action to confirm.
 
 pub(crate) mod choice;
 pub(crate) mod confirm;

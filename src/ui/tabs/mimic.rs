@@ -210,12 +210,12 @@ fn scale(cx: &ViewContext, area: Rect) -> CanvasScale {
 /// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
 pub fn command_of(cx: &ViewContext, event: KeyEvent) -> Option<Modal> {
     let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event))?;
-    intent(cx, command)
+    command_window(cx, command)
 }
 
 /// The window of a plant command, or why it cannot be given: a fixed value or the other of two states is asked at once; a toggle of a state that
 /// unknown value becomes a list, and anything else is entered.
-fn intent(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
+fn command_window(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     let tag = command.tag;
     let def = cx.def().tag(tag);
     if let Some(notice) = Notice::unreachable(cx, def.device) {
