@@ -93,7 +93,7 @@ impl Snapshot {
             move_by(&mut status.outcome_at, by);
             status.command.kind.move_from_utc(-by);
         });
-        self.watch.times().for_each(|since| move_by(since, by));
+        self.actuators.times().for_each(|since| move_by(since, by));
         self.restores.iter_mut().for_each(|run| {
             let at: &mut Restore = Arc::make_mut(run);
             move_by(&mut at.at, by);

@@ -77,12 +77,12 @@ pub struct Plant {
     alarm_monitor: AlarmMonitor,
     alarm_metrics: AlarmMetrics,
     commands: CommandTracker,
-    watch: ActuatorTracker,
+    actuators: ActuatorTracker,
     /// By place in [`PlantDef::batches`].
     batches: Vec<BatchTracker>,
     lines: Vec<LineStatus>,
     /// Earlier reports, by [`LineId`].
-    watches: Vec<LineMinuteTracker>,
+    line_minutes: Vec<LineMinuteTracker>,
     devices: Vec<DeviceStatus>,
     /// The last request for each tag, by [`TagId`].
     source_frames: Arc<Vec<Option<Arc<Exchange>>>>,
@@ -109,10 +109,10 @@ impl Plant {
             alarm_monitor: AlarmMonitor::running(at),
             alarm_metrics: AlarmMetrics::default(),
             commands: CommandTracker::new(def.clone()),
-            watch: ActuatorTracker::default(),
+            actuators: ActuatorTracker::default(),
             batches: vec![BatchTracker::default(); def.batches.len()],
             lines: vec![LineStatus::default(); def.lines.len()],
-            watches: vec![LineMinuteTracker::default(); def.lines.len()],
+            line_minutes: vec![LineMinuteTracker::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
             source_frames: Arc::new(vec![None; def.tags.len()]),
             history: HistoryStatus::default(),
@@ -305,12 +305,12 @@ impl Plant {
             sound: lists.sound,
             alarm_metrics: self.alarm_metrics.clone(),
             commands: self.commands.shown(),
-            watch: self.watch.clone(),
+            actuators: self.actuators.clone(),
             history: self.history.clone(),
             station: self.faults.details.clone(),
             sets: self.sets.clone(),
             restores: self.restores.clone(),
-            tunings: self.tunings.iter().map(|watch| watch.tuning.clone()).collect(),
+            tunings: self.tunings.iter().map(|tracker| tracker.tuning.clone()).collect(),
             programs: self.programs.iter().map(ProgramWatch::elapsed).collect(),
             speed: self.speed,
         }
@@ -356,7 +356,7 @@ impl Plant {
         self.image.calculate();
         let asked = self.watch_controllers();
         let image = &self.image;
-        self.watch.update(&self.def.logic, |tag| image.sample(tag), self.at);
+        self.actuators.update(&self.def.logic, |tag| image.sample(tag), self.at);
         let steps = self.evaluate_alarms();
         let mut records = self.image.records(self.at);
         records.extend(steps.into_iter().map(Record::Alarm));

@@ -69,7 +69,7 @@ pub struct Snapshot {
     /// The latest commands, newest first, at most 32.
     pub commands: Vec<CommandStatus>,
     /// Since when actuators have not obeyed.
-    pub watch: ActuatorTracker,
+    pub actuators: ActuatorTracker,
     /// The history store.
     pub history: HistoryStatus,
     /// The details of each fault that the station has or had.
@@ -105,7 +105,7 @@ impl Snapshot {
             sound: false,
             alarm_metrics: AlarmMetrics::default(),
             commands: Vec::new(),
-            watch: ActuatorTracker::default(),
+            actuators: ActuatorTracker::default(),
             history: HistoryStatus::default(),
             station: Arc::default(),
             sets: Arc::default(),

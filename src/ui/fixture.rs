@@ -168,7 +168,7 @@ impl Fixture {
             Decimals::From(_) => 1,
         });
         Arc::new(Snapshot {
-            watch: crate::plant::interlock::ActuatorTracker::default(),
+            actuators: crate::plant::interlock::ActuatorTracker::default(),
             texts: Arc::new(vec![None; self.def.tags.len()]),
             source_frames: Arc::new(self.source_frames.clone()),
             at: now(),

@@ -248,7 +248,7 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
     let theme = cx.theme;
     let logic = &cx.def().logic;
     let (place, actuator) = logic.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
-    if cx.snapshot.watch.disobeys(logic, place, cx.snapshot.at).is_some() {
+    if cx.snapshot.actuators.disobeys(logic, place, cx.snapshot.at).is_some() {
         let commanded = cx.snapshot.text(actuator.command).unwrap_or_default();
         return Some((t!("{pick} not {commanded}", pick = theme.pick("≠", "!="), commanded), theme.trouble()));
     }
@@ -320,5 +320,5 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
 }
 
 fn guards_disobeyed(cx: &ViewContext, place: usize) -> Option<Duration> {
-    cx.snapshot.watch.disobeys(&cx.def().logic, place, cx.snapshot.at)
+    cx.snapshot.actuators.disobeys(&cx.def().logic, place, cx.snapshot.at)
 }

@@ -16,8 +16,8 @@ use crate::plant::{
 impl Plant {
     /// The minutes of lines that end now.
     pub(super) fn minutes(&mut self, at: Timestamp) -> Vec<Record> {
-        let lines = self.def.lines.iter().zip(&self.lines).zip(&mut self.watches);
-        let minutes = lines.filter_map(|((def, line), watch)| watch.tick(at, &def.name, line.report.as_ref()?));
+        let lines = self.def.lines.iter().zip(&self.lines).zip(&mut self.line_minutes);
+        let minutes = lines.filter_map(|((def, line), tracker)| tracker.tick(at, &def.name, line.report.as_ref()?));
         minutes.map(Record::Line).collect()
     }
 
@@ -45,9 +45,9 @@ impl Plant {
     pub(super) fn diagnosed(&self) -> Vec<DeviceStatus> {
         let diagnosed = |(def, status): (&crate::plant::def::DeviceDef, &DeviceStatus)| {
             let line = &self.lines[def.line.index()];
-            let watch = &self.watches[def.line.index()];
+            let tracker = &self.line_minutes[def.line.index()];
             let report = line.report.as_deref();
-            let lately = report.map(|report| watch.lately(report, def.id)).unwrap_or_default();
+            let lately = report.map(|report| tracker.lately(report, def.id)).unwrap_or_default();
             let timeout = report.map_or(self.def.line(def.line).timeout, |report| report.settings.timeout);
             let settling = self.settling(def.id);
             let input = DiagnosisInput { device: status.state, line: &line.state, settling, lately: &lately, timeout };

@@ -362,7 +362,7 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
     let late = |plant: &Plant, second: i64| {
         let snapshot = plant.snapshot();
-        snapshot.watch.disobeys(&snapshot.def.logic, 0, at(second)).map(|span| span.as_secs())
+        snapshot.actuators.disobeys(&snapshot.def.logic, 0, at(second)).map(|span| span.as_secs())
     };
     plant.on_event(read(0, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
     plant.on_event(read(3, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));

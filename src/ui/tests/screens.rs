@@ -96,7 +96,7 @@ fn commanded() -> Snapshot {
     let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
     let samples = snapshot.samples.clone();
     let since = snapshot.at - SignedDuration::from_secs(8);
-    snapshot.watch.update(&snapshot.def.logic, |tag| samples[tag.index()], since);
+    snapshot.actuators.update(&snapshot.def.logic, |tag| samples[tag.index()], since);
     snapshot
 }
 

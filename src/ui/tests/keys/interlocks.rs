@@ -223,7 +223,7 @@ fn the_mimic_shows_how_a_command_went() {
         if disobeys {
             let samples = snapshot.samples.clone();
             let since = at - SignedDuration::from_secs(8);
-            snapshot.watch.update(&snapshot.def.logic, |tag| samples[tag.index()], since);
+            snapshot.actuators.update(&snapshot.def.logic, |tag| samples[tag.index()], since);
         }
         let mut model = model(fixture, Theme::FULL);
         update(&mut model, Msg::Snapshot(Arc::new(snapshot)));
