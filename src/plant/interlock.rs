@@ -1,4 +1,4 @@
-//! What stands between a command and its effect: interlocks, the mode in which an actuator listens, and whether it obeys.
+//! What stands between a command and its effect: interlocks, the mode in which a command is effective, and whether the feedback follows it.
 
 use std::time::Duration;
 
@@ -134,10 +134,10 @@ impl ControlLogic {
         else {
             return false;
         };
-        let listens = actuator.needs.iter().all(|(tag, state)| sample(*tag).good_value() == Some(*state));
+        let is_effective = actuator.needs.iter().all(|(tag, state)| sample(*tag).good_value() == Some(*state));
         let mut locks = self.interlocks_of(actuator.command, command);
         let blocked = locks.any(|lock| lock.status(sample(lock.of)) == InterlockStatus::Blocked);
-        actuator.travel.is_some() && listens && !blocked && (command != actuator.off) != (output != 0.0)
+        actuator.travel.is_some() && is_effective && !blocked && (command != actuator.off) != (output != 0.0)
     }
 }
 
@@ -155,7 +155,7 @@ pub fn is_stop(def: &PlantDef, tag: TagId, held: f64) -> bool {
     stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| off == held)
 }
 
-/// Since when each actuator has not obeyed, by its place in [`ControlLogic::actuators`].
+/// Since when the feedback of each actuator has differed from its command, by its place in [`ControlLogic::actuators`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ActuatorTracker {
     since: Vec<Option<Timestamp>>,
@@ -174,8 +174,8 @@ impl ActuatorTracker {
         }
     }
 
-    /// How long the actuator in this place has not obeyed, once that is longer than its travel takes.
-    pub fn disobeys(&self, logic: &ControlLogic, place: usize, at: Timestamp) -> Option<Duration> {
+    /// How long the feedback of the actuator in this place has differed from its command, once that is longer than its travel takes.
+    pub fn feedback_mismatch(&self, logic: &ControlLogic, place: usize, at: Timestamp) -> Option<Duration> {
         let since = (*self.since.get(place)?)?;
         let travel = logic.actuators.get(place)?.travel?;
         let lasts = elapsed(since, at);
@@ -251,14 +251,14 @@ mod tests {
     }
 
     #[test]
-    fn an_actuator_that_does_not_obey_is_reported_after_its_travel() {
+    fn a_feedback_mismatch_is_reported_after_the_travel_time() {
         let check = |auto: Sample, command: Sample, output: Sample, level: Sample, expect: Option<u64>| {
             let (logic, mut watch) = (logic(true), ActuatorTracker::default());
             let sample = |tag: TagId| [auto, command, output, level][tag.index()];
             watch.update(&logic, sample, at(10));
-            assert_eq!(watch.disobeys(&logic, 0, at(14)), None, "it may still travel");
+            assert_eq!(watch.feedback_mismatch(&logic, 0, at(14)), None, "it may still travel");
             watch.update(&logic, sample, at(15));
-            assert_eq!(watch.disobeys(&logic, 0, at(15)).map(|span| span.as_secs()), expect);
+            assert_eq!(watch.feedback_mismatch(&logic, 0, at(15)).map(|span| span.as_secs()), expect);
         };
         let (on, off, high) = (good(1.0), good(0.0), good(9.0));
         check(off, on, off, high, Some(5));
@@ -273,12 +273,16 @@ mod tests {
     }
 
     #[test]
-    fn an_actuator_that_obeys_again_starts_over() {
+    fn a_feedback_mismatch_that_ends_starts_over() {
         let (logic, mut watch) = (logic(true), ActuatorTracker::default());
         for (second, output, expect) in [(0, 0.0, None), (5, 0.0, Some(5)), (6, 1.0, None), (7, 0.0, None)] {
             let sample = |tag: TagId| [good(0.0), good(1.0), good(output), good(9.0)][tag.index()];
             watch.update(&logic, sample, at(second));
-            assert_eq!(watch.disobeys(&logic, 0, at(second)).map(|span| span.as_secs()), expect, "at {second} s");
+            assert_eq!(
+                watch.feedback_mismatch(&logic, 0, at(second)).map(|span| span.as_secs()),
+                expect,
+                "at {second} s"
+            );
         }
     }
 }

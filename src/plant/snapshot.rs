@@ -68,7 +68,7 @@ pub struct Snapshot {
     pub alarm_metrics: AlarmMetrics,
     /// The latest commands, newest first, at most 32.
     pub commands: Vec<CommandStatus>,
-    /// Since when actuators have not obeyed.
+    /// Since when the feedback of actuators has differed from their commands.
     pub actuators: ActuatorTracker,
     /// The history store.
     pub history: HistoryStatus,

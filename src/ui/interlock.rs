@@ -243,12 +243,12 @@ fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option
     (real_s <= lasts).then_some((&status.outcome, well))
 }
 
-/// The mark of an actuator in the mimic, by its output: what does not obey, how the last command went, what is blocked.
+/// The mark of an actuator in the mimic, by its output: what does not follow its command, how the last command went, what is blocked.
 pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
     let theme = cx.theme;
     let logic = &cx.def().logic;
     let (place, actuator) = logic.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
-    if cx.snapshot.actuators.disobeys(logic, place, cx.snapshot.at).is_some() {
+    if cx.snapshot.actuators.feedback_mismatch(logic, place, cx.snapshot.at).is_some() {
         let commanded = cx.snapshot.text(actuator.command).unwrap_or_default();
         return Some((t!("{pick} not {commanded}", pick = theme.pick("≠", "!="), commanded), theme.trouble()));
     }
@@ -264,7 +264,7 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
         // A command that cannot be read back was taken, which says nothing while it is blocked.
         Some((Outcome::NotConfirmed(_), Some(true))) if blocked => {}
         // Only while the output is as commanded: another mode may have taken over since.
-        Some((outcome, Some(true))) if obeys(cx, actuator) => {
+        Some((outcome, Some(true))) if follows_command(cx, actuator) => {
             let word = match outcome {
                 Outcome::NotConfirmed(_) => t!("accepted"),
                 Outcome::Unchanged => t!("unchanged"),
@@ -278,7 +278,7 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
 }
 
 /// Is the output certainly as commanded? One that need not follow its command counts as such.
-fn obeys(cx: &ViewContext, actuator: &ActuatorDef) -> bool {
+fn follows_command(cx: &ViewContext, actuator: &ActuatorDef) -> bool {
     let command = cx.snapshot.sample(actuator.command).good_value().map(|command| command != actuator.off);
     actuator.travel.is_none() || (command.is_some() && value::is_on(cx, actuator.output) == command)
 }
@@ -300,7 +300,7 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     }
     let locks = logic.interlocks.iter().filter(|lock| lock.tag == actuator.command);
     rows.extend(locks.filter_map(|lock| interlock_text(cx, lock)).map(|(words, style)| (t!("blocked"), words, style)));
-    if let Some(lasts) = guards_disobeyed(cx, place) {
+    if let Some(lasts) = feedback_mismatch(cx, place) {
         let (wanted, is) = (commanded.text, value::show(cx, actuator.output).with_unit());
         let words = t!(
             "{pick} commanded {wanted}, still {is} after {age}",
@@ -319,6 +319,6 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     rows
 }
 
-fn guards_disobeyed(cx: &ViewContext, place: usize) -> Option<Duration> {
-    cx.snapshot.actuators.disobeys(&cx.def().logic, place, cx.snapshot.at)
+fn feedback_mismatch(cx: &ViewContext, place: usize) -> Option<Duration> {
+    cx.snapshot.actuators.feedback_mismatch(&cx.def().logic, place, cx.snapshot.at)
 }

@@ -353,7 +353,7 @@ fn an_interlock_refuses_with_its_reason_but_never_a_stop() {
 }
 
 #[test]
-fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
+fn a_feedback_mismatch_is_in_the_snapshot() {
     use crate::plant::interlock::{ActuatorDef, ControlLogic};
     let mut def = fixture::plant();
     let travel = Some(Duration::from_secs(5));
@@ -362,11 +362,11 @@ fn an_actuator_that_does_not_obey_is_in_the_snapshot() {
     let mut plant = Plant::new(std::sync::Arc::new(def), at(0), 1.0);
     let late = |plant: &Plant, second: i64| {
         let snapshot = plant.snapshot();
-        snapshot.actuators.disobeys(&snapshot.def.logic, 0, at(second)).map(|span| span.as_secs())
+        snapshot.actuators.feedback_mismatch(&snapshot.def.logic, 0, at(second)).map(|span| span.as_secs())
     };
     plant.on_event(read(0, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
     plant.on_event(read(3, &[(fixture::RUN, 1.0), (FAULT, 0.0)]));
     assert_eq!((late(&plant, 4), late(&plant, 6)), (None, Some(6)));
     plant.on_event(read(7, &[(fixture::RUN, 1.0), (FAULT, 1.0)]));
-    assert_eq!(late(&plant, 20), None, "it has obeyed");
+    assert_eq!(late(&plant, 20), None, "it has followed");
 }

@@ -243,7 +243,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
         Some(format!("{} {}", def.tag(tag).name, snapshot.format(tag, now)))
     });
     let stubborn = def.logic.actuators.iter().enumerate().filter_map(|(n, actuator)| {
-        let lasts = snapshot.actuators.disobeys(&def.logic, n, cx.now)?;
+        let lasts = snapshot.actuators.feedback_mismatch(&def.logic, n, cx.now)?;
         Some(t!(
             "{name} has not followed its command for {running}",
             name = def.tag(actuator.output).name,

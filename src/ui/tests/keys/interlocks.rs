@@ -210,7 +210,7 @@ fn the_mimic_shows_how_a_command_went() {
     fixture.set("PLC-1.AUTO", 0.0);
     let tag = fixture.tag("PLC-1.MAN.P-1");
     let id = CommandId { terminal: 9, number: 1 };
-    let check = |fixture: &Fixture, outcome: Option<Outcome>, disobeys: bool, expect: &str| {
+    let check = |fixture: &Fixture, outcome: Option<Outcome>, mismatch: bool, expect: &str| {
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         let kind = CommandKind::Write { tag, value: 1.0 };
         let at = snapshot.at;
@@ -220,7 +220,7 @@ fn the_mimic_shows_how_a_command_went() {
             ..CommandStatus::new(Command::new(0, id, kind), "b", at)
         };
         snapshot.commands = outcome.map(status).into_iter().collect();
-        if disobeys {
+        if mismatch {
             let samples = snapshot.samples.clone();
             let since = at - SignedDuration::from_secs(8);
             snapshot.actuators.update(&snapshot.def.logic, |tag| samples[tag.index()], since);

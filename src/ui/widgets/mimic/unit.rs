@@ -69,7 +69,7 @@ pub fn pump(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, tag:
 /// Columns right of a symbol, and left of it, in which room for its mark is looked for.
 const MARK_REACH: (u16, u16) = (14, 6);
 
-/// What there is to say of an actuator beyond its state: blocked, sent, failed, not obeying. It is drawn when all else is,
+/// What there is to say of an actuator beyond its state: blocked, sent, failed, feedback mismatch. It is drawn when all else is,
 /// in the first of these rows that has room for its word, else for its shape: it never hides a number.
 pub fn mark(cx: &ViewContext, canvas: &mut Canvas, x: u16, rows: &[u16], tag: TagId) {
     let Some((words, style)) = interlock::mark(cx, tag) else { return };
