@@ -116,7 +116,7 @@ impl TabView for Controllers {
                 let title = t!("save the settings of {name} as a set", name = device.name);
                 return open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")));
             }
-            Action::All | Action::Turnaround => return self.in_compare(cx, action),
+            Action::All | Action::SwapDirection => return self.in_compare(cx, action),
             Action::Why
             | Action::Refresh
             | Action::Actions
@@ -147,7 +147,7 @@ impl TabView for Controllers {
                 (Action::Defaults, cx.def().tags_of(device.id).all(|tag| tag.default.is_none())),
                 (Action::Control(keys::ProgramCommand::Hold), program.is_none_or(|program| program.halt.is_none())),
                 (Action::Stop, cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work())),
-                (Action::Turnaround, !copies),
+                (Action::SwapDirection, !copies),
             ];
             hide(&mut keys, &lacking);
         }

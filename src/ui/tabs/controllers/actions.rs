@@ -51,7 +51,7 @@ impl Controllers {
             | Action::Turn(_)
             | Action::Save
             | Action::All
-            | Action::Turnaround => Vec::new(),
+            | Action::SwapDirection => Vec::new(),
         }
     }
 }

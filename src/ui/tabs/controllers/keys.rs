@@ -53,7 +53,7 @@ pub enum Action {
     /// Show what is the same too, or hide it.
     All,
     /// Copy the other way round.
-    Turnaround,
+    SwapDirection,
     /// Stop the restore at work.
     Stop,
 }
@@ -155,7 +155,7 @@ const COMPARE: &[Key<Action>] = &[
         .needs(Role::Technician),
     Key::new(char('x'), "stop", "stop after the current write", Action::Stop).needs(Role::Technician),
     Key::new(char('='), "all", "show or hide equal settings", Action::All),
-    Key::new(char('t'), "reverse", "copy in the other direction", Action::Turnaround),
+    Key::new(char('t'), "reverse", "copy in the other direction", Action::SwapDirection),
     ACTIONS,
     REFRESH,
     GUIDE,
