@@ -9,7 +9,7 @@ use tokio::{
 };
 
 use super::{
-    connect::{self, AttachError, Line},
+    connect::{self, AttachError, Connection},
     wire::{self, WireError},
 };
 use crate::{
@@ -55,7 +55,7 @@ impl Waiting {
 /// Sole owner of the socket of a terminal.
 pub struct ClientTask {
     path: PathBuf,
-    place: TerminalOrigin,
+    origin: TerminalOrigin,
     id_map: CommandIdMap,
     /// The plant as the station has it; what is published may differ by own commands.
     assembly: Assembly,
@@ -77,21 +77,21 @@ impl ClientTask {
     /// A task that has published the first snapshot.
     pub fn new(
         path: PathBuf,
-        place: TerminalOrigin,
+        origin: TerminalOrigin,
         id_map: CommandIdMap,
         assembly: Assembly,
         publish: watch::Sender<Arc<Snapshot>>,
         status_sender: watch::Sender<Arc<SessionStatus>>,
     ) -> ClientTask {
-        ClientTask { path, place, id_map, assembly, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
+        ClientTask { path, origin, id_map, assembly, publish, status_sender, waiting: HashMap::new(), last_ticket: 0 }
     }
 
     /// Runs until all handles of the session are dropped.
-    pub async fn run(mut self, line: Line, mut requests: mpsc::Receiver<(u32, Request)>) {
-        let mut line = Some(line);
+    pub async fn run(mut self, connection: Connection, mut requests: mpsc::Receiver<(u32, Request)>) {
+        let mut connection = Some(connection);
         loop {
-            let end = match line.take() {
-                Some(Line { read, write, .. }) => self.serve(read, write, &mut requests).await,
+            let end = match connection.take() {
+                Some(Connection { read, write, .. }) => self.serve(read, write, &mut requests).await,
                 None => Disconnected::Left,
             };
             let Disconnected::Gone(why) = end else { return };
@@ -102,7 +102,7 @@ impl ClientTask {
             }
             self.id_map.on_disconnected();
             self.publish_snapshot();
-            line = self.reconnect(&mut requests).await;
+            connection = self.reconnect(&mut requests).await;
         }
     }
 
@@ -241,15 +241,15 @@ impl ClientTask {
     }
 
     /// Reconnects to the station; `None` when all handles of the session are dropped.
-    async fn reconnect(&mut self, requests: &mut mpsc::Receiver<(u32, Request)>) -> Option<Line> {
+    async fn reconnect(&mut self, requests: &mut mpsc::Receiver<(u32, Request)>) -> Option<Connection> {
         let mut pause = PAUSE_MIN;
         loop {
             let at = Instant::now() + pause;
             pause = (pause * 2).min(PAUSE_MAX);
-            let (path, place) = (self.path.clone(), self.place.clone());
+            let (path, origin) = (self.path.clone(), self.origin.clone());
             let try_again = async {
                 sleep_until(at).await;
-                connect::open(&path, &place).await
+                connect::open(&path, &origin).await
             };
             tokio::pin!(try_again);
             let opened = loop {
@@ -259,9 +259,9 @@ impl ClientTask {
                 }
             };
             match opened {
-                Ok(line) => {
-                    self.start_over(&line.reply);
-                    return Some(line);
+                Ok(connection) => {
+                    self.start_over(&connection.reply);
+                    return Some(connection);
                 }
                 Err(AttachError::NoStation { .. }) => {}
                 // It is there, but does not want this terminal: its operator should know why.
@@ -342,7 +342,7 @@ mod tests {
     #[tokio::test]
     async fn an_abandoned_query_is_cancelled_at_the_station() {
         let (publish, _snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
-        let (status_sender, _standing) = watch::channel(Arc::new(SessionStatus::default()));
+        let (status_sender, _status) = watch::channel(Arc::new(SessionStatus::default()));
         let (id_map, assembly) = (CommandIdMap::new(1, 1), Assembly::new(fixture::shared()));
         let mut task =
             ClientTask::new(PathBuf::new(), TerminalOrigin::default(), id_map, assembly, publish, status_sender);

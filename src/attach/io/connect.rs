@@ -63,8 +63,8 @@ pub enum AttachError {
     OtherPlant(#[from] OtherPlant),
 }
 
-/// A connection that was welcomed.
-pub(super) struct Line {
+/// A connection that the station has accepted.
+pub(super) struct Connection {
     pub read: OwnedReadHalf,
     pub write: OwnedWriteHalf,
     pub reply: HandshakeReply,
@@ -73,40 +73,40 @@ pub(super) struct Line {
 /// Attaches to the station that listens at this path. The session feeds itself from now on: when the station goes, the
 /// status says so at once, and it is sought again for as long as a handle of the session exists.
 pub async fn connect(path: &Path) -> Result<Session, AttachError> {
-    let place = here();
-    let mut line = open(path, &place).await?;
+    let origin = here();
+    let mut connection = open(path, &origin).await?;
     let (status, assembly) =
-        timeout(HANDSHAKE_REPLY_MAX, first(&mut line)).await.unwrap_or(Err(AttachError::Silent))?;
-    let HandshakeReply { run, terminal, .. } = line.reply;
+        timeout(HANDSHAKE_REPLY_MAX, first(&mut connection)).await.unwrap_or(Err(AttachError::Silent))?;
+    let HandshakeReply { run, terminal, .. } = connection.reply;
     let (publish, snapshots) = watch::channel(assembly.latest().clone());
     let (status_sender, status) = watch::channel(Arc::new(status));
     let (requests, requested) = mpsc::channel(REQUESTS);
     let id_map = CommandIdMap::new(run, terminal);
     tokio::spawn(
-        ClientTask::new(path.to_owned(), place, id_map, assembly, publish, status_sender).run(line, requested),
+        ClientTask::new(path.to_owned(), origin, id_map, assembly, publish, status_sender).run(connection, requested),
     );
     Ok(Session { snapshots, status, requests, terminal })
 }
 
 /// Sends the handshake and waits for the reply.
-pub(super) async fn open(path: &Path, place: &TerminalOrigin) -> Result<Line, AttachError> {
+pub(super) async fn open(path: &Path, origin: &TerminalOrigin) -> Result<Connection, AttachError> {
     let no_station = |error| AttachError::NoStation { path: path.to_owned(), error };
     let opened = async {
         let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
-        let handshake = protocol::encode(&(Handshake::current(), place), HANDSHAKE_BYTES_MAX);
+        let handshake = protocol::encode(&(Handshake::current(), origin), HANDSHAKE_BYTES_MAX);
         wire::write(&mut write, &handshake.map_err(WireError::from)?).await?;
         let bytes = wire::read(&mut read, SERVER_MESSAGE_BYTES_MAX).await?;
         let reply = protocol::handshake_reply(&bytes).map_err(WireError::from)?.map_err(AttachError::Refused)?;
-        Ok(Line { read, write, reply })
+        Ok(Connection { read, write, reply })
     };
     timeout(HANDSHAKE_REPLY_MAX, opened).await.unwrap_or(Err(AttachError::Silent))
 }
 
 /// The session status and the snapshot with which a session begins.
-async fn first(line: &mut Line) -> Result<(SessionStatus, Assembly), AttachError> {
-    let (mut status, mut assembly) = (SessionStatus::default(), Assembly::new(line.reply.def.clone()));
+async fn first(connection: &mut Connection) -> Result<(SessionStatus, Assembly), AttachError> {
+    let (mut status, mut assembly) = (SessionStatus::default(), Assembly::new(connection.reply.def.clone()));
     loop {
-        match next(&mut line.read).await? {
+        match next(&mut connection.read).await? {
             ServerMessage::SessionStatus(latest) => status = *latest,
             ServerMessage::LineReport(line, report) => assembly.on_report(line, report)?,
             ServerMessage::Snapshot(snapshot) => {
