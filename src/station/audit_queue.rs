@@ -15,7 +15,7 @@ use super::{
 use crate::{
     access::{
         Durability,
-        io::recorder::{Batch, Handle, Message, Recorded},
+        io::recorder::{Handle, Message, Recorded, WriteGroup},
     },
     history::alarm_state::LatestEvents,
     plant::{
@@ -74,7 +74,7 @@ pub(super) struct AuditQueue {
     queue: queue::SyncSender<Message>,
     recorded: watch::Receiver<Recorded>,
     began: Instant,
-    /// The next batch. Its events are bounded by the alarms of the plant.
+    /// The next write group. Its events are bounded by the alarms of the plant.
     backlog: Vec<ActionRecord>,
     backlog_events: LatestEvents,
     barrier: CommitBarrier,
@@ -90,7 +90,7 @@ impl AuditQueue {
     /// The end of a recorder that has just started.
     pub fn new(recorder: &Handle) -> AuditQueue {
         AuditQueue {
-            queue: recorder.batches.clone(),
+            queue: recorder.groups.clone(),
             recorded: recorder.recorded.clone(),
             began: Instant::now(),
             backlog: Vec::new(),
@@ -104,7 +104,7 @@ impl AuditQueue {
     }
 
     fn disk(&self) -> RecorderProgress {
-        RecorderProgress { batches: self.recorded.borrow().batches, alive: self.recorded.has_changed().is_ok() }
+        RecorderProgress { groups: self.recorded.borrow().groups, alive: self.recorded.has_changed().is_ok() }
     }
 
     /// Records the start of a station; see [`RecordedFiles::started`].
@@ -128,14 +128,14 @@ impl AuditQueue {
         self.send_backlog()
     }
 
-    /// Sends the backlog as one batch. Returns the actions above [`BACKLOG_MAX`] if the queue is full.
+    /// Sends the backlog as one write group. Returns the actions above [`BACKLOG_MAX`] if the queue is full.
     fn send_backlog(&mut self) -> Vec<ActionRecord> {
         if self.backlog.is_empty() && self.backlog_events.is_empty() {
             return Vec::new();
         }
         let events = self.backlog_events.iter().cloned().collect();
-        let batch = Batch { actions: std::mem::take(&mut self.backlog), events };
-        let (message, most) = match self.queue.try_send(Message::Batch(batch)) {
+        let group = WriteGroup { actions: std::mem::take(&mut self.backlog), events };
+        let (message, most) = match self.queue.try_send(Message::WriteGroup(group)) {
             Ok(()) => {
                 self.barrier.sent();
                 self.backlog_events = LatestEvents::default();
@@ -144,8 +144,8 @@ impl AuditQueue {
             Err(queue::TrySendError::Full(message)) => (message, BACKLOG_MAX),
             Err(queue::TrySendError::Disconnected(message)) => (message, 0),
         };
-        if let Message::Batch(batch) = message {
-            self.backlog = batch.actions;
+        if let Message::WriteGroup(group) = message {
+            self.backlog = group.actions;
         }
         let excess = self.backlog.len().saturating_sub(most);
         self.left_out += excess as u64;
@@ -183,7 +183,7 @@ impl AuditQueue {
 
     /// When a snapshot that is due at `next` may be published: not before the disk has what it shows, or the wait is over.
     pub fn publish_at(&self, next: Instant) -> Instant {
-        self.barrier.hold_until(self.disk()).map_or(next, |end| next.max(self.began + end))
+        self.barrier.wait_until(self.disk()).map_or(next, |end| next.max(self.began + end))
     }
 
     /// Marks in a snapshot what is not on disk.

@@ -1,4 +1,4 @@
-//! When an outcome may be shown as recorded: which batches of actions and alarm events the disk has. Pure: the state of the
+//! When an outcome may be shown as recorded: which write groups of actions and alarm events the disk has. Pure: the state of the
 //! disk and the time since the start are arguments.
 
 use std::{
@@ -18,28 +18,28 @@ use crate::plant::{
 /// A snapshot that shows an outcome, and the reply to a request, wait this long for the disk. After that both say that it is
 /// not recorded.
 pub(super) const WAIT_MAX: Duration = Duration::from_secs(1);
-/// Ended commands whose batch is remembered: twice what a snapshot shows.
+/// Ended commands whose write group is remembered: twice what a snapshot shows.
 const COMMANDS_MAX: usize = 64;
 
 /// What the recorder has reported.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RecorderProgress {
-    /// Batches on disk.
-    pub batches: u64,
+    /// Write groups on disk.
+    pub groups: u64,
     /// The recorder still runs.
     pub alive: bool,
 }
 
-/// A wait for a batch.
+/// A wait for a write group.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wait {
-    batch: u64,
+    group: u64,
     since: Duration,
 }
 
 impl Wait {
     pub fn is_recorded(self, disk: RecorderProgress) -> bool {
-        self.batch <= disk.batches
+        self.group <= disk.groups
     }
 
     /// When it ends by itself; `None` if it is over already.
@@ -52,37 +52,37 @@ impl Wait {
     }
 }
 
-/// Batches on their way to the disk, and what each of them records.
+/// Write groups on their way to the disk, and what each of them records.
 #[derive(Debug)]
 pub(super) struct CommitBarrier {
     sent: u64,
-    /// The last batch with an action of an operator.
+    /// The last write group with an action of an operator.
     needed: Wait,
-    /// Ended commands, each with the batch of its action.
+    /// Ended commands, each with the write group of its action.
     ended: VecDeque<(CommandId, u64)>,
-    /// Alarms, by subject and message, with the batch of the last event of an operator that is not on disk.
+    /// Alarms, by subject and message, with the write group of the last event of an operator that is not on disk.
     events: HashMap<(Arc<str>, Arc<str>), u64>,
 }
 
 impl CommitBarrier {
     pub fn new(now: Duration) -> CommitBarrier {
-        let needed = Wait { batch: 0, since: now };
+        let needed = Wait { group: 0, since: now };
         CommitBarrier { sent: 0, needed, ended: VecDeque::new(), events: HashMap::new() }
     }
 
-    /// Actions and events join the next batch.
+    /// Actions and events join the next write group.
     pub fn put(&mut self, actions: &[ActionRecord], events: &[AlarmRecord], disk: RecorderProgress, now: Duration) {
         let by_operators = || events.iter().filter(|event| event.by.is_some());
         if !actions.is_empty() || by_operators().next().is_some() {
-            // The wait of an earlier batch goes on.
+            // The wait of an earlier write group goes on.
             let since = if self.needed.is_recorded(disk) { now } else { self.needed.since };
-            self.needed = Wait { batch: self.sent + 1, since };
+            self.needed = Wait { group: self.sent + 1, since };
         }
-        let batch = self.needed.batch;
-        self.events.extend(by_operators().map(|event| ((event.subject.clone(), event.message.clone()), batch)));
+        let group = self.needed.group;
+        self.events.extend(by_operators().map(|event| ((event.subject.clone(), event.message.clone()), group)));
     }
 
-    /// The next batch has been sent.
+    /// The next write group has been sent.
     pub fn sent(&mut self) {
         self.sent += 1;
     }
@@ -93,7 +93,7 @@ impl CommitBarrier {
     }
 
     /// Until when a snapshot must wait; `None` if it can be published now.
-    pub fn hold_until(&self, disk: RecorderProgress) -> Option<Duration> {
+    pub fn wait_until(&self, disk: RecorderProgress) -> Option<Duration> {
         self.needed.ends_at(disk)
     }
 
@@ -104,19 +104,19 @@ impl CommitBarrier {
 
     /// Marks in a snapshot what is not on disk: ended commands, and operator notes of alarms.
     pub fn mark(&mut self, snapshot: &mut Snapshot, disk: RecorderProgress) {
-        let needed = self.needed.batch;
+        let needed = self.needed.group;
         let has_ended = |status: &&mut CommandStatus| !status.is_pending();
         for status in snapshot.commands.iter_mut().rev().filter(has_ended) {
-            let known = self.ended.iter().find(|(id, _)| *id == status.command.id).map(|(_, batch)| *batch);
-            let batch = known.unwrap_or_else(|| {
+            let known = self.ended.iter().find(|(id, _)| *id == status.command.id).map(|(_, group)| *group);
+            let group = known.unwrap_or_else(|| {
                 self.ended.push_back((status.command.id, needed));
                 needed
             });
-            status.recorded = batch <= disk.batches;
+            status.recorded = group <= disk.groups;
         }
         let excess = self.ended.len().saturating_sub(COMMANDS_MAX);
         self.ended.drain(..excess);
-        self.events.retain(|_, batch| disk.batches < *batch);
+        self.events.retain(|_, group| disk.groups < *group);
         if self.events.is_empty() {
             return;
         }
@@ -142,20 +142,20 @@ mod tests {
     #[test]
     fn a_wait_ends_with_the_disk_or_after_its_time() {
         let (second, half) = (Duration::from_secs(1), Duration::from_millis(500));
-        let disk = |batches| RecorderProgress { batches, alive: true };
+        let disk = |groups| RecorderProgress { groups, alive: true };
         let action = [stopped("tank", jiff::Timestamp::UNIX_EPOCH)];
         let mut barrier = CommitBarrier::new(Duration::ZERO);
-        assert_eq!(barrier.hold_until(disk(0)), None, "nothing to record");
+        assert_eq!(barrier.wait_until(disk(0)), None, "nothing to record");
         barrier.put(&action, &[], disk(0), second);
         barrier.sent();
         let reply = barrier.wait(second + half);
-        assert_eq!(barrier.hold_until(disk(0)), Some(2 * second));
+        assert_eq!(barrier.wait_until(disk(0)), Some(2 * second));
         assert_eq!(
-            (barrier.hold_until(disk(1)), barrier.hold_until(RecorderProgress { batches: 0, alive: false })),
+            (barrier.wait_until(disk(1)), barrier.wait_until(RecorderProgress { groups: 0, alive: false })),
             (None, None)
         );
         barrier.put(&action, &[], disk(0), 2 * second);
-        assert_eq!(barrier.hold_until(disk(1)), Some(2 * second), "the wait of the first batch goes on");
+        assert_eq!(barrier.wait_until(disk(1)), Some(2 * second), "the wait of the first group goes on");
         assert!(!barrier.is_late(disk(1), second + half) && barrier.is_late(disk(1), 2 * second));
         assert!(!reply.is_over(disk(0), 2 * second) && reply.is_over(disk(0), 2 * second + half));
         assert!(reply.is_over(disk(1), second) && reply.is_recorded(disk(1)) && !reply.is_recorded(disk(0)));
@@ -164,12 +164,12 @@ mod tests {
     #[test]
     fn an_action_after_alarms_of_the_process_has_its_own_wait() {
         let (second, action) = (Duration::from_secs(1), [stopped("tank", jiff::Timestamp::UNIX_EPOCH)]);
-        let disk = RecorderProgress { batches: 1, alive: true };
+        let disk = RecorderProgress { groups: 1, alive: true };
         let mut barrier = CommitBarrier::new(Duration::ZERO);
-        // A batch of alarms that the process has raised: no snapshot waits for it.
+        // A write group of alarms that the process has raised: no snapshot waits for it.
         barrier.sent();
         barrier.put(&action, &[], disk, 10 * second);
-        assert_eq!(barrier.hold_until(disk), Some(11 * second));
+        assert_eq!(barrier.wait_until(disk), Some(11 * second));
         assert!(!barrier.is_late(disk, 10 * second) && barrier.is_late(disk, 11 * second));
     }
 }

@@ -32,9 +32,9 @@ use crate::{
     plant::record::{ActionRecord, AlarmRecord, ChainHash, Record},
 };
 
-/// Batches on their way to the thread; the sender handles a full queue.
-const BATCHES_MAX: usize = 256;
-/// Batches that are written with one sync.
+/// Write groups on their way to the thread; the sender handles a full queue.
+const WRITE_GROUPS_MAX: usize = 256;
+/// Write groups that are written with one sync.
 const GROUP_MAX: usize = 64;
 /// Actions that wait for a log that cannot be written; one more, and the oldest is in the history only.
 const PENDING_MAX: usize = 10_000;
@@ -47,7 +47,7 @@ const REOPEN: Duration = Duration::from_secs(10);
 
 /// What belongs together: actions, and the alarm events that they caused.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Batch {
+pub struct WriteGroup {
     /// For the audit log.
     pub actions: Vec<ActionRecord>,
     /// For the alarm-state file.
@@ -58,7 +58,7 @@ pub struct Batch {
 #[derive(Debug)]
 pub enum Message {
     /// To be written.
-    Batch(Batch),
+    WriteGroup(WriteGroup),
     /// The history is open, and holds these entries: what it lacks of the log is sent to it.
     Stored(Vec<ChainHash>),
 }
@@ -66,9 +66,9 @@ pub enum Message {
 /// How it stands.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recorded {
-    /// Number of batches, from the first, that are completely on disk.
-    pub batches: u64,
-    /// Batches taken, not yet on disk.
+    /// Number of write groups, from the first, that are completely on disk.
+    pub groups: u64,
+    /// Write groups taken, not yet on disk.
     pub waiting: u64,
     /// Actions that the history had no room for.
     pub lost: u64,
@@ -84,7 +84,7 @@ pub struct Recorded {
 #[derive(Debug)]
 pub struct Handle {
     /// What is to be written. When the last sender is dropped the thread writes what it has and ends.
-    pub batches: queue::SyncSender<Message>,
+    pub groups: queue::SyncSender<Message>,
     /// How it stands, after every sync.
     pub recorded: watch::Receiver<Recorded>,
     /// What was found when the log was opened.
@@ -98,14 +98,14 @@ pub struct Handle {
 /// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
 /// start. `Err` only where the system gives no thread.
 pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> io::Result<Handle> {
-    let (batches, queue) = queue::sync_channel(BATCHES_MAX);
+    let (groups, queue) = queue::sync_channel(WRITE_GROUPS_MAX);
     let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
     let mut opened = recorder.open();
     recorder.tail = std::mem::take(&mut opened.tail);
     recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.chain_hash).unwrap_or(START);
     let (status, recorded) = watch::channel(recorder.status());
     let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &status))?;
-    Ok(Handle { batches, recorded, opened, alarms, join })
+    Ok(Handle { groups, recorded, opened, alarms, join })
 }
 
 /// An action that waits for the log.
@@ -180,7 +180,7 @@ impl Recorder {
                 Ok(message) => {
                     let more = queue.try_iter().take(GROUP_MAX - 1);
                     [message].into_iter().chain(more).for_each(|message| match message {
-                        Message::Batch(batch) => self.on_batch(batch),
+                        Message::WriteGroup(group) => self.on_group(group),
                         Message::Stored(rows) => self.compare(&rows),
                     });
                 }
@@ -208,7 +208,7 @@ impl Recorder {
         self.status().last
     }
 
-    fn on_batch(&mut self, Batch { actions, events }: Batch) {
+    fn on_group(&mut self, WriteGroup { actions, events }: WriteGroup) {
         self.taken += 1;
         // The history says the same as the log.
         self.pending.extend(actions.into_iter().map(|action| Pending { action: fit(action), stored: false }));
@@ -356,7 +356,7 @@ impl Recorder {
             (!parts.is_empty()).then(|| parts.join("; "))
         };
         Recorded {
-            batches: self.recorded,
+            groups: self.recorded,
             waiting: self.taken - self.recorded,
             lost: self.lost,
             last: self.audit_log.as_ref().map(AuditLog::last),

@@ -40,17 +40,20 @@ fn clock() -> Clock {
     Clock::starting_at(jiff::Timestamp::from_second(1_000_000).unwrap(), 1.0)
 }
 
-fn batch(actions: &[&str], events: &[AlarmEvent]) -> Batch {
+fn group(actions: &[&str], events: &[AlarmEvent]) -> WriteGroup {
     let at = jiff::Timestamp::from_second(1_000_000).unwrap();
     let event = |kind: &AlarmEvent| AlarmRecord::new(at, "TIC-1.PV", "high", Priority::High, *kind);
-    Batch { actions: actions.iter().map(|what| record(what)).collect(), events: events.iter().map(event).collect() }
+    WriteGroup {
+        actions: actions.iter().map(|what| record(what)).collect(),
+        events: events.iter().map(event).collect(),
+    }
 }
 
 /// What went to the history.
 fn stored(rows: &mut mpsc::Receiver<Vec<Record>>) -> Vec<ActionRecord> {
     let mut kept = Vec::new();
-    while let Ok(batch) = rows.try_recv() {
-        kept.extend(batch.into_iter().map(|record| match record {
+    while let Ok(group) = rows.try_recv() {
+        kept.extend(group.into_iter().map(|record| match record {
             Record::Action(record) => record,
             other => panic!("{other:?}"),
         }));
@@ -61,11 +64,11 @@ fn stored(rows: &mut mpsc::Receiver<Vec<Record>>) -> Vec<ActionRecord> {
 /// One life of a station beside `tank.duckdb`: opens the log, writes each of these actions, ends.
 fn life(history_file: &Path, actions: &[&str]) -> (Vec<ActionRecord>, Recorded, Opened) {
     let (history, mut rows) = mpsc::channel(64);
-    let Handle { batches, recorded, opened, alarms: _, join } = start(history_file, clock(), history).unwrap();
+    let Handle { groups, recorded, opened, alarms: _, join } = start(history_file, clock(), history).unwrap();
     for what in actions {
-        batches.send(Message::Batch(batch(&[what], &[]))).unwrap();
+        groups.send(Message::WriteGroup(group(&[what], &[]))).unwrap();
     }
-    drop(batches);
+    drop(groups);
     join.join().unwrap();
     (stored(&mut rows), recorded.borrow().clone(), opened)
 }
@@ -145,7 +148,7 @@ fn without_a_disk_actions_go_to_the_history_only() {
     let trouble = status.log.unwrap();
     assert!(trouble.starts_with("the audit log cannot be written: "), "{trouble}");
     assert!(trouble.contains("2 actions are not in it"), "{trouble}");
-    assert_eq!((status.batches, status.waiting), (0, 2));
+    assert_eq!((status.groups, status.waiting), (0, 2));
 }
 
 #[test]
@@ -168,10 +171,10 @@ fn refused_writes_are_unrecorded_until_the_disk_is_back() {
     let (mut recorder, found) = Recorder::new(&history_file, clock(), history);
     assert_eq!(found, RestoredAlarms::default());
     recorder.open();
-    recorder.on_batch(batch(&["start", "acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
+    recorder.on_group(group(&["start", "acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
     recorder.write();
     let status = recorder.status();
-    assert_eq!((status.batches, status.waiting), (0, 1));
+    assert_eq!((status.groups, status.waiting), (0, 1));
     assert!(status.log.unwrap().contains("2 actions are not in it"));
     assert!(status.alarms.unwrap().contains("the state of the alarms cannot be written"));
     assert_eq!(
@@ -180,20 +183,20 @@ fn refused_writes_are_unrecorded_until_the_disk_is_back() {
         "in the history all the same"
     );
     fs::create_dir(folder.path().join("later")).unwrap();
-    recorder.on_batch(batch(&["write"], &[]));
+    recorder.on_group(group(&["write"], &[]));
     recorder.write();
-    assert_eq!(recorder.status().batches, 0, "the log is not opened again before its time");
+    assert_eq!(recorder.status().groups, 0, "the log is not opened again before its time");
     recorder.opened_at -= REOPEN;
     recorder.write();
     let status = recorder.status();
     assert_eq!(status.last.map(|chain_hash| chain_hash.number), Some(3));
-    assert_eq!(status, Recorded { batches: 2, last: status.last, ..Recorded::default() });
+    assert_eq!(status, Recorded { groups: 2, last: status.last, ..Recorded::default() });
     let rows = stored(&mut rows);
     let sealed: Vec<_> = rows.iter().filter(|row| row.chain_hash.is_some()).map(|row| &*row.action).collect();
     assert_eq!(sealed, ["start", "acknowledge", "write"]);
     assert_eq!(verify(&beside(&history_file), &chain_hashes(&rows)).unwrap().compared, 3);
     let events = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1.events.unwrap();
-    assert_eq!(events, batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
+    assert_eq!(events, group(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
 }
 
 #[test]
@@ -203,7 +206,7 @@ fn a_long_fault_keeps_the_latest_actions_and_counts_the_rest() {
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
-    recorder.on_batch(batch(&vec!["write"; PENDING_MAX + 7], &[]));
+    recorder.on_group(group(&vec!["write"; PENDING_MAX + 7], &[]));
     recorder.write();
     assert!(recorder.status().log.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
     fs::create_dir(folder.path().join("later")).unwrap();
@@ -225,7 +228,7 @@ fn a_long_full_disk_leaves_a_trace_in_the_log() {
     recorder.open();
     // The file stays as it is and takes nothing, so it is not opened again.
     recorder.audit_log.as_mut().unwrap().set_file(fs::File::open(&path).unwrap());
-    recorder.on_batch(batch(&vec!["write"; PENDING_MAX + 7], &[]));
+    recorder.on_group(group(&vec!["write"; PENDING_MAX + 7], &[]));
     recorder.write();
     assert!(recorder.status().log.unwrap().contains(&format!("{} actions are not in it", PENDING_MAX + 7)));
     recorder.audit_log.as_mut().unwrap().set_file(OpenOptions::new().append(true).open(&path).unwrap());
@@ -256,15 +259,15 @@ fn acknowledgements_survive_without_a_history() {
     let history_file = folder.path().join("tank.duckdb");
     let (history, rows) = mpsc::channel(1);
     drop(rows);
-    let Handle { batches, mut recorded, join, .. } = start(&history_file, clock(), history).unwrap();
-    let done = batch(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]);
-    batches.send(Message::Batch(done)).unwrap();
+    let Handle { groups, mut recorded, join, .. } = start(&history_file, clock(), history).unwrap();
+    let done = group(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]);
+    groups.send(Message::WriteGroup(done)).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    runtime.block_on(recorded.wait_for(|recorded| recorded.batches == 1)).unwrap();
+    runtime.block_on(recorded.wait_for(|recorded| recorded.groups == 1)).unwrap();
     // Killed here: only what is on disk counts.
     let found = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1;
-    assert_eq!(found.events.unwrap(), batch(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
-    drop(batches);
+    assert_eq!(found.events.unwrap(), group(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
+    drop(groups);
     join.join().unwrap();
 }
 
@@ -276,9 +279,9 @@ fn the_history_is_completed_and_differences_are_reported() {
     let (rows, ..) = life(&history_file, &["start", "write", "acknowledge"]);
     let compared = |known: Vec<ChainHash>| {
         let (history, mut stored_rows) = mpsc::channel(64);
-        let Handle { batches, recorded, join, .. } = start(&history_file, clock(), history).unwrap();
-        batches.send(Message::Stored(known)).unwrap();
-        drop(batches);
+        let Handle { groups, recorded, join, .. } = start(&history_file, clock(), history).unwrap();
+        groups.send(Message::Stored(known)).unwrap();
+        drop(groups);
         join.join().unwrap();
         (stored(&mut stored_rows), recorded.borrow().log.clone())
     };
@@ -307,7 +310,7 @@ fn files_in_use_by_another_process_are_left_alone() {
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
-    recorder.on_batch(batch(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
+    recorder.on_group(group(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]));
     recorder.write();
     let status = recorder.status();
     assert!(status.log.unwrap().contains(IN_USE) && status.alarms.unwrap().contains(IN_USE));

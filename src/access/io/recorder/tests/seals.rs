@@ -30,7 +30,7 @@ fn a_log_is_sealed_at_start_hourly_and_at_the_end() {
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
     for (second, seals) in [(3_600, 2), (7_200, 3)] {
-        recorder.on_batch(batch(&["write"], &[]));
+        recorder.on_group(group(&["write"], &[]));
         recorder.write();
         assert_eq!(sealed(&log, &key), (seals - 1, 1));
         recorder.seal(at(second));
@@ -120,7 +120,7 @@ fn a_key_that_cannot_be_replaced_makes_one_seal_only() {
     let obstacle = folder.path().join(format!("tank.audit.key.new-{}", std::process::id()));
     fs::create_dir(&obstacle).unwrap();
     for action in ["start", "write"] {
-        recorder.on_batch(batch(&[action], &[]));
+        recorder.on_group(group(&[action], &[]));
         recorder.write();
         recorder.seal(at(60));
         let said = recorder.status().log.unwrap();
@@ -146,7 +146,7 @@ fn an_unwritten_seal_leaves_its_key_for_the_next() {
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
     recorder.open();
-    recorder.on_batch(batch(&["start"], &[]));
+    recorder.on_group(group(&["start"], &[]));
     recorder.write();
     fs::remove_file(&log).unwrap();
     recorder.seal(at(60));
