@@ -114,9 +114,9 @@ impl SessionAcceptor {
     }
 }
 
-/// What became of the record of something that is answered.
+/// Whether the audit entry of a request that is answered is on its way to the log.
 #[derive(Clone, Copy, PartialEq)]
-enum Record {
+enum EntryDelivery {
     /// There is none.
     None,
     /// It is on its way to the log.
@@ -184,7 +184,7 @@ impl SessionServer {
                     };
                     self.apply_effects(effects);
                 }
-                Some(Ok((ticket, answer))) = self.reloads.join_next() => self.reply(ticket, answer, Record::Sent),
+                Some(Ok((ticket, answer))) = self.reloads.join_next() => self.reply(ticket, answer, EntryDelivery::Sent),
                 Some(Ok((ticket, done))) = self.history_jobs.join_next() => {
                     let effects = self.access.on_history_job_done(ticket, done, self.clock.now());
                     self.apply_effects(effects);
@@ -278,8 +278,8 @@ impl SessionServer {
     }
 
     fn apply_effects(&mut self, effects: Vec<Effect>) {
-        // An answer follows its record on the way to the log.
-        let mut record = Record::None;
+        // An answer follows its entry on the way to the log.
+        let mut entry = EntryDelivery::None;
         let mut answers = Vec::new();
         for effect in effects {
             match effect {
@@ -298,7 +298,11 @@ impl SessionServer {
                         tracing::error!(%error, "an action did not reach the audit log");
                         self.lost += 1;
                     }
-                    record = if sent.is_ok() && record != Record::Lost { Record::Sent } else { Record::Lost };
+                    entry = if sent.is_ok() && entry != EntryDelivery::Lost {
+                        EntryDelivery::Sent
+                    } else {
+                        EntryDelivery::Lost
+                    };
                 }
                 Effect::Reply(ticket, answer) => answers.push((ticket, answer)),
                 Effect::SessionStatus(terminal) => {
@@ -334,7 +338,7 @@ impl SessionServer {
             }
         }
         for (ticket, answer) in answers {
-            self.reply(ticket, answer, record);
+            self.reply(ticket, answer, entry);
         }
     }
 
@@ -348,13 +352,13 @@ impl SessionServer {
         });
     }
 
-    fn reply(&mut self, ticket: u64, answer: Result<(), String>, record: Record) {
+    fn reply(&mut self, ticket: u64, answer: Result<(), String>, entry: EntryDelivery) {
         let Some(reply) = self.tickets.remove(&ticket) else { return };
         // A terminal that has left needs no answer.
-        let (reply, answer, durability) = match record {
-            Record::None => (reply, answer, Durability::Recorded),
-            Record::Lost => (reply, answer, Durability::NotRecorded),
-            Record::Sent => {
+        let (reply, answer, durability) = match entry {
+            EntryDelivery::None => (reply, answer, Durability::Recorded),
+            EntryDelivery::Lost => (reply, answer, Durability::NotRecorded),
+            EntryDelivery::Sent => {
                 match self
                     .outputs
                     .audit
