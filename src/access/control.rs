@@ -115,7 +115,7 @@ pub struct AccessControl {
     /// Why login is disabled: the users file could not be read.
     closed: Option<Arc<str>>,
     /// The user of the operating system that the station runs as.
-    host: Option<Arc<str>>,
+    service_account: Option<Arc<str>>,
     sessions: BTreeMap<u32, SessionState>,
     attempts: LoginAttempts,
     refusals: BTreeMap<Arc<str>, Refusals>,
@@ -133,22 +133,22 @@ pub struct AccessControl {
 }
 
 impl AccessControl {
-    /// Access control without login: root, the user of the station and its own process may do everything. `host` is the user of the operating
+    /// Access control without login: root, the user of the station and its own process may do everything. `service_account` is the user of the operating
     /// system that the station runs as.
-    pub fn new(def: Arc<PlantDef>, host: Option<Arc<str>>) -> AccessControl {
-        AccessControl { def, host, ..AccessControl::default() }
+    pub fn new(def: Arc<PlantDef>, service_account: Option<Arc<str>>) -> AccessControl {
+        AccessControl { def, service_account, ..AccessControl::default() }
     }
 
-    /// Access control with these users. `host` is the user of the operating system that the station runs as.
-    pub fn with_users(def: Arc<PlantDef>, users: Users, host: Option<Arc<str>>) -> AccessControl {
-        AccessControl { users: Some(users), ..AccessControl::new(def, host) }
+    /// Access control with these users. `service_account` is the user of the operating system that the station runs as.
+    pub fn with_users(def: Arc<PlantDef>, users: Users, service_account: Option<Arc<str>>) -> AccessControl {
+        AccessControl { users: Some(users), ..AccessControl::new(def, service_account) }
     }
 
     /// Login is closed because the users file is damaged; `why` is the reply to each attempt.
-    pub fn closed(def: Arc<PlantDef>, why: &str, host: Option<Arc<str>>) -> AccessControl {
+    pub fn closed(def: Arc<PlantDef>, why: &str, service_account: Option<Arc<str>>) -> AccessControl {
         AccessControl {
             closed: Some(format!("login is disabled: {why}").into()),
-            ..AccessControl::with_users(def, Users::default(), host)
+            ..AccessControl::with_users(def, Users::default(), service_account)
         }
     }
 
@@ -198,7 +198,7 @@ impl AccessControl {
     fn known(&self, peer: &Peer) -> Option<LoggedInUser> {
         let user = peer.unix_user.clone();
         let role = match (&self.users, &user) {
-            (None, _) if self.is_host(peer) => Some(Role::Supervisor),
+            (None, _) if self.is_station_owner(peer) => Some(Role::Supervisor),
             (_, Some(name)) => {
                 self.def.access.trusted.iter().find(|(trusted, _)| trusted.as_str() == &**name).map(|(_, role)| *role)
             }
@@ -310,7 +310,7 @@ impl AccessControl {
                 | SessionRequest::Backup { .. }
                 | SessionRequest::Import { .. }
         );
-        of_station && session.is_some_and(|session| self.is_host(&session.peer))
+        of_station && session.is_some_and(|session| self.is_station_owner(&session.peer))
     }
 
     fn plant_name(&self) -> Arc<str> {

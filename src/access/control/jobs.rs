@@ -112,7 +112,7 @@ impl AccessControl {
         let key = Key {
             origin: if what.comes_from_outside() { session.origin.clone() } else { inside() },
             account: user::check_name(name).is_ok().then(|| user::key(name)),
-            never_locked: self.is_host(&session.peer),
+            never_locked: self.is_station_owner(&session.peer),
         };
         let job = self.pending_job(terminal, key, what)?;
         if let Some(wait) = self.attempts.wait(&job.key, &self.def.access, at)
@@ -128,7 +128,7 @@ impl AccessControl {
     pub(super) fn hash(&mut self, asker: Asker, password: Secret, change: UserChange) -> Result<Vec<Effect>, String> {
         let session = self.session(asker.terminal)?;
         let origin = format!("hash for terminal {}", asker.terminal).into();
-        let key = Key { origin, account: None, never_locked: self.is_host(&session.peer) };
+        let key = Key { origin, account: None, never_locked: self.is_station_owner(&session.peer) };
         let job = self.pending_job(asker.terminal, key, JobPurpose::Hash { asker, change })?;
         Ok(self.start_job(job, PasswordJob::Hash(password)))
     }

@@ -19,11 +19,11 @@ impl AccessControl {
             return Ok(Vec::new());
         }
         let most = usize::from(self.def.access.sessions_max);
-        let host = self.is_host(&new.peer);
-        let all = if host { most } else { most - most / KEPT };
+        let is_owner = self.is_station_owner(&new.peer);
+        let all = if is_owner { most } else { most - most / KEPT };
         let mut effects = Vec::new();
         // Sessions of the same user first: a user at the limit closes none of others.
-        if !host {
+        if !is_owner {
             let user = &new.origin;
             let of_user = |session: &SessionState| session.origin == *user;
             effects.extend(self.limit_among(of_user, most.div_ceil(2), &format!(" of {user}"), at)?);

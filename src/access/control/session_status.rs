@@ -30,7 +30,7 @@ impl AccessControl {
             view: rules.anonymous_view || session.who.is_some(),
             first: self.closed.is_none()
                 && self.users.as_ref().is_some_and(Users::is_empty)
-                && self.is_host(&session.peer),
+                && self.is_station_owner(&session.peer),
             banner,
             password_chars_min: rules.password_chars_min,
             idle_lock,

@@ -72,14 +72,14 @@ impl AccessControl {
     }
 
     /// Whether this is root, the user of the station, or its own process.
-    pub(super) fn is_host(&self, peer: &Peer) -> bool {
+    pub(super) fn is_station_owner(&self, peer: &Peer) -> bool {
         let user = peer.unix_user.as_deref();
-        peer.own || user == Some("root") || (user.is_some() && user == self.host.as_deref())
+        peer.own || user == Some("root") || (user.is_some() && user == self.service_account.as_deref())
     }
 
     fn first(&mut self, asker: Asker, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
         let session = self.session(asker.terminal)?;
-        if !self.is_host(&session.peer) {
+        if !self.is_station_owner(&session.peer) {
             return Err("only the user who started the station creates the first Supervisor".to_owned());
         }
         if self.users.as_ref().is_none_or(|users| !users.is_empty()) {
