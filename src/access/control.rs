@@ -224,7 +224,7 @@ impl AccessControl {
         if !self.within_rate(terminal, at) {
             return Err((TOO_MANY.to_owned(), Vec::new()));
         }
-        let needed = right::needs_for_question(query);
+        let needed = right::needs_for_query(query);
         let may =
             if needed == Role::Viewer { self.may_look(terminal) } else { self.may(terminal, Some(needed)).map(drop) };
         let Err(why) = may else { return Ok(()) };

@@ -87,7 +87,7 @@ pub fn needs(kind: &CommandKind) -> Role {
 }
 
 /// The least role that may ask a query.
-pub fn needs_for_question(query: &Query) -> Role {
+pub fn needs_for_query(query: &Query) -> Role {
     let right = match query {
         Query::Series { .. }
         | Query::Journal { .. }

@@ -104,7 +104,7 @@ impl Job {
         matches!(&self.run.diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty())
     }
 
-    /// Does it ask so much that other questions must not wait for its end?
+    /// Does it ask so much that other requests must not wait for its end?
     pub fn is_long(&self) -> bool {
         matches!(self.run.diagnostic, Diagnostic::Sweep(_) | Diagnostic::Scan(_) | Diagnostic::Loopback { .. })
     }

@@ -66,7 +66,7 @@ pub fn without_station() -> Result<Option<Vec<String>>, CliError> {
     choices.extend(plants(Path::new(".")));
     choices.extend(devices());
     choices.extend(networks());
-    choices.push(Choice::new("a new plant file, from questions and what answers", &["new"]));
+    choices.push(Choice::new("a new plant file, from queries and what answers", &["new"]));
     say("no station runs here");
     ask("what shall be shown? a number, HOST[:TCPPORT] or /dev/…", &choices).map(Some)
 }
@@ -108,7 +108,7 @@ pub fn devices() -> Vec<Choice> {
     again.chain(new.map(|port| Choice::open(format!("{port}{}", ports::driver_words(port)), port))).collect()
 }
 
-/// The networks of this machine, to be scanned after a question.
+/// The networks of this machine, to be scanned after a query.
 fn networks() -> impl Iterator<Item = Choice> {
     Network::neighbours().into_iter().map(|network| {
         let network = network.to_string();
@@ -136,10 +136,10 @@ pub fn show(choices: &[Choice]) {
 }
 
 /// Shows the choices until one is taken; an empty line leaves.
-fn ask(question: &str, choices: &[Choice]) -> Result<Vec<String>, CliError> {
+fn ask(query: &str, choices: &[Choice]) -> Result<Vec<String>, CliError> {
     show(choices);
     loop {
-        let _ = write!(io::stdout(), "{question}: ");
+        let _ = write!(io::stdout(), "{query}: ");
         let _ = io::stdout().flush();
         let mut line = String::new();
         let read = io::stdin().lock().read_line(&mut line).map_err(CliError::io("cannot read the answer"))?;

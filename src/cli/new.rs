@@ -1,4 +1,4 @@
-//! `sightglass new`: a plant file from questions and from what is found on the lines, checked by loading it.
+//! `sightglass new`: a plant file from queries and from what is found on the lines, checked by loading it.
 
 use std::{
     collections::BTreeMap,
@@ -60,7 +60,7 @@ struct FoundUnit {
 /// Asks, looks, and writes the plant file.
 pub fn main(args: &Args) -> Result<(), CliError> {
     if !menu::is_asked() {
-        let words = "`sightglass new` asks questions: run it in a terminal; `sightglass profiles tank` prints a plant file \
+        let words = "`sightglass new` asks queries: run it in a terminal; `sightglass profiles tank` prints a plant file \
                      to start from";
         return Err(CliError::Usage(words.to_owned()));
     }
@@ -83,7 +83,7 @@ fn free(text: &str) -> Result<PathBuf, String> {
 }
 
 async fn wizard(path: PathBuf) -> Result<(), CliError> {
-    say("Enter takes what stands in [ ]. Nothing is written before the last question; Ctrl-C leaves.");
+    say("Enter takes what stands in [ ]. Nothing is written before the last query; Ctrl-C leaves.");
     let profiles = open::own_profiles(path.parent().unwrap_or(Path::new("")));
     let known = profiles.recognisable();
     let title = ask("title", "Plant").await?;
@@ -121,9 +121,9 @@ async fn next_line(count: usize) -> Result<Option<LineDef>, CliError> {
         menu::show(&choices);
     }
     let usual = if count == 0 && !choices.is_empty() { "1" } else { END };
-    let question = format!("line {}: number, HOST[:TCPPORT] or /dev/… --baud 19200", count + 1);
+    let query = format!("line {}: number, HOST[:TCPPORT] or /dev/… --baud 19200", count + 1);
     loop {
-        let parsed = ask_until(&question, usual, |answer| match answer {
+        let parsed = ask_until(&query, usual, |answer| match answer {
             END => Ok(None),
             _ => open::Args::from_words(menu::chosen(answer, &choices)?).map(Some),
         });

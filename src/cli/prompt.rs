@@ -1,13 +1,13 @@
-//! Questions in plain lines, one answer each: they work over SSH and in every terminal.
+//! Queries in plain lines, one answer each: they work over SSH and in every terminal.
 
 use std::io::{self, BufRead, Write};
 
 use super::CliError;
 use crate::plant::visible::visible;
 
-/// The answer to a question; Enter takes the usual one. Ctrl-C and the end of the input are an error.
-pub async fn ask(question: &str, usual: &str) -> Result<String, CliError> {
-    let _ = write!(io::stdout(), "{} [{}]: ", visible(question), visible(usual));
+/// The answer to a query; Enter takes the usual one. Ctrl-C and the end of the input are an error.
+pub async fn ask(query: &str, usual: &str) -> Result<String, CliError> {
+    let _ = write!(io::stdout(), "{} [{}]: ", visible(query), visible(usual));
     let _ = io::stdout().flush();
     // A thread of its own, which nothing waits for when the program is left.
     let (sender, read) = tokio::sync::oneshot::channel();
@@ -29,12 +29,12 @@ pub async fn ask(question: &str, usual: &str) -> Result<String, CliError> {
 
 /// Asks until the answer can be used; says what is wrong with the others.
 pub async fn ask_until<T>(
-    question: &str,
+    query: &str,
     usual: &str,
     mut take: impl FnMut(&str) -> Result<T, String>,
 ) -> Result<T, CliError> {
     loop {
-        match take(&ask(question, usual).await?) {
+        match take(&ask(query, usual).await?) {
             Ok(taken) => return Ok(taken),
             Err(why) => super::say(&why),
         }
@@ -42,8 +42,8 @@ pub async fn ask_until<T>(
 }
 
 /// Is it agreed to? Enter means no.
-pub async fn is_agreed(question: &str) -> Result<bool, CliError> {
-    ask_until(&format!("{question}, yes or no"), "no", |answer| match answer {
+pub async fn is_agreed(query: &str) -> Result<bool, CliError> {
+    ask_until(&format!("{query}, yes or no"), "no", |answer| match answer {
         "yes" | "y" => Ok(true),
         "no" | "n" => Ok(false),
         _ => Err(format!("found `{answer}`, expected yes or no")),

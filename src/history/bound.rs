@@ -42,7 +42,7 @@ mod tests {
     const DAY: u64 = 86_400;
 
     #[test]
-    fn a_refusal_says_bound_question_and_way_out() {
+    fn a_refusal_says_bound_query_and_way_out() {
         let refused = |rows, asked| too_many_rows(rows, 100, asked);
         let cases = [
             (

@@ -335,7 +335,7 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
 }
 
 /// A new query does not compile until it has a row here; put it into [`queries`] as well.
-fn of_question(query: &Query) -> Row {
+fn of_query(query: &Query) -> Row {
     match query {
         Query::Series { .. } | Query::Journal { .. } | Query::Actions { .. } => look("", "-VTSL-"),
         Query::LineMinutes { .. } | Query::Values { .. } => look("", "-VTSL-"),
@@ -379,7 +379,7 @@ async fn every_query_is_permitted_or_refused_as_the_table_says() {
     for (person, name) in USERS.into_iter().enumerate() {
         let session = sits(&guarded, person).await;
         for query in queries(&guarded.def, at) {
-            let row = of_question(&query);
+            let row = of_query(&query);
             let said = format!("{query:?} by {name}");
             let written = guarded.entries().len();
             let (reply, answer) = oneshot::channel();

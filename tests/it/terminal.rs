@@ -32,8 +32,8 @@ fn a_new_plant_is_made_of_what_answers() {
     let file = folder.path().join("works.toml");
     let path = file.to_str().unwrap();
     let mut terminal = Terminal::start(160, 60, &["new", path]);
-    let enter = |question: &str, answer: &str| (question.to_owned(), format!("{answer}\r"));
-    for (question, keys) in [
+    let enter = |query: &str, answer: &str| (query.to_owned(), format!("{answer}\r"));
+    for (query, keys) in [
         enter("title [Plant]", "Works"),
         enter("time zone", "Nowhere/Atlantis"),
         enter("expected an IANA name", "Asia/Bangkok"),
@@ -51,7 +51,7 @@ fn a_new_plant_is_made_of_what_answers() {
         enter("shifts, or none", ""),
         enter("write the plant file", ""),
     ] {
-        terminal.wait_for(&question);
+        terminal.wait_for(&query);
         terminal.keys(&keys);
     }
     terminal.wait_for("saved");

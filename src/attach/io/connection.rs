@@ -321,7 +321,7 @@ mod tests {
         ClientMessage::Ask { ticket, query: Query::Journal { from, to, limit: 1 } }
     }
 
-    async fn next_question(requests: &mut mpsc::Receiver<(u32, Request)>) -> QueryRequest {
+    async fn next_query(requests: &mut mpsc::Receiver<(u32, Request)>) -> QueryRequest {
         let Some((_, Request::Ask(query))) = requests.recv().await else { panic!("no query") };
         query
     }
@@ -331,17 +331,17 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn questions_of_a_terminal_that_has_left_are_cancelled() {
+    async fn queries_of_a_terminal_that_has_left_are_cancelled() {
         let (mut far, mut requests, served) = serving();
         say(&mut far, &query(1)).await;
-        let mut query = next_question(&mut requests).await;
+        let mut query = next_query(&mut requests).await;
         drop(far);
         assert!(is_cancelled(&mut query).await, "the history is still working on it");
         assert!(matches!(served.await.unwrap(), ConnectionEnd::Wire(_)));
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_cancelled_question_makes_room_for_another() {
+    async fn a_cancelled_query_makes_room_for_another() {
         let (mut far, mut requests, _served) = serving();
         let last = ANSWERS_MAX as u64 + 1;
         for ticket in 1..=last {
@@ -349,7 +349,7 @@ mod tests {
         }
         let mut asked = Vec::new();
         for _ in 1..last {
-            asked.push(next_question(&mut requests).await);
+            asked.push(next_query(&mut requests).await);
         }
         assert!(
             timeout(Duration::from_secs(60), requests.recv()).await.is_err(),
@@ -360,7 +360,7 @@ mod tests {
         say(&mut far, &ClientMessage::Cancel { ticket: 2 }).await;
         assert!(is_cancelled(&mut asked[1]).await, "the history is still working on it");
         assert!(!asked[0].reply.is_closed() && !asked[2].reply.is_closed(), "others are not touched");
-        let mut next = next_question(&mut requests).await;
+        let mut next = next_query(&mut requests).await;
         assert!(!is_cancelled(&mut next).await);
     }
 }

@@ -15,7 +15,7 @@ use crate::{
 /// Asks, connects to every host, shows who answers, and offers to open one.
 pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<(), CliError> {
     if !yes && !menu::is_asked() {
-        let words = "a scan of a network connects to every host of it: --yes does so without a question";
+        let words = "a scan of a network connects to every host of it: --yes does so without a query";
         return Err(CliError::Usage(words.to_owned()));
     }
     let opened = in_runtime(async {
@@ -30,8 +30,8 @@ pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<(), CliError>
         if yes || units.is_empty() {
             return Ok(None);
         }
-        let question = format!("open which one, 1 to {}, or none", units.len());
-        let chosen = prompt::ask_until(&question, "none", |answer| match answer.parse::<usize>() {
+        let query = format!("open which one, 1 to {}, or none", units.len());
+        let chosen = prompt::ask_until(&query, "none", |answer| match answer.parse::<usize>() {
             _ if answer == "none" => Ok(None),
             Ok(number @ 1..) if number <= units.len() => Ok(units.get(number - 1).cloned()),
             _ => Err(format!("found `{answer}`, expected none or 1 to {}", units.len())),

@@ -27,9 +27,9 @@ use crate::{
 };
 
 /// Queries that are answered at a time; the others wait.
-pub const QUESTIONS_MAX: usize = 3;
+pub const QUERIES_IN_WORK_MAX: usize = 3;
 /// Of these of one terminal: the others find a place at once.
-pub const QUESTIONS_OF_ONE_MAX: usize = QUESTIONS_MAX - 1;
+pub const QUERIES_OF_ONE_MAX: usize = QUERIES_IN_WORK_MAX - 1;
 /// Queries that wait here; those behind them wait in the queue, which refuses when it is full.
 const WAITING_MAX: usize = 64;
 /// How long a query waits for the commit of what is pending.
@@ -162,11 +162,11 @@ fn next<'a, T>(
     waiting: &mut VecDeque<(u32, T)>,
     answered: impl ExactSizeIterator<Item = &'a u32> + Clone,
 ) -> Option<(u32, T)> {
-    if answered.len() >= QUESTIONS_MAX {
+    if answered.len() >= QUERIES_IN_WORK_MAX {
         return None;
     }
     let of_its_terminal = |place: &usize| answered.clone().filter(|terminal| **terminal == waiting[*place].0).count();
-    let fitting = (0..waiting.len()).filter(|place| of_its_terminal(place) < QUESTIONS_OF_ONE_MAX);
+    let fitting = (0..waiting.len()).filter(|place| of_its_terminal(place) < QUERIES_OF_ONE_MAX);
     let place = fitting.min_by_key(of_its_terminal)?;
     waiting.remove(place)
 }

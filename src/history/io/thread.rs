@@ -13,7 +13,7 @@ use super::{
     archiver::Archiver,
     files,
     open::{Opened, Restored},
-    reader::{Answerer, QUESTIONS_MAX, Reader, WriterRequest},
+    reader::{Answerer, QUERIES_IN_WORK_MAX, Reader, WriterRequest},
     store::Store,
     writer::Writer,
 };
@@ -30,7 +30,7 @@ const KEPT_FOR_EVENTS: usize = 128;
 /// Queries that wait for their turn; a full queue refuses more.
 pub const QUERIES_MAX: usize = 64;
 /// Requests of queries on their way to the writer: each that is being answered has one at most.
-const REQUESTS_MAX: usize = 2 * QUESTIONS_MAX;
+const REQUESTS_MAX: usize = 2 * QUERIES_IN_WORK_MAX;
 /// Jobs that wait; more are refused.
 const JOBS_MAX: usize = 2;
 /// Real time between two commits: what a power failure may cost.
@@ -121,8 +121,10 @@ fn spawn<F: Future<Output = ()>>(
     name: &str,
     work: impl FnOnce() -> F + Send + 'static,
 ) -> std::io::Result<JoinHandle<()>> {
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_time().max_blocking_threads(QUESTIONS_MAX).build()?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_time()
+        .max_blocking_threads(QUERIES_IN_WORK_MAX)
+        .build()?;
     std::thread::Builder::new().name(name.into()).spawn(move || runtime.block_on(work()))
 }
 

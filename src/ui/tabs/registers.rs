@@ -1,7 +1,7 @@
 //! The registers of a unit, live: every table from any address, each word as all that it may mean.
 //!
 //! It is the tab of a bench, and a page of the tab Bus in a plant, where it only reads.
-//! The tab asks the line for what is on the screen; each answer brings the next question, due one period later.
+//! The tab asks the line for what is on the screen; each answer brings the next query, due one period later.
 
 mod advice;
 mod cells;

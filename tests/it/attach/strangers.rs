@@ -108,7 +108,7 @@ async fn one_terminal_too_many_is_refused_with_the_reason() {
 
 /// A flood waits in the flooding terminal: the station takes no more than a person can ask.
 #[tokio::test(start_paused = true)]
-async fn a_flood_of_questions_waits_where_it_comes_from() {
+async fn a_flood_of_queries_waits_where_it_comes_from() {
     let stand = Stand::start();
     let mut quick = stand.session().await;
     let mut flood = Plain::connect(stand.path()).unwrap();

@@ -28,7 +28,7 @@ fn by_itself(store: &Store, tag: TagId) -> Vec<Sample> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn a_question_about_many_tags_is_answered_as_each_by_itself(
+    fn a_query_about_many_tags_is_answered_as_each_by_itself(
         rows in proptest::collection::vec((0u16..3, -60i64..600, proptest::option::weighted(0.8, -1e3f64..1e3)), 0..300),
         from in -100i64..300,
         length in 1i64..900,

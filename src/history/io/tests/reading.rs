@@ -9,7 +9,7 @@ use crate::history::{
     QUERY_TIME_MAX,
     io::{
         read::ROWS_MAX,
-        reader::{Answerer, QUESTIONS_MAX, QUESTIONS_OF_ONE_MAX, Reader, WriterRequest},
+        reader::{Answerer, QUERIES_IN_WORK_MAX, QUERIES_OF_ONE_MAX, Reader, WriterRequest},
         thread::COMMIT_EVERY,
     },
 };
@@ -33,11 +33,11 @@ fn query() -> (QueryRequest, oneshot::Receiver<Result<Answer, HistoryError>>) {
 }
 
 #[test]
-fn records_are_committed_while_a_question_runs() {
+fn records_are_committed_while_a_query_runs() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
     let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), COMMIT_EVERY, answer).unwrap();
-    let queries: Vec<_> = (0..QUESTIONS_MAX as u32).map(|terminal| (terminal, query())).collect();
+    let queries: Vec<_> = (0..QUERIES_IN_WORK_MAX as u32).map(|terminal| (terminal, query())).collect();
     let mut answers = Vec::new();
     for (terminal, (query, answer)) in queries {
         handle.queries.blocking_send((terminal, query)).unwrap();
@@ -52,7 +52,7 @@ fn records_are_committed_while_a_question_runs() {
     assert!(runtime.block_on(committed).is_ok(), "no commit while queries run");
     // A cancelled query is not worked on any longer.
     drop(answers);
-    assert!((0..QUESTIONS_MAX).all(|_| ended.recv().unwrap().contains("INTERRUPT")));
+    assert!((0..QUERIES_IN_WORK_MAX).all(|_| ended.recv().unwrap().contains("INTERRUPT")));
     handle.stop();
 }
 
@@ -69,7 +69,7 @@ fn a_terminal_that_asks_without_pause_keeps_no_other_waiting() {
     let mut greedy: Vec<_> = (0..10).map(|_| ask(1)).collect();
     let other = ask(2);
     // Two of the first terminal, and the one of the second, though nine were before it.
-    (0..QUESTIONS_MAX).for_each(|_| begun.recv().unwrap());
+    (0..QUERIES_IN_WORK_MAX).for_each(|_| begun.recv().unwrap());
     drop(other);
     assert!(ended.recv().unwrap().contains("INTERRUPT"));
     // Another one of the first terminal does not take its place: only when one of its own has ended.
@@ -80,11 +80,11 @@ fn a_terminal_that_asks_without_pause_keeps_no_other_waiting() {
     // What was cancelled before its turn is never begun.
     greedy.into_iter().rev().for_each(drop);
     handle.stop();
-    assert_eq!((begun.try_iter().count(), ended.try_iter().count()), (0, QUESTIONS_OF_ONE_MAX));
+    assert_eq!((begun.try_iter().count(), ended.try_iter().count()), (0, QUERIES_OF_ONE_MAX));
 }
 
 #[test]
-fn a_station_that_stops_ends_the_questions_and_closes_the_file() {
+fn a_station_that_stops_ends_the_queries_and_closes_the_file() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
     let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), COMMIT_EVERY, answer).unwrap();
@@ -132,7 +132,7 @@ fn alone(answer: Answerer) -> Alone {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_question_that_takes_too_long_is_ended_and_says_so() {
+async fn a_query_that_takes_too_long_is_ended_and_says_so() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
     let reader = alone(answer);
@@ -155,7 +155,7 @@ async fn a_question_that_takes_too_long_is_ended_and_says_so() {
 }
 
 #[tokio::test]
-async fn without_a_store_a_question_is_answered_with_the_reason() {
+async fn without_a_store_a_query_is_answered_with_the_reason() {
     let (_folder, db) = folder();
     let reader = alone(Arc::new(Store::answer));
     let ask = async || {
@@ -218,7 +218,7 @@ fn a_checkpoint_runs_between_endless_queries() {
     let mut writer = Writer::open(db.clone(), def(), sec(0)).unwrap();
     let rows = 30_000;
     writer.store().unwrap().append(&(0..rows).map(|at| good(PV, at, at as f64)).collect::<Vec<_>>()).unwrap();
-    let readers: Vec<Store> = (0..QUESTIONS_MAX).map(|_| writer.store().unwrap().try_clone().unwrap()).collect();
+    let readers: Vec<Store> = (0..QUERIES_IN_WORK_MAX).map(|_| writer.store().unwrap().try_clone().unwrap()).collect();
     let (answered, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     std::thread::scope(|scope| {
         for reader in readers {
@@ -251,7 +251,7 @@ fn a_checkpoint_runs_between_endless_queries() {
 }
 
 #[test]
-fn a_question_that_takes_all_memory_costs_no_record() {
+fn a_query_that_takes_all_memory_costs_no_record() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
     let reader = writer.store().unwrap().try_clone().unwrap();

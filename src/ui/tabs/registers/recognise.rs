@@ -60,7 +60,7 @@ impl Recognition {
 }
 
 impl Registers {
-    /// The next question of the signatures, when the window has had its first value and none is on its way.
+    /// The next query of the signatures, when the window has had its first value and none is on its way.
     pub(super) fn recognise(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         // A plant file says what its devices are.
         if self.reads == 0 || self.paused || cx.def().lines.is_empty() || !cx.def().is_bench() {

@@ -84,9 +84,9 @@ impl Bench {
         self.asked.extend(reads);
     }
 
-    /// The unit answers the last question after so many seconds: each register has its value, `None` does not exist.
+    /// The unit answers the last query after so many seconds: each register has its value, `None` does not exist.
     fn answer(&mut self, seconds: i64, value: impl Fn(u16) -> Option<u16>) -> LiveRead {
-        let (id, read) = self.asked.pop().expect("a question");
+        let (id, read) = self.asked.pop().expect("a query");
         self.asked.clear();
         self.respond(seconds, id, &read, |_, address| value(address));
         read
@@ -142,7 +142,7 @@ fn values_holes_and_a_likely_float_are_shown() {
 }
 
 #[test]
-fn each_answer_brings_the_next_question_one_period_later() {
+fn each_answer_brings_the_next_query_one_period_later() {
     let mut bench = Bench::new();
     assert_eq!(bench.answer(0, device).not_before, None, "at once");
     let next = now() + SignedDuration::from_secs(1);
@@ -182,7 +182,7 @@ fn a_change_is_marked_and_a_failed_read_is_not_shown_as_good() {
     let shown = bench.screen(80, 24);
     let row = shown.lines().find(|row| row.contains("41003 /")).expect("the row is on the screen");
     assert!(row.starts_with('*') && row.contains("701") && row.contains("now"), "{row}");
-    let (id, read) = bench.asked.pop().expect("a question");
+    let (id, read) = bench.asked.pop().expect("a query");
     let words = Err(Fault::Timeout);
     let part = LivePart { at: now() + SignedDuration::from_secs(5), span: read.spans[0], words };
     let reading = LiveReading { parts: vec![part], requests: 1, ..LiveReading::default() };
@@ -313,7 +313,7 @@ fn what_was_read_before_the_line_was_lost_is_marked_as_old() {
 fn where_nothing_answers_the_tab_says_what_to_check() {
     let mut bench = Bench::new();
     let silent = |bench: &mut Bench, fault| {
-        let (id, read) = bench.asked.pop().expect("a question");
+        let (id, read) = bench.asked.pop().expect("a query");
         let part = LivePart { at: now(), span: read.spans[0], words: Err(fault) };
         let reading = LiveReading { parts: vec![part], requests: 1, ..LiveReading::default() };
         bench.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
@@ -337,7 +337,7 @@ fn where_nothing_answers_the_tab_says_what_to_check() {
 #[test]
 fn a_system_clock_that_was_set_does_not_stop_reading() {
     let mut bench = Bench::new();
-    let (id, read) = bench.asked.pop().expect("a question");
+    let (id, read) = bench.asked.pop().expect("a query");
     let at = now() - SignedDuration::from_hours(1);
     let part = LivePart { at, span: read.spans[0], words: Err(Fault::Timeout) };
     let reading = LiveReading { began: now(), parts: vec![part], requests: 1, ..LiveReading::default() };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::{Registers, view};
 use crate::{
-    access::right::needs_for_question,
+    access::right::needs_for_query,
     plant::{
         live::{AddressSpan, LiveRead},
         number::to_u32,
@@ -66,7 +66,7 @@ impl Registers {
         let relearn = std::mem::take(&mut self.relearn);
         let spans = std::iter::once(span).chain(self.watched_spans(span)).collect();
         let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
-        if let Some(why) = rights::lacks(cx, needs_for_question(&query)) {
+        if let Some(why) = rights::lacks(cx, needs_for_query(&query)) {
             self.trouble = Some(why);
             return Vec::new();
         }

@@ -71,7 +71,7 @@ fn what_manual_changes_at_once_is_reported_before() {
 }
 
 #[test]
-fn a_mode_that_is_changed_under_the_question_is_reported_in_it() {
+fn a_mode_that_is_changed_under_it_is_in_the_confirmation() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = faceplate(&fixture, "PLC-1.P-1");
@@ -83,7 +83,7 @@ fn a_mode_that_is_changed_under_the_question_is_reported_in_it() {
 }
 
 #[test]
-fn a_line_that_goes_down_under_the_question_is_reported_in_it() {
+fn a_line_that_goes_down_under_it_is_in_the_confirmation() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = faceplate(&fixture, "PLC-1.P-1");

@@ -9,9 +9,9 @@ fn rows(bench: &mut Bench, width: u16) -> Vec<String> {
     (1..=4).map(place).collect()
 }
 
-/// The last question to a unit.
+/// The last query to a unit.
 fn asked(bench: &mut Bench, unit: u8) -> (QueryId, LiveRead) {
-    let last = bench.asked.iter().rposition(|(_, read)| read.unit == unit).expect("a question");
+    let last = bench.asked.iter().rposition(|(_, read)| read.unit == unit).expect("a query");
     bench.asked.remove(last)
 }
 

@@ -9,7 +9,7 @@ fn what_is_watched_is_read_wherever_the_window_is() {
     bench.answer(0, device);
     bench.keys("eSV int16 0.1 °C⏎");
     bench.keys("pj0⏎");
-    let spans = bench.asked.last().map(|(_, read)| read.spans.clone()).expect("a question");
+    let spans = bench.asked.last().map(|(_, read)| read.spans.clone()).expect("a query");
     assert_eq!((spans[0].address, spans[1].address, spans[1].count), (0, 1002, 1));
     bench.answer(1, device);
     bench.answer(2, |address| if address == 1002 { Some(720) } else { device(address) });
@@ -33,7 +33,7 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
     bench.keys("L");
     bench.answer(1, device);
     bench.answer(2, |address| if address == 1002 { Some(701) } else { device(address) });
-    let (id, read) = bench.asked.pop().expect("a question");
+    let (id, read) = bench.asked.pop().expect("a query");
     let at = now() + SignedDuration::from_secs(3);
     let parts = read.spans.iter().map(|span| LivePart { at, span: *span, words: Err(Fault::Timeout) }).collect();
     let reading = LiveReading { parts, requests: 1, ..LiveReading::default() };
