@@ -60,12 +60,12 @@ pub struct Peer {
 
 /// Who waits for the reply to a request.
 #[derive(Debug, Clone, Copy)]
-struct Asker {
+struct Requester {
     terminal: u32,
     ticket: u64,
 }
 
-impl Asker {
+impl Requester {
     fn done(self) -> Effect {
         Effect::Reply(self.ticket, Ok(()))
     }
@@ -125,7 +125,7 @@ pub struct AccessControl {
     last_job: JobId,
     saving: Option<Saving>,
     /// A change that waits until last logins are written.
-    next: Option<(Asker, UserChange)>,
+    next: Option<(Requester, UserChange)>,
     /// A last login is not saved yet.
     unsaved: bool,
     /// The entries of backups and imports that are under way.
@@ -250,40 +250,40 @@ impl AccessControl {
 
     /// Handles a request; the reply goes to the ticket.
     pub fn on_request(&mut self, terminal: u32, ticket: u64, request: SessionRequest, at: Timestamp) -> Vec<Effect> {
-        let asker = Asker { terminal, ticket };
+        let requester = Requester { terminal, ticket };
         if !self.within_rate(terminal, at) {
-            return asker.refused(TOO_MANY);
+            return requester.refused(TOO_MANY);
         }
         let needed = right::needs_for_request(&request);
         if let (Some(_), Err(why)) = (needed, self.may(terminal, needed))
             && !self.could_anyway(terminal, &request)
         {
             let (action, target) = words(&request);
-            return self.refuse(asker, action, &target, why, at);
+            return self.refuse(requester, action, &target, why, at);
         }
         if let Some(session) = self.sessions.get_mut(&terminal).filter(|session| !session.locked) {
             session.active = at;
         }
         match request {
-            SessionRequest::Login { user, password } => self.login(asker, &user, password, at),
-            SessionRequest::Logout => self.logout(asker, at),
-            SessionRequest::Lock => self.lock(asker, at),
-            SessionRequest::Unlock(password) => self.unlock(asker, password, at),
-            SessionRequest::Active => vec![asker.done(), Effect::SessionStatus(terminal)],
+            SessionRequest::Login { user, password } => self.login(requester, &user, password, at),
+            SessionRequest::Logout => self.logout(requester, at),
+            SessionRequest::Lock => self.lock(requester, at),
+            SessionRequest::Unlock(password) => self.unlock(requester, password, at),
+            SessionRequest::Active => vec![requester.done(), Effect::SessionStatus(terminal)],
             SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
-                self.record_and_reply(asker, "export", &file, new, at)
+                self.record_and_reply(requester, "export", &file, new, at)
             }
-            SessionRequest::Backup { folder } => self.begin_history_job(asker, BACKUP, folder, Effect::Backup, at),
-            SessionRequest::Import { file } => self.begin_history_job(asker, IMPORT, file, Effect::Import, at),
+            SessionRequest::Backup { folder } => self.begin_history_job(requester, BACKUP, folder, Effect::Backup, at),
+            SessionRequest::Import { file } => self.begin_history_job(requester, IMPORT, file, Effect::Import, at),
             SessionRequest::Stop => {
-                let mut effects = self.record_and_reply(asker, "stop station", &self.plant_name(), None, at);
+                let mut effects = self.record_and_reply(requester, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
                 effects
             }
             SessionRequest::Reload => {
-                let mut effects = self.record_and_reply(asker, "reload", &self.plant_name(), None, at);
+                let mut effects = self.record_and_reply(requester, "reload", &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket));
                 effects
@@ -294,7 +294,7 @@ impl AccessControl {
             | SessionRequest::SetRole { .. }
             | SessionRequest::Disable { .. }
             | SessionRequest::DeleteUser { .. }
-            | SessionRequest::ResetPassword { .. }) => self.user_admin_request(asker, request, at),
+            | SessionRequest::ResetPassword { .. }) => self.user_admin_request(requester, request, at),
         }
     }
 
@@ -320,17 +320,17 @@ impl AccessControl {
     /// Records the action and replies once it is durable.
     fn record_and_reply(
         &self,
-        asker: Asker,
+        requester: Requester,
         action: &str,
         target: &str,
         new: Option<Arc<str>>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let Some(session) = self.sessions.get(&asker.terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get(&requester.terminal) else { return Vec::new() };
         // What becomes of a stop or a reload is seen by the stop and the start of the station behind it.
         let outcome = if new.is_some() { "done" } else { "permitted" };
         let record = ActionRecord { new, ..record(session, action, target, outcome, at) };
-        vec![Effect::Record(record), asker.done()]
+        vec![Effect::Record(record), requester.done()]
     }
 
     /// Time passes.

@@ -10,7 +10,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Right {
     /// See the process, curves, journals and reports.
-    Look,
+    View,
     /// Control the process: write, acknowledge, open and close lines, use parameter sets, read-only tests of a line.
     Operate,
     /// Take what the station holds away as a file.
@@ -26,12 +26,12 @@ pub enum Right {
 impl Right {
     /// Every right.
     pub const ALL: [Right; 6] =
-        [Right::Look, Right::Operate, Right::Export, Right::Engineer, Right::ManageUsers, Right::Station];
+        [Right::View, Right::Operate, Right::Export, Right::Engineer, Right::ManageUsers, Right::Station];
 
     /// The least role that has it.
     pub fn role(self) -> Role {
         match self {
-            Right::Look => Role::Viewer,
+            Right::View => Role::Viewer,
             Right::Operate | Right::Export => Role::Technician,
             Right::Engineer | Right::ManageUsers | Right::Station => Role::Supervisor,
         }
@@ -99,7 +99,7 @@ pub fn needs_for_query(query: &Query) -> Role {
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview
-        | Query::Report { .. } => Right::Look,
+        | Query::Report { .. } => Right::View,
         Query::Audit { .. } => Right::ManageUsers,
         Query::Registers(_) => Right::Operate,
     };

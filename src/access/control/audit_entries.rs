@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Asker, Effect,
+    AccessControl, Effect, Requester,
     session::{Refusals, SessionState},
 };
 use crate::{
@@ -55,14 +55,14 @@ impl AccessControl {
     /// Refuses a request and records that.
     pub(super) fn refuse(
         &mut self,
-        asker: Asker,
+        requester: Requester,
         action: &str,
         target: &str,
         why: String,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let entry = self.refused(asker.terminal, action, target, &why, at);
-        entry.into_iter().chain(asker.refused(why)).collect()
+        let entry = self.refused(requester.terminal, action, target, &why, at);
+        entry.into_iter().chain(requester.refused(why)).collect()
     }
 
     /// The entry of a refusal; none above the rate limit.

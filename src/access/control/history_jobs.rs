@@ -5,7 +5,7 @@ use std::path::Path;
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Asker, Effect,
+    AccessControl, Effect, Requester,
     audit_entries::{clean, record},
 };
 use crate::plant::record::ActionRecord;
@@ -13,7 +13,7 @@ use crate::plant::record::ActionRecord;
 impl AccessControl {
     pub(super) fn begin_history_job(
         &mut self,
-        asker: Asker,
+        requester: Requester,
         action: &str,
         path: String,
         effect: fn(u64, String) -> Effect,
@@ -22,12 +22,12 @@ impl AccessControl {
         if !Path::new(&path).is_absolute() {
             // The station stands in a folder of its own.
             let why = format!("found the path `{path}`, expected an absolute one");
-            return self.refuse(asker, action, &clean(&path), why, at);
+            return self.refuse(requester, action, &clean(&path), why, at);
         }
-        let Some(session) = self.sessions.get(&asker.terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get(&requester.terminal) else { return Vec::new() };
         let entry = record(session, action, &clean(&path), "permitted", at);
-        self.history_jobs.insert(asker.ticket, entry.clone());
-        vec![Effect::Record(entry), effect(asker.ticket, path)]
+        self.history_jobs.insert(requester.ticket, entry.clone());
+        vec![Effect::Record(entry), effect(requester.ticket, path)]
     }
 
     /// A backup or an import is done, or failed; `done` says what it has, or why.

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{AccessControl, Asker, Effect, audit_entries::audit};
+use super::{AccessControl, Effect, Requester, audit_entries::audit};
 use crate::access::{Secret, lockout::Key, password, user, user::UserChange};
 use crate::plant::command::Command;
 
@@ -76,15 +76,15 @@ pub(super) struct PendingJob {
 #[derive(Debug)]
 pub(super) enum JobPurpose {
     /// The password of `user`; `None` for an unknown name.
-    Login { asker: Asker, user: Option<Arc<str>> },
+    Login { requester: Requester, user: Option<Arc<str>> },
     /// The password of the logged-in user.
-    Unlock { asker: Asker, user: Arc<str> },
+    Unlock { requester: Requester, user: Arc<str> },
     /// The present password of the user, before it is changed.
-    UserChange { asker: Asker, user: Arc<str>, new: Secret },
+    UserChange { requester: Requester, user: Arc<str>, new: Secret },
     /// The password of the approver.
     Reauthenticate { by: Arc<str>, approver: Option<Arc<str>>, command: Box<Command> },
     /// A new one is hashed.
-    Hash { asker: Asker, change: UserChange },
+    Hash { requester: Requester, change: UserChange },
 }
 
 /// Why an attempt failed.
@@ -125,11 +125,16 @@ impl AccessControl {
     }
 
     /// Has a new password hashed.
-    pub(super) fn hash(&mut self, asker: Asker, password: Secret, change: UserChange) -> Result<Vec<Effect>, String> {
-        let session = self.session(asker.terminal)?;
-        let origin = format!("hash for terminal {}", asker.terminal).into();
+    pub(super) fn hash(
+        &mut self,
+        requester: Requester,
+        password: Secret,
+        change: UserChange,
+    ) -> Result<Vec<Effect>, String> {
+        let session = self.session(requester.terminal)?;
+        let origin = format!("hash for terminal {}", requester.terminal).into();
         let key = Key { origin, account: None, never_locked: self.is_station_owner(&session.peer) };
-        let job = self.pending_job(asker.terminal, key, JobPurpose::Hash { asker, change })?;
+        let job = self.pending_job(requester.terminal, key, JobPurpose::Hash { requester, change })?;
         Ok(self.start_job(job, PasswordJob::Hash(password)))
     }
 
@@ -203,7 +208,7 @@ impl AccessControl {
 
     fn on_hashed(&mut self, job: PendingJob, hash: Result<String, String>, at: Timestamp) -> Vec<Effect> {
         match job.what {
-            JobPurpose::Hash { asker, change } => self.set_password(asker, change, hash, at),
+            JobPurpose::Hash { requester, change } => self.set_password(requester, change, hash, at),
             other => self.refuse_job(job.terminal, other, "internal error".to_owned(), at),
         }
     }
@@ -225,9 +230,9 @@ impl AccessControl {
             }
         };
         effects.extend(match what {
-            JobPurpose::Login { asker, user } => self.login_done(asker, user, wrong, at),
-            JobPurpose::Unlock { asker, user } => self.unlock_done(asker, user, wrong, at),
-            JobPurpose::UserChange { asker, user, new } => self.old_password_done(asker, user, new, wrong, at),
+            JobPurpose::Login { requester, user } => self.login_done(requester, user, wrong, at),
+            JobPurpose::Unlock { requester, user } => self.unlock_done(requester, user, wrong, at),
+            JobPurpose::UserChange { requester, user, new } => self.old_password_done(requester, user, new, wrong, at),
             JobPurpose::Reauthenticate { by, approver, command } => {
                 self.on_reauthenticated(terminal, by, approver, *command, wrong, at)
             }
@@ -266,10 +271,10 @@ impl AccessControl {
 
     fn refuse_job(&mut self, terminal: u32, what: JobPurpose, why: String, at: Timestamp) -> Vec<Effect> {
         match what {
-            JobPurpose::Login { asker, .. }
-            | JobPurpose::Unlock { asker, .. }
-            | JobPurpose::UserChange { asker, .. }
-            | JobPurpose::Hash { asker, .. } => asker.refused(why),
+            JobPurpose::Login { requester, .. }
+            | JobPurpose::Unlock { requester, .. }
+            | JobPurpose::UserChange { requester, .. }
+            | JobPurpose::Hash { requester, .. } => requester.refused(why),
             JobPurpose::Reauthenticate { command, .. } => self.refuse_reauthentication(terminal, *command, why, at),
         }
     }

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Asker, Effect, LOG_IN_FIRST, SessionState,
+    AccessControl, Effect, LOG_IN_FIRST, Requester, SessionState,
     audit_entries::audit,
     jobs::{JobError, JobPurpose},
     session_status::LOCK_NEAR,
@@ -17,37 +17,38 @@ const NO_LOGIN: &str = "this station does not require login";
 const NO_PASSWORD: &str = "the operating system identifies you here; no password is needed";
 
 impl AccessControl {
-    pub(super) fn login(&mut self, asker: Asker, user: &str, password: Secret, at: Timestamp) -> Vec<Effect> {
-        let Some(users) = &self.users else { return asker.refused(NO_LOGIN) };
+    pub(super) fn login(&mut self, requester: Requester, user: &str, password: Secret, at: Timestamp) -> Vec<Effect> {
+        let Some(users) = &self.users else { return requester.refused(NO_LOGIN) };
         if let Some(why) = &self.closed {
-            return asker.refused(&**why);
+            return requester.refused(&**why);
         }
         if users.is_empty() {
-            return asker.refused("no users exist: the user who started the station creates the first Supervisor");
+            return requester.refused("no users exist: the user who started the station creates the first Supervisor");
         }
         let (name, user) = (user.to_owned(), users.get(user).map(|user| user.name.clone()));
-        let checked = self.verify_password(asker.terminal, &name, password, JobPurpose::Login { asker, user }, at);
-        checked.unwrap_or_else(|why| asker.refused(why))
+        let checked =
+            self.verify_password(requester.terminal, &name, password, JobPurpose::Login { requester, user }, at);
+        checked.unwrap_or_else(|why| requester.refused(why))
     }
 
     pub(super) fn login_done(
         &mut self,
-        asker: Asker,
+        requester: Requester,
         user: Option<Arc<str>>,
         wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(asker, "login failed", user.as_deref(), wrong, at);
+            return self.failed(requester, "login failed", user.as_deref(), wrong, at);
         }
         let Some(user) = user.and_then(|user| self.users.as_ref()?.get(&user).cloned()) else { return Vec::new() };
-        if !self.sessions.contains_key(&asker.terminal) {
+        if !self.sessions.contains_key(&requester.terminal) {
             return Vec::new();
         }
-        let mut effects = self.log_out(asker.terminal, "done: another user logs in", at);
+        let mut effects = self.log_out(requester.terminal, "done: another user logs in", at);
         let who = LoggedInUser { user: user.name.clone(), role: user.role, must_change: user.must_change };
-        effects.extend(self.log_in(asker.terminal, who, at));
-        effects.push(asker.done());
+        effects.extend(self.log_in(requester.terminal, who, at));
+        effects.push(requester.done());
         effects
     }
 
@@ -69,27 +70,27 @@ impl AccessControl {
     /// Records why an attempt failed, and replies without the reason.
     pub(super) fn failed(
         &mut self,
-        asker: Asker,
+        requester: Requester,
         action: &str,
         user: Option<&str>,
         JobError { why, message }: JobError,
         at: Timestamp,
     ) -> Vec<Effect> {
         let mut effects = Vec::new();
-        if let Some(session) = self.sessions.get(&asker.terminal) {
+        if let Some(session) = self.sessions.get(&requester.terminal) {
             effects.push(audit(session, action, user.unwrap_or("unknown user"), &format!("refused: {why}"), at));
         }
-        effects.extend(asker.refused(message));
+        effects.extend(requester.refused(message));
         effects
     }
 
-    pub(super) fn logout(&mut self, asker: Asker, at: Timestamp) -> Vec<Effect> {
-        let mut effects = self.log_out(asker.terminal, "done", at);
+    pub(super) fn logout(&mut self, requester: Requester, at: Timestamp) -> Vec<Effect> {
+        let mut effects = self.log_out(requester.terminal, "done", at);
         if effects.is_empty() {
-            return asker.refused("no user is logged in here");
+            return requester.refused("no user is logged in here");
         }
-        effects.push(asker.done());
-        self.publish_status(asker.terminal, &mut effects);
+        effects.push(requester.done());
+        self.publish_status(requester.terminal, &mut effects);
         effects
     }
 
@@ -103,45 +104,50 @@ impl AccessControl {
         effects
     }
 
-    pub(super) fn lock(&mut self, asker: Asker, at: Timestamp) -> Vec<Effect> {
-        match self.sessions.get_mut(&asker.terminal) {
-            Some(session) if session.acting().is_some() && session.trusted => asker.refused(NO_PASSWORD),
+    pub(super) fn lock(&mut self, requester: Requester, at: Timestamp) -> Vec<Effect> {
+        match self.sessions.get_mut(&requester.terminal) {
+            Some(session) if session.acting().is_some() && session.trusted => requester.refused(NO_PASSWORD),
             Some(session) if session.acting().is_some() => {
                 session.locked = true;
                 let target = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                let mut effects = vec![audit(session, "lock terminal", &target, "done", at), asker.done()];
-                self.publish_status(asker.terminal, &mut effects);
+                let mut effects = vec![audit(session, "lock terminal", &target, "done", at), requester.done()];
+                self.publish_status(requester.terminal, &mut effects);
                 effects
             }
-            Some(session) if session.locked => asker.refused("this terminal is already locked"),
-            Some(_) | None => asker.refused(LOG_IN_FIRST),
+            Some(session) if session.locked => requester.refused("this terminal is already locked"),
+            Some(_) | None => requester.refused(LOG_IN_FIRST),
         }
     }
 
-    pub(super) fn unlock(&mut self, asker: Asker, password: Secret, at: Timestamp) -> Vec<Effect> {
-        let session = self.sessions.get(&asker.terminal).filter(|session| session.locked);
+    pub(super) fn unlock(&mut self, requester: Requester, password: Secret, at: Timestamp) -> Vec<Effect> {
+        let session = self.sessions.get(&requester.terminal).filter(|session| session.locked);
         let Some(user) = session.and_then(|session| session.who.as_ref()).map(|who| who.user.clone()) else {
-            return asker.refused("this terminal is not locked");
+            return requester.refused("this terminal is not locked");
         };
-        let checked =
-            self.verify_password(asker.terminal, &user.clone(), password, JobPurpose::Unlock { asker, user }, at);
-        checked.unwrap_or_else(|why| asker.refused(why))
+        let checked = self.verify_password(
+            requester.terminal,
+            &user.clone(),
+            password,
+            JobPurpose::Unlock { requester, user },
+            at,
+        );
+        checked.unwrap_or_else(|why| requester.refused(why))
     }
 
     pub(super) fn unlock_done(
         &mut self,
-        asker: Asker,
+        requester: Requester,
         user: Arc<str>,
         wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(asker, "unlock failed", Some(&user), wrong, at);
+            return self.failed(requester, "unlock failed", Some(&user), wrong, at);
         }
-        let Some(session) = self.sessions.get_mut(&asker.terminal) else { return Vec::new() };
+        let Some(session) = self.sessions.get_mut(&requester.terminal) else { return Vec::new() };
         (session.locked, session.active) = (false, at);
-        let mut effects = vec![audit(session, "unlock terminal", &user, "done", at), asker.done()];
-        self.publish_status(asker.terminal, &mut effects);
+        let mut effects = vec![audit(session, "unlock terminal", &user, "done", at), requester.done()];
+        self.publish_status(requester.terminal, &mut effects);
         effects
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Asker, Effect, Peer,
+    AccessControl, Effect, Peer, Requester,
     audit_entries::{record, words},
     enough,
     jobs::{JobError, JobPurpose},
@@ -28,35 +28,40 @@ const NO_HASH: &str = "";
 #[derive(Debug)]
 pub(super) struct Saving {
     /// `None` where only last logins are written.
-    request: Option<(Asker, UserChange, Box<ActionRecord>)>,
+    request: Option<(Requester, UserChange, Box<ActionRecord>)>,
 }
 
 impl AccessControl {
-    pub(super) fn user_admin_request(&mut self, asker: Asker, request: SessionRequest, at: Timestamp) -> Vec<Effect> {
+    pub(super) fn user_admin_request(
+        &mut self,
+        requester: Requester,
+        request: SessionRequest,
+        at: Timestamp,
+    ) -> Vec<Effect> {
         if self.users.is_none() {
-            return asker.refused("this station has no users");
+            return requester.refused("this station has no users");
         }
         let (action, target) = words(&request);
         if let Some(why) = self.closed.as_ref().map(ToString::to_string) {
             // The damaged file is not overwritten.
-            return self.refuse(asker, action, &target, why, at);
+            return self.refuse(requester, action, &target, why, at);
         }
         let result = match request {
-            SessionRequest::FirstSupervisor { user, password } => self.first(asker, user.into(), password),
-            SessionRequest::ChangePassword { old, new } => self.change_own(asker, old, new, at),
+            SessionRequest::FirstSupervisor { user, password } => self.first(requester, user.into(), password),
+            SessionRequest::ChangePassword { old, new } => self.change_own(requester, old, new, at),
             SessionRequest::AddUser { user, role, password } => {
                 let change = UserChange::Add { user: user.into(), role, hash: NO_HASH.into() };
-                self.new_password(asker, password, change)
+                self.new_password(requester, password, change)
             }
             SessionRequest::ResetPassword { user, password } => {
                 let change = UserChange::Password { user: user.into(), hash: NO_HASH.into(), must_change: true };
-                self.new_password(asker, password, change)
+                self.new_password(requester, password, change)
             }
-            SessionRequest::SetRole { user, role } => self.change(asker, UserChange::Role(user.into(), role), at),
+            SessionRequest::SetRole { user, role } => self.change(requester, UserChange::Role(user.into(), role), at),
             SessionRequest::Disable { user, disabled } => {
-                self.change(asker, UserChange::Disable(user.into(), disabled), at)
+                self.change(requester, UserChange::Disable(user.into(), disabled), at)
             }
-            SessionRequest::DeleteUser { user } => self.change(asker, UserChange::Delete(user.into()), at),
+            SessionRequest::DeleteUser { user } => self.change(requester, UserChange::Delete(user.into()), at),
             SessionRequest::Login { .. }
             | SessionRequest::Logout
             | SessionRequest::Lock
@@ -68,7 +73,7 @@ impl AccessControl {
             | SessionRequest::Stop
             | SessionRequest::Reload => return Vec::new(),
         };
-        result.unwrap_or_else(|why| self.refuse(asker, action, &target, why, at))
+        result.unwrap_or_else(|why| self.refuse(requester, action, &target, why, at))
     }
 
     /// Whether this is root, the user of the station, or its own process.
@@ -77,19 +82,25 @@ impl AccessControl {
         peer.own || user == Some("root") || (user.is_some() && user == self.service_account.as_deref())
     }
 
-    fn first(&mut self, asker: Asker, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
-        let session = self.session(asker.terminal)?;
+    fn first(&mut self, requester: Requester, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
+        let session = self.session(requester.terminal)?;
         if !self.is_station_owner(&session.peer) {
             return Err("only the user who started the station creates the first Supervisor".to_owned());
         }
         if self.users.as_ref().is_none_or(|users| !users.is_empty()) {
             return Err("users already exist".to_owned());
         }
-        self.new_password(asker, password, UserChange::First { user, hash: NO_HASH.into() })
+        self.new_password(requester, password, UserChange::First { user, hash: NO_HASH.into() })
     }
 
-    fn change_own(&mut self, asker: Asker, old: Secret, new: Secret, at: Timestamp) -> Result<Vec<Effect>, String> {
-        let session = self.session(asker.terminal)?;
+    fn change_own(
+        &mut self,
+        requester: Requester,
+        old: Secret,
+        new: Secret,
+        at: Timestamp,
+    ) -> Result<Vec<Effect>, String> {
+        let session = self.session(requester.terminal)?;
         if session.trusted {
             return Err("the operating system identifies you here; there is no password to change".to_owned());
         }
@@ -98,30 +109,41 @@ impl AccessControl {
         if password::one_form(&new.0) == password::one_form(&old.0) {
             return Err("this is the current password, choose another one".to_owned());
         }
-        self.verify_password(asker.terminal, &user.clone(), old, JobPurpose::UserChange { asker, user, new }, at)
+        self.verify_password(
+            requester.terminal,
+            &user.clone(),
+            old,
+            JobPurpose::UserChange { requester, user, new },
+            at,
+        )
     }
 
     pub(super) fn old_password_done(
         &mut self,
-        asker: Asker,
+        requester: Requester,
         user: Arc<str>,
         new: Secret,
         wrong: Option<JobError>,
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(asker, "change password", Some(&user), wrong, at);
+            return self.failed(requester, "change password", Some(&user), wrong, at);
         }
         let change = UserChange::Password { user, hash: NO_HASH.into(), must_change: false };
-        self.new_password(asker, new, change).unwrap_or_else(|why| asker.refused(why))
+        self.new_password(requester, new, change).unwrap_or_else(|why| requester.refused(why))
     }
 
     /// Checks a new password and has it hashed.
-    fn new_password(&mut self, asker: Asker, password: Secret, change: UserChange) -> Result<Vec<Effect>, String> {
+    fn new_password(
+        &mut self,
+        requester: Requester,
+        password: Secret,
+        change: UserChange,
+    ) -> Result<Vec<Effect>, String> {
         // Checked before the hash and again after it.
         self.check_change(&change)?;
         password::check(&password.0, change.user(), self.def.access.password_chars_min)?;
-        self.hash(asker, password, change)
+        self.hash(requester, password, change)
     }
 
     fn check_change(&self, change: &UserChange) -> Result<crate::access::Users, String> {
@@ -137,20 +159,20 @@ impl AccessControl {
 
     pub(super) fn set_password(
         &mut self,
-        asker: Asker,
+        requester: Requester,
         change: UserChange,
         hash: Result<String, String>,
         at: Timestamp,
     ) -> Vec<Effect> {
         match hash {
-            Ok(hash) => self.change_or_refuse(asker, change.with_hash(hash.into()), at),
-            Err(why) => self.refuse(asker, change.action(), change.user(), why, at),
+            Ok(hash) => self.change_or_refuse(requester, change.with_hash(hash.into()), at),
+            Err(why) => self.refuse(requester, change.action(), change.user(), why, at),
         }
     }
 
     /// Starts a change, which takes effect when it is on disk. Checks the rights again, because hashing takes time.
-    fn change(&mut self, asker: Asker, change: UserChange, at: Timestamp) -> Result<Vec<Effect>, String> {
-        let session = self.session(asker.terminal)?;
+    fn change(&mut self, requester: Requester, change: UserChange, at: Timestamp) -> Result<Vec<Effect>, String> {
+        let session = self.session(requester.terminal)?;
         match &change {
             UserChange::First { .. } | UserChange::Password { must_change: false, .. } => {}
             UserChange::Add { .. }
@@ -164,7 +186,7 @@ impl AccessControl {
         }
         match &self.saving {
             Some(Saving { request: None, .. }) if self.next.is_none() => {
-                self.next = Some((asker, change));
+                self.next = Some((requester, change));
                 return Ok(Vec::new());
             }
             Some(_) => return Err("another change is being saved, try again".to_owned()),
@@ -175,7 +197,7 @@ impl AccessControl {
         let name = self.users.as_ref().and_then(|users| users.get(change.user())).map(|user| user.name.clone());
         let target = name.unwrap_or_else(|| change.user().clone());
         let record = ActionRecord { old, new, ..record(session, change.action(), &target, "done", at) };
-        self.saving = Some(Saving { request: Some((asker, change, Box::new(record))) });
+        self.saving = Some(Saving { request: Some((requester, change, Box::new(record))) });
         Ok(vec![Effect::Save(after)])
     }
 
@@ -206,16 +228,16 @@ impl AccessControl {
 
     /// The users were saved, or not: `Err` says why.
     pub fn on_saved(&mut self, result: Result<(), String>, at: Timestamp) -> Vec<Effect> {
-        let Some(Saving { request: Some((asker, change, record)) }) = self.saving.take() else {
+        let Some(Saving { request: Some((requester, change, record)) }) = self.saving.take() else {
             let next = self.next.take();
-            return next.map_or_else(Vec::new, |(asker, change)| self.change_or_refuse(asker, change, at));
+            return next.map_or_else(Vec::new, |(requester, change)| self.change_or_refuse(requester, change, at));
         };
         let after = result.and_then(|()| self.check_change(&change));
         let users = match after {
             Ok(users) => users,
             Err(why) => {
                 let outcome = format!("refused: {why}").into();
-                let refused = asker.refused(why);
+                let refused = requester.refused(why);
                 return [Effect::Record(ActionRecord { outcome, ..*record })].into_iter().chain(refused).collect();
             }
         };
@@ -224,15 +246,15 @@ impl AccessControl {
         let (old, new) = (digest(before.as_ref()), digest(self.users.as_ref()));
         let file = ActionRecord::new(record.at, "station", USERS_FILE, "users", record.outcome.clone());
         let file = ActionRecord { old, new, ..file };
-        let mut effects = vec![Effect::Record(*record), Effect::Record(file), asker.done()];
-        effects.extend(self.apply_to_sessions(asker.terminal, &change, at));
-        self.publish_status(asker.terminal, &mut effects);
+        let mut effects = vec![Effect::Record(*record), Effect::Record(file), requester.done()];
+        effects.extend(self.apply_to_sessions(requester.terminal, &change, at));
+        self.publish_status(requester.terminal, &mut effects);
         effects
     }
 
-    fn change_or_refuse(&mut self, asker: Asker, change: UserChange, at: Timestamp) -> Vec<Effect> {
+    fn change_or_refuse(&mut self, requester: Requester, change: UserChange, at: Timestamp) -> Vec<Effect> {
         let (action, target) = (change.action(), change.user().clone());
-        self.change(asker, change, at).unwrap_or_else(|why| self.refuse(asker, action, &target, why, at))
+        self.change(requester, change, at).unwrap_or_else(|why| self.refuse(requester, action, &target, why, at))
     }
 
     /// Applies a change to the sessions.
