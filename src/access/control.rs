@@ -55,7 +55,7 @@ pub struct Peer {
     /// The user of the operating system, as the system says.
     pub unix_user: Option<Arc<str>>,
     /// It belongs to the process of the station.
-    pub own: bool,
+    pub in_process: bool,
 }
 
 /// Who waits for the reply to a request.
@@ -170,7 +170,7 @@ impl AccessControl {
     /// A terminal has attached.
     pub fn open(&mut self, terminal: u32, peer: Peer, at: Timestamp) -> Vec<Effect> {
         let peer = Peer { from: clean(&peer.from).into(), ..peer };
-        let (own, mut session) = (peer.own, SessionState::new(peer, at));
+        let (in_process, mut session) = (peer.in_process, SessionState::new(peer, at));
         let mut effects = match self.admit(&session, at) {
             Ok(effects) => effects,
             Err(why) => {
@@ -181,7 +181,7 @@ impl AccessControl {
         };
         session.who = self.known(&session.peer);
         session.trusted = session.who.is_some();
-        if !own && self.may_record(&session.origin.clone(), at) {
+        if !in_process && self.may_record(&session.origin.clone(), at) {
             effects.push(audit(&session, "attach", "", "done", at));
         }
         if let Some(who) = &session.who
@@ -212,7 +212,7 @@ impl AccessControl {
     pub fn close(&mut self, terminal: u32, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.log_out(terminal, "done: terminal disconnected", at);
         let Some(session) = self.sessions.remove(&terminal) else { return effects };
-        if !session.peer.own && self.may_record(&session.origin, at) {
+        if !session.peer.in_process && self.may_record(&session.origin, at) {
             effects.push(audit(&session, "detach", "", "done", at));
         }
         self.publish_status(terminal, &mut effects);
@@ -301,7 +301,8 @@ impl AccessControl {
     /// Stopping the station, reloading its plant file, a backup or an import need no login of those who can do so with the means of the
     /// operating system (its init system, for one), whatever role they have here without a password. Who logged in acts as that user.
     fn could_anyway(&self, terminal: u32, request: &SessionRequest) -> bool {
-        let without_login = |session: &&SessionState| (session.who.is_none() || session.trusted) && !session.peer.own;
+        let without_login =
+            |session: &&SessionState| (session.who.is_none() || session.trusted) && !session.peer.in_process;
         let session = self.sessions.get(&terminal).filter(without_login);
         let of_station = matches!(
             request,

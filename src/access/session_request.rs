@@ -150,9 +150,9 @@ pub struct SessionStatus {
     /// Locked: only looking, until the password is given.
     pub locked: bool,
     /// The process may be seen.
-    pub view: bool,
+    pub may_view: bool,
     /// There are no users yet: the first Supervisor is asked for.
-    pub first: bool,
+    pub needs_first_supervisor: bool,
     /// Shown before a login.
     pub banner: Option<Arc<str>>,
     /// Fewest characters of a password.

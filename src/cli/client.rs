@@ -88,7 +88,7 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
     let seen = async {
         // The answer may come before the status, and the status before the snapshot that belongs to it.
         let _ = session.status.wait_for(|status| status.who.is_some()).await;
-        let view = session.status.borrow().view;
+        let view = session.status.borrow().may_view;
         if view {
             let _ = session.snapshots.wait_for(|snapshot| !is_withheld(snapshot)).await;
         }

@@ -111,7 +111,7 @@ impl Source {
     pub async fn open(def: &Arc<PlantDef>, args: &StationArgs, login: &client::Login) -> Result<Source, CliError> {
         if args.history.is_none() && client::find_station(Some(&def.name)).await.is_ok() {
             let session = client::attach(Some(&def.name), login).await?;
-            if !session.status.borrow().view {
+            if !session.status.borrow().may_view {
                 let why = "the station of this plant runs: log in to ask it, --user NAME asks for the password";
                 return Err(CliError::Failed(why.to_owned()));
             }

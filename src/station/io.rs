@@ -252,7 +252,7 @@ impl Station {
     pub fn session(&self, operator: &str) -> Session {
         // The given name counts only without login.
         let user = if self.open { operator.to_owned() } else { own_user() };
-        self.acceptor.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), own: true })
+        self.acceptor.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), in_process: true })
     }
 
     /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.

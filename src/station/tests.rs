@@ -44,7 +44,7 @@ async fn every_action_is_in_the_audit_log_and_in_the_history() {
     let history = folder.path().join("fixture.duckdb");
     let mut station = start_guarded(options(&history)).unwrap();
     let mut session = station.session("whoever");
-    session.status.wait_for(|status| status.first).await.unwrap();
+    session.status.wait_for(|status| status.needs_first_supervisor).await.unwrap();
     assert!(session.request(SessionRequest::Stop).await.is_err(), "no user is logged in");
     let password = "four wet horses in a tank";
     session.request(SessionRequest::FirstSupervisor { user: "anna".into(), password: password.into() }).await.unwrap();
@@ -53,7 +53,7 @@ async fn every_action_is_in_the_audit_log_and_in_the_history() {
     session.request(SessionRequest::Unlock(password.into())).await.unwrap();
     session.request(SessionRequest::Logout).await.unwrap();
     let mut other = station.session("whoever");
-    other.status.wait_for(|status| !status.first && status.password_chars_min > 0).await.unwrap();
+    other.status.wait_for(|status| !status.needs_first_supervisor && status.password_chars_min > 0).await.unwrap();
     let command = other.send_command(1, CommandKind::Alarm(crate::plant::alarm::AlarmCommand::Silence)).unwrap();
     let shown =
         |snapshot: &Arc<crate::plant::Snapshot>| snapshot.commands.iter().any(|status| status.command.id == command);

@@ -236,5 +236,5 @@ pub fn session() -> Arc<crate::access::SessionStatus> {
         plant::role::Role,
     };
     let who = LoggedInUser { user: "tech1".into(), role: Role::Supervisor, must_change: false };
-    Arc::new(SessionStatus { who: Some(who), view: true, password_chars_min: 15, ..SessionStatus::default() })
+    Arc::new(SessionStatus { who: Some(who), may_view: true, password_chars_min: 15, ..SessionStatus::default() })
 }

@@ -40,7 +40,7 @@ pub struct SessionLock {
 
 /// Is everything but the login page closed?
 pub fn is_closed(session: &SessionStatus) -> bool {
-    session.who.as_ref().map_or(!session.view, |who| who.must_change)
+    session.who.as_ref().map_or(!session.may_view, |who| who.must_change)
 }
 
 impl Model {
@@ -85,10 +85,10 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     });
     let shown = model.tabs.shown;
     let let_in = shown == Tab::Login && now.who.is_some() && user(&before) != user(&now);
-    let opened = shown == Tab::Login && is_closed(&before) && !now.first;
+    let opened = shown == Tab::Login && is_closed(&before) && !now.needs_first_supervisor;
     // The login page has every letter for itself: a locked terminal is for looking.
     let locked = shown == Tab::Login && !before.locked && now.locked;
-    if is_closed(&now) || (now.first && !before.first) {
+    if is_closed(&now) || (now.needs_first_supervisor && !before.needs_first_supervisor) {
         return vec![UiAction::Show(Tab::Login)];
     }
     let offered = Tab::offered(&model.cx()).contains(&shown);

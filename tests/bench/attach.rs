@@ -110,7 +110,7 @@ fn station(devices: u16, lines: u16) {
         tokio::spawn(async move {
             let mut there = Vec::new();
             while let Some(request) = attach_requests.recv().await {
-                request.status.send_replace(Arc::new(SessionStatus { view: true, ..SessionStatus::default() }));
+                request.status.send_replace(Arc::new(SessionStatus { may_view: true, ..SessionStatus::default() }));
                 there.push(request.status);
             }
         });

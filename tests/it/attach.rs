@@ -91,8 +91,8 @@ impl Stand {
             loop {
                 tokio::select! {
                     Some(request) = attach_requests.recv() => {
-                        let view = *may.borrow();
-                        request.status.send_replace(Arc::new(SessionStatus { view, banner: Some(request.peer.from), ..SessionStatus::default() }));
+                        let may_view = *may.borrow();
+                        request.status.send_replace(Arc::new(SessionStatus { may_view, banner: Some(request.peer.from), ..SessionStatus::default() }));
                         terminals.push(request.status);
                     }
                     Some((_, request)) = requests.recv() => {
@@ -100,9 +100,9 @@ impl Stand {
                         ask.send_modify(|count| *count += 1);
                     }
                     Ok(()) = may.changed() => {
-                        let view = *may.borrow_and_update();
+                        let may_view = *may.borrow_and_update();
                         for terminal in &terminals {
-                            terminal.send_modify(|status| *status = Arc::new(SessionStatus { view, ..SessionStatus::clone(status) }));
+                            terminal.send_modify(|status| *status = Arc::new(SessionStatus { may_view, ..SessionStatus::clone(status) }));
                         }
                     }
                     _ = tick.tick() => terminals.retain(|terminal| !terminal.is_closed()),

@@ -112,7 +112,7 @@ impl Guarded {
     /// A terminal as the socket makes it of a host far away.
     pub fn far(&self, user: &str) -> Session {
         let from = format!("pts/9 from 10.0.0.9, user {user}, process 1").into();
-        self.station.acceptor().attach(Peer { from, unix_user: Some(user.into()), own: false })
+        self.station.acceptor().attach(Peer { from, unix_user: Some(user.into()), in_process: false })
     }
 
     /// Plant time goes on for so long.

@@ -320,7 +320,7 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
     }
     // Another user of the operating system who has not logged in either.
     let from = "pts/7, user stranger, process 1".into();
-    let peer = Peer { from, unix_user: Some("stranger".into()), own: false };
+    let peer = Peer { from, unix_user: Some("stranger".into()), in_process: false };
     let stranger = guarded.station.acceptor().attach(peer);
     for request in [SessionRequest::Reload, SessionRequest::Stop] {
         assert_eq!(stranger.request(request).await, Err(LOG_IN.to_owned()));

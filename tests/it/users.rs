@@ -147,7 +147,7 @@ async fn an_idle_terminal_is_locked_and_still_shows_alarms() {
         () = touching => unreachable!("it touches for ever"),
     }
     assert!(!touched.status.borrow().locked, "keys were pressed there");
-    assert!(idle.status.borrow().users.is_empty() && idle.status.borrow().view, "only looking");
+    assert!(idle.status.borrow().users.is_empty() && idle.status.borrow().may_view, "only looking");
 
     guarded.tap.mute();
     let alarmed = until(&mut idle.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;

@@ -29,7 +29,7 @@ impl AccessControl {
     pub(super) fn within_rate(&mut self, terminal: u32, at: Timestamp) -> bool {
         let Some(session) = self.sessions.get_mut(&terminal) else { return false };
         // The station's own process shares its fate anyway.
-        if session.peer.own || session.accepts_request(at) {
+        if session.peer.in_process || session.accepts_request(at) {
             return true;
         }
         let origin = session.origin.clone();

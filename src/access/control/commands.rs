@@ -92,8 +92,8 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
-        let (origin, own) = (session.origin.clone(), session.peer.own);
-        if !own && !self.may_record(&origin, at) {
+        let (origin, in_process) = (session.origin.clone(), session.peer.in_process);
+        if !in_process && !self.may_record(&origin, at) {
             return self.undelivered(command.id, &why.to_string());
         }
         self.forward_to_plant(terminal, command, None, command::Outcome::Refused(why), at)

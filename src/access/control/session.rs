@@ -96,7 +96,7 @@ impl SessionState {
 
 fn origin(peer: &Peer) -> Arc<str> {
     match &peer.unix_user {
-        _ if peer.own => "this process".into(),
+        _ if peer.in_process => "this process".into(),
         Some(user) => user.clone(),
         None => "unknown".into(),
     }

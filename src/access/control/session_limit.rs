@@ -15,7 +15,7 @@ const KEPT: usize = 8;
 impl AccessControl {
     /// Admits a session. One user of the operating system gets at most half of all. `Ok`: the effects; `Err`: why not.
     pub(super) fn admit(&mut self, new: &SessionState, at: Timestamp) -> Result<Vec<Effect>, String> {
-        if new.peer.own {
+        if new.peer.in_process {
             return Ok(Vec::new());
         }
         let most = usize::from(self.def.access.sessions_max);
@@ -40,7 +40,7 @@ impl AccessControl {
         whose: &str,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
-        let these = || self.sessions.iter().filter(|(_, session)| !session.peer.own && counts(session));
+        let these = || self.sessions.iter().filter(|(_, session)| !session.peer.in_process && counts(session));
         let there = these().count();
         if there < most {
             return Ok(Vec::new());

@@ -27,8 +27,8 @@ impl AccessControl {
         SessionStatus {
             who: session.who.clone(),
             locked: session.locked,
-            view: rules.anonymous_view || session.who.is_some(),
-            first: self.closed.is_none()
+            may_view: rules.anonymous_view || session.who.is_some(),
+            needs_first_supervisor: self.closed.is_none()
                 && self.users.as_ref().is_some_and(Users::is_empty)
                 && self.is_station_owner(&session.peer),
             banner,

@@ -57,7 +57,7 @@ impl Bench {
         let peer = Peer {
             from: format!("pts/{terminal} from {host}, user panel").into(),
             unix_user: Some("panel".into()),
-            own: false,
+            in_process: false,
         };
         let effects = self.access.open(terminal, peer, self.now);
         self.work(effects)
@@ -193,7 +193,7 @@ fn five_failures_lock_out_one_system_user_of_one_account() {
     let reply = bench.login(1, "tech", TECH).unwrap_err();
     assert!(reply.contains("wait 284 s"), "{reply}");
     assert!(bench.login(3, "TECH", TECH).is_err(), "the right password elsewhere does not help");
-    assert!(bench.access.session_status(1, bench.now).view, "alarms and process stay to be seen");
+    assert!(bench.access.session_status(1, bench.now).may_view, "alarms and process stay to be seen");
     assert_eq!(bench.who(2).as_deref(), Some("tech"));
     assert_eq!(bench.send_command(2, RUN, None).unwrap().1, None, "who is in goes on working");
     bench.request(2, SessionRequest::Lock).unwrap();
@@ -266,7 +266,7 @@ fn an_idle_terminal_is_locked_until_the_password_is_entered() {
     assert!(!bench.access.session_status(1, bench.now).locked, "a command is a sign of life");
     bench.later(1);
     let status = bench.access.session_status(1, bench.now);
-    assert!(status.locked && status.view);
+    assert!(status.locked && status.may_view);
     assert!(bench.send_command(1, RUN, None).unwrap().1.is_some());
     assert!(bench.request(1, SessionRequest::Unlock("guess".into())).is_err());
     bench.later(1);
@@ -294,7 +294,7 @@ fn the_station_user_can_stop_it_with_a_lesser_trusted_role() {
     let trusted = vec![("panel".to_owned(), Role::Technician), ("sight".to_owned(), Role::Technician)];
     let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
     bench.open(1, "10.0.0.1");
-    let own = Peer { from: "here".into(), unix_user: Some("sight".into()), own: false };
+    let own = Peer { from: "here".into(), unix_user: Some("sight".into()), in_process: false };
     bench.access.open(2, own, bench.now);
     assert!(bench.request(1, SessionRequest::Stop).is_err());
     assert_eq!(bench.request(2, SessionRequest::Stop), Ok(()));
@@ -307,7 +307,7 @@ fn the_session_limit_exempts_the_stations_own_terminal() {
     bench.open(2, "b");
     let sent_away = bench.open(3, "c");
     assert!(matches!(sent_away.last(), Some(Effect::HangUp(3, why)) if why.contains("2 terminals")));
-    let own = Peer { from: "this process".into(), unix_user: None, own: true };
+    let own = Peer { from: "this process".into(), unix_user: None, in_process: true };
     assert!(bench.access.open(4, own, bench.now).iter().all(|effect| !matches!(effect, Effect::HangUp(..))));
     bench.access.close(1, bench.now);
     assert!(bench.open(5, "c").iter().all(|effect| !matches!(effect, Effect::HangUp(..))));
@@ -343,7 +343,7 @@ fn a_hostile_terminal_floods_neither_plant_nor_audit_log() {
 #[test]
 fn a_demonstration_needs_no_login() {
     let mut bench = Bench::of(AccessControl::new(Arc::new(fixture::plant()), Some("sight".into())));
-    let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), own: true };
+    let own = Peer { from: "this process".into(), unix_user: Some("anna".into()), in_process: true };
     bench.access.open(1, own, bench.now);
     assert_eq!(bench.who(1).as_deref(), Some("anna"));
     assert_eq!(bench.send_command(1, RUN, None).unwrap().1, None);

@@ -79,7 +79,7 @@ impl AccessControl {
     /// Whether this is root, the user of the station, or its own process.
     pub(super) fn is_station_owner(&self, peer: &Peer) -> bool {
         let user = peer.unix_user.as_deref();
-        peer.own || user == Some("root") || (user.is_some() && user == self.service_account.as_deref())
+        peer.in_process || user == Some("root") || (user.is_some() && user == self.service_account.as_deref())
     }
 
     fn first(&mut self, requester: Requester, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {

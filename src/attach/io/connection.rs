@@ -241,7 +241,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
             let own = snapshot.commands.iter().filter(|status| status.command.id.terminal == terminal);
             own.map(|status| (status.command.id.number, status.outcome.clone())).collect()
         };
-        self.session.status.borrow().view && own(sent) != own(snapshot)
+        self.session.status.borrow().may_view && own(sent) != own(snapshot)
     }
 
     /// Sends the latest snapshot, as far as the terminal may see it, after the line reports that are new.
@@ -250,7 +250,7 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         if !Arc::ptr_eq(&latest.snapshot.def, &self.def) {
             return Err(ConnectionEnd::OtherPlant);
         }
-        let view = self.session.status.borrow().view;
+        let view = self.session.status.borrow().may_view;
         for (line, report) in latest.reports.iter().enumerate() {
             if !is_same(self.sent_reports[line].as_ref(), report.visible(view)) {
                 self.write(&report.encoded(view).await.map_err(WireError::from)?, STUCK_MAX).await?;
@@ -302,7 +302,7 @@ mod tests {
         let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
         let (sender, shared) = SnapshotSender::new(snapshots.borrow().clone());
         let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
-        let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, own: false });
+        let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, in_process: false });
         let (near, far) = tokio::io::duplex(REQUEST_BYTES_MAX);
         let (read, write) = tokio::io::split(near);
         let served = tokio::spawn(async move {

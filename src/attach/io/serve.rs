@@ -363,7 +363,7 @@ async fn receive_handshake(stream: UnixStream, credentials: UCred) -> HandshakeE
     let name = name.map(|name| name.name().to_string_lossy().into_owned());
     let process = credentials.pid().and_then(|process| u32::try_from(process).ok());
     let from = place.words(name.as_deref(), process).into();
-    let peer = Peer { from, unix_user: name.map(Into::into), own: false };
+    let peer = Peer { from, unix_user: name.map(Into::into), in_process: false };
     HandshakeEnd { user, handshaken: Some(Ok(Handshaken { read, write, peer })) }
 }
 

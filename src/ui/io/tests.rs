@@ -38,7 +38,7 @@ fn on_the_pty() {
         let (requests, mut taken) = mpsc::channel(8);
         let who = LoggedInUser { user: "tech1".into(), role: Role::Supervisor, must_change: false };
         let (_reported, status) =
-            watch::channel(Arc::new(SessionStatus { who: Some(who), view: true, ..SessionStatus::default() }));
+            watch::channel(Arc::new(SessionStatus { who: Some(who), may_view: true, ..SessionStatus::default() }));
         tokio::spawn(async move {
             while let Some((_, request)) = taken.recv().await {
                 let Request::Command(Command { kind, .. }, _) = request else { continue };

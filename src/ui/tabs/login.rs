@@ -63,7 +63,7 @@ impl TabView for Login {
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let Some(form) = &self.form else { return keys::hints(KEYS) };
-        let leads = if self.changing || cx.session.view || cx.session.locked { t!("back") } else { t!("clear") };
+        let leads = if self.changing || cx.session.may_view || cx.session.locked { t!("back") } else { t!("clear") };
         let quit = Hint::new("Ctrl-C", t!("quit"), "");
         form.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
     }
@@ -157,7 +157,7 @@ impl Login {
             Some(who) if who.must_change => Some(Purpose::Change(self.given.clone())),
             Some(_) if self.changing => Some(Purpose::Change(None)),
             Some(_) => None,
-            None if session.first => Some(Purpose::First),
+            None if session.needs_first_supervisor => Some(Purpose::First),
             None => Some(Purpose::Login),
         };
         let fits = self.form.as_ref().map(|form| &form.purpose) == purpose.as_ref();

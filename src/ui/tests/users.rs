@@ -34,7 +34,7 @@ use crate::{
 /// No user is logged in, and nothing may be seen but alarms.
 fn closed() -> SessionStatus {
     let banner = "This is the control of the water tank. Only for those who work here; all that is done is recorded.";
-    SessionStatus { who: None, view: false, banner: Some(banner.into()), ..(*fixture::session()).clone() }
+    SessionStatus { who: None, may_view: false, banner: Some(banner.into()), ..(*fixture::session()).clone() }
 }
 
 fn person(user: &str, role: Role) -> SessionStatus {
@@ -80,7 +80,7 @@ fn shows(model: &mut Model, words: &str) {
 
 #[test]
 fn the_login_page_in_every_mood() {
-    let first = SessionStatus { first: true, ..closed() };
+    let first = SessionStatus { needs_first_supervisor: true, ..closed() };
     let moods = [
         ("first", Fixture::normal(), first),
         ("normal", Fixture::normal(), closed()),

@@ -6,7 +6,8 @@ use crate::access::control::jobs::{BUSY, JOBS_MAX, JOBS_OF_USER_MAX, WRONG};
 impl Bench {
     /// A terminal of this user of the operating system.
     fn open_as(&mut self, terminal: u32, user: &str) {
-        let peer = Peer { from: format!("script, user {user}").into(), unix_user: Some(user.into()), own: false };
+        let peer =
+            Peer { from: format!("script, user {user}").into(), unix_user: Some(user.into()), in_process: false };
         self.access.open(terminal, peer, self.now);
     }
 

@@ -5,7 +5,8 @@ use super::*;
 impl Bench {
     /// A terminal of this user comes. Gives the terminals that were sent away because of it.
     fn comes(&mut self, terminal: u32, user: &str) -> Vec<u32> {
-        let peer = Peer { from: format!("script, user {user}").into(), unix_user: Some(user.into()), own: false };
+        let peer =
+            Peer { from: format!("script, user {user}").into(), unix_user: Some(user.into()), in_process: false };
         let effects = self.access.open(terminal, peer, self.now);
         let gone = effects.into_iter().filter_map(|effect| match effect {
             Effect::HangUp(terminal, _) => Some(terminal),

@@ -23,12 +23,12 @@ fn only_the_host_creates_the_first_supervisor_and_only_once() {
     let first =
         || SessionRequest::FirstSupervisor { user: "anna".into(), password: "a horse in a tank of water".into() };
     bench.open(1, "10.0.0.1");
-    assert!(!bench.access.session_status(1, bench.now).first);
+    assert!(!bench.access.session_status(1, bench.now).needs_first_supervisor);
     bench.request(1, first()).unwrap_err();
     bench.login(1, "anna", "").unwrap_err();
-    let peer = Peer { from: "pts/0".into(), unix_user: Some("sight".into()), own: false };
+    let peer = Peer { from: "pts/0".into(), unix_user: Some("sight".into()), in_process: false };
     bench.access.open(2, peer, bench.now);
-    assert!(bench.access.session_status(2, bench.now).first);
+    assert!(bench.access.session_status(2, bench.now).needs_first_supervisor);
     assert!(
         bench.request(2, SessionRequest::FirstSupervisor { user: "anna".into(), password: "short".into() }).is_err()
     );
@@ -42,7 +42,7 @@ fn only_the_host_creates_the_first_supervisor_and_only_once() {
             )
             .is_err()
     );
-    assert!(!bench.access.session_status(2, bench.now).first);
+    assert!(!bench.access.session_status(2, bench.now).needs_first_supervisor);
 }
 
 #[test]

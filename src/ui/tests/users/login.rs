@@ -26,13 +26,13 @@ fn before_a_login_every_other_tab_is_closed_and_alarms_are_seen() {
     shows(&mut model, "alarms 3");
     update(&mut model, Msg::SessionStatus(Arc::new(person("anna", Role::Technician))));
     assert_eq!(model.tabs.shown, Tab::Mimic);
-    change_session(&mut model, |session| (session.who, session.view) = (None, false));
+    change_session(&mut model, |session| (session.who, session.may_view) = (None, false));
     assert_eq!(model.tabs.shown, Tab::Login);
 }
 
 #[test]
 fn an_anonymous_view_shows_the_process_and_takes_no_action() {
-    let mut model = with(&Fixture::normal(), SessionStatus { view: true, ..closed() });
+    let mut model = with(&Fixture::normal(), SessionStatus { may_view: true, ..closed() });
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "Technician: s r m");
     shows(&mut model, "not logged in");
@@ -47,7 +47,7 @@ fn an_anonymous_view_shows_the_process_and_takes_no_action() {
 #[test]
 fn the_first_supervisor_types_his_password_twice() {
     let check = |keys: &str, expect: Result<&str, &str>| {
-        let mut model = with(&Fixture::normal(), SessionStatus { first: true, ..closed() });
+        let mut model = with(&Fixture::normal(), SessionStatus { needs_first_supervisor: true, ..closed() });
         let effects = type_keys(&mut model, keys);
         match expect {
             Ok(password) => {
@@ -73,7 +73,7 @@ fn a_password_set_by_another_user_is_changed_before_anything() {
     answer(&mut model, Ok(()));
     change_session(&mut model, |session| {
         session.who = Some(LoggedInUser { user: "anna".into(), role: Role::Technician, must_change: true });
-        session.view = true;
+        session.may_view = true;
     });
     type_keys(&mut model, "1");
     assert_eq!(model.tabs.shown, Tab::Login);
