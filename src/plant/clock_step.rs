@@ -27,7 +27,7 @@ impl Record {
     pub fn move_to_utc(&mut self, by: SignedDuration) {
         match self {
             Record::Sample(_, sample) => move_by(&mut sample.at, by),
-            Record::Alarm(step) => step.move_to_utc(by),
+            Record::Alarm(event) => event.move_to_utc(by),
             Record::Action(action) => move_by(&mut action.at, by),
             Record::Line(minute) => move_by(&mut minute.at, by),
             Record::Batch(batch) => move_by(&mut batch.at, by),

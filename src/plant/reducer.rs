@@ -357,9 +357,9 @@ impl Plant {
         let asked = self.watch_controllers();
         let image = &self.image;
         self.actuators.update(&self.def.logic, |tag| image.sample(tag), self.at);
-        let steps = self.evaluate_alarms();
+        let events = self.evaluate_alarms();
         let mut records = self.image.records(self.at);
-        records.extend(steps.into_iter().map(Record::Alarm));
+        records.extend(events.into_iter().map(Record::Alarm));
         records.extend(self.follow_batches());
         Effects { bus: asked, records, ..Effects::default() }
     }

@@ -1,4 +1,4 @@
-//! The figures of a period: from stored samples and alarm steps to the rows of a report.
+//! The figures of a period: from stored samples and alarm events to the rows of a report.
 
 use std::{
     collections::{BTreeMap, HashMap, HashSet},
@@ -97,24 +97,24 @@ impl Figures {
     }
 }
 
-/// Time within `from..until` in which at least one alarm of a subject was active. The steps are all of this subject, in
+/// Time within `from..until` in which at least one alarm of a subject was active. The events are all of this subject, in
 /// order, and begin with those of the alarms that were active at `from`; an alarm still active at the end counts to the end.
-pub fn time_in_alarm<'a>(steps: impl Iterator<Item = &'a AlarmRecord>, from: Timestamp, until: Timestamp) -> Duration {
+pub fn time_in_alarm<'a>(events: impl Iterator<Item = &'a AlarmRecord>, from: Timestamp, until: Timestamp) -> Duration {
     let mut active: HashSet<&str> = HashSet::new();
     let mut since = from;
     let mut total = Duration::ZERO;
-    for step in steps.filter(|step| step.at < until) {
-        let at = step.at.max(since);
+    for event in events.filter(|event| event.at < until) {
+        let at = event.at.max(since);
         if !active.is_empty() {
             total += elapsed(since, at);
         }
         since = at;
-        match step.event {
+        match event.event {
             AlarmEvent::Raised | AlarmEvent::RaisedSuppressed => {
-                active.insert(&step.message);
+                active.insert(&event.message);
             }
             AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
-                active.remove(&*step.message);
+                active.remove(&*event.message);
             }
             _ => {}
         }
@@ -135,28 +135,28 @@ pub fn record(instants: &[Timestamp], sv: &[Option<Sample>], pv: &[Option<Sample
     instants.iter().zip(sv).zip(pv).map(row).collect()
 }
 
-/// The alarms that were active over `from..until` while they were not annunciated. `active` are the raising steps of those
-/// active at `from`, `standing` of those that were annunciated then; `steps` are those of the period, in order.
+/// The alarms that were active over `from..until` while they were not annunciated. `active` are the raising events of those
+/// active at `from`, `standing` of those that were annunciated then; `events` are those of the period, in order.
 pub fn suppressed(
     active: &[AlarmRecord],
     standing: &[AlarmRecord],
-    steps: &[AlarmRecord],
+    events: &[AlarmRecord],
     from: Timestamp,
     until: Timestamp,
 ) -> Vec<SuppressedSummary> {
     let mut alarms: BTreeMap<(&str, &str), SuppressionTracker> = BTreeMap::new();
-    let annunciated: HashSet<(&str, &str)> = standing.iter().map(|step| (&*step.subject, &*step.message)).collect();
-    for step in active {
-        let name = (&*step.subject, &*step.message);
-        alarms.entry(name).or_insert_with(|| SuppressionTracker::new(step)).set(
+    let annunciated: HashSet<(&str, &str)> = standing.iter().map(|event| (&*event.subject, &*event.message)).collect();
+    for event in active {
+        let name = (&*event.subject, &*event.message);
+        alarms.entry(name).or_insert_with(|| SuppressionTracker::new(event)).set(
             true,
             !annunciated.contains(&name),
             from,
         );
     }
-    for step in steps {
-        let alarm = alarms.entry((&step.subject, &step.message)).or_insert_with(|| SuppressionTracker::new(step));
-        let (active, quiet) = match step.event {
+    for event in events {
+        let alarm = alarms.entry((&event.subject, &event.message)).or_insert_with(|| SuppressionTracker::new(event));
+        let (active, quiet) = match event.event {
             AlarmEvent::Raised => (true, false),
             AlarmEvent::RaisedSuppressed => (true, true),
             AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => (false, alarm.quiet),
@@ -164,8 +164,8 @@ pub fn suppressed(
             AlarmEvent::Unshelved | AlarmEvent::Unsuppressed | AlarmEvent::InService => (alarm.active, false),
             AlarmEvent::Acknowledged | AlarmEvent::ReAlarmed | AlarmEvent::Reset => continue,
         };
-        alarm.found.raised += u64::from(step.event == AlarmEvent::RaisedSuppressed);
-        alarm.set(active, quiet, step.at);
+        alarm.found.raised += u64::from(event.event == AlarmEvent::RaisedSuppressed);
+        alarm.set(active, quiet, event.at);
     }
     let ended = alarms.into_values().map(|mut alarm| {
         alarm.set(false, false, until);
@@ -183,10 +183,10 @@ struct SuppressionTracker {
 }
 
 impl SuppressionTracker {
-    fn new(step: &AlarmRecord) -> SuppressionTracker {
-        let (subject, message) = (step.subject.clone(), step.message.clone());
-        let found = SuppressedSummary { subject, message, priority: step.priority, raised: 0, active: Duration::ZERO };
-        SuppressionTracker { active: false, quiet: false, since: step.at, found }
+    fn new(event: &AlarmRecord) -> SuppressionTracker {
+        let (subject, message) = (event.subject.clone(), event.message.clone());
+        let found = SuppressedSummary { subject, message, priority: event.priority, raised: 0, active: Duration::ZERO };
+        SuppressionTracker { active: false, quiet: false, since: event.at, found }
     }
 
     fn set(&mut self, active: bool, quiet: bool, at: Timestamp) {

@@ -156,7 +156,7 @@ impl Writer {
     /// Takes records to be stored with the next commit; drops and counts the oldest samples where too much waits. `true`
     /// if that commit should be now: what an operator has done with an alarm is not to be missing in the journal.
     pub fn accept(&mut self, records: Vec<Record>) -> bool {
-        let now = records.iter().any(|record| matches!(record, Record::Alarm(step) if step.by.is_some()));
+        let now = records.iter().any(|record| matches!(record, Record::Alarm(event) if event.by.is_some()));
         self.pending.extend(records);
         let lost = shed(&mut self.pending, PENDING_MAX);
         if lost > 0 {
@@ -330,7 +330,7 @@ impl Writer {
 }
 
 /// Brings a list down to three quarters of `max` if it is longer: the oldest samples go first, then the oldest of all.
-/// Alarm steps and operator actions are worth more than any sample. Returns how many went.
+/// Alarm events and operator actions are worth more than any sample. Returns how many went.
 fn shed(pending: &mut Vec<Record>, max: usize) -> u64 {
     if pending.len() <= max {
         return 0;

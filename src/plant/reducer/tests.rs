@@ -234,7 +234,10 @@ fn a_silent_device_fails_then_is_down_then_comes_back() {
     let effects = plant.on_event(fail(3, &[PV, SV, DP, FAULT], Fault::BackedOff));
     assert!(plant.snapshot().samples[..4].iter().all(|sample| sample.quality == Quality::Bad(Cause::DeviceDown)));
     assert!(
-        effects.records.iter().any(|record| matches!(record, Record::Alarm(step) if step.event == AlarmEvent::Raised))
+        effects
+            .records
+            .iter()
+            .any(|record| matches!(record, Record::Alarm(event) if event.event == AlarmEvent::Raised))
     );
     assert_eq!(plant.snapshot().alarms[0].id, SILENT);
     plant.on_event(read(9, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
@@ -285,7 +288,7 @@ fn an_overloaded_line_is_said_once_and_no_device_is_at_fault() {
         let report = LineReport { strain: strain.map(str::to_owned), ..LineReport::new(plant.def().line(L1).clone()) };
         let mut records = plant.on_event(Event::Report { at: at(second), line: L1, report: Arc::new(report) }).records;
         records.extend(plant.on_event(read(second, &[(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)])).records);
-        let is_raise = |record: &Record| matches!(record, Record::Alarm(step) if step.event == AlarmEvent::Raised);
+        let is_raise = |record: &Record| matches!(record, Record::Alarm(event) if event.event == AlarmEvent::Raised);
         raised += records.iter().chain(&plant.on_tick(at(second)).records).filter(|record| is_raise(record)).count();
         plant.snapshot().alarms.iter().map(|alarm| (alarm.id, alarm.state)).collect::<Vec<_>>()
     };
@@ -308,7 +311,7 @@ fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
     assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Unacknowledged);
     let seen = plant.snapshot();
     let effects = plant.on_command(command(1, seen.alarms[0].acknowledge()), at(4));
-    assert!(matches!(&effects.records[0], Record::Alarm(step) if step.by.as_deref() == Some("anna")));
+    assert!(matches!(&effects.records[0], Record::Alarm(event) if event.by.as_deref() == Some("anna")));
     let all = seen.acknowledge_all().expect("one waited when it was seen");
     let effects = plant.on_command(command(2, all), at(4));
     assert!(!effects.records.iter().any(|record| matches!(record, Record::Alarm(_))), "it was acknowledged already");

@@ -243,7 +243,7 @@ mod tests {
             exchange: None,
         };
         let raised = plant.on_event(down).records;
-        let is_step = |record: &&Record| matches!(record, Record::Alarm(step) if step.event == AlarmEvent::Raised);
+        let is_step = |record: &&Record| matches!(record, Record::Alarm(event) if event.event == AlarmEvent::Raised);
         assert_eq!(raised.iter().filter(is_step).count(), 1, "{raised:?}");
         observe(&[]);
         observe(&raised);

@@ -102,8 +102,8 @@ impl Judge {
     /// Takes lines of the journal.
     pub fn on_records(&mut self, records: &[Record]) {
         for record in records {
-            if let Record::Alarm(step) = record {
-                self.on_step(step);
+            if let Record::Alarm(event) = record {
+                self.on_alarm_event(event);
             }
         }
     }
@@ -132,18 +132,18 @@ impl Judge {
         Duration::try_from(at.duration_since(self.began)).ok()
     }
 
-    fn on_step(&mut self, step: &AlarmRecord) {
-        let Some(at) = self.elapsed(step.at) else { return };
+    fn on_alarm_event(&mut self, event: &AlarmRecord) {
+        let Some(at) = self.elapsed(event.at) else { return };
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let inside = expect.from <= at && at <= expect.until;
             match expect.expectation {
-                Expectation::Alarm(alarm, wanted) if inside && wanted == step.event && is(&self.def, alarm, step) => {
+                Expectation::Alarm(alarm, wanted) if inside && wanted == event.event && is(&self.def, alarm, event) => {
                     mark.met.get_or_insert(at);
                 }
                 Expectation::NoAlarm(alarm)
-                    if inside && step.event == AlarmEvent::Raised && is(&self.def, alarm, step) =>
+                    if inside && event.event == AlarmEvent::Raised && is(&self.def, alarm, event) =>
                 {
-                    mark.broken.get_or_insert((at, step.value));
+                    mark.broken.get_or_insert((at, event.value));
                 }
                 Expectation::Alarm(..)
                 | Expectation::NoAlarm(_)
@@ -194,10 +194,10 @@ impl Judge {
     }
 }
 
-/// Whether a step of the journal is of an alarm: the journal has names, not numbers.
-fn is(def: &PlantDef, alarm: AlarmId, step: &AlarmRecord) -> bool {
+/// Whether an event of the journal is of an alarm: the journal has names, not numbers.
+fn is(def: &PlantDef, alarm: AlarmId, event: &AlarmRecord) -> bool {
     let alarm = def.alarm(alarm);
-    *subject_name(def, alarm.subject) == *step.subject && *alarm.message == *step.message
+    *subject_name(def, alarm.subject) == *event.subject && *alarm.message == *event.message
 }
 
 impl Mark {

@@ -93,10 +93,10 @@ impl Station {
     }
 }
 
-fn steps(history: &Path) -> Vec<AlarmEvent> {
+fn alarm_events(history: &Path) -> Vec<AlarmEvent> {
     let (_, found) = AlarmFile::open(&alarm_file::beside(history), jiff::Timestamp::UNIX_EPOCH);
-    let steps = found.events.unwrap_or_default();
-    steps.iter().filter(|step| &*step.subject == "TIC-1").map(|step| step.event).collect()
+    let alarm_events = found.events.unwrap_or_default();
+    alarm_events.iter().filter(|event| &*event.subject == "TIC-1").map(|event| event.event).collect()
 }
 
 #[tokio::test]
@@ -108,7 +108,7 @@ async fn a_shown_acknowledgement_is_on_disk_without_a_history() {
     let snapshot = station.ended(|_| true).await;
     assert!(snapshot.commands[0].recorded);
     // A kill at this very moment leaves these files.
-    assert_eq!(steps(&history), [AlarmEvent::Raised, AlarmEvent::Acknowledged]);
+    assert_eq!(alarm_events(&history), [AlarmEvent::Raised, AlarmEvent::Acknowledged]);
     let log = fs::read_to_string(audit_log::beside(&history)).unwrap();
     assert!(log.contains("\"who\":\"anna\"") && log.contains("\"action\":\"acknowledge\""), "{log}");
     station.stop().await;
@@ -135,7 +135,7 @@ async fn unwritten_actions_are_shown_as_not_recorded() {
     let snapshot = station.ended(|recorded| recorded).await;
     let silent = snapshot.alarms.iter().find(|alarm| alarm.id == fixture::SILENT).unwrap();
     assert!(silent.acknowledged.as_ref().unwrap().recorded);
-    assert_eq!(steps(&history), [AlarmEvent::Raised, AlarmEvent::Acknowledged]);
+    assert_eq!(alarm_events(&history), [AlarmEvent::Raised, AlarmEvent::Acknowledged]);
     station.stop().await;
 }
 

@@ -14,7 +14,7 @@ use crate::{
     report::{Period, ShiftReport, SuppressedSummary, TagFigures, raised, text::mean_or_difference},
 };
 
-/// Alarm steps and actions listed at most; the CSV has all of them.
+/// Alarm events and actions listed at most; the CSV has all of them.
 const LIST_MAX: usize = 500;
 
 /// Draws the tab.
