@@ -70,7 +70,7 @@ impl CommandTracker {
         let command = Command { kind, ..status.command.clone() };
         let status = CommandStatus { command, old: image.sample(tag).value, ..status.clone() };
         match checked {
-            Err(outcome) => Err(Box::new(self.finish(&status, outcome, image))),
+            Err(outcome) => Err(Box::new(self.complete_at_once(&status, outcome, image))),
             Ok(job) => {
                 self.last_write = job.id.0;
                 self.writes.push((status.command.id, job));
@@ -91,14 +91,14 @@ impl CommandTracker {
     }
 
     /// Accepts a command that ends at once.
-    pub fn finish(&mut self, status: &CommandStatus, outcome: Outcome, image: &ProcessImage) -> ActionRecord {
+    pub fn complete_at_once(&mut self, status: &CommandStatus, outcome: Outcome, image: &ProcessImage) -> ActionRecord {
         let status = CommandStatus { outcome, ..status.clone() };
         self.accept(&status);
         record(&self.def, &status, image)
     }
 
     /// Ends a pending command.
-    pub fn end(
+    pub fn complete(
         &mut self,
         id: CommandId,
         outcome: Outcome,
@@ -113,7 +113,7 @@ impl CommandTracker {
     /// A line is open (or trying to be) or closed: ends the command that asked for it.
     pub fn connected(&mut self, line: LineId, open: bool, image: &ProcessImage, at: Timestamp) -> Option<ActionRecord> {
         let id = self.pending(|status| status.command.kind == CommandKind::Connect(line, open))?;
-        self.end(id, Outcome::Verified, image, at)
+        self.complete(id, Outcome::Verified, image, at)
     }
 
     /// The outcome of a command; `None` once it is forgotten.
@@ -169,7 +169,7 @@ impl CommandTracker {
             WriteResult::Held(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
             unread => without_read_back(&unread),
         };
-        self.end(command, outcome, image, at)
+        self.complete(command, outcome, image, at)
     }
 
     /// A line has taken a request: ends a command that waits for nothing else.
@@ -181,7 +181,7 @@ impl CommandTracker {
         at: Timestamp,
     ) -> Option<ActionRecord> {
         let id = self.of_line(line, request)?;
-        self.end(id, Outcome::Verified, image, at)
+        self.complete(id, Outcome::Verified, image, at)
     }
 
     /// The queue of a line was full: refuses the command of the request.
@@ -206,7 +206,7 @@ impl CommandTracker {
             }
             BusRequest::Configure(_) | BusRequest::Test { .. } | BusRequest::StopTest => self.of_line(line, request)?,
         };
-        self.end(id, Outcome::Refused(Refusal::Busy), image, at)
+        self.complete(id, Outcome::Refused(Refusal::Busy), image, at)
     }
 
     /// Ends commands without a result for too long. The bus waits in real time; `speed` is plant seconds per real second.
@@ -224,7 +224,7 @@ impl CommandTracker {
         let late = self.commands.iter().filter(late).map(|status| (status.command.id, outcome(status)));
         let late: Vec<(CommandId, Outcome)> = late.collect();
         self.writes.retain(|(command, _)| late.iter().all(|(id, _)| id != command));
-        late.into_iter().filter_map(|(id, outcome)| self.end(id, outcome, image, at)).collect()
+        late.into_iter().filter_map(|(id, outcome)| self.complete(id, outcome, image, at)).collect()
     }
 
     /// The station stops: ends every pending command.
@@ -233,7 +233,7 @@ impl CommandTracker {
         let pending = self.commands.iter().rev().filter(|status| status.is_pending());
         let ids: Vec<CommandId> = pending.map(|status| status.command.id).collect();
         let stopped = || Outcome::NotConfirmed(NotConfirmed::StationStopped);
-        ids.into_iter().filter_map(|id| self.end(id, stopped(), image, at)).collect()
+        ids.into_iter().filter_map(|id| self.complete(id, stopped(), image, at)).collect()
     }
 
     /// The record that a write is about to be sent, for the case that the station ends before its outcome.

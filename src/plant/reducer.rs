@@ -187,7 +187,7 @@ impl Plant {
         let status = CommandStatus { at, outcome_at: at, ..status };
         let mut effects = Effects::default();
         if !status.is_pending() {
-            let refused = self.commands.finish(&status, status.outcome.clone(), &self.image);
+            let refused = self.commands.complete_at_once(&status, status.outcome.clone(), &self.image);
             effects.records.push(Record::Action(refused));
             self.at = self.at.max(at);
             return effects;
@@ -227,7 +227,7 @@ impl Plant {
         match outcome {
             None => self.commands.accept(&status),
             Some(outcome) => {
-                let action = self.commands.finish(&status, outcome, &self.image);
+                let action = self.commands.complete_at_once(&status, outcome, &self.image);
                 effects.records.extend(Some(Record::Action(action)).filter(|_| is_recorded));
             }
         }

@@ -86,7 +86,12 @@ impl Plant {
 
     /// A set was written into the folder, or `Err` says why not.
     pub fn on_set_written(&mut self, command: CommandId, result: Result<(), String>) -> Effects {
-        Effects::of_actions(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image, self.at))
+        Effects::of_actions(self.commands.complete(
+            command,
+            result.map_err(Refusal::NotSaved).into(),
+            &self.image,
+            self.at,
+        ))
     }
 
     /// Begins a restore by reading the device: the value of a tag that is polled seldom may be hours old.
@@ -183,14 +188,14 @@ impl Plant {
             let status = CommandStatus::new(command, by, at);
             let refusal = if line_changed { Some(Refusal::LineChanged) } else { overtaken(step, &self.image) };
             if let Some(why) = refusal {
-                let refused = self.commands.finish(&status, Outcome::Refused(why), &self.image);
+                let refused = self.commands.complete_at_once(&status, Outcome::Refused(why), &self.image);
                 effects.records.push(Record::Action(refused));
                 continue;
             }
             effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
         }
         if let Some(outcome) = run.outcome(&self.def) {
-            let action = self.commands.end(run.id, outcome, &self.image, at);
+            let action = self.commands.complete(run.id, outcome, &self.image, at);
             effects.records.extend(action.map(Record::Action));
         }
     }

@@ -56,7 +56,12 @@ impl Plant {
             let tried_since = self.settings(saved.id) != saved;
             self.lines[saved.id.index()].settings_before = tried_since.then(|| Arc::new(saved.clone()));
         }
-        Effects::of_actions(self.commands.end(command, result.map_err(Refusal::NotSaved).into(), &self.image, self.at))
+        Effects::of_actions(self.commands.complete(
+            command,
+            result.map_err(Refusal::NotSaved).into(),
+            &self.image,
+            self.at,
+        ))
     }
 
     /// The settings in use.
