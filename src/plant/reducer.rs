@@ -94,7 +94,7 @@ pub struct Plant {
     /// The latest restore of each device that had one.
     restores: Vec<Arc<Restore>>,
     /// Number of the last command that a restore sent.
-    numbers: u32,
+    last_restore_number: u32,
     /// Auto-tuning and program, by device.
     tunings: Vec<TuningTracker>,
     programs: Vec<ProgramWatch>,
@@ -119,7 +119,7 @@ impl Plant {
             faults: StationFaults::default(),
             sets: Arc::default(),
             restores: Vec::new(),
-            numbers: 0,
+            last_restore_number: 0,
             tunings: vec![TuningTracker::default(); def.devices.len()],
             programs: vec![ProgramWatch::default(); def.devices.len()],
             def,

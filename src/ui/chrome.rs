@@ -171,7 +171,7 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     if let Some(note) = model.note {
         canvas.text(1, 0, &format!(" {note} "), cx.theme.strong());
     } else if let Some(pending) = &model.last_command {
-        let (text, style) = pending_label(cx, pending);
+        let (text, style) = last_command_label(cx, pending);
         let room = length.saturating_sub(4);
         // The time stays whatever must be cut: an old outcome is not a new one.
         let text = match &pending.status {
@@ -186,7 +186,7 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 }
 
 /// A command and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
-pub fn pending_label(cx: &ViewContext, pending: &LastCommand) -> (String, Style) {
+pub fn last_command_label(cx: &ViewContext, pending: &LastCommand) -> (String, Style) {
     let theme = cx.theme;
     // As the station took it: a write of what the device can hold.
     let (kind, old) =

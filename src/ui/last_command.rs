@@ -59,29 +59,29 @@ impl Model {
         is_sent.then_some(Effect::Command(command, credentials))
     }
 
-    /// Notes that the pending command did not reach the plant.
+    /// Notes that the last command did not reach the plant.
     pub(super) fn note_undelivered(&mut self, id: CommandId, why: Arc<str>) {
-        if let Some(pending) = self.last_command.as_mut().filter(|pending| pending.command.id == id) {
-            pending.undelivered = Some(why);
+        if let Some(last) = self.last_command.as_mut().filter(|last| last.command.id == id) {
+            last.undelivered = Some(why);
         }
     }
 
-    /// Reads the outcome of the pending command from the new snapshot.
+    /// Reads the outcome of the last command from the new snapshot.
     pub(super) fn follow(&mut self) {
-        if let Some(pending) = &mut self.last_command
-            && let Some(status) = self.snapshot.commands.iter().find(|status| status.command.id == pending.command.id)
+        if let Some(last) = &mut self.last_command
+            && let Some(status) = self.snapshot.commands.iter().find(|status| status.command.id == last.command.id)
         {
-            if pending.status.as_ref() != Some(status) {
-                pending.changed_at = self.clock.phase;
+            if last.status.as_ref() != Some(status) {
+                last.changed_at = self.clock.phase;
             }
-            pending.status = Some(status.clone());
+            last.status = Some(status.clone());
         }
     }
 
     /// Ends the wait of a window for the check of its credentials; refused ones are asked for again.
     pub(super) fn close_confirmation(&mut self) {
-        let Some(pending) = &self.last_command else { return };
-        let refused = match (&pending.undelivered, pending.status.as_ref().map(|status| &status.outcome)) {
+        let Some(last) = &self.last_command else { return };
+        let refused = match (&last.undelivered, last.status.as_ref().map(|status| &status.outcome)) {
             (Some(why), _) => Some(t!("not sent: {why}", why)),
             (None, Some(Outcome::Refused(Refusal::NotReauthenticated(why)))) => Some(why.clone()),
             (None, Some(_)) => None,

@@ -177,10 +177,10 @@ impl Plant {
                     ))),
                 }
             }
-            let (by, line_changed, numbers) = (run.by.clone(), run.line_changed, &mut self.numbers);
+            let (by, line_changed, number) = (run.by.clone(), run.line_changed, &mut self.last_restore_number);
             let Some(step) = run.begin_next() else { break };
-            *numbers = numbers.wrapping_add(1);
-            let id = CommandId { terminal: PLANT, number: *numbers };
+            *number = number.wrapping_add(1);
+            let id = CommandId { terminal: PLANT, number: *number };
             step.command = Some(id);
             let (tag, value) = (step.change.tag, step.change.new);
             let expected_value = Some(step.change.old);
