@@ -82,7 +82,7 @@ pub struct Link {
     echoes: bool,
     /// Exchanges in a row to which nothing came back.
     pub unanswered: u32,
-    /// What the last exchange was; `None` before the first.
+    /// What the last exchange was; `None` before the first since a caller has cleared it.
     pub last: Option<Arc<Exchange>>,
     /// Real time in which the line was busy.
     busy: Duration,

@@ -43,6 +43,7 @@ impl Task<'_> {
             let own = self.def.devices.iter().find(|device| device.line == self.line && device.unit == unit);
             let block = block_of(own.map_or(DeviceId(0), |device| device.id), unit, span);
             let (mut retried_fault, started) = (None, self.clock.now());
+            link.last = None;
             let read = self.requests.unless_stopped(read_in_sync(&self.blocks, link, &block, &mut retried_fault)).await;
             let ended = self.clock.now();
             self.live_budget.spent(elapsed(started, ended), ended);

@@ -54,7 +54,8 @@ impl Task<'_> {
         }
         let block = self.blocks[index].clone();
         let began = self.clock.now();
-        let sent = link.last.clone();
+        // If only time can resynchronise, nothing is sent.
+        link.last = None;
         let timeout = link.timeout();
         link.set_timeout(schedule.response_timeout(index, &self.settings));
         let read = self.read_unless_stopped(link, &block, Some(index)).await;
@@ -74,8 +75,7 @@ impl Task<'_> {
                 return Ok(());
             }
         };
-        // If only time could resynchronise, nothing was sent and `last` is the previous exchange.
-        let exchange = link.last.clone().filter(|last| sent.as_ref().is_none_or(|sent| !Arc::ptr_eq(sent, last)));
+        let exchange = link.last.clone();
         let took = elapsed(began, ended);
         self.finish_poll(link, schedule, Some(index), &block, ReadResult { began, ended, took, answer, exchange })
             .await?;

@@ -242,6 +242,8 @@ impl Task<'_> {
         request: Request<'_>,
         keeps: bool,
     ) -> Result<(), LinkError> {
+        // If the port is lost, the previous exchange, perhaps of another device, is not counted for this one.
+        link.last = None;
         let sent = link.call(device.unit, request);
         let sent = if keeps { Some(sent.await) } else { self.requests.unless_stopped(sent).await };
         let Some(sent) = sent else {

@@ -201,3 +201,35 @@ async fn a_key_is_reported_and_read_again_though_the_value_is_refused() {
     assert_eq!(line.until(&def, is_result).await, (None, WriteResult::Refused(ExceptionCode(3))));
     line.until(&def, holds).await;
 }
+
+/// The last exchange that the link remembers is then one of another device.
+#[tokio::test(start_paused = true)]
+async fn a_write_that_loses_the_port_counts_no_other_exchange() {
+    let mut def = plant(Mode::Rtu);
+    // The second unit is never polled.
+    def.tags.iter_mut().filter(|tag| tag.device == DeviceId(1)).for_each(|tag| tag.poll = Poll::Never);
+    let mut line = line(def.clone());
+    line.plug(Mode::Rtu, |_, message| match message {
+        // It ends, and the port with it.
+        [2, 6, ..] => std::panic::resume_unwind(Box::new("unplugged")),
+        _ => SlaveAction::Answer,
+    });
+    line.read(&def).await;
+    let (id, tag) = (WriteId(1), TagId(10));
+    let request = BusRequest::Write(WriteJob { id, tag, raw: 10.0, unlock: None, verify: true, urgent: false });
+    line.requests.send(request).await.expect("the line runs");
+    let mut lost = false;
+    loop {
+        match line.events.recv().await.expect("the line runs") {
+            Event::Wrote { result, .. } => {
+                assert_eq!(result, WriteResult::Lost(Fault::NotConnected));
+                lost = true;
+            }
+            Event::Report { report, .. } if lost => {
+                assert_eq!(report.device(DeviceId(1)).map_or(0, |stats| stats.requests), 0);
+                return;
+            }
+            _ => {}
+        }
+    }
+}
