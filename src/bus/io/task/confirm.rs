@@ -95,6 +95,15 @@ impl Task<'_> {
         self.publish_write_result(write.id, result).await
     }
 
+    /// The tag was written again, with or without effect: what it holds now says nothing about an earlier write.
+    pub(super) async fn end_unconfirmed(&mut self, tag: TagId) -> Result<(), LinkExit> {
+        let ended: Vec<Unconfirmed> = self.unconfirmed.extract_if(.., |write| write.tag == tag).collect();
+        for write in ended {
+            self.publish_write_result(write.id, write.result).await?;
+        }
+        Ok(())
+    }
+
     /// The port is left: nothing more can be learned of them in time.
     pub(super) async fn give_up_unconfirmed(&mut self) -> Result<(), LinkExit> {
         for write in std::mem::take(&mut self.unconfirmed) {

@@ -56,7 +56,15 @@ impl Task<'_> {
             None => Unlocked::Yes,
         };
         let written = match unlocked {
-            Unlocked::Yes => self.write_once(link, schedule, job).await,
+            Unlocked::Yes => {
+                let written = self.write_once(link, schedule, job).await;
+                if let WriteEnd::Ended(result) = &written
+                    && may_have_effect(result)
+                {
+                    self.end_unconfirmed(tag.id).await?;
+                }
+                written
+            }
             Unlocked::No(written) => written,
         };
         let result = match written {
@@ -122,6 +130,9 @@ impl Task<'_> {
         let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
         self.publish(Event::Unlocked { at: self.clock.now(), id: job.id, key: key.id, result }).await?;
         schedule.refresh(key.device, self.clock.now());
+        if sent.as_ref().is_ok_and(may_have_effect) {
+            self.end_unconfirmed(key.id).await?;
+        }
         Ok(match sent {
             Ok(WriteResult::Accepted) => Unlocked::Yes,
             // A stop is tried all the same: a key without a reply may have arrived.
@@ -255,6 +266,11 @@ impl Task<'_> {
         }
         sent.map(drop)
     }
+}
+
+/// May a write with this result have changed its tag?
+fn may_have_effect(result: &WriteResult) -> bool {
+    !matches!(result, WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Superseded)
 }
 
 /// Can no outstanding reply be taken for the next one?

@@ -122,3 +122,31 @@ async fn a_stop_is_not_held_by_a_write_that_is_not_answered() {
         assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::Held(10.0), "{mode:?}");
     }
 }
+
+/// The device has started, then stopped: what is read after the stop says nothing about the start.
+#[tokio::test(start_paused = true)]
+async fn a_start_is_not_compared_with_what_a_stop_has_left() {
+    // Over TCP a write without an answer has the connection opened again.
+    for mode in [Mode::Rtu, Mode::Ascii] {
+        let def = plant(mode);
+        let mut line = line(def.clone());
+        let mut writes = 0;
+        line.plug(mode, move |_, message| {
+            writes += usize::from(message[1] == 6);
+            match message {
+                // The start, and what it is compared with before the stop.
+                [1, 6, ..] | [1, 3, 0, 10, 0, 1] if writes == 1 => SlaveAction::Silent,
+                _ => SlaveAction::Answer,
+            }
+        });
+        line.read(&def).await;
+        line.requests.send(write(1, FIRST_OF[0], false)).await.expect("the line runs");
+        let is_lost = |event: &Event| {
+            matches!(event, Event::Failed { tags, fault: Fault::Timeout, .. } if *tags == [FIRST_OF[0]]).then_some(())
+        };
+        line.until(&def, is_lost).await;
+        line.requests.send(write(2, FIRST_OF[0], true)).await.expect("the line runs");
+        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::Lost(Fault::Timeout), "{mode:?}");
+        assert_eq!(end_of(&mut line, &def, 2).await, WriteResult::ReadBack(10.0), "{mode:?}");
+    }
+}
