@@ -39,7 +39,8 @@
 //!
 //! Every request of a terminal goes through the **session server**, the task around [`access::AccessControl`], which
 //! alone decides what is permitted. What it refuses goes on to the plant as a refused command, so that it is seen and on
-//! record like any other. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
+//! record like any other; only a command above the rate limit, of another run or with a used number does not reach the plant,
+//! and its terminal alone is told. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
 //! outcome as recorded; the history follows within a second.
 //! Queries go to the history; one that reads registers goes to the line, which answers it between polls.
 //! The history thread only writes; a second one answers queries, each on a connection of its own and for a bounded time.
@@ -59,12 +60,16 @@
 //! 2. **One way.** device → [`bus`] → [`plant`] → snapshot → ([`history`], terminals). Back only as commands, whose
 //!    outcome comes back inside a later snapshot.
 //! 3. **Three pure reducers**: [`plant::Plant`] for facts, [`access::AccessControl`] for users and sessions, [`ui::update`] for the view.
-//!    Everything asynchronous is a thin loop around one of them.
+//!    What is asynchronous is a thin loop around one of them; only a [link task](bus::io::task) is more than that, because
+//!    on a line the time between two bytes has a meaning. What it decides is pure again: [`bus::schedule`],
+//!    [`bus::late_reply`], [`bus::diagnostics`].
 //! 4. **The outside world is in `io`.** Only `io` files, the station and the command line may name tokio, DuckDB,
-//!    files, sockets, the terminal or a clock. Time is an argument everywhere else.
+//!    files, sockets, the terminal (but for its key events) or a clock. Time is an argument everywhere else.
 //! 5. **A value never travels alone**: [`plant::sample::Sample`] is value, quality and time, on screen, in alarms, in the
 //!    history and in exports; a figure of a report has its share of good time. Never a silent last value, never 0 for "no answer".
-//! 6. **A write is never retried by itself and always read back.** Its outcome is a state in the snapshot.
+//!    The old value of a command and the value that raised an alarm are alone: they are as old as their command or alarm.
+//! 6. **A write is never retried by itself, and is read back** unless nothing can be read: a write-only tag, a broadcast.
+//!    Its outcome is a state in the snapshot.
 //! 7. Every queue, list, wait and retry has a bound, and an overflow that an operator can see.
 //! 8. UTC is stored, samples in whole milliseconds, events in microseconds; local time is a matter of display and of reports.
 //!
@@ -80,8 +85,8 @@
 //! | hole | an address that a device does not have, found by a live read, a sweep or a refused block |
 //! | hold | how long a stored value counts without a successor |
 //! | source frame | the request and response that a sample was decoded from |
-//! | command | what an operator asks of the plant, with a status from pending to verified, refused, failed or not confirmed |
-//! | session request | what a user asks of access control: log in, log out, change users, lock |
+//! | command | what an operator asks of the plant, with a status from pending to verified, unchanged, refused, failed or not confirmed |
+//! | session request | what a user asks beside commands and queries: log in, log out, lock, change users, export, back up, import, reload, stop |
 //! | expected value | what a write must still find, because its operator saw it |
 //! | condition, alarm, alarm event | what is evaluated; its state (ISA-18.2); a transition that the journal keeps |
 //! | suppressed | shelved, suppressed by design, or out of service |

@@ -85,7 +85,7 @@ pub struct Comparison {
     pub not_in_log: Vec<u64>,
 }
 
-/// Compares the latest entries of the log, up to its chain_hash `last`, with the latest `rows` of the history, at most `rows_max`.
+/// Compares the latest entries of the log, up to its chain hash `last`, with the latest `rows` of the history, at most `rows_max`.
 pub fn compare<'a>(
     tail: impl IntoIterator<Item = &'a ActionRecord>,
     last: ChainHash,
@@ -127,7 +127,7 @@ fn fit_text(text: &mut Arc<str>) {
     }
 }
 
-/// The next line after `last`, with its end of line, and its chain_hash. [`Check`] accepts the line for every action.
+/// The next line after `last`, with its end of line, and its chain hash. [`Check`] accepts the line for every action.
 pub fn line(last: ChainHash, record: &ActionRecord) -> (String, ChainHash) {
     let ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash: _ } = fit(record.clone());
     let entry = Entry { n: last.number + 1, utc: at, who: by, from, action, target, old, new, outcome, note };
@@ -147,7 +147,7 @@ fn tied(last: [u8; 32], bytes: &[u8]) -> [u8; 32] {
 pub struct Summary {
     /// Lines.
     pub entries: u64,
-    /// The chain_hash of the last one.
+    /// The chain hash of the last one.
     pub last: ChainHash,
     /// The first and the last time.
     pub span: Option<(Timestamp, Timestamp)>,
@@ -181,7 +181,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// Before the first line. `head` is the chain_hash that the station noted last, `rows` are those of the history.
+    /// Before the first line. `head` is the chain hash that the station noted last, `rows` are those of the history.
     pub fn new(head: Option<ChainHash>, rows: &[ChainHash]) -> Check {
         let rows = rows.iter().map(|chain_hash| (chain_hash.number, chain_hash.hash)).collect();
         Check { last: START, line: 0, span: None, bad: None, head, rows, compared: 0 }
@@ -234,7 +234,7 @@ impl Check {
         Ok((entry, ChainHash { number, hash }))
     }
 
-    /// The chain_hash of the last sound line.
+    /// The chain hash of the last sound line.
     pub fn last(&self) -> ChainHash {
         self.last
     }
@@ -290,7 +290,7 @@ pub fn head_text(chain_hash: ChainHash) -> String {
     format!("{:020} {}\n", chain_hash.number, chain_hash.hash_hex())
 }
 
-/// The chain_hash of such a note.
+/// The chain hash of such a note.
 pub fn head(text: &str) -> Option<ChainHash> {
     let (number, hash) = text.strip_suffix('\n')?.split_once(' ')?;
     Some(ChainHash { number: number.parse().ok()?, hash: unhex(hash)? })

@@ -23,7 +23,8 @@ impl From<&str> for Secret {
     }
 }
 
-/// A request that is not about the plant. Each gets a reply: done, or the reason for the operator.
+/// What a user asks beside commands and queries: of the session, users, the history or the station itself. Each gets a reply:
+/// done, or the reason for the operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum SessionRequest {
     /// Log in.

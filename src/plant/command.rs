@@ -132,7 +132,7 @@ pub struct CommandStatus {
     pub outcome: Outcome,
     /// When it got this outcome; when the plant accepted it, while it is pending.
     pub outcome_at: Timestamp,
-    /// The audit entry of its outcome is on disk; meaningless while it is pending.
+    /// The audit entry of its outcome is on disk; meaningless while it is pending, and where the terminal itself has lost it.
     pub recorded: bool,
 }
 
@@ -226,7 +226,7 @@ pub enum Refusal {
         /// Highest permitted.
         max: String,
     },
-    /// A bound, the decimals or the present value is not known, so the write cannot be checked.
+    /// A bound or the decimals are not known, so the write cannot be checked.
     #[error("{}", t!("{what} is unknown", what = .0))]
     Unknown(String),
     /// Not one of the values of the enumeration.

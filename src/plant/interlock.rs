@@ -150,7 +150,8 @@ pub fn stops<'a>(logic: &'a ControlLogic, actions: &'a [ActionDef], tag: TagId) 
     actuators.chain(sequences).chain(actions).filter(move |(command, _)| *command == tag).map(|(_, off)| off)
 }
 
-/// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::held`].
+/// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::held`]: a typed number
+/// that is only rounded to a stop counts as none.
 pub fn is_stop(def: &PlantDef, tag: TagId, held: f64) -> bool {
     stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| off == held)
 }

@@ -127,7 +127,7 @@ impl AlarmEvent {
     }
 }
 
-/// An operator action, written when its outcome is known.
+/// An operator action, written when its outcome is known; a write also before it is sent ([`WRITE_REQUESTED`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
     /// When the command was taken.

@@ -37,7 +37,7 @@ use crate::{
     profile::PlantFile,
 };
 
-/// Places of that queue that only a stop may take.
+/// Places of the queue to a link that only a stop may take.
 pub(super) const KEPT_FOR_STOPS: usize = 4;
 /// Real time between two snapshots: what a person can follow.
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(100);

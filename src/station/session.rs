@@ -16,7 +16,7 @@ use crate::{
 /// One attached terminal. Dropping it stops nothing.
 ///
 /// The station publishes a snapshot at least every two seconds of real time, changed or not: a terminal that receives
-/// nothing for longer shows the station as silent and all values as uncertain.
+/// nothing for three seconds shows the station as silent and all values as uncertain.
 #[derive(Debug, Clone)]
 pub struct Session {
     /// The latest snapshot only.
@@ -34,11 +34,12 @@ pub struct Session {
 /// means nothing without its connection.
 #[derive(Debug)]
 pub enum Request {
-    /// A command to the plant. Its outcome is seen in a later snapshot, also that it was not permitted.
+    /// A command to the plant. Its outcome is seen in a later snapshot, also that it was not permitted; a command that did not
+    /// reach the plant is in the session status, [`SessionStatus::undelivered`].
     Command(Command, Option<Credentials>),
     /// A query to the history.
     Ask(QueryRequest),
-    /// A request about people or the station.
+    /// A session request.
     SessionRequest(SessionRequest, oneshot::Sender<Result<Durability, String>>),
 }
 

@@ -66,7 +66,7 @@ pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, St
     rows
 }
 
-/// `First TIC-2.UNLOCK := ON; it stays so.`, where a write needs a key that is not certainly turned.
+/// `First writes TIC-2.UNLOCK := ON; it keeps this value.`, where a write needs a key that is not certainly turned.
 pub fn key_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     let (key, turned) = cx.def().tag(tag).write_unlock?;
     if cx.snapshot.sample(key).good_value() == Some(turned) {

@@ -25,7 +25,7 @@ pub fn words(role: Role) -> &'static str {
     }
 }
 
-/// Why the user may not give this command: `needs Technician, tom is Viewer`.
+/// Why the user may not give this command: `needs Technician; tom is Viewer`.
 pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
     lacks(cx, right::needs(kind))
 }

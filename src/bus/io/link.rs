@@ -226,7 +226,7 @@ impl Link {
         self.timeout
     }
 
-    /// Another time from now on, for a diagnostic in a shorten_hold_off.
+    /// Another response timeout from now on: a poll or a step of a diagnostic has its own.
     pub fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;
     }

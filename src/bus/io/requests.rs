@@ -25,7 +25,7 @@ pub struct Requests {
     /// Served before all others: stops, then what is neither a write nor a refresh.
     priority: VecDeque<BusRequest>,
     /// Writes that wait for their share of the line's time, and one refresh for each device. The plant has no more than one
-    /// write under way for a tag.
+    /// write under way for a tag, and a stop beside it.
     waiting: VecDeque<BusRequest>,
     /// Writes that were handed out and have not ended.
     started: Vec<WriteId>,

@@ -11,17 +11,17 @@ use crate::{
 /// Entries that are compared with the audit log at a start: the latest.
 pub const CHAIN_HASHES_MAX: usize = 5_000;
 
-/// The chain_hashes of the latest entries, newest first.
+/// The chain hashes of the latest entries, newest first.
 const CHAIN_HASHES: &str = "SELECT number, any_value(hash) FROM operator_action WHERE number IS NOT NULL
     GROUP BY number ORDER BY number DESC LIMIT ?";
-/// Is an action stored without its chain_hash, because the audit log could not be written?
+/// Is an action stored without its chain hash, because the audit log could not be written?
 const UNCHAINED: &str = "SELECT count(*) FROM (SELECT 1 FROM operator_action WHERE number IS NULL LIMIT 1)";
-/// The action that is about to be stored with its chain_hash.
+/// The action that is about to be stored with its chain hash.
 const REMOVE_UNSEALED: &str = "DELETE FROM operator_action WHERE number IS NULL AND utc = ? AND by_whom = ?
     AND action = ? AND target = ? AND outcome = ? AND coalesce(new_value, '') = ?";
 
 impl Store {
-    /// The chain_hashes of the latest entries, at most [`CHAIN_HASHES_MAX`].
+    /// The chain hashes of the latest entries, at most [`CHAIN_HASHES_MAX`].
     pub fn chain_hashes(&self) -> Result<Vec<ChainHash>, HistoryError> {
         let mut statement = self.db.prepare(CHAIN_HASHES).map_err(engine)?;
         let row = |row: &duckdb::Row| Ok((row.get::<_, u64>(0)?, row.get::<_, Vec<u8>>(1)?));
@@ -34,7 +34,7 @@ impl Store {
         rows.map(chain_hash).collect()
     }
 
-    /// Makes room for actions that come with their chain_hashes and were stored without before. Part of a transaction.
+    /// Makes room for actions that come with their chain hashes and were stored without before. Part of a transaction.
     pub(super) fn remove_unsealed(&self, actions: &[&ActionRecord]) -> duckdb::Result<()> {
         let mut chained = actions.iter().filter(|action| action.chain_hash.is_some()).peekable();
         if chained.peek().is_none() || self.db.query_row(UNCHAINED, [], |row| row.get::<_, u64>(0))? == 0 {

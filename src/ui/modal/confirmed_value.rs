@@ -28,7 +28,7 @@ impl ConfirmedValue {
     /// Is it another value than was seen? Then that is what was seen from now on, and its author should be asked again.
     pub fn changed(&mut self, cx: &ViewContext) -> bool {
         let now = cx.snapshot.sample(self.tag).good_value();
-        // What has become unknown is not another value: the window shows it, and the station checks.
+        // What has become unknown is not another value: the window shows it, and the station writes over it.
         if now.is_none() || now == self.value || self.asked >= ASKED_MAX {
             return false;
         }

@@ -78,7 +78,7 @@ pub fn needs_confirmation(cx: &ViewContext, tag: TagId, value: f64) -> bool {
         || !warnings(cx, tag, value).is_empty()
 }
 
-/// `72.3 → the device holds steps of 0.5: 72.5`; `None` where it holds what was typed.
+/// `72.3 → the resolution of the device is 0.5: 72.5`; `None` where it holds what was typed.
 pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> {
     let held = cx.snapshot.held(tag, value);
     // A single-precision register is as good as exact.

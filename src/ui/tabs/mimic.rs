@@ -213,8 +213,8 @@ pub fn command_of(cx: &ViewContext, event: KeyEvent) -> Option<Modal> {
     command_window(cx, command)
 }
 
-/// The window of a plant command, or why it cannot be given: a fixed value or the other of two states is asked at once; a toggle of a state that
-/// unknown value becomes a list, and anything else is entered.
+/// The window of a plant command, or why it cannot be given: a fixed value, or the other of two known states, is confirmed;
+/// of two states the present one of which is unknown one is chosen from a list; any other value is entered.
 fn command_window(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     let tag = command.tag;
     let def = cx.def().tag(tag);

@@ -22,7 +22,8 @@ use crate::{
 /// What cannot be read for so long (plant time) stays unconfirmed.
 const CONFIRM_MAX: SignedDuration = SignedDuration::from_secs(30);
 
-/// A write that was not answered, or not read back. The plant has no more than one under way for a tag.
+/// A write that was not answered, or not read back. The plant has no more than one of a tag under
+/// way, and a stop beside it, which is never one of these.
 pub(super) struct Unconfirmed {
     id: WriteId,
     tag: TagId,

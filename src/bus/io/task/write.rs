@@ -39,7 +39,7 @@ enum Unlocked {
 }
 
 impl Task<'_> {
-    /// Performs a write and reports its result.
+    /// Performs a write and reports its result; one that a stop has overtaken waits again and has none yet.
     pub(super) async fn write(
         &mut self,
         link: &mut Link,
