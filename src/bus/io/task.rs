@@ -1,7 +1,7 @@
 //! The task of one line: opens the port, keeps the schedule, serves operators and diagnostics, and sends events to the plant.
 
 mod concurrent;
-mod confirm;
+mod deferred_read_back;
 mod exit;
 mod live;
 mod poll;
@@ -109,8 +109,8 @@ struct Task<'a> {
     live_budget: Budget,
     /// Counters and outstanding replies, from one opening to the next.
     memory: LineMemory,
-    /// Writes whose fate is not known yet.
-    unconfirmed: Vec<confirm::Unconfirmed>,
+    /// Writes whose result is not known yet.
+    unconfirmed: Vec<deferred_read_back::Unconfirmed>,
     /// Reads that are under way over Modbus TCP, no more than a device takes at once.
     under_way: Vec<concurrent::UnderWay>,
     /// When the counters of the link were last added to the statistics.
@@ -211,7 +211,7 @@ impl Task<'_> {
             let may_write = !matches!(next, Next::Run(_)) || self.budget.allows(now);
             match (self.requests.next(may_write)?, next) {
                 (Some(request), _) => self.serve_request(link, schedule, request).await?,
-                (None, _) if self.is_turn_of_confirm(now) => self.confirm(link, schedule).await?,
+                (None, _) if self.is_turn_of_deferred_read_back(now) => self.deferred_read_back(link, schedule).await?,
                 (None, next) if self.is_turn_of_diagnostic(next) => self.diagnostic_step(link).await?,
                 (None, next) if self.is_turn_of_live_read(next) => self.live_step(link).await?,
                 (None, Next::Run(index)) => self.poll(link, schedule, index).await?,

@@ -100,7 +100,7 @@ impl Task<'_> {
         match result {
             // A stop may be requested again at once.
             WriteResult::Lost(fault) | WriteResult::NotRead(fault) if job.verify && !job.urgent => {
-                self.confirm_later(id, tag.id, result, fault).await?;
+                self.defer_read_back(id, tag.id, result, fault).await?;
             }
             result => self.publish_write_result(id, result).await?,
         }

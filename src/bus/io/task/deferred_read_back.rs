@@ -1,4 +1,4 @@
-//! Writes whose fate is not known: what the device holds is read as soon as the unit is in sync, never written again.
+//! Writes whose result is not known: what the device holds is read as soon as the unit is in sync, never written again.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// What cannot be read for so long (plant time) stays unconfirmed.
-const CONFIRM_MAX: SignedDuration = SignedDuration::from_secs(30);
+const DEFER_MAX: SignedDuration = SignedDuration::from_secs(30);
 
 /// A write that was not answered, or not read back. The plant has no more than one of a tag under
 /// way, and a stop beside it, which is never one of these.
@@ -36,8 +36,8 @@ pub(super) struct Unconfirmed {
 }
 
 impl Task<'_> {
-    /// Remembers a write whose fate is not known; what was read before it is in doubt.
-    pub(super) async fn confirm_later(
+    /// Remembers a write whose result is not known; what was read before it becomes uncertain.
+    pub(super) async fn defer_read_back(
         &mut self,
         id: WriteId,
         tag: TagId,
@@ -45,18 +45,22 @@ impl Task<'_> {
         fault: Fault,
     ) -> Result<(), LinkExit> {
         let now = self.clock.now();
-        let until = now.checked_add(CONFIRM_MAX).unwrap_or(Timestamp::MAX);
+        let until = now.checked_add(DEFER_MAX).unwrap_or(Timestamp::MAX);
         self.unconfirmed.push(Unconfirmed { id, tag, result, next: now, until, backoff: Backoff::default() });
         self.publish_failure(now, self.def.tag(tag).device, vec![tag], fault, None).await
     }
 
     /// Is it time to read one of them?
-    pub(super) fn is_turn_of_confirm(&self, now: Timestamp) -> bool {
+    pub(super) fn is_turn_of_deferred_read_back(&self, now: Timestamp) -> bool {
         self.unconfirmed.iter().any(|write| write.next <= now)
     }
 
     /// Reads the tag of the first that is due, and publishes the result of its write if it is known now.
-    pub(super) async fn confirm(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
+    pub(super) async fn deferred_read_back(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+    ) -> Result<(), LinkExit> {
         let now = self.clock.now();
         let Some(index) = self.unconfirmed.iter().position(|write| write.next <= now) else { return Ok(()) };
         let def = self.def.clone();
@@ -75,7 +79,7 @@ impl Task<'_> {
         };
         let Some(raw) = raw else {
             let write = &mut self.unconfirmed[index];
-            let wait = SignedDuration::try_from(write.backoff.fail()).unwrap_or(CONFIRM_MAX);
+            let wait = SignedDuration::try_from(write.backoff.fail()).unwrap_or(DEFER_MAX);
             write.next = at.checked_add(wait).unwrap_or(Timestamp::MAX);
             if write.until < write.next {
                 let write = self.unconfirmed.remove(index);
