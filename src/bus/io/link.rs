@@ -350,7 +350,7 @@ impl Link {
         match fault.kind() {
             FaultKind::Exception(_) => {
                 self.wire.counters.exceptions += 1;
-                // An exception names no address: while the unit owes, it may be the answer to an older request.
+                // An exception names no address: while a reply of the unit is outstanding, it may be the answer to an older request.
                 if mbap || self.wire.replies.of(*unit).is_clear() {
                     return;
                 }

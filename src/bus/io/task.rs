@@ -282,7 +282,7 @@ impl Task<'_> {
                     self.publish_write_result(id, WriteResult::Superseded).await?;
                 }
                 let def = self.def.clone();
-                match self.clear_way(link, schedule, def.tag(job.tag).device, job.urgent).await {
+                match self.wait_until_idle(link, schedule, def.tag(job.tag).device, job.urgent).await {
                     Ok(true) => {}
                     Ok(false) => {
                         self.requests.defer(BusRequest::Write(job));

@@ -1,4 +1,4 @@
-//! What a unit owes, and what proves that it owes nothing.
+//! Which replies of a unit are outstanding, and what proves that none is.
 
 use super::*;
 use crate::{
@@ -61,7 +61,7 @@ fn a_unit_that_was_late_must_rest_longer() {
     let s = Duration::from_secs;
     let mut replies = LineReplies::new(s(1), 0);
     let request = [1, 3, 0, 0, 0, 2];
-    assert_eq!(replies.forget(1, s(0)), None, "who owes nothing has nothing to forget");
+    assert_eq!(replies.forget(1, s(0)), None, "without an outstanding reply there is nothing to forget");
     replies.failed(&request, s(100));
     assert!(replies.is_ambiguous(&request) && !replies.is_ambiguous(&[2, 3, 0, 0, 0, 2]));
     assert_eq!(replies.forget(1, s(104)), Some(s(6)), "ten timeouts");

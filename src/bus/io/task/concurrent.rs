@@ -132,7 +132,7 @@ impl Task<'_> {
 
     /// Waits until nothing of a device is under way, so that no value that was read before what comes next is shown after it.
     /// For an `urgent` one what does not end soon is given up; another one gives way to a stop: `false`.
-    pub(super) async fn clear_way(
+    pub(super) async fn wait_until_idle(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,

@@ -65,7 +65,7 @@ impl Task<'_> {
         let Some(index) = self.unconfirmed.iter().position(|write| write.next <= now) else { return Ok(()) };
         let def = self.def.clone();
         let tag = def.tag(self.unconfirmed[index].tag);
-        if !self.clear_way(link, schedule, tag.device, false).await? {
+        if !self.wait_until_idle(link, schedule, tag.device, false).await? {
             return Ok(());
         }
         let block = plan::single(def.device(tag.device), tag);

@@ -163,7 +163,8 @@ impl Task<'_> {
         // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
         let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
         // A stop does not wait for an unambiguous response: its refusal may then be reported as a missing response.
-        let own = (urgent && is_clear(link, device)) || (!urgent && self.owes_nothing(link, device).await?);
+        let own =
+            (urgent && is_clear(link, device)) || (!urgent && self.has_no_outstanding_reply(link, device).await?);
         // Nothing else goes out before a stop that waits.
         if !urgent && self.requests.stop_waits() {
             return Ok(WriteResult::Superseded);
@@ -220,7 +221,7 @@ impl Task<'_> {
 
     /// An exception names no address: only from a unit without outstanding replies is it certainly the response to this
     /// write. `Err`: the port closed.
-    async fn owes_nothing(&mut self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
+    async fn has_no_outstanding_reply(&mut self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
         if is_clear(link, device) {
             return Ok(true);
         }

@@ -74,7 +74,7 @@ impl Device {
         if late { self.by } else { 5 * MS + Duration::from_millis(chance % 20) }
     }
 
-    /// Serves one port after the other: what it owes to one that was closed goes out at the next.
+    /// Serves one port after the other: what one that was closed did not get goes out at the next.
     async fn serve(self, start: Instant, mut ports: mpsc::Receiver<DuplexStream>) {
         let Some(mut port) = ports.recv().await else { return };
         let (mut open, mut buffer, mut number, mut busy_until) = (true, Vec::new(), 0, start);
