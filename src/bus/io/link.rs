@@ -262,7 +262,7 @@ impl Link {
     }
 
     /// Nothing is sent for this long (plant time), for devices that need it.
-    pub fn hold_off(&mut self, plant: Duration) {
+    pub fn hold_off_plant_time(&mut self, plant: Duration) {
         self.wire.hold_off(self.wire.clock().real_span(plant));
     }
 

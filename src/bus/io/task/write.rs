@@ -239,7 +239,7 @@ impl Task<'_> {
     /// The device is left alone for a while after a write; the others are not, unless it was a broadcast.
     fn keep_write_gap(&self, link: &mut Link, schedule: &mut Schedule, device: &DeviceDef) {
         if device.unit == 0 {
-            link.hold_off(device.write_gap);
+            link.hold_off_plant_time(device.write_gap);
         } else if !device.write_gap.is_zero() {
             schedule.keep_gap(device.id, self.clock.now() + device.write_gap);
             link.set_unit_gap(device.unit, device.write_gap);

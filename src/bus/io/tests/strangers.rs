@@ -1,4 +1,4 @@
-//! Frames that this line has not asked for: owed to a process that was killed, sent to another master, or sent twice.
+//! Frames that this line has not asked for: due to a process that was killed, sent to another master, or sent twice.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ use crate::{
 const MODES: [Mode; 3] = [Mode::Rtu, Mode::Ascii, Mode::RtuOverTcp];
 
 /// The answer to the block at 20, which looks like one to the block at 10.
-fn owed(mode: Mode) -> Vec<u8> {
+fn outstanding(mode: Mode) -> Vec<u8> {
     frame::wrap(mode.framing(), 0, &[1, 3, 8, 0, 20, 0, 21, 0, 22, 0, 23])
 }
 
@@ -41,7 +41,7 @@ async fn an_answer_owed_to_a_process_that_was_killed_is_no_value() {
         let mut line = line(def.clone());
         // It needs 250 ms for each request, and answers in their order: the first two are those of the dead process.
         line.plug(mode, move |number, _| match number {
-            0 => SlaveAction::Noise([owed(mode), owed(mode)].concat()),
+            0 => SlaveAction::Noise([outstanding(mode), outstanding(mode)].concat()),
             _ => SlaveAction::Late(250 * MS),
         });
         let (good, failed) = read(&mut line, &def, 60).await;
@@ -49,7 +49,7 @@ async fn an_answer_owed_to_a_process_that_was_killed_is_no_value() {
     }
 }
 
-/// The same where the dead process had begun as this one does: what is owed answers the very first request.
+/// The same where the dead process had begun as this one does: what is outstanding answers the very first request.
 #[tokio::test(start_paused = true)]
 async fn an_outstanding_first_reply_does_not_shift_the_others() {
     for mode in MODES {
@@ -136,7 +136,7 @@ async fn an_unasked_frame_puts_the_values_of_its_unit_in_doubt() {
         let mut sent = 0;
         line.plug(mode, move |_, message| {
             sent += usize::from(message[0] == 2);
-            if sent == 6 && message[0] == 2 { SlaveAction::Noise(owed(mode)) } else { SlaveAction::Answer }
+            if sent == 6 && message[0] == 2 { SlaveAction::Noise(outstanding(mode)) } else { SlaveAction::Answer }
         });
         let mut doubted = None;
         let mut good = 0;
