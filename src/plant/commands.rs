@@ -65,8 +65,8 @@ impl CommandTracker {
         let checked = self.check(image, status, tag, value);
         // What is shown and recorded is what the device will hold, not what was typed.
         let def = self.def.tag(tag);
-        let held = image.scaling_decimals(def).and_then(|decimals| scale::held(def, value, decimals));
-        let kind = CommandKind::Write { tag, value: held.unwrap_or(value) };
+        let rounded = image.scaling_decimals(def).and_then(|decimals| scale::rounded_to_device(def, value, decimals));
+        let kind = CommandKind::Write { tag, value: rounded.unwrap_or(value) };
         let command = Command { kind, ..status.command.clone() };
         let status = CommandStatus { command, old: image.sample(tag).value, ..status.clone() };
         match checked {
@@ -162,11 +162,13 @@ impl CommandTracker {
         let def = self.def.tag(job.tag);
         let value = |back| scale::to_value(def, back, image.scaling_decimals(def).unwrap_or(0));
         let outcome = match result {
-            WriteResult::ReadBack(back) | WriteResult::Held(back) if scale::same_raw(def, job.raw, back) => {
+            WriteResult::ReadBack(back) | WriteResult::ReadBackAfterNoResponse(back)
+                if scale::same_raw(def, job.raw, back) =>
+            {
                 Outcome::Verified
             }
             WriteResult::ReadBack(back) => Outcome::NotConfirmed(NotConfirmed::Different(value(back))),
-            WriteResult::Held(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
+            WriteResult::ReadBackAfterNoResponse(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
             unread => without_read_back(&unread),
         };
         self.complete(command, outcome, image, at)
@@ -274,7 +276,7 @@ fn without_read_back(result: &WriteResult) -> Outcome {
         WriteResult::Superseded => Outcome::Refused(Refusal::Superseded),
         WriteResult::Lost(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
         WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
-        WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::Held(_) => {
+        WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterNoResponse(_) => {
             Outcome::NotConfirmed(NotConfirmed::NoReadBack)
         }
     }

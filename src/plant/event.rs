@@ -109,7 +109,7 @@ pub enum WriteResult {
     /// The device accepted it; then it was read back: this raw number.
     ReadBack(f64),
     /// No valid answer; read once the unit was in sync again, the device holds this raw number.
-    Held(f64),
+    ReadBackAfterNoResponse(f64),
     /// The device accepted it, but the read-back failed.
     NotRead(Fault),
     /// The device accepted it; the profile excludes a read-back.

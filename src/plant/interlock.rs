@@ -116,7 +116,7 @@ impl ControlLogic {
     }
 
     /// The interlock for which this command is certainly without effect and is not to be sent. What will be sent decides, not
-    /// what was typed: `value` is as the device will hold it, `super::scale::held`.
+    /// what was typed: `value` is as the device will hold it, `super::scale::rounded_to_device`.
     pub fn refusal(&self, tag: TagId, value: f64, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
         let blocks = |lock: &&InterlockDef| lock.refuse && lock.status(sample(lock.of)) == InterlockStatus::Blocked;
         self.interlocks_of(tag, value).find(blocks)
@@ -150,10 +150,10 @@ pub fn stops<'a>(logic: &'a ControlLogic, actions: &'a [ActionDef], tag: TagId) 
     actuators.chain(sequences).chain(actions).filter(move |(command, _)| *command == tag).map(|(_, off)| off)
 }
 
-/// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::held`]: a typed number
+/// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::rounded_to_device`]: a typed number
 /// that is only rounded to a stop counts as none.
-pub fn is_stop(def: &PlantDef, tag: TagId, held: f64) -> bool {
-    stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| off == held)
+pub fn is_stop(def: &PlantDef, tag: TagId, rounded: f64) -> bool {
+    stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| off == rounded)
 }
 
 /// Since when the feedback of each actuator has differed from its command, by its place in [`ControlLogic::actuators`].

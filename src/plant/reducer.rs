@@ -343,7 +343,7 @@ impl Plant {
             WriteResult::Accepted => self.image.written(tag, None, at),
             WriteResult::NotRead(fault) | WriteResult::Lost(fault) => self.image.written(tag, Some(*fault), at),
             WriteResult::ReadBack(_)
-            | WriteResult::Held(_)
+            | WriteResult::ReadBackAfterNoResponse(_)
             | WriteResult::Refused(_)
             | WriteResult::NotSent(_)
             | WriteResult::Superseded => {}

@@ -13,7 +13,7 @@ pub fn to_value(tag: &TagDef, raw: f64, decimals: u8) -> f64 {
 pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
     let exact = (value - tag.offset) / (tag.scale * 10f64.powi(-i32::from(decimals)));
     let raw = match tag.point.kind.encoding() {
-        Encoding::Float => as_held(tag, exact),
+        Encoding::Float => as_stored(tag, exact),
         Encoding::Bit | Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => exact.round(),
         Encoding::Text => return None,
     };
@@ -22,7 +22,7 @@ pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
 }
 
 /// The value as the device will hold it once it is written: rounded to what the type can hold; `None` if it does not fit.
-pub fn held(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
+pub fn rounded_to_device(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
     to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
 }
 
@@ -33,7 +33,7 @@ pub fn same_raw(tag: &TagDef, one: f64, other: f64) -> bool {
         Encoding::Float if tag.point.kind.registers() == 4 => {
             alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0))
         }
-        Encoding::Float => as_held(tag, one) == as_held(tag, other),
+        Encoding::Float => as_stored(tag, one) == as_stored(tag, other),
         Encoding::Bit => (one != 0.0) == (other != 0.0),
         Encoding::Text => false,
         Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => one == other,
@@ -41,7 +41,7 @@ pub fn same_raw(tag: &TagDef, one: f64, other: f64) -> bool {
 }
 
 /// A float in the precision of its type.
-fn as_held(tag: &TagDef, exact: f64) -> f64 {
+fn as_stored(tag: &TagDef, exact: f64) -> f64 {
     if tag.point.kind.registers() == 2 { f64::from(to_f32(exact)) } else { exact }
 }
 

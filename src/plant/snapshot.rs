@@ -140,8 +140,8 @@ impl Snapshot {
         }
     }
     /// A value as the device will hold it once it is written; as it is where it cannot be sent.
-    pub fn held(&self, tag: TagId, value: f64) -> f64 {
-        scale::held(self.def.tag(tag), value, self.scaling_decimals(tag)).unwrap_or(value)
+    pub fn rounded_to_device(&self, tag: TagId, value: f64) -> f64 {
+        scale::rounded_to_device(self.def.tag(tag), value, self.scaling_decimals(tag)).unwrap_or(value)
     }
     /// The smallest change of a value that a whole number in the device can hold.
     pub fn step(&self, tag: TagId) -> f64 {

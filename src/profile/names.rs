@@ -177,7 +177,7 @@ pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Proble
 pub(crate) fn held_number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
     let number = number_of(choice, tag, problems)?;
     match tag.decimals {
-        Decimals::Fixed(_) => Some(scale::held(tag, number, 0).unwrap_or(number)),
+        Decimals::Fixed(_) => Some(scale::rounded_to_device(tag, number, 0).unwrap_or(number)),
         Decimals::From(_) => Some(number),
     }
 }

@@ -44,15 +44,18 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
 
 /// Is this value of a tag certainly without effect, so that it is not to be sent?
 pub fn is_refused(cx: &ViewContext, tag: TagId, value: f64) -> bool {
-    cx.def().logic.refusal(tag, cx.snapshot.held(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
+    cx.def().logic.refusal(tag, cx.snapshot.rounded_to_device(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
 }
 
 /// All there is to say before a value is written, with its look.
 pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, Style)> {
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (t!("! Writing is not possible now. {why}", why), cx.theme.trouble()));
-    let locks =
-        cx.def().logic.interlocks_of(tag, cx.snapshot.held(tag, value)).filter_map(|lock| interlock_text(cx, lock));
+    let locks = cx
+        .def()
+        .logic
+        .interlocks_of(tag, cx.snapshot.rounded_to_device(tag, value))
+        .filter_map(|lock| interlock_text(cx, lock));
     let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
         rows.push((t!("Not sent: it would have no effect.").to_owned(), cx.theme.strong()));

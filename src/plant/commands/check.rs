@@ -46,19 +46,19 @@ impl CommandTracker {
             return refuse(Refusal::ReadOnly);
         }
         let decimals = image.scaling_decimals(def);
-        let held = decimals.and_then(|decimals| scale::held(def, value, decimals));
-        let urgent = held.is_some_and(|held| interlock::is_stop(&self.def, tag, held));
+        let rounded = decimals.and_then(|decimals| scale::rounded_to_device(def, value, decimals));
+        let urgent = rounded.is_some_and(|rounded| interlock::is_stop(&self.def, tag, rounded));
         let mut under_way = self.writes.iter().filter(|(_, job)| job.tag == tag).map(|(_, job)| job.raw).peekable();
         let is_busy = under_way.peek().is_some();
         // A stop need not wait for the start under way; the same stop twice would only take the line's time.
-        let same = |raw| decimals.map(|decimals| scale::to_value(def, raw, decimals)) == held;
+        let same = |raw| decimals.map(|decimals| scale::to_value(def, raw, decimals)) == rounded;
         if is_busy && (!urgent || under_way.any(same)) {
             return refuse(Refusal::UnderWay);
         }
         if !def.enum_labels.is_empty() && def.label_of(value).is_none() {
             return refuse(Refusal::NotAChoice);
         }
-        if let Some(lock) = self.def.logic.refusal(tag, held.unwrap_or(value), |tag| image.sample(tag)) {
+        if let Some(lock) = self.def.logic.refusal(tag, rounded.unwrap_or(value), |tag| image.sample(tag)) {
             return refuse(Refusal::Interlock(lock.message.clone()));
         }
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
@@ -67,7 +67,8 @@ impl CommandTracker {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };
         // A limit holds for what is sent: rounding must not lead beyond it, nor hide that more was asked for.
-        let inside = scale::is_inside(min, max, value) && held.is_none_or(|held| scale::is_inside(min, max, held));
+        let inside =
+            scale::is_inside(min, max, value) && rounded.is_none_or(|rounded| scale::is_inside(min, max, rounded));
         let raw = scale::to_raw(def, value, decimals).filter(|_| inside);
         let Some(raw) = raw else {
             let shown = usize::from(image.shown_decimals(def));

@@ -151,8 +151,9 @@ fn unfit(
     if !tag.enum_labels.is_empty() && tag.label_of(change.new).is_none() {
         return Some(Problem::NotAChoice { tag: tag.short.clone(), value: change.new });
     }
-    let held = tag.scaling_decimals(trusted).and_then(|decimals| scale::held(tag, change.new, decimals));
-    if let Some(lock) = def.logic.refusal(tag.id, held.unwrap_or(change.new), |tag| as_sample(trusted(tag))) {
+    let rounded =
+        tag.scaling_decimals(trusted).and_then(|decimals| scale::rounded_to_device(tag, change.new, decimals));
+    if let Some(lock) = def.logic.refusal(tag.id, rounded.unwrap_or(change.new), |tag| as_sample(trusted(tag))) {
         return Some(Problem::Interlock { tag: tag.short.clone(), text: lock.message.clone() });
     }
     let (min, max) = match tag.limits(then) {

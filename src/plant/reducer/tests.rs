@@ -89,8 +89,13 @@ fn a_write_is_verified_only_by_its_own_read_back() {
             Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
             Some(725.0),
         ),
-        (72.5, WriteResult::Held(725.0), Outcome::Verified, Some(725.0)),
-        (72.5, WriteResult::Held(700.0), Outcome::NotConfirmed(NotConfirmed::NotApplied(70.0)), Some(725.0)),
+        (72.5, WriteResult::ReadBackAfterNoResponse(725.0), Outcome::Verified, Some(725.0)),
+        (
+            72.5,
+            WriteResult::ReadBackAfterNoResponse(700.0),
+            Outcome::NotConfirmed(NotConfirmed::NotApplied(70.0)),
+            Some(725.0),
+        ),
         (70.0, WriteResult::Accepted, Outcome::Unchanged, None),
         (100.1, WriteResult::Accepted, refused(Refusal::OutOfRange { min: "0.0".into(), max: "100.0".into() }), None),
         (

@@ -95,7 +95,7 @@ impl Confirm {
     pub fn write(cx: &ViewContext, tag: TagId, value: f64) -> Confirm {
         let def = cx.def().tag(tag);
         let rounded = rounded_text(cx, tag, value);
-        let value = if rounded.is_some() { cx.snapshot.held(tag, value) } else { value };
+        let value = if rounded.is_some() { cx.snapshot.rounded_to_device(tag, value) } else { value };
         let action = ConfirmAction::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
         let confirm = Confirm::new(action, t!("write {name}", name = def.name), notes);

@@ -43,12 +43,12 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
     };
     let Some((min, max)) = cx.snapshot.range(tag) else { return Ok(value) };
     let inside = |value| scale::is_inside(Some(min), Some(max), value);
-    let held = cx.snapshot.held(tag, value);
-    match (inside(value), inside(held)) {
+    let rounded = cx.snapshot.rounded_to_device(tag, value);
+    match (inside(value), inside(rounded)) {
         (false, _) => Err(t!("outside {range_text}", range_text = range_text(cx, tag))),
         (true, false) => Err(t!(
             "the device would store {plain}, outside {range_text}",
-            plain = plain(held),
+            plain = plain(rounded),
             range_text = range_text(cx, tag)
         )),
         (true, true) => Ok(value),
@@ -80,16 +80,16 @@ pub fn needs_confirmation(cx: &ViewContext, tag: TagId, value: f64) -> bool {
 
 /// `72.3 → the resolution of the device is 0.5: 72.5`; `None` where it holds what was typed.
 pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> {
-    let held = cx.snapshot.held(tag, value);
+    let rounded = cx.snapshot.rounded_to_device(tag, value);
     // A single-precision register is as good as exact.
-    let same = (held - value).abs() <= 1e-6 * value.abs().max(1.0);
+    let same = (rounded - value).abs() <= 1e-6 * value.abs().max(1.0);
     let step = plain(cx.snapshot.step(tag));
     (!same).then(|| {
         t!(
             "{format} → the resolution of the device is {step}: {plain}",
             format = cx.snapshot.format(tag, value),
             step,
-            plain = plain(held)
+            plain = plain(rounded)
         )
     })
 }

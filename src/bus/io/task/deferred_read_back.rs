@@ -95,7 +95,7 @@ impl Task<'_> {
         let write = self.unconfirmed.remove(index);
         let result = match write.result {
             WriteResult::NotRead(_) => WriteResult::ReadBack(raw),
-            _ => WriteResult::Held(raw),
+            _ => WriteResult::ReadBackAfterNoResponse(raw),
         };
         self.publish_write_result(write.id, result).await
     }

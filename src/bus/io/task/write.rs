@@ -95,7 +95,10 @@ impl Task<'_> {
             }
             // The key may have changed since it was read.
             WriteResult::Refused(_) if tag.write_unlock.is_some() => schedule.refresh(tag.device, self.clock.now()),
-            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Superseded | WriteResult::Held(_) => {}
+            WriteResult::Refused(_)
+            | WriteResult::NotSent(_)
+            | WriteResult::Superseded
+            | WriteResult::ReadBackAfterNoResponse(_) => {}
         }
         match result {
             // A stop may be requested again at once.

@@ -42,10 +42,14 @@ async fn a_write_is_sent_once_whatever_happens() {
     for (action, read_back, expect) in [
         (SlaveAction::Answer, SlaveAction::Answer, WriteResult::ReadBack(10.0)),
         (SlaveAction::Exception(3), SlaveAction::Answer, WriteResult::Refused(ExceptionCode(3))),
-        (SlaveAction::Silent, SlaveAction::Answer, WriteResult::Held(10.0)),
+        (SlaveAction::Silent, SlaveAction::Answer, WriteResult::ReadBackAfterNoResponse(10.0)),
         (SlaveAction::Silent, SlaveAction::Silent, WriteResult::Lost(Fault::Timeout)),
         (SlaveAction::Answer, SlaveAction::Silent, WriteResult::NotRead(Fault::Timeout)),
-        (SlaveAction::Instead(vec![1, 6, 0, 10, 0, 11]), SlaveAction::Answer, WriteResult::Held(10.0)),
+        (
+            SlaveAction::Instead(vec![1, 6, 0, 10, 0, 11]),
+            SlaveAction::Answer,
+            WriteResult::ReadBackAfterNoResponse(10.0),
+        ),
     ] {
         assert_eq!(write(action.clone(), read_back).await, (expect, 1), "{action:?}");
     }
@@ -122,7 +126,7 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
     }
     for (id, expect) in
         // Read once the unit is in sync: what the device holds, not what an answer to another write says.
-        [(1, WriteResult::Held(10.0)), (2, WriteResult::Held(11.0))]
+        [(1, WriteResult::ReadBackAfterNoResponse(10.0)), (2, WriteResult::ReadBackAfterNoResponse(11.0))]
     {
         let result = line
             .until(&def, |event| match event {
