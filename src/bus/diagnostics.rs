@@ -142,7 +142,7 @@ impl Job {
         let Some(step) = self.step.take() else { return };
         self.run.done += 1;
         match (&self.run.diagnostic, result) {
-            (_, StepResult::Bytes(bytes, reply)) => self.found(Finding::Bytes { bytes, reply }),
+            (_, StepResult::Bytes(bytes, response_time)) => self.found(Finding::Bytes { bytes, response_time }),
             (Diagnostic::Scan(_), StepResult::Answer(answer, _)) => self.add_unit(&step, answer),
             (Diagnostic::Sweep(_), StepResult::Answer(answer, _)) => return self.on_swept(&step, answer),
             // It only had an adapter with echo give itself away.
@@ -346,7 +346,7 @@ fn loopback_words(findings: &[Finding], sent: u32) -> String {
     let replies: Vec<Duration> = findings
         .iter()
         .filter_map(|finding| match finding {
-            Finding::Exchange(exchange) => exchange.outcome.is_ok().then_some(exchange.reply).flatten(),
+            Finding::Exchange(exchange) => exchange.outcome.is_ok().then_some(exchange.response_time).flatten(),
             _ => None,
         })
         .collect();

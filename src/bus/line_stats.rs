@@ -86,19 +86,19 @@ impl LineStats {
         index: Option<usize>,
         device: DeviceId,
         outcome: Result<(), Fault>,
-        reply: Option<Duration>,
+        response_time: Option<Duration>,
         tries: u8,
     ) {
         let of_device = self.devices.iter_mut().find(|(id, _)| *id == device).map(|(_, stats)| stats);
         for stats in index.and_then(|index| self.polls.get_mut(index)).into_iter().chain(of_device) {
-            stats.count(outcome, reply);
+            stats.count(outcome, response_time);
             stats.retries += u64::from(tries.saturating_sub(1));
         }
     }
 
     /// Any other request to a device has ended.
-    pub fn asked(&mut self, device: DeviceId, outcome: Result<(), Fault>, reply: Option<Duration>) {
-        self.polled(None, device, outcome, reply, 1);
+    pub fn asked(&mut self, device: DeviceId, outcome: Result<(), Fault>, response_time: Option<Duration>) {
+        self.polled(None, device, outcome, response_time, 1);
     }
 
     /// The line has been busy for this share of a span.

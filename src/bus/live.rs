@@ -124,8 +124,8 @@ impl LiveJob {
     }
 
     /// What was found.
-    pub fn finish(self, reply: Option<std::time::Duration>) -> LiveReading {
-        LiveReading { reply, ..self.reading }
+    pub fn finish(self, response_time: Option<std::time::Duration>) -> LiveReading {
+        LiveReading { response_time, ..self.reading }
     }
 }
 

@@ -289,10 +289,10 @@ impl Schedule {
 
     /// The device answered (an exception is an answer too), `reply` after the request, where that is known. If it was down,
     /// everything of it is due. What was released while it did not answer is not missed: the line had time.
-    pub fn answered(&mut self, device: DeviceId, reply: Option<Duration>, now: Timestamp) {
+    pub fn answered(&mut self, device: DeviceId, response_time: Option<Duration>, now: Timestamp) {
         let Some(place) = self.place_of(device) else { return };
         let failing = self.devices[place].probe_at.is_some();
-        let was_down = self.devices[place].answered(reply);
+        let was_down = self.devices[place].answered(response_time);
         if failing {
             self.stale = true;
             let polls = self.polls.iter_mut().filter(|poll| poll.place == place);

@@ -104,7 +104,7 @@ mod tests {
             request: frame::wrap(framing, 7, request).into(),
             answer: frame::wrap(framing, 7, answer).into(),
             outcome: Ok(()),
-            reply: None,
+            response_time: None,
             tries: 1,
         }
     }

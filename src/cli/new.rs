@@ -232,7 +232,7 @@ async fn read(
     let answer = tokio::time::timeout(READ_MAX, query_station(session, Query::Registers(read))).await;
     match answer.map_err(|_| CliError::Failed(format!("unit {unit}: the line is not connected any more")))?? {
         Answer::Registers(reading) => {
-            reading.reply.into_iter().for_each(|reply| replies.see(reply));
+            reading.response_time.into_iter().for_each(|time| replies.see(time));
             Ok(reading)
         }
         _ => Err(super::source::unexpected()),

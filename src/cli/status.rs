@@ -186,7 +186,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "name": device.name, "unit": device.unit, "state": device_word(status.state),
             "responding": status.state == DeviceState::Responding,
             "ne107": status.diagnosis.map(|reason| reason.to_string()),
-            "reply_ms": status.reply.map(|reply| reply.as_secs_f64() * 1e3),
+            "reply_ms": status.response_time.map(|reply| reply.as_secs_f64() * 1e3),
             "ok": count(status.ok), "failed": count(status.failed),
         })
     });

@@ -159,8 +159,8 @@ mod tests {
 
     fn values(second: i64) -> Event {
         let values = vec![(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)];
-        let reply = Duration::from_millis(12);
-        Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None }
+        let response_time = Duration::from_millis(12);
+        Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), response_time, exchange: None }
     }
 
     #[test]

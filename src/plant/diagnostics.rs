@@ -255,7 +255,7 @@ pub enum Finding {
         /// As they came.
         bytes: Vec<u8>,
         /// From the last byte sent to the first byte received.
-        reply: Option<Duration>,
+        response_time: Option<Duration>,
     },
     /// A unit answers.
     Unit {

@@ -28,7 +28,7 @@ pub enum Event {
         /// Text of every tag in the block that holds text.
         texts: Vec<(TagId, Arc<str>)>,
         /// From the last byte sent to the first byte received.
-        reply: Duration,
+        response_time: Duration,
         /// The exchange that brought them.
         exchange: Option<Arc<Exchange>>,
     },

@@ -66,8 +66,8 @@ pub fn minute(line: Arc<str>, before: &LineReport, after: &LineReport, at: Times
         received_bytes: since(new.received_bytes, old.received_bytes),
         // A line that is not connected reports nothing new: its last figure is not that of this minute.
         utilisation: if sent_bytes == 0 { 0.0 } else { new.utilisation_minute },
-        reply_p99_ms: ms(devices.reply.p99()),
-        reply_max_ms: ms(devices.reply.max()),
+        reply_p99_ms: ms(devices.response_time.p99()),
+        reply_max_ms: ms(devices.response_time.max()),
     }
 }
 
@@ -77,7 +77,7 @@ fn devices(after: &LineReport, before: Option<&LineReport>) -> RequestStats {
     for (device, stats) in &after.devices {
         let since = since(stats, before.and_then(|before| before.device(*device)));
         all.retries += since.retries;
-        all.reply.merge(&since.reply);
+        all.response_time.merge(&since.response_time);
     }
     all
 }

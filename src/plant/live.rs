@@ -69,7 +69,7 @@ pub struct LiveReading {
     /// Each part that was asked, in the order in which it was read.
     pub parts: Vec<LivePart>,
     /// From the last byte sent to the first byte received, of the last request that was answered.
-    pub reply: Option<Duration>,
+    pub response_time: Option<Duration>,
     /// Requests that it took.
     pub requests: u32,
 }
@@ -88,8 +88,8 @@ pub struct ReplyTimes {
 
 impl ReplyTimes {
     /// Counts a reply.
-    pub fn see(&mut self, reply: Duration) {
-        (self.count, self.slowest) = (self.count + 1, self.slowest.max(reply));
+    pub fn see(&mut self, response_time: Duration) {
+        (self.count, self.slowest) = (self.count + 1, self.slowest.max(response_time));
     }
 
     /// A timeout with a margin: three times the slowest reply in steps of 50 ms, at least 200 ms; `None` after too few.

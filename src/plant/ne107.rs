@@ -166,7 +166,7 @@ pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
 
 fn out_of_specification(lately: &RequestStats, timeout: Duration) -> Option<Reason> {
     let enough = REQUESTS_MIN <= lately.requests;
-    let slow = lately.reply.p99().filter(|p99| enough && timeout * SLOW_PERCENT < *p99 * 100);
+    let slow = lately.response_time.p99().filter(|p99| enough && timeout * SLOW_PERCENT < *p99 * 100);
     if lately.fails_since(NO_VALUES_AFTER) {
         return Some(Reason::NoValues);
     }

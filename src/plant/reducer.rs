@@ -137,14 +137,14 @@ impl Plant {
     /// Applies an event.
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
-            Event::Read { at, device, values, texts, reply, exchange } => {
+            Event::Read { at, device, values, texts, response_time, exchange } => {
                 self.image.read(&values, at);
                 self.image.read_texts(&texts, at);
                 let tags = values.iter().map(|(tag, _)| *tag).chain(texts.iter().map(|(tag, _)| *tag));
                 self.keep_source_frames(tags, exchange);
                 let status = &mut self.devices[device.index()];
                 status.state = DeviceState::Responding;
-                status.reply = Some(reply);
+                status.response_time = Some(response_time);
                 status.ok += 1;
                 status.values += (values.len() + texts.len()) as u64;
                 (at, None)

@@ -29,7 +29,7 @@ pub struct RequestStats {
     /// Answers to requests that had been given up.
     pub late: u64,
     /// From the last byte sent to the first byte received.
-    pub reply: Spread,
+    pub response_time: Spread,
     /// How long after its point of the grid a poll was sent.
     pub jitter: Spread,
     /// Releases of the poll that were skipped because the line had no time.
@@ -40,10 +40,10 @@ pub struct RequestStats {
 
 impl RequestStats {
     /// Counts one request.
-    pub fn count(&mut self, outcome: Result<(), Fault>, reply: Option<Duration>) {
+    pub fn count(&mut self, outcome: Result<(), Fault>, response_time: Option<Duration>) {
         self.requests += 1;
-        if let Some(reply) = reply {
-            self.reply.add(reply);
+        if let Some(response_time) = response_time {
+            self.response_time.add(response_time);
         }
         self.recent = self.recent << 1 | u64::from(outcome.is_err());
         let Err(fault) = outcome else {
@@ -93,7 +93,7 @@ impl RequestStats {
             exceptions: exceptions.filter(|(_, count)| 0 < *count).collect(),
             retries: self.retries.saturating_sub(before.retries),
             late: self.late.saturating_sub(before.late),
-            reply: self.reply.since(&before.reply),
+            response_time: self.response_time.since(&before.response_time),
             jitter: self.jitter.since(&before.jitter),
             missed: self.missed.saturating_sub(before.missed),
             recent: self.recent & 1u64.checked_shl(requests.min(64) as u32).map_or(u64::MAX, |bit| bit - 1),

@@ -227,7 +227,7 @@ pub struct DeviceStatus {
     /// Responding or not.
     pub state: DeviceState,
     /// Time of the last answer, from last byte sent to first byte received.
-    pub reply: Option<Duration>,
+    pub response_time: Option<Duration>,
     /// Valid answers since the start.
     pub ok: u64,
     /// Values in those answers.

@@ -138,7 +138,7 @@ pub struct Exchange {
     /// `Ok`, or what was wrong.
     pub outcome: Result<(), Fault>,
     /// From the last byte sent to the first byte received; `None` if none came.
-    pub reply: Option<Duration>,
+    pub response_time: Option<Duration>,
     /// 1, or 2 if a corrupt answer was asked for again.
     pub tries: u8,
 }

@@ -77,7 +77,7 @@ impl Fixture {
         };
         let responding = DeviceStatus {
             state: DeviceState::Responding,
-            reply: Some(Duration::from_millis(12)),
+            response_time: Some(Duration::from_millis(12)),
             ok: 406,
             ..DeviceStatus::default()
         };

@@ -159,15 +159,16 @@ async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<s
             let (request, answer): (Arc<[u8]>, Arc<[u8]>) = ([1; 8].into(), [2; 205].into());
             let values =
                 tags_of(device.id.0).map(|tag| (tag, (round * 7 + u64::from(tag.0)) as f64 % 60_000.0)).collect();
-            let reply = Duration::from_millis(12);
+            let response_time = Duration::from_millis(12);
             let (framing, outcome, tries) = (Framing::Rtu, Ok(()), 1);
             let (sent, got) = (request.clone(), answer.clone());
-            let exchange = Exchange { at, framing, request, answer, outcome, reply: Some(reply), tries };
+            let exchange =
+                Exchange { at, framing, request, answer, outcome, response_time: Some(response_time), tries };
             let exchange = Some(Arc::new(exchange));
-            plant.on_event(Event::Read { at, device: device.id, values, texts: Vec::new(), reply, exchange });
+            plant.on_event(Event::Read { at, device: device.id, values, texts: Vec::new(), response_time, exchange });
             let report = &mut reports[device.line.index()];
             let poll = report.polls.iter_mut().find(|poll| poll.device == device.id).unwrap();
-            poll.stats.count(Ok(()), Some(reply + Duration::from_millis(round % 9)));
+            poll.stats.count(Ok(()), Some(response_time + Duration::from_millis(round % 9)));
             poll.next = Some(at + jiff::SignedDuration::from_secs(1));
             let frame = |bytes, sent, number| Frame {
                 at,

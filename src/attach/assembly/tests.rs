@@ -70,7 +70,7 @@ fn full() -> Snapshot {
         request: [1, 4].into(),
         answer: [7].into(),
         outcome: Err(Fault::Timeout),
-        reply: None,
+        response_time: None,
         tries: 1,
     });
     Arc::make_mut(&mut snapshot.source_frames)[..3].fill(Some(exchange));

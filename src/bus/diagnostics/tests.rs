@@ -24,7 +24,7 @@ fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>)
                     outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
                     answer: answer.clone().unwrap_or_default().into(),
                     request: request.into(),
-                    reply: answer.is_ok().then_some(Duration::from_millis(12)),
+                    response_time: answer.is_ok().then_some(Duration::from_millis(12)),
                     tries: 1,
                 };
                 StepResult::Answer(answer, Arc::new(exchange))

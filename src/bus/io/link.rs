@@ -336,7 +336,7 @@ impl Link {
             request,
             answer: received.frame,
             outcome: received.answer.as_ref().map(drop).map_err(|fault| *fault),
-            reply: received.reply,
+            response_time: received.response_time,
             tries: 1,
         }));
         received.answer

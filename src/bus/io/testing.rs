@@ -90,7 +90,9 @@ async fn work_off(mut link: Link) {
 /// One step. `Err` only when the port is gone.
 pub async fn step(link: &mut Link, step: &Step) -> Result<StepResult, LinkError> {
     match &step.ask {
-        Ask::Raw(bytes) => link.send_raw(bytes).await.map(|(bytes, reply)| StepResult::Bytes(bytes, reply)),
+        Ask::Raw(bytes) => {
+            link.send_raw(bytes).await.map(|(bytes, response_time)| StepResult::Bytes(bytes, response_time))
+        }
         Ask::Message(message) => {
             let (usual, unanswered) = (link.timeout(), link.unanswered);
             link.set_timeout(step.timeout.unwrap_or(usual));

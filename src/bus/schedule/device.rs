@@ -89,10 +89,10 @@ impl Health {
     }
 
     /// It has answered, `reply` after the request. `true` if it was given up before.
-    pub fn answered(&mut self, reply: Option<Duration>) -> bool {
-        if let Some(reply) = reply {
+    pub fn answered(&mut self, response_time: Option<Duration>) -> bool {
+        if let Some(response_time) = response_time {
             self.answers = self.answers.saturating_add(1);
-            self.slowest = self.slowest.max(reply);
+            self.slowest = self.slowest.max(response_time);
         }
         (self.failures, self.probe_at, self.thorough) = (0, None, false);
         self.backoff.reset();

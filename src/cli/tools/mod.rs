@@ -242,7 +242,8 @@ pub fn exchange_lines(exchange: &Exchange) -> Vec<String> {
         return lines;
     }
     lines.extend(answer_lines(&exchange.answer, exchange.framing, &request.message));
-    let reply = exchange.reply.map(|reply| format!(", after {:.1} ms", reply.as_secs_f64() * 1e3)).unwrap_or_default();
+    let reply =
+        exchange.response_time.map(|reply| format!(", after {:.1} ms", reply.as_secs_f64() * 1e3)).unwrap_or_default();
     match exchange.outcome {
         Ok(()) => lines.push(format!("   ok{reply}")),
         Err(fault) => lines.push(format!("   {fault}{reply}")),

@@ -67,7 +67,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let request = message.clone();
     let run = run(&line, Diagnostic::Send(frame), |finding| match finding {
         Finding::Bytes { bytes, .. } if bytes.is_empty() => sent.to_vec(),
-        Finding::Bytes { bytes, reply } => {
+        Finding::Bytes { bytes, response_time: reply } => {
             let mut lines = sent.to_vec();
             lines.extend(answer_lines(bytes, framing, &request));
             let verdict = verdict(framing, &request, bytes).unwrap_or_else(|why| why);

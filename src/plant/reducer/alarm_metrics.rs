@@ -58,8 +58,8 @@ mod tests {
     /// The temperature at a second; above 75 is too hot after two seconds.
     fn read(plant: &mut Plant, second: i64, value: f64) -> Vec<AlarmRecord> {
         let values = vec![(DP, 0.0), (FAULT, 0.0), (PV, value)];
-        let (device, texts, reply) = (TIC, Vec::new(), Duration::from_millis(12));
-        let event = Event::Read { at: at(second), device, values, texts, reply, exchange: None };
+        let (device, texts, response_time) = (TIC, Vec::new(), Duration::from_millis(12));
+        let event = Event::Read { at: at(second), device, values, texts, response_time, exchange: None };
         let events = plant.on_event(event).records.into_iter().filter_map(|record| match record {
             Record::Alarm(event) => Some(event),
             Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => None,

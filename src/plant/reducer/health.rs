@@ -105,8 +105,15 @@ mod tests {
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
         let values = vec![(PV, 700.0), (DP, 1.0)];
-        let reply = Duration::from_millis(12);
-        plant.on_event(Event::Read { at: at(0), device: TIC, values, texts: Vec::new(), reply, exchange: None });
+        let response_time = Duration::from_millis(12);
+        plant.on_event(Event::Read {
+            at: at(0),
+            device: TIC,
+            values,
+            texts: Vec::new(),
+            response_time,
+            exchange: None,
+        });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
         let id = CommandId { terminal: 1, number: 1 };
         let command = Command::new(1, id, CommandKind::Write { tag: SV, value: 1.0 });

@@ -29,7 +29,7 @@ fn read(second: i64, values: &[(TagId, f64)]) -> Event {
         device: TIC,
         values: values.to_vec(),
         texts: Vec::new(),
-        reply: Duration::from_millis(12),
+        response_time: Duration::from_millis(12),
         exchange: None,
     }
 }

@@ -228,7 +228,7 @@ pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> Str
     let status = cx.snapshot.device(device);
     match status.state {
         DeviceState::Unknown => t!("not polled yet").to_owned(),
-        DeviceState::Responding => match status.reply {
+        DeviceState::Responding => match status.response_time {
             Some(reply) => t!("OK, {reply} ms", reply = reply.as_millis()),
             None => t!("OK").to_owned(),
         },

@@ -294,7 +294,7 @@ impl TabView for Registers {
         };
         self.trouble = None;
         self.reads += 1;
-        reading.reply.into_iter().for_each(|reply| self.replies.see(reply));
+        reading.response_time.into_iter().for_each(|reply| self.replies.see(reply));
         self.cells.on_reading(&reading);
         let began = reading.began;
         let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);

@@ -24,13 +24,13 @@ impl Link {
         self.note_sent(bytes.into());
         let deadline = sent_at + self.timeout + self.wire.char_time * to_u32(frame::MESSAGE_MAX);
         let proof = framing != Framing::Mbap && !self.wire.replies.is_ambiguous(&request);
-        let (mut buffer, mut reply) = (Vec::new(), None);
+        let (mut buffer, mut response_time) = (Vec::new(), None);
         let mut until = deadline;
         let answered = loop {
             if !self.wire.receive(until, &mut buffer).await? || RECEIVE_MAX <= buffer.len() {
                 break false;
             }
-            reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
+            response_time.get_or_insert(Instant::now().saturating_duration_since(sent_at));
             // One frame answers a request; after other bytes only silence ends the response.
             if request.is_empty() {
                 until = (Instant::now() + self.frame_timeout).min(deadline);
@@ -55,7 +55,7 @@ impl Link {
         if framing != Framing::Mbap && !request.is_empty() && !(answered && proof) {
             self.expect_late(&request);
         }
-        Ok((buffer, reply))
+        Ok((buffer, response_time))
     }
 
     /// Resynchronises a unit by a loopback, where no read can: after it nothing older can come any more.

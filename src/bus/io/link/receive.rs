@@ -24,12 +24,12 @@ pub(super) struct Received {
     pub answer: Result<Vec<u8>, Fault>,
     /// As it was on the wire.
     pub frame: Arc<[u8]>,
-    pub reply: Option<Duration>,
+    pub response_time: Option<Duration>,
 }
 
 impl Received {
     pub fn nothing(answer: Result<Vec<u8>, Fault>) -> Received {
-        Received { answer, frame: Arc::default(), reply: None }
+        Received { answer, frame: Arc::default(), response_time: None }
     }
 }
 
@@ -49,7 +49,7 @@ impl Link {
         let mut buffer: Vec<u8> = Vec::new();
         // What came and did not fit: it names the fault if nothing better comes.
         let mut misfit: Option<Fault> = None;
-        let mut reply = None;
+        let mut response_time = None;
         loop {
             // An adapter that gives back what it sends: its echo is no answer, however much it looks like one.
             if let Some(sent) = echo.filter(|sent| buffer.starts_with(sent)) {
@@ -70,7 +70,7 @@ impl Link {
                     self.wire.record(false, frame.clone(), FrameResult::Good);
                     let answer = frame::unwrap(framing, &frame)
                         .and_then(|answer| frame::check_answer(message, &answer).map(|()| answer));
-                    return Ok(Received { answer, frame, reply });
+                    return Ok(Received { answer, frame, response_time });
                 }
                 FrameMatch::Foreign(end, fault) => {
                     self.wire.drop_stale(&buffer[..end]);
@@ -85,7 +85,7 @@ impl Link {
                 FrameMatch::Begun | FrameMatch::Corrupt(_) => (Instant::now() + self.frame_timeout).min(deadline),
             };
             if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= RECEIVE_MAX {
-                reply.get_or_insert(Instant::now().saturating_duration_since(sent_at));
+                response_time.get_or_insert(Instant::now().saturating_duration_since(sent_at));
                 continue;
             }
             let fault = match verdict {
@@ -96,7 +96,7 @@ impl Link {
             if !frame.is_empty() {
                 self.wire.record(false, frame.clone(), FrameResult::wrong(fault.to_string()));
             }
-            return Ok(Received { answer: Err(fault), frame, reply });
+            return Ok(Received { answer: Err(fault), frame, response_time });
         }
     }
 

@@ -372,8 +372,8 @@ impl Link {
             Ok(_) => self.wire.counters.ok += 1,
             Err(fault) => self.count_fault(&request.message, *fault),
         }
-        let reply = (!frame.is_empty()).then(|| now.saturating_duration_since(sent_at));
-        if reply.is_some() {
+        let response_time = (!frame.is_empty()).then(|| now.saturating_duration_since(sent_at));
+        if response_time.is_some() {
             let result = match &answer {
                 Ok(_) | Err(Fault::Exception(_)) => FrameResult::Good,
                 Err(fault) => FrameResult::wrong(fault.to_string()),
@@ -387,7 +387,7 @@ impl Link {
             request: request.frame,
             answer: frame,
             outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
-            reply,
+            response_time,
             tries: 1,
         };
         Ended { id: request.id, answer, at: now, exchange: Arc::new(exchange) }

@@ -88,10 +88,10 @@ impl Task<'_> {
             return Ok(());
         };
         let exchange = link.last.clone();
-        let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
-        schedule.answered(tag.device, Some(reply).filter(|reply| *reply > Duration::ZERO), at);
+        let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
+        schedule.answered(tag.device, Some(response_time).filter(|response_time| *response_time > Duration::ZERO), at);
         let (device, values) = (tag.device, vec![(tag.id, raw)]);
-        self.publish(Event::Read { at, device, values, texts: Vec::new(), reply, exchange }).await?;
+        self.publish(Event::Read { at, device, values, texts: Vec::new(), response_time, exchange }).await?;
         let write = self.unconfirmed.remove(index);
         let result = match write.result {
             WriteResult::NotRead(_) => WriteResult::ReadBack(raw),

@@ -63,9 +63,9 @@ impl Task<'_> {
         if job.next().is_none()
             && let Some((job, request)) = self.live.job.take()
         {
-            let reply = link.last.as_ref().and_then(|exchange| exchange.reply);
+            let response_time = link.last.as_ref().and_then(|exchange| exchange.response_time);
             // A terminal that has left needs no answer.
-            let _ = request.reply.send(job.finish(reply));
+            let _ = request.reply.send(job.finish(response_time));
         }
         Ok(())
     }

@@ -117,10 +117,10 @@ impl Task<'_> {
         block: &Block,
         ReadResult { began, ended: at, took, answer, exchange }: ReadResult,
     ) -> Result<(), LinkExit> {
-        let reply = exchange.as_ref().and_then(|exchange| exchange.reply);
+        let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time);
         if let Some(exchange) = &exchange {
             let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
-            self.stats.polled(index, block.device, outcome, reply, exchange.tries);
+            self.stats.polled(index, block.device, outcome, response_time, exchange.tries);
         }
         let is_answer = match &answer {
             Ok(_) => true,
@@ -128,12 +128,12 @@ impl Task<'_> {
             Err(_) => false,
         };
         if is_answer {
-            schedule.answered(block.device, reply, at);
+            schedule.answered(block.device, response_time, at);
             index.into_iter().for_each(|index| schedule.spent(index, took));
         }
         match answer {
             Ok(values) => {
-                self.publish_values(at, block, &values, reply.unwrap_or_default(), exchange).await?;
+                self.publish_values(at, block, &values, response_time.unwrap_or_default(), exchange).await?;
                 self.bisection.answered(block);
                 let disproved = self.unreadable.disproved(block);
                 self.replan(link, schedule, at, disproved);
@@ -223,7 +223,7 @@ impl Task<'_> {
         at: Timestamp,
         block: &Block,
         values: &Answer,
-        reply: Duration,
+        response_time: Duration,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), LinkExit> {
         let (mut numbers, mut texts, mut corrupt) = (Vec::with_capacity(block.tags.len()), Vec::new(), Vec::new());
@@ -239,7 +239,7 @@ impl Task<'_> {
             device: block.device,
             values: numbers,
             texts,
-            reply,
+            response_time,
             exchange: exchange.clone(),
         })
         .await?;

@@ -85,9 +85,16 @@ impl Task<'_> {
             WriteResult::ReadBack(raw) => {
                 let (device, values) = (tag.device, vec![(tag.id, raw)]);
                 let exchange = link.last.clone();
-                let reply = exchange.as_ref().and_then(|exchange| exchange.reply).unwrap_or_default();
-                self.publish(Event::Read { at: self.clock.now(), device, values, texts: Vec::new(), reply, exchange })
-                    .await?;
+                let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
+                self.publish(Event::Read {
+                    at: self.clock.now(),
+                    device,
+                    values,
+                    texts: Vec::new(),
+                    response_time,
+                    exchange,
+                })
+                .await?;
             }
             // The value is unknown until it is read again.
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
@@ -266,7 +273,7 @@ impl Task<'_> {
             return Err(Fault::Timeout.into());
         };
         if let Some(last) = &link.last {
-            self.stats.asked(device.id, last.outcome, last.reply);
+            self.stats.asked(device.id, last.outcome, last.response_time);
         }
         sent.map(drop)
     }

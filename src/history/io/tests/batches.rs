@@ -48,7 +48,7 @@ fn station(db: &Path, def: &Arc<PlantDef>, seconds: std::ops::Range<i64>, silent
             device,
             values,
             texts: Vec::new(),
-            reply: Duration::from_millis(9),
+            response_time: Duration::from_millis(9),
             exchange: None,
         };
         let mut records = plant.on_event(read(TIC, vec![(DP, 0.0), (FAULT, 0.0), (PV, (second % 17) as f64)])).records;

@@ -70,7 +70,9 @@ fn live(def: &Arc<PlantDef>, mut each: impl FnMut(i64, Vec<Record>, Snapshot)) {
             let tags = values.iter().map(|(tag, _)| *tag).collect();
             let event = match second < fails_until[place] {
                 true => Event::Failed { at, device, tags, fault: Fault::Timeout, exchange: None },
-                false => Event::Read { at, device, values, texts: Vec::new(), reply: Duration::ZERO, exchange: None },
+                false => {
+                    Event::Read { at, device, values, texts: Vec::new(), response_time: Duration::ZERO, exchange: None }
+                }
             };
             take(plant.on_event(event));
         }

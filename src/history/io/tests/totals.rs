@@ -32,10 +32,12 @@ fn station(db: &Path, minutes: std::ops::Range<i64>, restores: bool) -> Sample {
     let opened = Store::open_at_start(db, &def, sec(minutes.start * 60)).unwrap();
     let mut plant = Plant::new(def, sec(minutes.start * 60), 1.0);
     for minute in minutes {
-        let (at, values, texts, reply) = (sec(minute * 60), vec![(RUN, 1.0)], Vec::new(), Duration::ZERO);
+        let (at, values, texts, response_time) = (sec(minute * 60), vec![(RUN, 1.0)], Vec::new(), Duration::ZERO);
         opened
             .store
-            .append(&plant.on_event(Event::Read { at, device: PLC, values, texts, reply, exchange: None }).records)
+            .append(
+                &plant.on_event(Event::Read { at, device: PLC, values, texts, response_time, exchange: None }).records,
+            )
             .unwrap();
         if restores {
             plant.restore_totals(&opened.read.totals);

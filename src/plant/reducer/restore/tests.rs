@@ -40,8 +40,15 @@ fn plant() -> Plant {
 
 fn read(plant: &mut Plant, second: i64, sv: f64, high: f64) -> Effects {
     let values = vec![(SV, sv), (DP, 1.0), (FAULT, 0.0), (HIGH, high)];
-    let reply = std::time::Duration::from_millis(12);
-    plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
+    let response_time = std::time::Duration::from_millis(12);
+    plant.on_event(Event::Read {
+        at: at(second),
+        device: TIC,
+        values,
+        texts: Vec::new(),
+        response_time,
+        exchange: None,
+    })
 }
 
 /// The read of the device that a restore begins with.
@@ -104,13 +111,13 @@ fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> 
         })
         .expect("a write is under way");
     if let WriteResult::ReadBack(back) = result(raw) {
-        let reply = std::time::Duration::from_millis(12);
+        let response_time = std::time::Duration::from_millis(12);
         plant.on_event(Event::Read {
             at: at(2),
             device: TIC,
             values: vec![(tag, back)],
             texts: Vec::new(),
-            reply,
+            response_time,
             exchange: None,
         });
     }
@@ -177,8 +184,15 @@ fn nothing_is_written_before_every_value_was_read() {
     let request = restore_request(&plant, set(40.0, 80.0));
     command(&mut plant, 1, CommandKind::Restore(Box::new(request.clone())));
     let only_sv = |plant: &mut Plant, second| {
-        let (values, reply) = (vec![(SV, 500.0), (DP, 1.0)], std::time::Duration::from_millis(12));
-        plant.on_event(Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), reply, exchange: None })
+        let (values, response_time) = (vec![(SV, 500.0), (DP, 1.0)], std::time::Duration::from_millis(12));
+        plant.on_event(Event::Read {
+            at: at(second),
+            device: TIC,
+            values,
+            texts: Vec::new(),
+            response_time,
+            exchange: None,
+        })
     };
     assert_eq!(written(&only_sv(&mut plant, 2)), [], "SV-H is still of yesterday");
     assert_eq!(plant.restore_of(TIC).map(|run| run.state), Some(State::Reading));

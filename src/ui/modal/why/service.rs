@@ -29,7 +29,7 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     let line = cx.snapshot.line(device.line);
     let stats = line.report.as_ref().and_then(|report| report.device(device.id));
     let mut text = device_text(cx, device.id);
-    if let Some(p99) = stats.and_then(|stats| stats.reply.p99()) {
+    if let Some(p99) = stats.and_then(|stats| stats.response_time.p99()) {
         text += &t!(", 99 % within {span}", span = span(p99));
     }
     if let Some((failed, of)) = stats.map(|stats| stats.recent()).filter(|(failed, _)| 0 < *failed) {

@@ -79,7 +79,7 @@ fn asked(plant: &mut Fixture, outcome: Result<(), Fault>, answer: Vec<u8>, tries
         at: ago(420),
         framing: Framing::Rtu,
         request: frame::with_crc(&[1, 3, 0x03, 0xE8, 0, 10]).into(),
-        reply: (!answer.is_empty()).then_some(Duration::from_millis(12)),
+        response_time: (!answer.is_empty()).then_some(Duration::from_millis(12)),
         answer: answer.into(),
         outcome,
         tries,

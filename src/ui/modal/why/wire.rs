@@ -58,7 +58,7 @@ pub(super) fn exchange_rows(
         }
         rows.push(Row { wraps: false, ..Row::new("", answer.summary.clone(), theme.dim()) });
     }
-    let reply = exchange.reply.map(|reply| t!(", after {span}", span = span(reply))).unwrap_or_default();
+    let reply = exchange.response_time.map(|reply| t!(", after {span}", span = span(reply))).unwrap_or_default();
     let tries =
         if 1 < exchange.tries { t!(", second attempt: the first response was corrupt") } else { t!(", first attempt") };
     let (verdict, style) = match exchange.outcome {

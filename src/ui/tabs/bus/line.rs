@@ -239,7 +239,7 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
         styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
         let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
         let (failed, of) = stats.recent();
-        let share = stats.reply.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
+        let share = stats.response_time.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
         lines.push([
             mark,
             device.name.clone(),
@@ -248,9 +248,9 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
             grouped(stats.ok),
             grouped(stats.requests - stats.ok),
             format!("{failed}/{of}"),
-            span(stats.reply.last()),
-            span(stats.reply.p99()),
-            span(stats.reply.max()),
+            span(stats.response_time.last()),
+            span(stats.response_time.p99()),
+            span(stats.response_time.max()),
             share.map_or(String::new(), |share| bar(cx, share, 8)),
         ]);
     }
@@ -278,7 +278,7 @@ fn is_ill(cx: &ViewContext, device: &DeviceDef) -> bool {
 
 /// The longest usual reply, if it comes near the timeout.
 fn near(stats: &RequestStats, timeout: Duration) -> Option<Duration> {
-    stats.reply.p99().filter(|p99| timeout.mul_f64(NEAR) <= *p99)
+    stats.response_time.p99().filter(|p99| timeout.mul_f64(NEAR) <= *p99)
 }
 
 fn value(cx: &ViewContext, label: &str, text: &str) -> Row {

@@ -126,7 +126,7 @@ fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
         next,
         grouped(stats.ok),
         grouped(stats.requests - stats.ok),
-        span(stats.reply.last()),
+        span(stats.response_time.last()),
         span(stats.jitter.max()),
         grouped(stats.missed),
     ]
@@ -221,9 +221,9 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
         ),
         t!(
             "reply {span} ms, p99 {span2}, max {span3}; {late}; missed {grouped}; retries {grouped2}{dead}",
-            span = span(stats.reply.last()),
-            span2 = span(stats.reply.p99()),
-            span3 = span(stats.reply.max()),
+            span = span(stats.response_time.last()),
+            span2 = span(stats.response_time.p99()),
+            span3 = span(stats.response_time.max()),
             late,
             grouped = grouped(stats.missed),
             grouped2 = grouped(stats.retries),

@@ -37,10 +37,11 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     }
     for finding in &run.findings {
         match finding {
-            Finding::Bytes { bytes, reply } => rows.extend(came_back(cx, at, run, bytes, *reply, room)),
+            Finding::Bytes { bytes, response_time: reply } => rows.extend(came_back(cx, at, run, bytes, *reply, room)),
             Finding::Exchange(exchange) if matches!(run.diagnostic, Diagnostic::Loopback { .. }) => {
-                let reply =
-                    exchange.reply.map_or("–".to_owned(), |reply| t!("{short_ms} ms", short_ms = short_ms(reply)));
+                let reply = exchange
+                    .response_time
+                    .map_or("–".to_owned(), |reply| t!("{short_ms} ms", short_ms = short_ms(reply)));
                 rows.push(match exchange.outcome {
                     Ok(()) => plain(t!("✓ returned after {reply}", reply), theme.normal()),
                     Err(fault) => plain(format!("✗ {fault}"), theme.trouble()),

@@ -250,8 +250,13 @@ fn what_came_back_is_described() {
     let sent = with_crc(&[1, 3, 3, 0xEA, 0, 1]);
     let bytes = with_crc(&[1, 3, 2, 0, 0xC8]);
     let reply = Some(Duration::from_micros(12_400));
-    fixture.line.test =
-        Some(run(Diagnostic::Send(sent.clone()), DiagnosticState::Done, 1, 1, vec![Finding::Bytes { bytes, reply }]));
+    fixture.line.test = Some(run(
+        Diagnostic::Send(sent.clone()),
+        DiagnosticState::Done,
+        1,
+        1,
+        vec![Finding::Bytes { bytes, response_time: reply }],
+    ));
     insta::assert_snapshot!("test_answered_80x24", screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24));
     insta::assert_snapshot!("test_answered_120x40", screen(&mut bus(&fixture, Theme::FULL, "T"), 120, 40));
     let check = |finding: Finding, words: &str| {
@@ -260,9 +265,12 @@ fn what_came_back_is_described() {
         let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
         assert!(shown.contains(words), "{words} is missing:\n{shown}");
     };
-    check(Finding::Bytes { bytes: Vec::new(), reply: None }, "✗ no response within 300 ms");
-    check(Finding::Bytes { bytes: with_crc(&[1, 0x83, 2]), reply }, "✗ refused by the device   after 12.4 ms");
-    check(Finding::Bytes { bytes: vec![1, 3, 2, 0, 0xC8, 0, 0], reply }, "✗ CRC");
+    check(Finding::Bytes { bytes: Vec::new(), response_time: None }, "✗ no response within 300 ms");
+    check(
+        Finding::Bytes { bytes: with_crc(&[1, 0x83, 2]), response_time: reply },
+        "✗ refused by the device   after 12.4 ms",
+    );
+    check(Finding::Bytes { bytes: vec![1, 3, 2, 0, 0xC8, 0, 0], response_time: reply }, "✗ CRC");
 }
 
 #[test]
@@ -278,7 +286,7 @@ fn loopback_and_identification_are_described() {
             request: request.into(),
             answer: answer.into(),
             outcome,
-            reply,
+            response_time: reply,
             tries: 1,
         }))
     };

@@ -222,7 +222,8 @@ pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Ro
         lines.into_iter().map(|line| plain(line, style)).collect::<Vec<Row>>()
     };
     let mut rows = row("TX", &exchange.request, &request.summary, theme.dim());
-    let reply = exchange.reply.map_or(String::new(), |reply| t!("   after {short_ms} ms", short_ms = short_ms(reply)));
+    let reply =
+        exchange.response_time.map_or(String::new(), |reply| t!("   after {short_ms} ms", short_ms = short_ms(reply)));
     let outcome = exchange.outcome.map_or_else(|fault| format!("✗ {fault}{reply}"), |()| t!("✓ ok{reply}", reply));
     let style = if exchange.outcome.is_ok() { theme.normal() } else { theme.trouble() };
     if !exchange.answer.is_empty() {

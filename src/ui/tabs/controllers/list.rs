@@ -168,7 +168,7 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
             cells.push((String::new(), Columns::MODE, style));
         }
     }
-    let reply = cx.snapshot.device(device.id).reply.filter(|_| answers(cx, device.id));
+    let reply = cx.snapshot.device(device.id).response_time.filter(|_| answers(cx, device.id));
     let reply = reply.map_or(String::new(), |reply| t!("{reply} ms", reply = reply.as_millis()));
     cells.push((pad_left(&reply, Columns::REPLY), Columns::REPLY, theme.dim()));
     cells

@@ -100,7 +100,7 @@ impl Bench {
             words: value(span.table, to_u16(address)).map(|word| vec![word]).ok_or(Fault::Exception(ExceptionCode(2))),
         };
         let parts = read.spans.iter().flat_map(|span| span.range().map(|address| part(span, address))).collect();
-        let reading = LiveReading { began: at, parts, reply: Some(Duration::from_micros(6_600)), requests: 2 };
+        let reading = LiveReading { began: at, parts, response_time: Some(Duration::from_micros(6_600)), requests: 2 };
         self.send(Msg::Answer(id, Ok(Answer::Registers(reading))));
     }
 

@@ -123,7 +123,7 @@ pub fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
     if let Some(comparison) = &tab.comparison {
         return (compare::summary(tab, cx, comparison) + &t!("   every {every} s", every), true);
     }
-    let reply = last.reply.map_or(String::new(), |reply| format!("{:.1} ms", reply.as_secs_f64() * 1e3));
+    let reply = last.response_time.map_or(String::new(), |reply| format!("{:.1} ms", reply.as_secs_f64() * 1e3));
     let words = t!(
         "unit {unit}   every {every} s   reply {reply}   requests per read {requests}   reads {reads}",
         unit,
