@@ -158,7 +158,7 @@ pub enum Outcome {
     Verified,
     /// The device already had this value: nothing was written, memory is spared.
     Unchanged,
-    /// Not done, and certainly without effect on the tag. A key that was sent before has an audit entry of its own.
+    /// Not done, and certainly without effect on the tag. An unlock register that was sent before has an audit entry of its own.
     Refused(Refusal),
     /// A write that may or may not have taken effect, or had another effect than requested.
     NotConfirmed(NotConfirmed),
@@ -323,7 +323,7 @@ pub struct WriteJob {
     pub tag: TagId,
     /// The raw number, already unscaled.
     pub raw: f64,
-    /// A key to write first (tag and raw number), if the device needs unlocking.
+    /// An unlock register to write first (tag and raw number), if the device needs unlocking.
     pub unlock: Option<(TagId, f64)>,
     /// Read the value back afterwards.
     pub verify: bool,

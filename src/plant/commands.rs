@@ -126,24 +126,24 @@ impl CommandTracker {
         self.writes.iter().find(|(_, job)| job.id == id).map(|(_, job)| job.tag)
     }
 
-    /// Records that the key of a write was sent before it: an action of its own.
+    /// Records that the unlock register of a write was sent before it: an action of its own.
     pub fn unlocked(
         &mut self,
         id: WriteId,
-        key: TagId,
+        unlock_tag: TagId,
         result: &WriteResult,
         image: &ProcessImage,
         at: Timestamp,
     ) -> Option<ActionRecord> {
         let (command, job) = self.writes.iter().find(|(_, job)| job.id == id)?;
         let status = self.commands.iter().find(|status| status.command.id == *command)?;
-        let (key, tag) = (self.def.tag(key), self.def.tag(job.tag));
+        let (unlock_tag, tag) = (self.def.tag(unlock_tag), self.def.tag(job.tag));
         Some(ActionRecord {
             at,
             action: "unlock".into(),
-            target: key.name.as_str().into(),
-            old: image.sample(key.id).value.map(|old| value_text(image, key, old).into()),
-            new: tag.write_unlock.map(|(_, new)| value_text(image, key, new).into()),
+            target: unlock_tag.name.as_str().into(),
+            old: image.sample(unlock_tag.id).value.map(|old| value_text(image, unlock_tag, old).into()),
+            new: tag.write_unlock.map(|(_, new)| value_text(image, unlock_tag, new).into()),
             outcome: format!("{}; for {}", without_read_back(result), tag.name).into(),
             note: None,
             ..record(&self.def, status, image)

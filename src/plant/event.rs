@@ -72,14 +72,14 @@ pub enum Event {
         /// Its progress.
         run: Arc<DiagnosticRun>,
     },
-    /// The key of a write was sent before it: the device now accepts writes, also of others.
+    /// The unlock register of a write was sent before it: the device now accepts writes, also of others.
     Unlocked {
         /// When.
         at: Timestamp,
         /// The write that needs it.
         id: WriteId,
-        /// The key.
-        key: TagId,
+        /// The unlock register.
+        unlock_tag: TagId,
         /// Its result: accepted, refused or lost.
         result: WriteResult,
     },

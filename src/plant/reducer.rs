@@ -169,9 +169,9 @@ impl Plant {
                 self.faults.set(fault, state);
                 (at, None)
             }
-            Event::Unlocked { at, id, key, result } => {
-                self.written(key, &result, at);
-                (at, self.commands.unlocked(id, key, &result, &self.image, at))
+            Event::Unlocked { at, id, unlock_tag, result } => {
+                self.written(unlock_tag, &result, at);
+                (at, self.commands.unlocked(id, unlock_tag, &result, &self.image, at))
             }
             Event::Wrote { at, id, result } => (at, self.wrote(id, result, at)),
         };

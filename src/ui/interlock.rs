@@ -63,22 +63,23 @@ pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, St
     if let Some(words) = unmet_text(cx, tag) {
         rows.push((format!("! {words}"), cx.theme.strong()));
     }
-    rows.extend(key_text(cx, tag).into_iter().map(|words| (words, cx.theme.strong())));
+    rows.extend(unlock_text(cx, tag).into_iter().map(|words| (words, cx.theme.strong())));
     rows.extend(sequence_text(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows.extend(taken_over(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
     rows
 }
 
-/// `First writes TIC-2.UNLOCK := ON; it keeps this value.`, where a write needs a key that is not certainly turned.
-pub fn key_text(cx: &ViewContext, tag: TagId) -> Option<String> {
-    let (key, turned) = cx.def().tag(tag).write_unlock?;
-    if cx.snapshot.sample(key).good_value() == Some(turned) {
+/// `First writes TIC-2.UNLOCK := ON; it keeps this value.`, where a write needs an unlock register that does not
+/// certainly have its value.
+pub fn unlock_text(cx: &ViewContext, tag: TagId) -> Option<String> {
+    let (unlock_tag, unlock_value) = cx.def().tag(tag).write_unlock?;
+    if cx.snapshot.sample(unlock_tag).good_value() == Some(unlock_value) {
         return None;
     }
     Some(t!(
         "First writes {name} := {format}; it keeps this value.",
-        name = cx.def().tag(key).name,
-        format = cx.snapshot.format(key, turned)
+        name = cx.def().tag(unlock_tag).name,
+        format = cx.snapshot.format(unlock_tag, unlock_value)
     ))
 }
 

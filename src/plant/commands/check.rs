@@ -79,13 +79,13 @@ impl CommandTracker {
         if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
             return Err(Outcome::Unchanged);
         }
-        let raw_of = |key, value| scale::to_raw(self.def.tag(key), value, 0).unwrap_or(value);
-        let unlock = def.write_unlock.map(|(key, value)| (key, raw_of(key, value)));
-        // A key that is turned already stays so, unless a write is just turning it.
-        let unlock = unlock.filter(|(key, turned)| {
-            let moving = self.writes.iter().any(|(_, job)| job.tag == *key);
-            let now = image.good_raw(*key).filter(|_| !moving);
-            now.is_none_or(|now| !scale::same_raw(self.def.tag(*key), now, *turned))
+        let raw_of = |unlock_tag, value| scale::to_raw(self.def.tag(unlock_tag), value, 0).unwrap_or(value);
+        let unlock = def.write_unlock.map(|(unlock_tag, value)| (unlock_tag, raw_of(unlock_tag, value)));
+        // An unlock register that has its value keeps it, unless a write is just changing it.
+        let unlock = unlock.filter(|(unlock_tag, unlock_value)| {
+            let moving = self.writes.iter().any(|(_, job)| job.tag == *unlock_tag);
+            let now = image.good_raw(*unlock_tag).filter(|_| !moving);
+            now.is_none_or(|now| !scale::same_raw(self.def.tag(*unlock_tag), now, *unlock_value))
         });
         let verify = def.access != Access::Write;
         Ok(WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent })

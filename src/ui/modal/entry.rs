@@ -100,7 +100,7 @@ impl Entry {
             vec![(range_text(cx, self.tag), theme.normal()), (wire_text(def), theme.dim())];
         rows.push((number::help(cx, self.tag), theme.dim()));
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
-        let notes = notes.chain(interlock::key_text(cx, self.tag));
+        let notes = notes.chain(interlock::unlock_text(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let missing = rights::missing(cx, &CommandKind::Write { tag: self.tag, value: 0.0 });
         let notes = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);

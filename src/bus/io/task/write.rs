@@ -30,7 +30,7 @@ enum WriteEnd {
     PortClosed(WriteResult, String),
 }
 
-/// What became of the key that a write needs.
+/// What became of the unlock register that a write needs.
 enum Unlocked {
     /// The write may be sent.
     Yes,
@@ -52,7 +52,7 @@ impl Task<'_> {
             link.shorten_hold_off();
         }
         let unlocked = match job.unlock {
-            Some((key, raw)) => self.unlock(link, schedule, def.tag(key), raw, job).await?,
+            Some((unlock_tag, raw)) => self.unlock(link, schedule, def.tag(unlock_tag), raw, job).await?,
             None => Unlocked::Yes,
         };
         let written = match unlocked {
@@ -79,7 +79,7 @@ impl Task<'_> {
                 return Err(LinkExit::Lost(why));
             }
         };
-        // The key is lost where its write was not sent for want of an answer.
+        // The write of the unlock register is lost where the write of the value was not sent for want of an answer.
         let unanswered = matches!(result, WriteResult::Lost(Fault::Timeout) | WriteResult::NotSent(Fault::Timeout));
         match result {
             WriteResult::ReadBack(raw) => {
@@ -100,7 +100,7 @@ impl Task<'_> {
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
                 schedule.refresh(tag.device, self.clock.now());
             }
-            // The key may have changed since it was read.
+            // The unlock register may have changed since it was read.
             WriteResult::Refused(_) if tag.write_unlock.is_some() => schedule.refresh(tag.device, self.clock.now()),
             WriteResult::Refused(_)
             | WriteResult::NotSent(_)
@@ -120,32 +120,32 @@ impl Task<'_> {
         if tcp && unanswered && !self.requests.stop_waits() { Err(LinkExit::Reopen) } else { Ok(()) }
     }
 
-    /// Writes the key, reports it and has it read again.
+    /// Writes the unlock register, reports that and has it read again.
     async fn unlock(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
-        key: &TagDef,
+        unlock_tag: &TagDef,
         raw: f64,
         job: &WriteJob,
     ) -> Result<Unlocked, LinkExit> {
-        // A key of another device would be written to an address of this one.
-        if key.device != self.def.tag(job.tag).device {
+        // An unlock register of another device would be written to an address of this one.
+        if unlock_tag.device != self.def.tag(job.tag).device {
             return Ok(Unlocked::No(WriteEnd::Ended(WriteResult::NotSent(Fault::NotANumber))));
         }
-        let sent = self.send_number(link, schedule, key, raw, job.urgent).await;
+        let sent = self.send_number(link, schedule, unlock_tag, raw, job.urgent).await;
         if let Ok(ended @ (WriteResult::NotSent(_) | WriteResult::Superseded)) = sent {
             return Ok(Unlocked::No(WriteEnd::Ended(ended)));
         }
         let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
-        self.publish(Event::Unlocked { at: self.clock.now(), id: job.id, key: key.id, result }).await?;
-        schedule.refresh(key.device, self.clock.now());
+        self.publish(Event::Unlocked { at: self.clock.now(), id: job.id, unlock_tag: unlock_tag.id, result }).await?;
+        schedule.refresh(unlock_tag.device, self.clock.now());
         if sent.as_ref().is_ok_and(may_have_effect) {
-            self.end_unconfirmed(key.id).await?;
+            self.end_unconfirmed(unlock_tag.id).await?;
         }
         Ok(match sent {
             Ok(WriteResult::Accepted) => Unlocked::Yes,
-            // A stop is tried all the same: a key without a reply may have arrived.
+            // A stop is tried all the same: an unlock register without a reply may have arrived.
             Ok(WriteResult::Lost(_)) if job.urgent => Unlocked::Yes,
             // The value itself was never on the wire.
             Ok(WriteResult::Lost(fault)) => Unlocked::No(WriteEnd::Ended(WriteResult::NotSent(fault))),

@@ -177,31 +177,31 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
     assert!(!heard.contains(&vec![1, 6, 0, 20, 0, 1]), "the start is not sent after the stop");
 }
 
-/// A key that was turned stays turned though the value is refused: that is reported, and the key is read again.
+/// An unlock register that was written stays so though the value is refused: that is reported, and it is read again.
 #[tokio::test(start_paused = true)]
-async fn a_key_is_reported_and_read_again_though_the_value_is_refused() {
+async fn an_unlock_is_reported_and_read_again_after_a_refusal() {
     let def = plant(Mode::Rtu);
-    let (value, key) = (TagId(1), TagId(9));
+    let (value, unlock_tag) = (TagId(1), TagId(9));
     let mut line = line(def.clone());
     line.plug(Mode::Rtu, |_, message| match message {
         [1, 6, 0, 11, ..] => SlaveAction::Exception(3),
         _ => SlaveAction::Answer,
     });
-    // The key is read once at the start and then only on request.
+    // The unlock register is read once at the start and then only on request.
     let holds = |event: &Event| match event {
-        Event::Read { values, .. } => values.iter().any(|(tag, _)| *tag == key).then_some(()),
+        Event::Read { values, .. } => values.iter().any(|(tag, _)| *tag == unlock_tag).then_some(()),
         _ => None,
     };
     line.until(&def, holds).await;
-    let (id, unlock) = (WriteId(1), Some((key, 1.0)));
+    let (id, unlock) = (WriteId(1), Some((unlock_tag, 1.0)));
     let request = BusRequest::Write(WriteJob { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false });
     line.requests.send(request).await.expect("the line runs");
     let is_result = |event: &Event| match event {
-        Event::Unlocked { key, result, .. } => Some((Some(*key), result.clone())),
+        Event::Unlocked { unlock_tag, result, .. } => Some((Some(*unlock_tag), result.clone())),
         Event::Wrote { result, .. } => Some((None, result.clone())),
         _ => None,
     };
-    assert_eq!(line.until(&def, is_result).await, (Some(key), WriteResult::Accepted));
+    assert_eq!(line.until(&def, is_result).await, (Some(unlock_tag), WriteResult::Accepted));
     assert_eq!(line.until(&def, is_result).await, (None, WriteResult::Refused(ExceptionCode(3))));
     line.until(&def, holds).await;
 }

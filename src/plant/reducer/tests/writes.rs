@@ -1,4 +1,4 @@
-//! Writes: stops, keys, interlocks, rounding, and the value that the operator saw.
+//! Writes: stops, unlock registers, interlocks, rounding, and the value that the operator saw.
 
 use super::*;
 
@@ -33,11 +33,11 @@ fn a_stop_is_sent_though_a_start_is_under_way() {
 }
 
 #[test]
-fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
+fn an_unlock_is_sent_once_and_has_its_own_audit_entry() {
     let mut def = fixture::plant();
     def.tags[SV.index()].write_unlock = Some((FAULT, 1.0));
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
-    let keyed = |plant: &mut Plant, number, value| {
+    let unlocked = |plant: &mut Plant, number, value| {
         let effects = plant.on_command(shown(plant, number, SV, value), at(1));
         match &effects.bus[0].1 {
             BusRequest::Write(job) => (job.id, job.unlock),
@@ -45,20 +45,20 @@ fn a_key_is_sent_once_and_has_its_own_line_in_the_journal() {
         }
     };
     plant.on_event(read(0, &[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
-    let (id, unlock) = keyed(&mut plant, 1, 71.0);
+    let (id, unlock) = unlocked(&mut plant, 1, 71.0);
     assert_eq!(unlock, Some((FAULT, 1.0)));
-    let effects = plant.on_event(Event::Unlocked { at: at(2), id, key: FAULT, result: WriteResult::Accepted });
-    let Some(Record::Action(action)) = effects.records.last() else { panic!("no line for the key") };
+    let effects = plant.on_event(Event::Unlocked { at: at(2), id, unlock_tag: FAULT, result: WriteResult::Accepted });
+    let Some(Record::Action(action)) = effects.records.last() else { panic!("no entry for it") };
     assert_eq!((&*action.by, &*action.target, action.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
     assert_eq!(&*action.outcome, "not confirmed: accepted, not read back; for TIC-1.SV");
-    assert!(plant.snapshot().sample(FAULT).good_value().is_none(), "the key is not as it was read before");
+    assert!(plant.snapshot().sample(FAULT).good_value().is_none(), "it is not as it was read before");
     plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::Refused(ExceptionCode(3)) });
     // Not read again yet: unknown, so it is sent again.
-    let (id, unlock) = keyed(&mut plant, 2, 71.0);
+    let (id, unlock) = unlocked(&mut plant, 2, 71.0);
     assert_eq!(unlock, Some((FAULT, 1.0)));
     plant.on_event(Event::Wrote { at: at(3), id, result: WriteResult::ReadBack(710.0) });
     plant.on_event(read(4, &[(FAULT, 1.0)]));
-    assert_eq!(keyed(&mut plant, 3, 72.0).1, None, "it is turned already");
+    assert_eq!(unlocked(&mut plant, 3, 72.0).1, None, "it has its value already");
 }
 
 #[test]
@@ -217,7 +217,7 @@ fn a_written_value_is_uncertain_for_the_true_cause() {
         plant.on_event(read(0, &[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
         let effects = plant.on_command(shown(&plant, 1, SV, 71.0), at(1));
         let BusRequest::Write(WriteJob { id, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
-        plant.on_event(Event::Unlocked { at: at(2), id, key: FAULT, result: result.clone() });
+        plant.on_event(Event::Unlocked { at: at(2), id, unlock_tag: FAULT, result: result.clone() });
         plant.on_event(Event::Wrote { at: at(2), id, result: result.clone() });
         for tag in [SV, FAULT] {
             assert_eq!(plant.snapshot().sample(tag).quality.word(), expect, "{result:?}");
