@@ -265,7 +265,7 @@ impl Schedule {
     }
 
     /// A block that is read once could not be: it is due again soon.
-    pub fn again(&mut self, index: usize, now: Timestamp) {
+    pub fn reschedule(&mut self, index: usize, now: Timestamp) {
         let poll = &mut self.polls[index];
         if poll.period.is_none() {
             poll.release = Some(now + ONCE_WITHIN);
@@ -281,7 +281,7 @@ impl Schedule {
 
     /// The block was answered with an exception; call it after [`Schedule::done`]. 05: it is read again in a second; 06: after
     /// 0.1 s, twice as long each time, 5 s at most; 08: once at once. Returns when; `None` for the next period.
-    pub fn excused(&mut self, index: usize, code: ExceptionCode, now: Timestamp) -> Option<Timestamp> {
+    pub fn on_exception(&mut self, index: usize, code: ExceptionCode, now: Timestamp) -> Option<Timestamp> {
         let until = now + self.polls[index].retry_after(code)?;
         self.later(index, until);
         Some(until)

@@ -207,7 +207,7 @@ fn a_busy_device_is_asked_again_after_waits_that_grow_and_end() {
     let (mut now, mut waits) = (0, Vec::new());
     for _ in 0..9 {
         schedule.done(0, at(now), at(now));
-        let until = schedule.excused(0, ExceptionCode(6), at(now)).expect("busy").as_millisecond();
+        let until = schedule.on_exception(0, ExceptionCode(6), at(now)).expect("busy").as_millisecond();
         waits.push(until - now);
         schedule.done(1, at(now), at(now));
         assert_eq!(schedule.next(at(now)), Next::WaitUntil(at(until)));
@@ -216,23 +216,23 @@ fn a_busy_device_is_asked_again_after_waits_that_grow_and_end() {
     assert_eq!(waits, [100, 200, 400, 800, 1600, 3200, 5000, 5000, 5000]);
     schedule.done(0, at(now), at(now));
     schedule.done(0, at(now), at(now));
-    assert_eq!(schedule.excused(0, ExceptionCode(6), at(now)), Some(at(now + 100)), "it was good in between");
+    assert_eq!(schedule.on_exception(0, ExceptionCode(6), at(now)), Some(at(now + 100)), "it was good in between");
 }
 
 #[test]
 fn acknowledge_waits_parity_error_retries_refusal_does_neither() {
     let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
     schedule.done(0, at(0), at(10));
-    assert_eq!(schedule.excused(0, ExceptionCode(5), at(10)), Some(at(1010)));
+    assert_eq!(schedule.on_exception(0, ExceptionCode(5), at(10)), Some(at(1010)));
     assert_eq!(schedule.next(at(500)), Next::WaitUntil(at(1010)), "also its own grid waits");
     schedule.done(0, at(1010), at(1020));
     schedule.done(0, at(1100), at(1110));
-    assert_eq!(schedule.excused(0, ExceptionCode(8), at(1110)), Some(at(1110)));
+    assert_eq!(schedule.on_exception(0, ExceptionCode(8), at(1110)), Some(at(1110)));
     assert_eq!(schedule.next(at(1110)), Next::Run(0));
     schedule.done(0, at(1110), at(1120));
-    assert_eq!(schedule.excused(0, ExceptionCode(8), at(1120)), None, "once");
+    assert_eq!(schedule.on_exception(0, ExceptionCode(8), at(1120)), None, "once");
     for code in [1, 2, 3, 4, 10, 11] {
-        assert_eq!(schedule.excused(0, ExceptionCode(code), at(1120)), None);
+        assert_eq!(schedule.on_exception(0, ExceptionCode(code), at(1120)), None);
     }
 }
 
@@ -304,8 +304,8 @@ proptest! {
                     schedule.done(index, at(began), at(now));
                     match action {
                         0 | 1 => { schedule.failed(device, at(began), Duration::from_millis(300), at(now)); }
-                        2 => { schedule.excused(index, ExceptionCode(6), at(now)); }
-                        3 => { schedule.again(index, at(now)); }
+                        2 => { schedule.on_exception(index, ExceptionCode(6), at(now)); }
+                        3 => { schedule.reschedule(index, at(now)); }
                         4..8 => schedule.keep_gap(device, at(now + ms)),
                         _ => {
                             schedule.answered(device, Some(Duration::from_millis(20)), at(now));

@@ -79,7 +79,7 @@ impl Task<'_> {
             if let Some(index) = self.place_of(index, &block) {
                 let served = schedule.done(index, began, now);
                 self.stats.served(index, served.jitter, served.missed);
-                schedule.again(index, now);
+                schedule.reschedule(index, now);
             }
         }
     }

@@ -71,7 +71,7 @@ impl Task<'_> {
             Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
             // Nothing was learned of the device.
             None => {
-                schedule.again(index, ended);
+                schedule.reschedule(index, ended);
                 return Ok(());
             }
         };
@@ -143,7 +143,7 @@ impl Task<'_> {
                 self.publish_failure(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 let its_own = link.outstanding(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
-                schedule.again(index, at);
+                schedule.reschedule(index, at);
                 let is_unreadable = code == ExceptionCode(0x02) && its_own;
                 if is_unreadable && let Some(parts) = self.bisection.refused(&self.def, &self.unreadable, block) {
                     tracing::debug!(address = block.address, count = block.count, "exception 02: the block is split");
@@ -152,13 +152,13 @@ impl Task<'_> {
                     self.use_plan(link, schedule, blocks, at);
                     self.replan(link, schedule, at, false);
                 } else {
-                    schedule.excused(index, code, at);
+                    schedule.on_exception(index, code, at);
                 }
                 Ok(())
             }
             Err(fault) => {
                 if let Some(index) = index {
-                    schedule.again(index, at);
+                    schedule.reschedule(index, at);
                 }
                 self.publish_failure(at, block.device, block.tags.to_vec(), fault, exchange).await?;
                 // It answers, and is asked again in its turn.
