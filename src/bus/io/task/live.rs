@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{
     LinkExit, Task,
-    poll::{Answer, read_in_sync},
+    poll::{ReadValues, read_in_sync},
     test::POLLS_BETWEEN,
 };
 use crate::{
@@ -48,8 +48,8 @@ impl Task<'_> {
             let ended = self.clock.now();
             self.live_budget.spent(elapsed(started, ended), ended);
             let words = match read {
-                Some(Ok(Answer::Words(words))) => Ok(words),
-                Some(Ok(Answer::Bits(bits))) => Ok(bits.into_iter().map(u16::from).collect()),
+                Some(Ok(ReadValues::Registers(words))) => Ok(words),
+                Some(Ok(ReadValues::Bits(bits))) => Ok(bits.into_iter().map(u16::from).collect()),
                 Some(Err(LinkError::Fault(fault))) => Err(fault),
                 Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
                 // A stop comes first; the request is made again.

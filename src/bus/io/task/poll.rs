@@ -35,7 +35,7 @@ pub(super) struct ReadResult {
     pub ended: Timestamp,
     /// The time of the line that it took.
     pub took: Duration,
-    pub answer: Result<Answer, Fault>,
+    pub answer: Result<ReadValues, Fault>,
     /// The exchange.
     pub exchange: Option<Arc<Exchange>>,
 }
@@ -182,7 +182,7 @@ impl Task<'_> {
         link: &mut Link,
         block: &Block,
         index: Option<usize>,
-    ) -> Option<Result<Answer, LinkError>> {
+    ) -> Option<Result<ReadValues, LinkError>> {
         let mut retried_fault = None;
         let read = if self.requests.stop_waits() {
             None
@@ -222,7 +222,7 @@ impl Task<'_> {
         &mut self,
         at: Timestamp,
         block: &Block,
-        values: &Answer,
+        values: &ReadValues,
         response_time: Duration,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), LinkExit> {
@@ -257,9 +257,9 @@ fn check_in_sync(link: &Link, block: &Block) -> Result<(), LinkError> {
 
 /// What a block read gave: bits or registers, the first at the block's address.
 #[derive(Debug)]
-pub(super) enum Answer {
+pub(super) enum ReadValues {
     Bits(Vec<bool>),
-    Words(Vec<u16>),
+    Registers(Vec<u16>),
 }
 
 /// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another shape,
@@ -298,7 +298,7 @@ pub(super) async fn read_in_sync(
     link: &mut Link,
     block: &Block,
     corrupt: &mut Option<Fault>,
-) -> Result<Answer, LinkError> {
+) -> Result<ReadValues, LinkError> {
     resynchronise(blocks, link, block).await?;
     match read(link, block).await {
         Err(LinkError::Fault(fault)) if fault.is_corrupt() => {
@@ -314,22 +314,22 @@ pub(super) async fn read_in_sync(
     }
 }
 
-async fn read(link: &mut Link, block: &Block) -> Result<Answer, LinkError> {
+async fn read(link: &mut Link, block: &Block) -> Result<ReadValues, LinkError> {
     let answer = link.exchange(&block.request()).await?;
     Ok(parse(block, answer)?)
 }
 
 /// The values in a checked answer message.
-pub(super) fn parse(block: &Block, answer: Vec<u8>) -> Result<Answer, Fault> {
+pub(super) fn parse(block: &Block, answer: Vec<u8>) -> Result<ReadValues, Fault> {
     let (count, got) = (usize::from(block.count), to_u16(answer.len()));
     let mut pdu = Bytes::from(answer);
     pdu.advance(1.min(pdu.len()));
     match Response::try_from(pdu) {
         Ok(Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits)) if count <= bits.len() => {
-            Ok(Answer::Bits(bits))
+            Ok(ReadValues::Bits(bits))
         }
         Ok(Response::ReadInputRegisters(words) | Response::ReadHoldingRegisters(words)) if words.len() == count => {
-            Ok(Answer::Words(words))
+            Ok(ReadValues::Registers(words))
         }
         // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
         _ => Err(Fault::WrongLength { got, asked: block.count }),
@@ -337,22 +337,24 @@ pub(super) fn parse(block: &Block, answer: Vec<u8>) -> Result<Answer, Fault> {
 }
 
 /// The text of a tag that holds text.
-fn text_of(tag: &TagDef, block: &Block, values: &Answer) -> Option<Arc<str>> {
+fn text_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<Arc<str>> {
     tag.is_text().then_some(())?;
     let start = usize::from(tag.point.address.checked_sub(block.address)?);
     match values {
-        Answer::Bits(_) => None,
-        Answer::Words(words) => {
+        ReadValues::Bits(_) => None,
+        ReadValues::Registers(words) => {
             let words = words.get(start..start + usize::from(tag.point.len()))?;
             codec::decode_text(tag.point, words).map(Into::into)
         }
     }
 }
 
-pub(super) fn value_of(tag: &TagDef, block: &Block, values: &Answer) -> Option<f64> {
+pub(super) fn value_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<f64> {
     let start = usize::from(tag.point.address.checked_sub(block.address)?);
     match values {
-        Answer::Bits(bits) => bits.get(start).map(|bit| f64::from(u8::from(*bit))),
-        Answer::Words(words) => codec::decode(tag.point, words.get(start..start + usize::from(tag.point.len()))?),
+        ReadValues::Bits(bits) => bits.get(start).map(|bit| f64::from(u8::from(*bit))),
+        ReadValues::Registers(words) => {
+            codec::decode(tag.point, words.get(start..start + usize::from(tag.point.len()))?)
+        }
     }
 }
