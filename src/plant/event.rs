@@ -329,7 +329,7 @@ pub struct LineCounters {
     /// Exception answers.
     pub exceptions: u64,
     /// Frames or bytes without an outstanding request.
-    pub stale: u64,
+    pub unexpected: u64,
     /// Of these, answers to requests that had been given up.
     pub late: u64,
     /// Frames sent and received, and runs of bytes that were none.

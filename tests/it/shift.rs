@@ -68,7 +68,11 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     station.stop().await;
     assert_eq!(last.history.lost, 0);
     let counters = last.lines[0].counters;
-    assert_eq!((counters.timeouts, counters.corrupt, counters.stale, counters.missed), (0, 0, 0, 0), "{counters:?}");
+    assert_eq!(
+        (counters.timeouts, counters.corrupt, counters.unexpected, counters.missed),
+        (0, 0, 0, 0),
+        "{counters:?}"
+    );
 
     let store = Store::open_read_only(&history, &def).unwrap();
     let now = clock.now();

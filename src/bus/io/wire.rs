@@ -242,7 +242,7 @@ impl Wire {
 
     /// The answer of a unit to a request that was given up.
     pub fn drop_late(&mut self, unit: u8, frame: &[u8]) {
-        self.counters.stale += 1;
+        self.counters.unexpected += 1;
         self.counters.late += 1;
         self.late.push(unit);
         tracing::debug!(unit, bytes = %frame::hex(frame), "late answer dropped");
@@ -261,16 +261,16 @@ impl Wire {
     /// The line is silent, or something is sent.
     fn drop_stray(&mut self) {
         let bytes = std::mem::take(&mut self.stray);
-        self.drop_stale(&bytes);
+        self.drop_unexpected(&bytes);
     }
 
     /// Records unexpected or late bytes, and counts them for their unit.
-    pub fn drop_stale(&mut self, bytes: &[u8]) {
+    pub fn drop_unexpected(&mut self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
         }
-        self.counters.stale += 1;
-        tracing::debug!(bytes = %frame::hex(bytes), "stale bytes dropped");
+        self.counters.unexpected += 1;
+        tracing::debug!(bytes = %frame::hex(bytes), "unexpected bytes dropped");
         let mut late = false;
         // Only a whole good frame names the unit: chance bytes may name any.
         for frame in frame::unsolicited(self.framing, bytes) {
@@ -292,7 +292,11 @@ impl Wire {
                 self.replies.mark_all_unproven();
             }
         }
-        self.record(false, bytes.into(), FrameResult::wrong(if late { "late, dropped" } else { "stale, dropped" }));
+        self.record(
+            false,
+            bytes.into(),
+            FrameResult::wrong(if late { "late, dropped" } else { "unexpected, dropped" }),
+        );
     }
 
     /// Puts bytes on record.

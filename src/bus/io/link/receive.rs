@@ -65,7 +65,7 @@ impl Link {
                 if echo_begun { FrameMatch::Nothing } else { framing::find_answer(framing, message, &buffer) };
             let wait_until = match verdict {
                 FrameMatch::Answer(range) => {
-                    self.wire.drop_stale(&buffer[..range.start]);
+                    self.wire.drop_unexpected(&buffer[..range.start]);
                     let frame: Arc<[u8]> = buffer[range].into();
                     self.wire.record(false, frame.clone(), FrameResult::Good);
                     let answer = frame::unwrap(framing, &frame)
@@ -73,7 +73,7 @@ impl Link {
                     return Ok(Received { answer, frame, response_time });
                 }
                 FrameMatch::Foreign(end, fault) => {
-                    self.wire.drop_stale(&buffer[..end]);
+                    self.wire.drop_unexpected(&buffer[..end]);
                     buffer.drain(..end);
                     misfit = Some(fault);
                     continue;

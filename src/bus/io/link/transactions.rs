@@ -344,7 +344,7 @@ impl Link {
             let frame = &bytes[start..start + end];
             start += end;
             match self.transactions.take(transaction) {
-                Owner::Unknown => self.wire.drop_stale(frame),
+                Owner::Unknown => self.wire.drop_unexpected(frame),
                 Owner::Late(unit) => {
                     self.wire.drop_late(unit, frame);
                     // It is slower than it was: what else it was asked has the whole timeout.

@@ -158,7 +158,7 @@ fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) ->
         parts.push(count(&format!("{:02X} {}", code.0, translate(code.label())), *times));
     }
     parts.push(value(cx, t!("retries"), &grouped(sum.retries)));
-    parts.extend([count(t!("late"), counters.late), count(t!("stale"), counters.stale)]);
+    parts.extend([count(t!("late"), counters.late), count(t!("unexpected"), counters.unexpected)]);
     let mut rows = flow(t!("requests"), dim, width, parts);
     let lost = at.status.state != LineState::Connected;
     let parts = [
