@@ -1,4 +1,4 @@
-//! Frames as bytes: checks, lengths, shapes, and whether an answer belongs to its request.
+//! Frames as bytes: checks, lengths, signatures, and whether an answer belongs to its request.
 //!
 //! A *message* is unit and PDU without any check: `01 03 03 EA 00 01`. RTU appends a CRC, TCP prepends the MBAP header.
 
@@ -162,10 +162,10 @@ pub(crate) fn unsolicited(framing: Framing, bytes: &[u8]) -> Vec<Unsolicited> {
     }
 }
 
-/// What an answer looks like from outside. RTU answers carry no transaction id: two answers of one shape look
+/// What an answer looks like from outside. RTU answers carry no transaction id: two answers of one signature look
 /// the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Shape {
+pub struct ResponseSignature {
     function: u8,
     /// Length of the message.
     length: usize,
@@ -173,8 +173,8 @@ pub struct Shape {
     echo: Option<[u8; 4]>,
 }
 
-/// The shape of the normal answer to a request message; `None` for functions whose answer length is not known before.
-pub fn shape_of(request: &[u8]) -> Option<Shape> {
+/// The signature of the normal answer to a request message; `None` for functions whose answer length is not known before.
+pub fn response_signature(request: &[u8]) -> Option<ResponseSignature> {
     let function = pdu::function(*request.get(1)?)?;
     let count = || Some(usize::from(u16::from_be_bytes([*request.get(4)?, *request.get(5)?])));
     let (length, echo) = match function.response {
@@ -185,11 +185,11 @@ pub fn shape_of(request: &[u8]) -> Option<Shape> {
         }
         _ => return None,
     };
-    Some(Shape { function: function.code, length, echo })
+    Some(ResponseSignature { function: function.code, length, echo })
 }
 
-impl Shape {
-    /// Would this answer message be taken for one of this shape?
+impl ResponseSignature {
+    /// Would this answer message be taken for one of this signature?
     pub fn fits(self, answer: &[u8]) -> bool {
         answer.get(1) == Some(&self.function)
             && answer.len() == self.length
@@ -225,14 +225,14 @@ pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     if function != asked {
         return Err(Fault::WrongFunction { got: function, asked });
     }
-    let Some(shape) = shape_of(request) else { return Ok(()) };
-    if answer.len() != shape.length {
-        return Err(Fault::WrongLength { got: to_u16(answer.len()), asked: to_u16(shape.length) });
+    let Some(signature) = response_signature(request) else { return Ok(()) };
+    if answer.len() != signature.length {
+        return Err(Fault::WrongLength { got: to_u16(answer.len()), asked: to_u16(signature.length) });
     }
-    if shape.echo.is_none() && usize::from(answer[2]) != shape.length - 3 {
-        return Err(Fault::WrongLength { got: u16::from(answer[2]), asked: to_u16(shape.length - 3) });
+    if signature.echo.is_none() && usize::from(answer[2]) != signature.length - 3 {
+        return Err(Fault::WrongLength { got: u16::from(answer[2]), asked: to_u16(signature.length - 3) });
     }
-    if shape.fits(answer) { Ok(()) } else { Err(Fault::WrongEcho) }
+    if signature.fits(answer) { Ok(()) } else { Err(Fault::WrongEcho) }
 }
 
 /// `01 03 03 EA`.

@@ -67,7 +67,7 @@ fn full_frame(bytes: &[u8]) -> Option<&[u8]> {
 
 /// Length of the frame that answers a message.
 fn expected_length(framing: Framing, message: &[u8]) -> usize {
-    frame::wrapped_length(framing, frame::shape_of(message).map_or(3, |shape| shape.length()))
+    frame::wrapped_length(framing, frame::response_signature(message).map_or(3, |signature| signature.length()))
 }
 
 /// Names what is left at the deadline.

@@ -1,7 +1,7 @@
 //! Protection against late answers where frames carry no transaction id (RTU and ASCII).
 //!
 //! After a timeout a reply is *outstanding*. It may come at any later moment and would then be taken for the answer to the
-//! next request of the same shape: the value of another tag, called good. So while a reply is outstanding, only a request is sent
+//! next request of the same signature: the value of another tag, called good. So while a reply is outstanding, only a request is sent
 //! whose answer cannot be mistaken for an outstanding one. A serial device answers in order; a valid answer to such a request
 //! therefore proves that nothing older is still to come, and nothing is outstanding any more.
 //!
@@ -14,7 +14,7 @@
 use std::time::Duration;
 
 use super::{
-    frame::{Shape, shape_of},
+    frame::{ResponseSignature, response_signature},
     plan::Block,
 };
 use crate::plant::number::{to_u8, to_u32};
@@ -22,7 +22,7 @@ use crate::plant::number::{to_u8, to_u32};
 /// Most answers that are remembered as outstanding; with more, the unit is not polled until it has paused.
 const OUTSTANDING_MAX: usize = 16;
 
-/// Usual shapes that are remembered of a unit; one with more is resynchronised by a loopback.
+/// Usual signatures that are remembered of a unit; one with more is resynchronised by a loopback.
 const USUAL_MAX: usize = 64;
 
 /// A unit is left alone no longer than this, however late it seems to have been.
@@ -31,43 +31,44 @@ const REST_MAX: Duration = Duration::from_secs(600);
 /// Outstanding replies of one unit.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct OutstandingReplies {
-    shapes: Vec<Shape>,
+    signatures: Vec<ResponseSignature>,
     /// A loopback is outstanding: the next *refusal* of a loopback may be the answer to that one.
     loopback: bool,
-    /// Functions whose answers have no shape (identification, event log) that are outstanding.
+    /// Functions whose answers have no signature (identification, event log) that are outstanding.
     functions: Vec<u8>,
-    /// Shapes of the blocks that the unit is asked for.
-    usual: Vec<Shape>,
-    /// A reply of a usual shape may be outstanding that this line has not asked for.
+    /// Response signatures of the blocks that the unit is asked for.
+    usual: Vec<ResponseSignature>,
+    /// A reply of a usual signature may be outstanding that this line has not asked for.
     unproven: bool,
 }
 
 impl OutstandingReplies {
-    /// A request of this shape was not answered in time.
-    pub fn add(&mut self, shape: Shape) {
-        if shape.is_loopback() {
+    /// A request of this signature was not answered in time.
+    pub fn add(&mut self, signature: ResponseSignature) {
+        if signature.is_loopback() {
             self.loopback = true;
-        } else if !self.shapes.contains(&shape) && self.shapes.len() < OUTSTANDING_MAX {
-            self.shapes.push(shape);
+        } else if !self.signatures.contains(&signature) && self.signatures.len() < OUTSTANDING_MAX {
+            self.signatures.push(signature);
         }
     }
 
-    /// A request of a function whose answers have no shape was not answered in time.
+    /// A request of a function whose answers have no signature was not answered in time.
     fn add_function(&mut self, function: u8) {
         if !self.functions.contains(&function) {
             self.functions.push(function);
         }
     }
 
-    /// Could an answer of this shape be an outstanding one?
-    pub fn is_ambiguous(&self, shape: Shape) -> bool {
-        let usual = self.unproven && (self.usual.contains(&shape) || self.usual.len() == USUAL_MAX);
-        !shape.is_loopback() && (usual || self.shapes.contains(&shape) || self.shapes.len() == OUTSTANDING_MAX)
+    /// Could an answer of this signature be an outstanding one?
+    pub fn is_ambiguous(&self, signature: ResponseSignature) -> bool {
+        let usual = self.unproven && (self.usual.contains(&signature) || self.usual.len() == USUAL_MAX);
+        !signature.is_loopback()
+            && (usual || self.signatures.contains(&signature) || self.signatures.len() == OUTSTANDING_MAX)
     }
 
-    /// Is a reply of this shape outstanding?
-    fn contains(&self, shape: Shape) -> bool {
-        self.shapes.contains(&shape)
+    /// Is a reply of this signature outstanding?
+    fn contains(&self, signature: ResponseSignature) -> bool {
+        self.signatures.contains(&signature)
     }
 
     /// Does the refusal of a loopback (exception 01, by devices that do not have it) prove as much as its echo?
@@ -75,9 +76,9 @@ impl OutstandingReplies {
         !self.loopback
     }
 
-    /// How many shapes are outstanding.
+    /// How many signatures are outstanding.
     pub fn count(&self) -> usize {
-        self.shapes.len()
+        self.signatures.len()
     }
 
     /// Nothing older can come any more.
@@ -87,13 +88,15 @@ impl OutstandingReplies {
 
     /// Is nothing outstanding?
     pub fn is_clear(&self) -> bool {
-        self.shapes.is_empty() && self.functions.is_empty() && !self.loopback && !self.unproven
+        self.signatures.is_empty() && self.functions.is_empty() && !self.loopback && !self.unproven
     }
 
     /// A read that resynchronises the unit: part of a block that is read anyway, with a count whose answer cannot
     /// be mistaken. `None`: there is none, see [`loopback`].
     pub fn probe<'a>(&self, blocks: impl Iterator<Item = &'a Block>) -> Option<[u8; 6]> {
-        blocks.flat_map(probes).find(|request| shape_of(request).is_some_and(|shape| !self.is_ambiguous(shape)))
+        blocks
+            .flat_map(probes)
+            .find(|request| response_signature(request).is_some_and(|signature| !self.is_ambiguous(signature)))
     }
 }
 
@@ -104,7 +107,7 @@ pub fn loopback(unit: u8, number: u16) -> [u8; 6] {
     [unit, 0x08, 0, 0, high, low]
 }
 
-/// Reads of the first part of a block, the shortest first: each has a shape of its own.
+/// Reads of the first part of a block, the shortest first: each has a signature of its own.
 fn probes(block: &Block) -> impl Iterator<Item = [u8; 6]> {
     let (first, step) = if block.table.is_bits() { (1, 8) } else { (block.alignment.max(1), block.alignment.max(1)) };
     let counts = (first..block.count).step_by(usize::from(step)).chain([block.count]);
@@ -135,14 +138,14 @@ struct Unit {
     /// Its last good answer, and whether that came again.
     answer: Vec<u8>,
     repeats: bool,
-    /// Outstanding shapes of which one has come late.
-    arrived: Vec<Shape>,
+    /// Outstanding signatures of which one has come late.
+    arrived: Vec<ResponseSignature>,
     /// What had not come, and since when it was outstanding, when it proved to be in sync: from a unit that answers in order, it
     /// never comes.
-    disproved: Vec<(Shape, Duration)>,
+    disproved: Vec<(ResponseSignature, Duration)>,
     /// It does not answer in order.
     reorders: bool,
-    /// More than one answer of a shape may be under way: only time clears what is outstanding.
+    /// More than one answer of a signature may be under way: only time clears what is outstanding.
     is_unsure: bool,
 }
 
@@ -155,33 +158,41 @@ impl Unit {
 
     /// It has given an answer that cannot have been an older one.
     fn prove(&mut self, quarantine: Duration, now: Duration) {
-        let (shapes, arrived) = (std::mem::take(&mut self.outstanding.shapes), std::mem::take(&mut self.arrived));
+        let (signatures, arrived) =
+            (std::mem::take(&mut self.outstanding.signatures), std::mem::take(&mut self.arrived));
         let (failed_at, is_unsure) = (self.failed_at, self.is_unsure);
         self.resynchronise();
         let Some(failed_at) = failed_at else { return };
         if self.reorders {
-            (self.outstanding.shapes, self.failed_at, self.is_unsure) = (shapes, Some(failed_at), is_unsure);
+            (self.outstanding.signatures, self.failed_at, self.is_unsure) = (signatures, Some(failed_at), is_unsure);
             return;
         }
         self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < quarantine);
-        let missing = shapes.into_iter().filter(|shape| !arrived.contains(shape)).map(|shape| (shape, failed_at));
+        let missing = signatures
+            .into_iter()
+            .filter(|signature| !arrived.contains(signature))
+            .map(|signature| (signature, failed_at));
         self.disproved.extend(missing.take(OUTSTANDING_MAX.saturating_sub(self.disproved.len())));
     }
 
-    /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its shape is outstanding but what
+    /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its signature is outstanding but what
     /// cannot come any more from a unit that answers in order. All of that may still come now.
     fn detect_reordering(&mut self, message: &[u8], quarantine: Duration, now: Duration) -> bool {
-        let fits = |shape: &&Shape| shape.fits(message);
-        if let Some(shape) = self.outstanding.shapes.iter().find(fits).filter(|shape| !self.arrived.contains(shape)) {
-            self.arrived.push(*shape);
+        let fits = |signature: &&ResponseSignature| signature.fits(message);
+        if let Some(signature) =
+            self.outstanding.signatures.iter().find(fits).filter(|signature| !self.arrived.contains(signature))
+        {
+            self.arrived.push(*signature);
             return false;
         }
         self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < quarantine);
-        let Some(place) = self.disproved.iter().position(|(shape, _)| shape.fits(message)) else { return false };
+        let Some(place) = self.disproved.iter().position(|(signature, _)| signature.fits(message)) else {
+            return false;
+        };
         self.disproved.swap_remove(place);
-        (self.reorders, self.is_unsure) = (true, !self.disproved.is_empty() || !self.outstanding.shapes.is_empty());
-        for (shape, failed_at) in std::mem::take(&mut self.disproved) {
-            self.outstanding.add(shape);
+        (self.reorders, self.is_unsure) = (true, !self.disproved.is_empty() || !self.outstanding.signatures.is_empty());
+        for (signature, failed_at) in std::mem::take(&mut self.disproved) {
+            self.outstanding.add(signature);
             self.failed_at = self.failed_at.max(Some(failed_at));
         }
         true
@@ -205,10 +216,13 @@ impl LineReplies {
             let outstanding = &mut known.outstanding;
             let first = outstanding.usual.is_empty();
             outstanding.usual.clear();
-            for shape in blocks.iter().filter(|block| block.unit == unit).filter_map(|block| shape_of(&block.request()))
+            for signature in blocks
+                .iter()
+                .filter(|block| block.unit == unit)
+                .filter_map(|block| response_signature(&block.request()))
             {
-                if !outstanding.usual.contains(&shape) && outstanding.usual.len() < USUAL_MAX {
-                    outstanding.usual.push(shape);
+                if !outstanding.usual.contains(&signature) && outstanding.usual.len() < USUAL_MAX {
+                    outstanding.usual.push(signature);
                 }
             }
             outstanding.unproven |= first && !outstanding.usual.is_empty();
@@ -226,7 +240,7 @@ impl LineReplies {
             unit.prove(unit.quarantine(timeout), now);
         }
         answer.clone_into(&mut unit.answer);
-        let is_usual = shape_of(request).is_some_and(|shape| unit.outstanding.usual.contains(&shape));
+        let is_usual = response_signature(request).is_some_and(|signature| unit.outstanding.usual.contains(&signature));
         if is_usual && std::mem::take(&mut unit.repeats) {
             unit.outstanding.unproven = true;
             unit.unsolicited_at = Some(now);
@@ -238,7 +252,7 @@ impl LineReplies {
         let unit = &mut self.units[usize::from(unit)];
         if unit.answer == message {
             unit.repeats = true;
-            let usual = unit.outstanding.usual.iter().any(|shape| shape.fits(message));
+            let usual = unit.outstanding.usual.iter().any(|signature| signature.fits(message));
             if usual {
                 unit.outstanding.unproven = true;
                 unit.unsolicited_at = Some(now);
@@ -280,8 +294,8 @@ impl LineReplies {
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first() else { return false };
         let outstanding = self.of(*unit);
-        match (shape_of(message), message.get(1)) {
-            (Some(shape), _) => outstanding.is_ambiguous(shape),
+        match (response_signature(message), message.get(1)) {
+            (Some(signature), _) => outstanding.is_ambiguous(signature),
             (None, Some(function)) => outstanding.unproven || outstanding.functions.contains(function),
             (None, None) => false,
         }
@@ -297,14 +311,14 @@ impl LineReplies {
     /// A request was not answered, or only by something corrupt.
     pub fn failed(&mut self, message: &[u8], now: Duration) {
         let Some(unit) = message.first().map(|unit| &mut self.units[usize::from(*unit)]) else { return };
-        let shape = shape_of(message);
-        match (shape, message.get(1)) {
-            (Some(shape), _) => unit.outstanding.add(shape),
+        let signature = response_signature(message);
+        match (signature, message.get(1)) {
+            (Some(signature), _) => unit.outstanding.add(signature),
             (None, Some(function)) => unit.outstanding.add_function(*function),
             (None, None) => {}
         }
         // Patience counts from the last request that may be answered late; a loopback cannot be mistaken.
-        if !shape.is_some_and(Shape::is_loopback) {
+        if !signature.is_some_and(ResponseSignature::is_loopback) {
             unit.failed_at = Some(now);
         }
     }
@@ -316,7 +330,7 @@ impl LineReplies {
         let Some(failed_at) = unit.failed_at.filter(|_| !unit.outstanding.is_clear()) else { return false };
         unit.late_max = unit.late_max.max(now.saturating_sub(failed_at) + timeout);
         if unit.reorders && !unit.is_unsure {
-            unit.outstanding.shapes.retain(|shape| !shape.fits(message));
+            unit.outstanding.signatures.retain(|signature| !signature.fits(message));
         }
         true
     }
@@ -333,7 +347,7 @@ impl LineReplies {
     /// Can only time, or the outstanding reply, make sure that the answer to this message is no older one?
     pub fn must_wait(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first().map(|unit| &self.units[usize::from(*unit)]) else { return false };
-        unit.reorders && shape_of(message).is_some_and(|shape| unit.outstanding.contains(shape))
+        unit.reorders && response_signature(message).is_some_and(|signature| unit.outstanding.contains(signature))
     }
 
     /// The next loopback of a unit, with a number of its own.

@@ -35,7 +35,7 @@ use super::{
 };
 use crate::{
     bus::{
-        frame::{self, Shape},
+        frame::{self, ResponseSignature},
         late_reply::OutstandingReplies,
         plan::Block,
     },
@@ -173,7 +173,7 @@ impl Link {
         match &received.answer {
             Ok(answer) => {
                 self.wire.counters.ok += 1;
-                let age = self.wire.age();
+                let age = self.wire.uptime();
                 self.wire.replies.answered(message, answer, proof, age);
             }
             Err(fault) => self.count_fault(message, *fault),
@@ -187,7 +187,7 @@ impl Link {
         self.abandon_mbap();
         let Some(message) = self.asked.take() else { return };
         if self.framing() != Framing::Mbap && !message.is_empty() {
-            self.wire.replies.failed(&message, self.wire.age());
+            self.wire.replies.failed(&message, self.wire.uptime());
         }
         self.wire.hold_off_after_sending(self.frame_timeout);
     }
@@ -238,7 +238,7 @@ impl Link {
 
     /// See [`crate::bus::late_reply::LineReplies::forget`].
     pub fn forget_outstanding(&mut self, unit: u8) -> Option<Duration> {
-        self.wire.replies.forget(unit, self.wire.age())
+        self.wire.replies.forget(unit, self.wire.uptime())
     }
 
     /// Nothing is sent to a unit for this long (plant time): it wants a gap between two requests.
@@ -287,7 +287,7 @@ impl Link {
 
     /// See [`crate::bus::late_reply::LineReplies::is_unsettled`].
     pub fn is_unsettled(&self, unit: u8) -> bool {
-        self.wire.replies.is_unsettled(unit, self.wire.age())
+        self.wire.replies.is_unsettled(unit, self.wire.uptime())
     }
 
     /// Other blocks are asked for from now on.
@@ -371,8 +371,8 @@ impl Link {
 
     /// The answer to this message may still come: it is remembered, and the line stays silent until it would have passed.
     fn expect_late(&mut self, message: &[u8]) {
-        self.wire.replies.failed(message, self.wire.age());
-        let longest = frame::shape_of(message).map_or(frame::MESSAGE_MAX, Shape::length);
+        self.wire.replies.failed(message, self.wire.uptime());
+        let longest = frame::response_signature(message).map_or(frame::MESSAGE_MAX, ResponseSignature::length);
         let chars = to_u32(frame::wrapped_length(self.framing(), longest));
         self.wire.hold_off(self.wire.char_time * chars + self.wire.silent_interval);
     }

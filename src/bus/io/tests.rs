@@ -287,7 +287,7 @@ async fn a_late_reply_is_known_after_other_settings_too() {
         if gone && message[0] == 1 { SlaveAction::Silent } else { SlaveAction::Answer }
     });
     assert_eq!(line.fault(&def).await, Fault::Timeout);
-    // The answer to the block at 20 comes when the block at 10, of the same shape, would be asked.
+    // The answer to the block at 20 comes when the block at 10, of the same signature, would be asked.
     let late = vec![1, 3, 8, 0, 20, 0, 21, 0, 22, 0, 23];
     line.plug(Mode::Rtu, move |number, message| {
         if number == 0 && message[..2] == [1, 3] { SlaveAction::Instead(late.clone()) } else { SlaveAction::Answer }

@@ -132,8 +132,8 @@ impl Wire {
         self.framing
     }
 
-    /// Time since the line began.
-    pub fn age(&self) -> Duration {
+    /// Time since the line was opened first.
+    pub fn uptime(&self) -> Duration {
         self.created_at.elapsed()
     }
 
@@ -274,7 +274,7 @@ impl Wire {
         let mut late = false;
         // Only a whole good frame names the unit: chance bytes may name any.
         for frame in frame::unsolicited(self.framing, bytes) {
-            let age = self.age();
+            let age = self.uptime();
             let (Unsolicited::Response(message) | Unsolicited::Request(message)) = &frame;
             let Some(unit) = message.first().copied() else { continue };
             let asks = matches!(frame, Unsolicited::Request(_));

@@ -7,43 +7,43 @@ use crate::{
 };
 
 #[test]
-fn a_probe_is_never_of_an_owed_shape() {
+fn a_probe_never_has_an_outstanding_signature() {
     let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::UnreadableRanges::default());
     let inputs = &blocks[0];
     let mut outstanding = OutstandingReplies::default();
     assert!(outstanding.is_clear());
     let mut asked = Vec::new();
-    // Every probe in vain is outstanding too; each next one differs until the block has no more shapes to offer.
-    outstanding.add(shape_of(&inputs.request()).unwrap());
-    assert!(outstanding.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+    // Every probe in vain is outstanding too; each next one differs until the block has no more signatures to offer.
+    outstanding.add(response_signature(&inputs.request()).unwrap());
+    assert!(outstanding.is_ambiguous(response_signature(&inputs.request()).unwrap()));
     while let Some(probe) = outstanding.probe([inputs].into_iter()) {
         assert!(!asked.contains(&probe));
         assert!(probe[5] < inputs.count as u8);
-        outstanding.add(shape_of(&probe).unwrap());
+        outstanding.add(response_signature(&probe).unwrap());
         asked.push(probe);
     }
     assert_eq!(asked.len(), 7, "one to seven of eight registers");
     outstanding.clear();
-    assert!(!outstanding.is_ambiguous(shape_of(&inputs.request()).unwrap()));
+    assert!(!outstanding.is_ambiguous(response_signature(&inputs.request()).unwrap()));
 }
 
 #[test]
 fn a_unit_that_owes_too_much_is_asked_nothing() {
     let mut outstanding = OutstandingReplies::default();
     for count in 1..=OUTSTANDING_MAX as u8 {
-        outstanding.add(shape_of(&[1, 3, 0, 0, 0, count]).unwrap());
+        outstanding.add(response_signature(&[1, 3, 0, 0, 0, count]).unwrap());
     }
-    assert!(outstanding.is_ambiguous(shape_of(&[1, 4, 0, 0, 0, 99]).unwrap()));
+    assert!(outstanding.is_ambiguous(response_signature(&[1, 4, 0, 0, 0, 99]).unwrap()));
 }
 
 #[test]
 fn a_loopback_is_never_ambiguous_and_its_first_refusal_is_proof() {
     let mut outstanding = OutstandingReplies::default();
-    let shape = |number| shape_of(&loopback(1, number)).unwrap();
+    let signature = |number| response_signature(&loopback(1, number)).unwrap();
     assert!(outstanding.refusal_proves());
-    outstanding.add(shape(7));
+    outstanding.add(signature(7));
     assert!(!outstanding.is_clear() && !outstanding.refusal_proves());
-    assert!(!outstanding.is_ambiguous(shape(8)));
+    assert!(!outstanding.is_ambiguous(signature(8)));
     outstanding.clear();
     assert!(outstanding.is_clear() && outstanding.refusal_proves());
 }
@@ -51,9 +51,9 @@ fn a_loopback_is_never_ambiguous_and_its_first_refusal_is_proof() {
 #[test]
 fn writes_are_distinguished_by_their_echo() {
     let mut outstanding = OutstandingReplies::default();
-    outstanding.add(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap());
-    assert!(!outstanding.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 6]).unwrap()));
-    assert!(outstanding.is_ambiguous(shape_of(&[1, 6, 0, 1, 0, 5]).unwrap()));
+    outstanding.add(response_signature(&[1, 6, 0, 1, 0, 5]).unwrap());
+    assert!(!outstanding.is_ambiguous(response_signature(&[1, 6, 0, 1, 0, 6]).unwrap()));
+    assert!(outstanding.is_ambiguous(response_signature(&[1, 6, 0, 1, 0, 5]).unwrap()));
 }
 
 #[test]

@@ -66,7 +66,7 @@ impl Link {
             Ok(_) => Ok(()),
             Err(LinkError::Fault(Fault::Exception(_))) if proves => {
                 if !self.is_unsettled(unit) {
-                    self.wire.replies.clear(unit, self.wire.age());
+                    self.wire.replies.clear(unit, self.wire.uptime());
                 }
                 Ok(())
             }

@@ -262,7 +262,7 @@ pub(super) enum ReadValues {
     Registers(Vec<u16>),
 }
 
-/// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another shape,
+/// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another signature,
 /// part of this block or of one of `blocks`, if there is one, else by a loopback, else by time.
 async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), LinkError> {
     if !link.is_ambiguous(&block.request()) {
