@@ -274,7 +274,7 @@ fn without_read_back(result: &WriteResult) -> Outcome {
         WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
         WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(*fault)),
         WriteResult::Superseded => Outcome::Refused(Refusal::Superseded),
-        WriteResult::Lost(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
+        WriteResult::NoValidResponse(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
         WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
         WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterNoResponse(_) => {
             Outcome::NotConfirmed(NotConfirmed::NoReadBack)

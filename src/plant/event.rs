@@ -80,7 +80,7 @@ pub enum Event {
         id: WriteId,
         /// The unlock register.
         unlock_tag: TagId,
-        /// Its result: accepted, refused or lost.
+        /// Its result: accepted, refused or without a valid response.
         result: WriteResult,
     },
     /// The station itself has a fault, or no longer has it.
@@ -117,7 +117,7 @@ pub enum WriteResult {
     /// The device refused with an exception.
     Refused(ExceptionCode),
     /// No valid answer: it is not known whether the write took effect.
-    Lost(Fault),
+    NoValidResponse(Fault),
     /// Nothing was sent.
     NotSent(Fault),
     /// Nothing was sent: it still waited when a stop of the same tag came.

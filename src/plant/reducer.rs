@@ -341,7 +341,9 @@ impl Plant {
     fn written(&mut self, tag: TagId, result: &WriteResult, at: Timestamp) {
         match result {
             WriteResult::Accepted => self.image.written(tag, None, at),
-            WriteResult::NotRead(fault) | WriteResult::Lost(fault) => self.image.written(tag, Some(*fault), at),
+            WriteResult::NotRead(fault) | WriteResult::NoValidResponse(fault) => {
+                self.image.written(tag, Some(*fault), at)
+            }
             WriteResult::ReadBack(_)
             | WriteResult::ReadBackAfterNoResponse(_)
             | WriteResult::Refused(_)

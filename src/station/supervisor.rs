@@ -65,7 +65,7 @@ pub(super) async fn run(
         let at = clock.now();
         let states = [Event::Station { at, fault, state: occurred }, Event::Line { at, line, state }];
         // It cannot be known how far these writes had come.
-        let lost = |id| Event::Wrote { at, id, result: WriteResult::Lost(Fault::NotConnected) };
+        let lost = |id| Event::Wrote { at, id, result: WriteResult::NoValidResponse(Fault::NotConnected) };
         for event in requests.take_started().into_iter().map(lost).chain(states) {
             if events.send(event).await.is_err() {
                 return;
@@ -135,7 +135,7 @@ mod tests {
             }
             assert_eq!(alarms, 1);
             // What had been sent of it is not known.
-            assert_eq!(ended, [(WriteId(1), WriteResult::Lost(Fault::NotConnected))]);
+            assert_eq!(ended, [(WriteId(1), WriteResult::NoValidResponse(Fault::NotConnected))]);
             let why = "internal error, see the log".to_owned();
             let waits = |state: &LineState| matches!(state, LineState::Waiting { why: words, .. } if *words == why);
             assert_eq!(states[..2], [LineState::Connecting, LineState::Connected]);

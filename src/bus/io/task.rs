@@ -142,7 +142,7 @@ impl Task<'_> {
                     }
                     exit
                 }
-                Err(why) => LinkExit::Lost(why),
+                Err(why) => LinkExit::PortFailed(why),
             };
             if !matches!(exit, LinkExit::Reopen | LinkExit::Shutdown) {
                 self.give_up_unconfirmed().await?;
@@ -160,7 +160,7 @@ impl Task<'_> {
                     self.publish_report(None).await?;
                     self.wait(None).await?;
                 }
-                LinkExit::Lost(why) => {
+                LinkExit::PortFailed(why) => {
                     self.end_diagnostic(&why).await?;
                     tracing::warn!(line = self.settings.name, why, "not connected");
                     let retry_at = self.clock.now() + backoff.fail();

@@ -85,7 +85,7 @@ fn a_write_is_verified_only_by_its_own_read_back() {
         (72.5, WriteResult::Refused(ExceptionCode(3)), refused(Refusal::Exception(ExceptionCode(3))), Some(725.0)),
         (
             72.5,
-            WriteResult::Lost(Fault::Timeout),
+            WriteResult::NoValidResponse(Fault::Timeout),
             Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
             Some(725.0),
         ),
@@ -111,7 +111,7 @@ fn a_write_is_verified_only_by_its_own_read_back() {
 
 #[test]
 fn after_an_uncertain_write_the_old_value_is_not_good() {
-    for result in [WriteResult::Lost(Fault::Timeout), WriteResult::NotRead(Fault::Timeout)] {
+    for result in [WriteResult::NoValidResponse(Fault::Timeout), WriteResult::NotRead(Fault::Timeout)] {
         let mut plant = running();
         write(&mut plant, 72.5, result);
         assert_eq!(plant.snapshot().sample(SV).quality, Quality::Uncertain(Cause::Timeout));

@@ -74,7 +74,7 @@ impl Task<'_> {
         let raw = match back {
             Some(Ok(values)) => value_of(tag, &block, &values),
             Some(Err(LinkError::Fault(_))) => None,
-            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
+            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::PortFailed(why)),
             None => return Ok(()),
         };
         let Some(raw) = raw else {

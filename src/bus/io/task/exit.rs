@@ -8,7 +8,7 @@ pub(super) enum LinkExit {
     /// An operator closed the line.
     Closed,
     /// The port or connection failed.
-    Lost(String),
+    PortFailed(String),
     /// It is opened again at once, with other settings.
     Reopen,
     /// A diagnostic needs the port for itself.
@@ -27,8 +27,8 @@ impl From<LinkError> for LinkExit {
     /// Of a request without a caller only the end of the port matters.
     fn from(error: LinkError) -> LinkExit {
         match error {
-            LinkError::Gone(why) => LinkExit::Lost(why),
-            LinkError::Fault(fault) => LinkExit::Lost(fault.to_string()),
+            LinkError::Gone(why) => LinkExit::PortFailed(why),
+            LinkError::Fault(fault) => LinkExit::PortFailed(fault.to_string()),
         }
     }
 }

@@ -51,7 +51,7 @@ impl Task<'_> {
                 Some(Ok(ReadValues::Registers(words))) => Ok(words),
                 Some(Ok(ReadValues::Bits(bits))) => Ok(bits.into_iter().map(u16::from).collect()),
                 Some(Err(LinkError::Fault(fault))) => Err(fault),
-                Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
+                Some(Err(LinkError::Gone(why))) => return Err(LinkExit::PortFailed(why)),
                 // A stop comes first; the request is made again.
                 None => {
                     link.abandon();

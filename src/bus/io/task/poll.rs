@@ -68,7 +68,7 @@ impl Task<'_> {
         let answer = match read {
             Some(Ok(answer)) => Ok(answer),
             Some(Err(LinkError::Fault(fault))) => Err(fault),
-            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Lost(why)),
+            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::PortFailed(why)),
             // Nothing was learned of the device.
             None => {
                 schedule.reschedule(index, ended);
@@ -97,7 +97,7 @@ impl Task<'_> {
         if self.settings.transport.serial().is_some() || link.unanswered < UNANSWERED_MAX {
             return Ok(());
         }
-        Err(LinkExit::Lost(format!("no answer to {} requests over this connection", link.unanswered)))
+        Err(LinkExit::PortFailed(format!("no answer to {} requests over this connection", link.unanswered)))
     }
 
     pub(super) fn keep_gap(&self, link: &mut Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {

@@ -64,7 +64,7 @@ impl Task<'_> {
                 }
                 if in_sync { Ok(()) } else { Err(LinkExit::Reopen) }
             }
-            (Err(LinkError::Gone(why)), _) => Err(LinkExit::Lost(why)),
+            (Err(LinkError::Gone(why)), _) => Err(LinkExit::PortFailed(why)),
             (Ok(_), None) | (Err(LinkError::Fault(_)), _) => Ok(()),
         }
     }

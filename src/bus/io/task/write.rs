@@ -76,11 +76,12 @@ impl Task<'_> {
             WriteEnd::Ended(result) => result,
             WriteEnd::PortClosed(result, why) => {
                 self.publish_write_result(id, result).await?;
-                return Err(LinkExit::Lost(why));
+                return Err(LinkExit::PortFailed(why));
             }
         };
         // The write of the unlock register is lost where the write of the value was not sent for want of an answer.
-        let unanswered = matches!(result, WriteResult::Lost(Fault::Timeout) | WriteResult::NotSent(Fault::Timeout));
+        let unanswered =
+            matches!(result, WriteResult::NoValidResponse(Fault::Timeout) | WriteResult::NotSent(Fault::Timeout));
         match result {
             WriteResult::ReadBack(raw) => {
                 let (device, values) = (tag.device, vec![(tag.id, raw)]);
@@ -97,7 +98,7 @@ impl Task<'_> {
                 .await?;
             }
             // The value is unknown until it is read again.
-            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Lost(_) => {
+            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::NoValidResponse(_) => {
                 schedule.refresh(tag.device, self.clock.now());
             }
             // The unlock register may have changed since it was read.
@@ -109,7 +110,7 @@ impl Task<'_> {
         }
         match result {
             // A stop may be requested again at once.
-            WriteResult::Lost(fault) | WriteResult::NotRead(fault) if job.verify && !job.urgent => {
+            WriteResult::NoValidResponse(fault) | WriteResult::NotRead(fault) if job.verify && !job.urgent => {
                 self.defer_read_back(id, tag.id, result, fault).await?;
             }
             result => self.publish_write_result(id, result).await?,
@@ -137,7 +138,7 @@ impl Task<'_> {
         if let Ok(ended @ (WriteResult::NotSent(_) | WriteResult::Superseded)) = sent {
             return Ok(Unlocked::No(WriteEnd::Ended(ended)));
         }
-        let result = sent.clone().unwrap_or(WriteResult::Lost(Fault::NotConnected));
+        let result = sent.clone().unwrap_or(WriteResult::NoValidResponse(Fault::NotConnected));
         self.publish(Event::Unlocked { at: self.clock.now(), id: job.id, unlock_tag: unlock_tag.id, result }).await?;
         schedule.refresh(unlock_tag.device, self.clock.now());
         if sent.as_ref().is_ok_and(may_have_effect) {
@@ -146,15 +147,15 @@ impl Task<'_> {
         Ok(match sent {
             Ok(WriteResult::Accepted) => Unlocked::Yes,
             // A stop is tried all the same: an unlock register without a reply may have arrived.
-            Ok(WriteResult::Lost(_)) if job.urgent => Unlocked::Yes,
+            Ok(WriteResult::NoValidResponse(_)) if job.urgent => Unlocked::Yes,
             // The value itself was never on the wire.
-            Ok(WriteResult::Lost(fault)) => Unlocked::No(WriteEnd::Ended(WriteResult::NotSent(fault))),
+            Ok(WriteResult::NoValidResponse(fault)) => Unlocked::No(WriteEnd::Ended(WriteResult::NotSent(fault))),
             Ok(refused) => Unlocked::No(WriteEnd::Ended(refused)),
             Err(why) => Unlocked::No(WriteEnd::PortClosed(WriteResult::NotSent(Fault::NotConnected), why)),
         })
     }
 
-    /// Sends one number: accepted, refused, lost, not sent, or overtaken by a stop of any tag. `Err`: the port closed.
+    /// Sends one number: accepted, refused, without a valid response, not sent, or overtaken by a stop of any tag. `Err`: the port closed.
     async fn send_number(
         &mut self,
         link: &mut Link,
@@ -188,7 +189,7 @@ impl Task<'_> {
             }
             Err(LinkError::Gone(why)) => Err(why),
             Err(LinkError::Fault(Fault::Exception(code))) if own && code.is_refusal() => Ok(WriteResult::Refused(code)),
-            Err(LinkError::Fault(fault)) => Ok(WriteResult::Lost(fault)),
+            Err(LinkError::Fault(fault)) => Ok(WriteResult::NoValidResponse(fault)),
         }
     }
 
@@ -205,7 +206,7 @@ impl Task<'_> {
             Ok(WriteResult::Accepted) => {}
             Ok(ended) => return WriteEnd::Ended(ended),
             // It may or may not have arrived.
-            Err(why) => return WriteEnd::PortClosed(WriteResult::Lost(Fault::NotConnected), why),
+            Err(why) => return WriteEnd::PortClosed(WriteResult::NoValidResponse(Fault::NotConnected), why),
         }
         let device = def.device(tag.device);
         // An action such as saving to non-volatile memory wants the device left alone, not the line.

@@ -56,7 +56,7 @@ async fn a_stop_is_sent_to_a_device_that_is_given_up() {
             line.requests.send(write(1, FIRST_OF[0], false)).await.expect("the line runs");
             assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::NotSent(Fault::BackedOff), "{mode:?}");
             line.requests.send(write(2, FIRST_OF[0], true)).await.expect("the line runs");
-            let expect = if hears { WriteResult::ReadBack(10.0) } else { WriteResult::Lost(Fault::Timeout) };
+            let expect = if hears { WriteResult::ReadBack(10.0) } else { WriteResult::NoValidResponse(Fault::Timeout) };
             assert_eq!(end_of(&mut line, &def, 2).await, expect, "{mode:?}");
             assert_eq!(*writes.lock().expect("no panic"), 1, "{mode:?}: sent once");
         }
@@ -146,7 +146,7 @@ async fn a_start_is_not_compared_with_what_a_stop_has_left() {
         };
         line.until(&def, is_lost).await;
         line.requests.send(write(2, FIRST_OF[0], true)).await.expect("the line runs");
-        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::Lost(Fault::Timeout), "{mode:?}");
+        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::NoValidResponse(Fault::Timeout), "{mode:?}");
         assert_eq!(end_of(&mut line, &def, 2).await, WriteResult::ReadBack(10.0), "{mode:?}");
     }
 }

@@ -43,7 +43,7 @@ async fn a_write_is_sent_once_whatever_happens() {
         (SlaveAction::Answer, SlaveAction::Answer, WriteResult::ReadBack(10.0)),
         (SlaveAction::Exception(3), SlaveAction::Answer, WriteResult::Refused(ExceptionCode(3))),
         (SlaveAction::Silent, SlaveAction::Answer, WriteResult::ReadBackAfterNoResponse(10.0)),
-        (SlaveAction::Silent, SlaveAction::Silent, WriteResult::Lost(Fault::Timeout)),
+        (SlaveAction::Silent, SlaveAction::Silent, WriteResult::NoValidResponse(Fault::Timeout)),
         (SlaveAction::Answer, SlaveAction::Silent, WriteResult::NotRead(Fault::Timeout)),
         (
             SlaveAction::Instead(vec![1, 6, 0, 10, 0, 11]),
@@ -226,7 +226,7 @@ async fn a_write_that_loses_the_port_counts_no_other_exchange() {
     loop {
         match line.events.recv().await.expect("the line runs") {
             Event::Wrote { result, .. } => {
-                assert_eq!(result, WriteResult::Lost(Fault::NotConnected));
+                assert_eq!(result, WriteResult::NoValidResponse(Fault::NotConnected));
                 lost = true;
             }
             Event::Report { report, .. } if lost => {

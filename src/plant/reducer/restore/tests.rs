@@ -155,7 +155,7 @@ fn the_first_failure_stops_it_and_says_what_was_written() {
     assert_eq!(written(&first), [(SV, 400.0)]);
     let second = end(&mut plant, &first, WriteResult::ReadBack);
     assert_eq!(written(&second), [(HIGH, 80.0)]);
-    let last = end(&mut plant, &second, |_| WriteResult::Lost(Fault::Timeout));
+    let last = end(&mut plant, &second, |_| WriteResult::NoValidResponse(Fault::Timeout));
     assert_eq!(
         outcome(&plant, 1).map(|outcome| outcome.to_string()).as_deref(),
         Some("not confirmed: 1 of 2 written, then SV-H failed")

@@ -225,8 +225,8 @@ fn a_written_value_is_uncertain_for_the_true_cause() {
     };
     check(WriteResult::Accepted, "uncertain: written, not read back");
     check(WriteResult::NotRead(crc), "uncertain: corrupt response");
-    check(WriteResult::Lost(crc), "uncertain: corrupt response");
-    check(WriteResult::Lost(Fault::Timeout), "uncertain: response timeout");
-    check(WriteResult::Lost(Fault::Exception(ExceptionCode(4))), "uncertain: refused by the device");
+    check(WriteResult::NoValidResponse(crc), "uncertain: corrupt response");
+    check(WriteResult::NoValidResponse(Fault::Timeout), "uncertain: response timeout");
+    check(WriteResult::NoValidResponse(Fault::Exception(ExceptionCode(4))), "uncertain: refused by the device");
     check(WriteResult::Refused(ExceptionCode(3)), "good");
 }
