@@ -40,7 +40,7 @@
 //! Every request of a terminal goes through the **session server**, the task around [`access::AccessControl`], which
 //! alone decides what is permitted. What it refuses goes on to the plant as a refused command, so that it is seen and on
 //! record like any other; only a command above the rate limit, of another run or with a used number does not reach the plant,
-//! and its terminal alone is told. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
+//! and only its terminal shows it. Actions are in the audit log and alarms in their state file, on disk, before a snapshot shows an
 //! outcome as recorded; the history follows within a second.
 //! Queries go to the history; one that reads registers goes to the line, which answers it between polls.
 //! The history thread only writes; a second one answers queries, each on a connection of its own and for a bounded time.

@@ -162,10 +162,11 @@ async fn a_command_made_before_a_reload_is_refused() {
     session.send(Request::Command(open, None)).unwrap();
     let of = |snapshot: &Snapshot, id| snapshot.commands.iter().find(|status| status.command.id == id).cloned();
     let ended = |snapshot: &Snapshot, id| of(snapshot, id).is_some_and(|status| !status.is_pending());
-    until(&mut session, "an outcome", |snapshot| ended(snapshot, id)).await;
-    let outcome = of(&session.snapshots.borrow(), id).unwrap().outcome;
-    let Outcome::Refused(Refusal::NotPermitted(why)) = outcome else { panic!("{outcome:?}") };
-    assert!(why.contains("restarted since this was shown"), "{why}");
+    let undelivered = session.status.wait_for(|status| !status.undelivered.is_empty());
+    let status =
+        tokio::time::timeout(Duration::from_secs(600), undelivered).await.expect("never undelivered").unwrap().clone();
+    let [(undelivered, why)] = &status.undelivered[..] else { panic!("{:?}", status.undelivered) };
+    assert!(*undelivered == id && why.contains("restarted since this was shown"), "{why}");
 
     // What is made on the new plant is done, so the refused one had its time.
     let again = write(&session.snapshots.borrow(), 2);

@@ -69,8 +69,8 @@ async fn an_undelivered_command_is_in_the_session_status() {
     task.on_message(ServerMessage::Undelivered { id: at_station(1), why: why.to_owned() }).unwrap();
     check(&[(1, why)]);
     let undelivered = vec![(at_station(2), Arc::from("too late"))];
-    let told = SessionStatus { undelivered, ..SessionStatus::default() };
-    task.on_message(ServerMessage::SessionStatus(Box::new(told))).unwrap();
+    let session = SessionStatus { undelivered, ..SessionStatus::default() };
+    task.on_message(ServerMessage::SessionStatus(Box::new(session))).unwrap();
     check(&[(1, why), (2, "too late")]);
     task.on_message(ServerMessage::SessionStatus(Box::default())).unwrap();
     task.refuse(command(4));

@@ -56,15 +56,7 @@ impl Task<'_> {
             None => Unlocked::Yes,
         };
         let written = match unlocked {
-            Unlocked::Yes => {
-                let written = self.write_once(link, schedule, job).await;
-                if let WriteEnd::Ended(result) = &written
-                    && may_have_effect(result)
-                {
-                    self.end_unconfirmed(tag.id).await?;
-                }
-                written
-            }
+            Unlocked::Yes => self.write_once(link, schedule, job).await,
             Unlocked::No(written) => written,
         };
         let result = match written {
@@ -82,7 +74,32 @@ impl Task<'_> {
         // The write of the unlock register is lost where the write of the value was not sent for want of an answer.
         let unanswered =
             matches!(result, WriteResult::NoValidResponse(Fault::Timeout) | WriteResult::NotSent(Fault::Timeout));
+        if may_have_effect(&result) {
+            self.end_unconfirmed(tag.id).await?;
+        }
+        self.publish_value(link, schedule, tag, &result).await?;
         match result {
+            // A stop may be requested again at once.
+            WriteResult::NoValidResponse(fault) | WriteResult::NotRead(fault) if job.verify && !job.urgent => {
+                self.defer_read_back(id, tag.id, result, fault).await?;
+            }
+            result => self.publish_write_result(id, result).await?,
+        }
+        // It may still be queued here or on the way; closing the connection discards it. A waiting stop does not wait for
+        // another connection and follows it on this one.
+        let tcp = self.settings.transport.serial().is_none();
+        if tcp && unanswered && !self.requests.stop_waits() { Err(LinkExit::Reopen) } else { Ok(()) }
+    }
+
+    /// Publishes the value that was read back, or has the value read again that a write has made unknown.
+    async fn publish_value(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        tag: &TagDef,
+        result: &WriteResult,
+    ) -> Result<(), LinkExit> {
+        match *result {
             WriteResult::ReadBack(raw) => {
                 let (device, values) = (tag.device, vec![(tag.id, raw)]);
                 let exchange = link.last.clone();
@@ -108,17 +125,7 @@ impl Task<'_> {
             | WriteResult::Superseded
             | WriteResult::ReadBackAfterNoResponse(_) => {}
         }
-        match result {
-            // A stop may be requested again at once.
-            WriteResult::NoValidResponse(fault) | WriteResult::NotRead(fault) if job.verify && !job.urgent => {
-                self.defer_read_back(id, tag.id, result, fault).await?;
-            }
-            result => self.publish_write_result(id, result).await?,
-        }
-        // It may still be queued here or on the way; closing the connection discards it. A waiting stop does not wait for
-        // another connection and follows it on this one.
-        let tcp = self.settings.transport.serial().is_none();
-        if tcp && unanswered && !self.requests.stop_waits() { Err(LinkExit::Reopen) } else { Ok(()) }
+        Ok(())
     }
 
     /// Writes the unlock register, reports that and has it read again.
