@@ -83,6 +83,7 @@
 //! | snapshot | everything that is true now, immutable, for terminals and the history |
 //! | bench, live read | one device without tags, for `open`; a read of its registers beside the polls |
 //! | hole | an address that a device does not have, found by a live read, a sweep or a refused block |
+//! | replay, present | a past instant that the tabs show; what is true now, while they do |
 //! | hold | how long a stored value counts without a successor |
 //! | source frame | the request and response that a sample was decoded from |
 //! | command | what an operator asks of the plant, with a status from pending to verified, unchanged, refused, failed or not confirmed |

@@ -2,6 +2,7 @@
 
 mod header;
 mod banner;
+mod past;
 
 use crate::t;
 use crate::text::translate;
@@ -15,7 +16,7 @@ use super::{
     LastCommand, Model, SILENCE, ViewContext,
     keys::{self, Hint},
     modal::Modal,
-    rights,
+    replay, rights,
     tabs::Tab,
     widgets::text::{Canvas, clock, fit, fit_words, running, width},
 };
@@ -83,19 +84,22 @@ pub fn layout(screen: Rect) -> Layout {
 }
 
 /// Draws the whole screen.
-pub fn view(model: &Model, cx: &ViewContext, frame: &mut Frame) {
+pub fn view(model: &Model, frame: &mut Frame) {
     let parts = layout(frame.area());
-    banner(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.banner));
+    let present = &super::context::present_context(model, frame.area());
+    banner(model, present, &mut Canvas::new(frame.buffer_mut(), parts.banner));
     if parts.small {
-        return too_small(model, cx, frame);
+        return too_small(model, present, frame);
     }
-    header(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.header));
+    header(model, present, &mut Canvas::new(frame.buffer_mut(), parts.header));
+    let cx = &super::context::context(model, frame.area());
     tab_bar(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.tabs));
-    Canvas::new(frame.buffer_mut(), parts.rule).run(0, 0, parts.rule.width, '─', cx.theme.dim());
+    past::rule(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.rule));
     model.tabs.shown().view(cx, frame, parts.body);
     status(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.status));
     let hints = match &model.modal {
         Some(modal) => modal.hints(cx),
+        None if cx.is_past() => [keys::hints(replay::KEYS), past::own_keys(model, cx)].concat(),
         None => model.tabs.shown().hints(cx),
     };
     let typing = model.tabs.shown == Tab::Login && model.tabs.login.is_typing();
@@ -167,9 +171,11 @@ fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 
 fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let length = canvas.width();
-    canvas.run(0, 0, length, '─', cx.theme.dim());
+    past::line(cx, canvas);
     if let Some(note) = model.note {
         canvas.text(1, 0, &format!(" {note} "), cx.theme.strong());
+    } else if let Some(words) = past::words(model, cx) {
+        canvas.text(1, 0, &format!(" {} ", fit_words(&words, length.saturating_sub(4))), cx.theme.strong());
     } else if let Some(pending) = &model.last_command {
         let (text, style) = last_command_label(cx, pending);
         let room = length.saturating_sub(4);
@@ -321,10 +327,10 @@ fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option
     }
 }
 
-/// Two arrow keys that belong together as one: `↑↓ select`.
+/// Two keys that belong together as one: `↑↓ select`.
 fn pair(before: &Hint, hint: &Hint) -> Option<Hint> {
-    let arrow = |hint: &Hint| matches!(hint.key.as_str(), "←" | "→" | "↑" | "↓");
-    let together = before.label.is_empty() && arrow(before) && arrow(hint);
+    const PAIRS: &str = "←→←↑↓↑[]<>,.";
+    let together = before.label.is_empty() && PAIRS.contains(&format!("{}{}", before.key, hint.key));
     together.then(|| Hint { key: format!("{}{}", before.key, hint.key), ..hint.clone() })
 }
 

@@ -27,12 +27,16 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 effects.extend(show(model, Tab::Mimic));
             }
             UiAction::ShowOnTrends(tag, span) => {
+                if model.replay.shown().is_some() {
+                    effects.push(model.replay.go_to(span.0));
+                }
                 with_tabs(model, |tabs, cx| {
                     tabs.trends.show(cx, tag, span);
                     Vec::new()
                 });
                 effects.extend(show(model, Tab::Trends));
             }
+            UiAction::Replay(at) => effects.push(model.replay.go_to(at)),
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
             UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
             UiAction::SessionRequest(tab, request) => {
@@ -42,7 +46,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 if let Some(Modal::UserForm(form)) = &mut model.modal {
                     form.sent(number);
                 }
-                effects.push(Effect::SessionRequest(QueryId { tab, number }, request));
+                effects.push(Effect::SessionRequest(QueryId { tab: Some(tab), number }, request));
             }
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
@@ -53,6 +57,9 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
 
 /// Shows a tab; it asks at once for what it needs, and says what it has to say.
 pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
+    if !tab.has_past() {
+        model.replay.leave();
+    }
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
     let effects = asked.into_iter().filter_map(|action| match action {
@@ -67,6 +74,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowParameter(_)
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
+        | UiAction::Replay(_)
         | UiAction::Command(_)
         | UiAction::SendCommand(..)
         | UiAction::SessionRequest(..) => None,

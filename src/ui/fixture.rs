@@ -202,6 +202,7 @@ pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&ViewContext) -> T) -> 
         snapshot,
         theme: &Theme::FULL,
         now: snapshot.at,
+        present: None,
         phase: 0,
         area,
         extension: None,

@@ -247,10 +247,11 @@ impl Loop {
         Ok(false)
     }
 
-    /// Cancels the queries whose answers no tab waits for any more.
+    /// Cancels the queries whose answers are not awaited any more.
     fn cancel(&mut self) {
-        let tabs = &self.model.tabs;
-        self.asked.extract_if(.., |(id, _)| !tabs.awaits(*id)).for_each(|(_, waiting)| waiting.abort());
+        let Model { tabs, replay, .. } = &self.model;
+        let awaits = |id: &QueryId| id.tab.map_or(replay.awaits(id.number), |tab| tabs.awaits(tab, id.number));
+        self.asked.extract_if(.., |(id, _)| !awaits(id)).for_each(|(_, waiting)| waiting.abort());
         self.asked.retain(|(_, waiting)| !waiting.is_finished());
     }
 

@@ -167,6 +167,8 @@ pub enum Global {
     Redraw,
     /// Take the outcome of the last command off the screen.
     Dismiss,
+    /// Show a past instant of the plant.
+    Replay,
     /// Lock this terminal at once.
     Lock,
 }
@@ -186,6 +188,7 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(char('a'), "", "acknowledge the selected or most urgent alarm", Global::Acknowledge),
     Key::new(char('A'), "", "acknowledge all alarms (asks first)", Global::AcknowledgeAll),
     Key::new(code(KeyCode::Esc), "", "close a window; dismiss a message; previous page", Global::Dismiss),
+    Key::new(char('@'), "", "replay: the plant as it was at a past time", Global::Replay),
     Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
     Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
@@ -197,9 +200,13 @@ const GLOBAL: &[Key<Global>] = &[
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ui::replay;
 
     fn assert_no_clash(name: &str, chords: Vec<Chord>) {
-        let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global())).collect();
+        // Two keys mean the same in the past: a time is asked for, and a step back is made.
+        let replayed =
+            chords_of(replay::KEYS).into_iter().filter(|chord| ![char('@'), code(KeyCode::Esc)].contains(chord));
+        let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global())).chain(replayed).collect();
         for (n, chord) in all.iter().enumerate() {
             assert!(!all[..n].contains(chord), "{name}: {} means two things", chord.name());
         }

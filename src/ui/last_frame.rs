@@ -12,10 +12,15 @@ use super::{
     Model, UiAction,
     tabs::{Tab, alarms::actions},
 };
-use crate::plant::{def::AlarmId, snapshot::ActiveAlarm};
+use crate::{
+    plant::{def::AlarmId, snapshot::ActiveAlarm},
+    t,
+};
 
 /// Shown where a key was ignored.
-const CHANGED: &str = "The list has changed, press again";
+fn changed() -> &'static str {
+    t!("The list has changed, press again")
+}
 
 /// The rows of a list that keys act on, each with its state, and the selected one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -104,7 +109,7 @@ impl Model {
         }
         let seen = !last_frame.astray && last_frame.tab == self.tabs.shown && last_frame.rows.selected == now.selected;
         if !seen {
-            self.note = Some(CHANGED);
+            self.note = Some(changed());
         }
         seen
     }
@@ -112,6 +117,9 @@ impl Model {
     /// The alarm that `a` is for as things stand: the one selected on the alarms tab if that can be seen, else the most
     /// urgent unacknowledged, which is the banner's.
     pub(super) fn alarm_to_acknowledge(&self) -> Option<&ActiveAlarm> {
+        if self.replay.shown().is_some() {
+            return None;
+        }
         let selected = self.lists().then(|| self.tabs.alarms.selected(&self.cx())).flatten();
         selected.or_else(|| self.snapshot.alarms.iter().find(|alarm| alarm.state.needs_acknowledgement()))
     }
@@ -126,13 +134,13 @@ impl Model {
         let now = self.alarm_to_acknowledge();
         let Some(last_frame) = self.last_frame else { return Ok(now) };
         if last_frame.astray {
-            return Err(CHANGED);
+            return Err(changed());
         }
         let Some((id, annunciated_at)) = last_frame.alarm else {
-            return if now.is_none() { Ok(None) } else { Err(CHANGED) };
+            return if now.is_none() { Ok(None) } else { Err(changed()) };
         };
         let seen = |alarm: &&ActiveAlarm| (alarm.id, alarm.annunciated_at) == (id, annunciated_at);
-        self.snapshot.alarms.iter().find(seen).map(Some).ok_or(CHANGED)
+        self.snapshot.alarms.iter().find(seen).map(Some).ok_or_else(changed)
     }
 }
 

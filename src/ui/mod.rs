@@ -1,5 +1,6 @@
 //! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
 
+mod context;
 mod effects;
 pub(crate) mod bell;
 pub(crate) mod chrome;
@@ -12,6 +13,7 @@ pub(crate) mod keys;
 pub(crate) mod modal;
 pub(crate) mod msg;
 pub(crate) mod session_lock;
+pub(crate) mod replay;
 pub(crate) mod rights;
 pub(crate) mod tabs;
 pub(crate) mod theme;
@@ -23,18 +25,18 @@ pub(crate) mod fixture;
 #[cfg(test)]
 mod tests;
 
+pub use context::ViewContext;
+use context::{past_context, view_context, with_tabs};
 use effects::perform;
 use std::{sync::Arc, time::Duration};
 
 use crossterm::event::{KeyEvent, KeyEventKind};
-use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
     access::SessionStatus,
-    plant::{
-        alarm::AlarmCommand, command::CommandKind, def::PlantDef, sample::Cause, snapshot::Snapshot, time::elapsed,
-    },
+    history::{Answer, HistoryError},
+    plant::{alarm::AlarmCommand, command::CommandKind, sample::Cause, snapshot::Snapshot},
     text::Language,
 };
 use extension::Extension;
@@ -43,6 +45,7 @@ pub use last_command::LastCommand;
 use last_frame::LastFrame;
 use modal::{Confirm, Modal};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
+use replay::Replay;
 use session_lock::SessionLock;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
@@ -57,6 +60,8 @@ pub struct Model {
     pub snapshot: Arc<Snapshot>,
     /// The tabs and which one is shown.
     pub tabs: Tabs,
+    /// The past that the tabs show instead of the present.
+    pub replay: Replay,
     /// The window on top, which gets every key.
     pub modal: Option<Modal>,
     /// How things look.
@@ -100,44 +105,6 @@ pub struct Clock {
     pub phase: u32,
 }
 
-/// What every tab, window and widget may read.
-#[derive(Debug, Clone, Copy)]
-pub struct ViewContext<'a> {
-    /// The plant.
-    pub snapshot: &'a Snapshot,
-    /// The looks.
-    pub theme: &'a Theme,
-    /// Plant time now: the snapshot's, carried on while none comes.
-    pub now: Timestamp,
-    /// Counts half seconds.
-    pub phase: u32,
-    /// Where the shown tab draws, for queries that depend on its width.
-    pub area: Rect,
-    /// State that the embedding command adds.
-    pub extension: Option<&'a dyn Extension>,
-    /// The session: user, role and lock.
-    pub session: &'a SessionStatus,
-}
-
-impl<'a> ViewContext<'a> {
-    /// The plant's definition.
-    pub fn def(&self) -> &'a PlantDef {
-        &self.snapshot.def
-    }
-    /// The phase in which unacknowledged alarms are reversed: half of every two seconds.
-    pub fn flash(&self) -> bool {
-        self.phase % 4 < 2
-    }
-    /// The time that no setting of a clock moves: for what is asked again after a while.
-    pub fn steady(&self) -> Timestamp {
-        self.now.checked_sub(self.snapshot.stepped).unwrap_or(self.now)
-    }
-    /// Age of a tag's sample now.
-    pub fn age(&self, tag: crate::plant::def::TagId) -> Duration {
-        elapsed(self.snapshot.sample(tag).at, self.now)
-    }
-}
-
 impl Model {
     /// A terminal that has just attached.
     pub fn new(snapshot: Arc<Snapshot>, theme: Theme, terminal: u32, session: Arc<SessionStatus>) -> Model {
@@ -145,6 +112,7 @@ impl Model {
         let mut model = Model {
             snapshot,
             tabs,
+            replay: Replay::default(),
             modal: None,
             theme,
             language: Language::default(),
@@ -164,11 +132,6 @@ impl Model {
         };
         update(&mut model, Msg::SessionStatus(session));
         model
-    }
-
-    /// What the parts of the terminal may read.
-    pub fn cx(&self) -> ViewContext<'_> {
-        context(self, self.screen)
     }
 
     /// Is the screen too small for more than the banner?
@@ -229,7 +192,10 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.extension = Some(state);
             Vec::new()
         }
-        Msg::Answer(id, answer) => with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_answer(cx, id.number, answer)),
+        Msg::Answer(QueryId { tab: Some(tab), number }, answer) => {
+            with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_answer(cx, number, answer))
+        }
+        Msg::Answer(QueryId { tab: None, number }, answer) => on_replayed(model, number, answer),
         Msg::LogFailed(tab, why) => {
             model.tabs.of_mut(tab).on_log_failed(&why);
             Vec::new()
@@ -247,6 +213,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
     };
     let actions = session_lock::hold_back(model, actions);
+    let actions = replay::refuse_commands(model, actions);
     let effects = perform(model, actions);
     model.close_confirmation();
     if keyed {
@@ -257,36 +224,8 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    let cx = context(model, frame.area());
-    model.language.within(|| chrome::view(model, &cx, frame));
+    model.language.within(|| chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
-}
-
-/// What the parts of a terminal of this size may read.
-fn context(model: &Model, screen: Rect) -> ViewContext<'_> {
-    let Model { snapshot, theme, clock, extension, session, .. } = model;
-    view_context(snapshot, theme, *clock, screen, extension, session)
-}
-
-/// The same of parts of a model, while others of it change.
-fn view_context<'a>(
-    snapshot: &'a Snapshot,
-    theme: &'a Theme,
-    clock: Clock,
-    screen: Rect,
-    extension: &'a Option<Arc<dyn Extension>>,
-    session: &'a SessionStatus,
-) -> ViewContext<'a> {
-    let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
-    let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
-    let area = chrome::layout(screen).body;
-    ViewContext { snapshot, theme, now, phase: clock.phase, area, extension: extension.as_deref(), session }
-}
-
-/// Lets the tabs change while they read the rest of the model.
-fn with_tabs(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>) -> Vec<UiAction> {
-    let Model { snapshot, theme, clock, extension, session, screen, tabs, .. } = model;
-    change(tabs, &view_context(snapshot, theme, *clock, *screen, extension, session))
 }
 
 fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
@@ -307,14 +246,22 @@ fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return on_global(model, show);
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
-        let Model { snapshot, theme, clock, extension, session, screen, tabs, .. } = model;
-        let cx = view_context(snapshot, theme, *clock, *screen, extension, session);
+        let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
+        let cx = past_context(view_context(snapshot, theme, *clock, *screen, extension, session), replay);
         let (rest, actions) = modal.on_key(&cx, tabs, event);
         model.modal = rest;
         return actions;
     }
     if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
         return session_lock::on_typed(model, event);
+    }
+    if let Some(action) = keys::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some()) {
+        let present = model.present_cx().now;
+        let actions = match action {
+            replay::Action::GoTo => on_global(model, Global::Replay),
+            _ => model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect(),
+        };
+        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
     }
     match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
@@ -338,6 +285,13 @@ fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Next => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
         Global::Previous => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
         Global::Lock => session_lock::lock(model),
+        Global::Acknowledge | Global::AcknowledgeAll | Global::Silence if model.replay.shown().is_some() => {
+            model.note = Some(replay::refused());
+            Vec::new()
+        }
+        // A bench has no history.
+        Global::Replay if model.snapshot.def.is_bench() || session_lock::is_closed(&model.session) => Vec::new(),
+        Global::Replay => vec![UiAction::Open(replay::ask_instant(&model.cx(), model.tabs.shown()))],
         Global::Help => vec![UiAction::Open(Modal::Help(0))],
         Global::Quit => vec![UiAction::Leave],
         Global::Acknowledge => last_frame::acknowledge(model),
@@ -392,5 +346,19 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     if silent >= SILENCE {
         model.doubt();
     }
-    with_tabs(model, |tabs, cx| tabs.on_tick(cx))
+    let present = model.present_cx().now;
+    let played = model.replay.on_tick(present).into_iter().map(UiAction::Do);
+    played.chain(with_tabs(model, |tabs, cx| tabs.on_tick(cx))).collect()
+}
+
+/// The history has answered the replay. A tab that has no past gives way to the one that the terminal begins with.
+fn on_replayed(model: &mut Model, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+    let Model { snapshot, theme, clock, extension, session, screen, replay, tabs, .. } = model;
+    let present = view_context(snapshot, theme, *clock, *screen, extension, session);
+    let asked = replay.on_answer(number, answer, &present);
+    if replay.shown().is_some() && !tabs.shown.has_past() {
+        tabs.shown = Tab::home(&snapshot.def);
+    }
+    let asked = asked.into_iter().map(UiAction::Do);
+    asked.chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
 }

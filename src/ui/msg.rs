@@ -107,12 +107,12 @@ pub enum Effect {
     Quit,
 }
 
-/// Identifies a query: who asked, and its running count. An answer to an older query is ignored by the tab.
+/// Identifies a query: who asked, and its running count. An answer to an older query is ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct QueryId {
-    /// The tab that asked.
-    pub tab: Tab,
-    /// Chosen by the tab.
+    /// The tab that asked; `None` is the replay, which is on all of them.
+    pub tab: Option<Tab>,
+    /// Chosen by who asked.
     pub number: u32,
 }
 
@@ -131,6 +131,8 @@ pub enum UiAction {
     ShowOnMimic(Vec<TagId>),
     /// Show the curve of a tag over a stretch of time; a moment, which begins as it ends, with the cursor on it.
     ShowOnTrends(TagId, (Timestamp, Timestamp)),
+    /// Show the plant as it was at an instant.
+    Replay(Timestamp),
     /// Give a command and watch its outcome.
     Command(CommandKind),
     /// The same with the confirmed value and the credentials.
@@ -162,6 +164,6 @@ pub enum Leaving {
 impl UiAction {
     /// Queries the history on behalf of a tab.
     pub fn query(tab: Tab, number: u32, query: Query) -> UiAction {
-        UiAction::Do(Effect::Query(QueryId { tab, number }, query))
+        UiAction::Do(Effect::Query(QueryId { tab: Some(tab), number }, query))
     }
 }

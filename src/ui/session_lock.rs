@@ -6,11 +6,12 @@ use std::{mem, sync::Arc, time::Duration};
 use crossterm::event::{KeyCode, KeyEvent};
 
 use super::{
-    Effect, Model, QueryId, UiAction, context,
+    Effect, Model, QueryId, UiAction,
+    context::with_tabs,
     keys::{self, Global},
     modal::{Modal, Notice, UserForm, user_form::Purpose},
+    replay::Replay,
     tabs::{Tab, TabView, Tabs, login},
-    with_tabs,
 };
 use crate::{
     access::{Durability, SessionRequest, SessionStatus},
@@ -21,9 +22,6 @@ use crate::{
 const ACTIVE_TICKS: u32 = 60;
 /// The same once the station has said that it will lock.
 const WARNED_TICKS: u32 = 4;
-
-/// Said of what the station has done and its disk has not taken.
-const NOT_RECORDED: &str = "Done, but NOT RECORDED: the station cannot write to its disk";
 
 /// Times of the session and the lock, in ticks, and the number of the last request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -182,6 +180,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             | UiAction::ShowParameter(_)
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
+            | UiAction::Replay(_)
             | UiAction::SessionRequest(..)
             | UiAction::Do(_) => rest.push(action),
         }
@@ -209,19 +208,19 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
         return None;
     }
     model.session_lock.active_at = Some(model.clock.phase);
-    Some(Effect::SessionRequest(QueryId { tab: Tab::Login, number: 0 }, SessionRequest::Active))
+    Some(Effect::SessionRequest(QueryId { tab: Some(Tab::Login), number: 0 }, SessionRequest::Active))
 }
 
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
 /// which waits for its last request only.
 pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Durability, String>) -> Vec<UiAction> {
     if answer == Ok(Durability::NotRecorded) {
-        model.note = Some(NOT_RECORDED);
+        model.note = Some(t!("Done, but NOT RECORDED: the station cannot write to its disk"));
     }
-    let answer = answer.map(drop);
-    if matches!(id.tab, Tab::Reports | Tab::Bus) {
+    let (Some(tab), answer) = (id.tab, answer.map(drop)) else { return Vec::new() };
+    if matches!(tab, Tab::Reports | Tab::Bus) {
         // A file that waits to be written waits for its own answer, whatever was requested since.
-        return with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_request_done(cx, answer));
+        return with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_request_done(cx, answer));
     }
     let waits = |modal: &Modal| matches!(modal, Modal::UserForm(form) if form.waits_for(id.number));
     let shown = model.modal.take_if(|modal| waits(modal));
@@ -232,7 +231,7 @@ pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Dur
             model.kept = answered(model, form, answer).map(|modal| (tab, modal));
         }
         _ if id.number != 0 && id.number == model.session_lock.last_request => {
-            return with_tabs(model, |tabs, cx| tabs.of_mut(id.tab).on_request_done(cx, answer));
+            return with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_request_done(cx, answer));
         }
         _ => {}
     }
@@ -240,7 +239,7 @@ pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Dur
 }
 
 fn answered(model: &Model, mut form: Box<UserForm>, answer: Result<(), String>) -> Option<Modal> {
-    let done = form.answered(&context(model, model.screen), answer);
+    let done = form.answered(&model.cx(), answer);
     if done { form.below() } else { Some(Modal::UserForm(form)) }
 }
 
@@ -249,6 +248,7 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     let shown = model.tabs.shown;
     model.tabs = Tabs::new(&snapshot);
     (model.snapshot, model.last_command, model.kept) = (snapshot, None, None);
+    model.replay = Replay::default();
     model.plants = model.plants.wrapping_add(1);
     let words = vec![
         t!("The plant file changed").to_owned(),

@@ -10,6 +10,7 @@ use crate::plant::number::to_u16;
 use crate::ui::{
     ViewContext, keys,
     keys::{Global, Hint},
+    replay,
     tabs::{Tab, Tabs},
     widgets::{
         list::Motion,
@@ -37,10 +38,12 @@ pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, b
         keys::global().into_iter().filter(|key| !matches!(key.action, Global::Show(tab) if !offered.contains(&tab)));
     let global = keys::hints(&there.collect::<Vec<_>>());
     let heading = |text: &str| Hint::new("", text, "");
+    let past = [heading(""), heading(t!("past"))].into_iter().chain(keys::hints(replay::KEYS)).filter(|_| cx.is_past());
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
     let rows: Vec<Hint> = [heading(translate(tabs.shown.title()))]
         .into_iter()
         .chain(own)
+        .chain(past)
         .chain([heading(""), heading(t!("every tab"))])
         .chain(global)
         .collect();

@@ -2,12 +2,13 @@
 
 use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
+use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, line::Line, window};
-use crate::ui::{ViewContext, keys, tabs::Tabs, widgets::text::width};
+use crate::ui::{ViewContext, keys, replay, tabs::Tabs, widgets::text::width};
 
-/// A prompt with one line for the answer; the shown tab's `on_text` takes it.
+/// A prompt with one line for the answer; the shown tab's `on_text` takes it, or the replay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prompt {
     /// What is asked.
@@ -18,17 +19,29 @@ pub struct Prompt {
     pub line: Line,
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
+    /// The answer is an instant for the replay, not for the tab; that of what was selected is meant by none.
+    replay: Option<Option<Timestamp>>,
 }
 
 impl Prompt {
     /// A prompt with a text to start from.
     pub fn new(title: impl Into<String>, hint: impl Into<String>, text: &str) -> Prompt {
-        Prompt { title: title.into(), hint: hint.into(), line: Line::new(text), problem: None }
+        Prompt { title: title.into(), hint: hint.into(), line: Line::new(text), problem: None, replay: None }
+    }
+
+    /// The answer is an instant to replay.
+    pub fn for_replay(self, selected: Option<Timestamp>) -> Prompt {
+        Prompt { replay: Some(selected), ..self }
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
-            match tabs.shown_mut().on_text(cx, &self.line.text()) {
+            let text = self.line.text();
+            let taken = match self.replay {
+                Some(selected) => replay::typed(cx, &text, selected),
+                None => tabs.shown_mut().on_text(cx, &text),
+            };
+            match taken {
                 Ok(acts) => return Next::Do(acts),
                 Err(problem) => self.problem = Some(problem),
             }

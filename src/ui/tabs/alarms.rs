@@ -32,6 +32,7 @@ use filter::Filter;
 use handover::Handover;
 pub use handover::suppressed_words;
 use journal::Journal;
+pub use journal::action_text;
 use keys::Action;
 use metrics::Metrics;
 
@@ -142,6 +143,10 @@ impl TabView for Alarms {
         let mut keys = keys::table(self.page);
         hide(&mut keys, &lacking);
         [keys::everywhere(self.page), hints(&keys)].concat()
+    }
+
+    fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
+        self.selected(cx).map(|alarm| alarm.raised_at)
     }
 
     fn back(&mut self, _cx: &ViewContext) -> bool {

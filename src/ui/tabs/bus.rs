@@ -60,7 +60,12 @@ impl Page {
 
     /// Those that there are here.
     fn offered(cx: &ViewContext) -> &'static [Page] {
-        if cx.def().is_bench() { &Page::ALL[..4] } else { &Page::ALL }
+        // Of the past only what the history has of a line.
+        match (cx.is_past(), cx.def().is_bench()) {
+            (true, _) => &Page::ALL[..1],
+            (false, true) => &Page::ALL[..4],
+            (false, false) => &Page::ALL,
+        }
     }
 
     fn title(self) -> &'static str {
@@ -106,16 +111,17 @@ impl TabView for Bus {
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        if self.page == Page::Registers && self.registers.handles(cx, event) {
+        if self.page(cx) == Page::Registers && self.registers.handles(cx, event) {
             return self.registers.on_key(&below(cx), event);
         }
-        let action = find(&table(cx, self.page), event);
+        let action = find(&table(cx, self.page(cx)), event);
         let (Some(action), Some(at)) = (action, LineView::new(cx, self.line)) else { return Vec::new() };
         self.frames.dismiss();
         match action {
+            Action::Turn(_) | Action::Show(_) if cx.is_past() => {}
             Action::Turn(by) => {
                 let pages = Page::offered(cx);
-                self.show(cx, &at, pages[around(self.page as usize, by, pages.len())]);
+                self.show(cx, &at, pages[around(self.page(cx) as usize, by, pages.len())]);
             }
             Action::Show(page) => self.show(cx, &at, page),
             Action::NextLine => self.choose_line(cx, 1),
@@ -139,17 +145,17 @@ impl TabView for Bus {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        if self.page == Page::Registers && self.registers.has_graph() {
+        if self.page(cx) == Page::Registers && self.registers.has_graph() {
             return self.registers.hints(&below(cx));
         }
-        let mut keys = table(cx, self.page);
+        let mut keys = table(cx, self.page(cx));
         let is_testing = LineView::new(cx, self.line).is_some_and(|at| at.is_testing());
         hide(&mut keys, &[(Action::Stop, !is_testing)]);
         if 1 < cx.def().lines.len() {
             keys.iter_mut().filter(|key| key.action == Action::NextLine).for_each(|key| key.label = "line");
         }
         let mut hints = hints(&keys);
-        if self.page == Page::Registers {
+        if self.page(cx) == Page::Registers {
             hints.extend(self.registers.hints(&below(cx)));
         }
         hints
@@ -157,17 +163,17 @@ impl TabView for Bus {
 
     fn back(&mut self, cx: &ViewContext) -> bool {
         self.frames.dismiss();
-        if self.page == Page::Registers {
+        if self.page(cx) == Page::Registers {
             if !self.registers.back(cx) {
                 self.page = Page::Line;
             }
             return true;
         }
-        LineView::new(cx, self.line).is_some_and(|at| self.page == Page::Frames && self.frames.back(cx, &at))
+        LineView::new(cx, self.line).is_some_and(|at| self.page(cx) == Page::Frames && self.frames.back(cx, &at))
     }
 
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
-        match (self.page, LineView::new(cx, self.line)) {
+        match (self.page(cx), LineView::new(cx, self.line)) {
             (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
             (Page::Frames, Some(_)) => self.frames.drawn_rows(),
             (Page::Line | Page::Plan | Page::Frames | Page::Test | Page::Registers, _) => Rows::default(),
@@ -175,16 +181,16 @@ impl TabView for Bus {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if let (Page::Frames, Some(at)) = (self.page, LineView::new(cx, self.line)) {
+        if let (Page::Frames, Some(at)) = (self.page(cx), LineView::new(cx, self.line)) {
             self.frames.follow(cx, &at);
         }
-        match self.page {
+        match self.page(cx) {
             Page::Plan | Page::Frames | Page::Test => return Vec::new(),
             Page::Registers => return self.registers.on_snapshot(&below(cx)),
             Page::Line => {}
         }
         let (number, query) = ((Tab::Bus, &mut self.registers.number), line_trend::query(self.line, cx.now));
-        self.minutes.query.ask(cx, number, ASK_EVERY, TIMEOUT, query).into_iter().collect()
+        self.minutes.ask(cx, number, ASK_EVERY, TIMEOUT, query).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
@@ -195,7 +201,7 @@ impl TabView for Bus {
         if self.registers.awaits(number) {
             let next = self.registers.on_answer(&below(cx), number, answer);
             // Nothing is read where nothing is seen; the page asks when it is shown.
-            return if self.page == Page::Registers { next } else { self.registers.rest() };
+            return if self.page(cx) == Page::Registers { next } else { self.registers.rest() };
         }
         self.minutes.on_answer(cx, number, &answer);
         Vec::new()
@@ -206,7 +212,7 @@ impl TabView for Bus {
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        if self.page == Page::Registers {
+        if self.page(cx) == Page::Registers {
             return self.registers.on_text(&below(cx), text);
         }
         self.frames.set_filter(text).map(|()| Vec::new())
@@ -226,7 +232,7 @@ impl TabView for Bus {
         self.heading(cx, &at, &mut canvas);
         let (width, height) = (canvas.width(), canvas.height());
         let mut page = canvas.part(0, 1, width, height.saturating_sub(1));
-        match self.page {
+        match self.page(cx) {
             Page::Line => {
                 let rows = line::rows(cx, &at, width);
                 rows::draw(cx, &mut page, &rows, self.scroll.first(rows.len(), self.room(cx) - 1));
@@ -250,6 +256,11 @@ impl TabView for Bus {
 }
 
 impl Bus {
+    /// The page that is shown: of the past there is one.
+    fn page(&self, cx: &ViewContext) -> Page {
+        if cx.is_past() { Page::Line } else { self.page }
+    }
+
     /// Rows that a page has below the heading.
     fn room(&self, cx: &ViewContext) -> usize {
         usize::from(cx.area.height.saturating_sub(1)).max(2)
@@ -280,7 +291,7 @@ impl Bus {
 
     fn scroll(&mut self, cx: &ViewContext, at: &LineView, motion: Motion) {
         let room = self.room(cx);
-        match (self.page, motion) {
+        match (self.page(cx), motion) {
             (Page::Line, Motion::Rows(by)) if 1 < cx.def().lines.len() => self.choose_line(cx, by),
             (Page::Line, _) => self.scroll.on(motion, line::rows(cx, at, cx.area.width).len(), room - 1),
             (Page::Plan, _) => self.plan.scroll(at, motion, room),
@@ -292,7 +303,7 @@ impl Bus {
     }
 
     fn open(&mut self, cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
-        match self.page {
+        match self.page(cx) {
             Page::Line => Vec::new(),
             Page::Plan => self.plan.open(at).into_iter().collect(),
             Page::Frames => self.frames.open(at).into_iter().collect(),
@@ -305,7 +316,7 @@ impl Bus {
     fn heading(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
         let mut x = 1;
         for page in Page::offered(cx) {
-            let shown = *page == self.page;
+            let shown = *page == self.page(cx);
             let text = if shown { format!("‹{}›", page.title()) } else { format!(" {} ", page.title()) };
             x = canvas.text(x, 0, &text, if shown { cx.theme.focus() } else { cx.theme.dim() });
         }

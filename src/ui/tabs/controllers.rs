@@ -104,6 +104,7 @@ impl TabView for Controllers {
             Action::Open => return self.open_selected(cx, device),
             Action::Program if device.program.is_some() => self.page = Page::Program,
             Action::Program => return notice(device, t!("this device has no ramp/soak program")),
+            Action::Sets if cx.is_past() => return notice(device, t!("parameter sets are shown in the present only")),
             Action::Sets => (self.page, self.set) = (Page::Sets, 0),
             Action::Find => {
                 self.asked_for = Asked::Filter;
@@ -196,12 +197,15 @@ impl TabView for Controllers {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if cx.is_past() && matches!(self.page, Page::Sets | Page::Compare(_)) {
+            self.page = Page::Device;
+        }
         let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
         let Some(faceplate) = faceplate.filter(|_| self.page == Page::Device) else { return Vec::new() };
         let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
         let query = Query::Series { tags: vec![faceplate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
         let number = (Tab::Controllers, &mut self.asked);
-        self.trend.query.ask(cx, number, TREND_EVERY, TIMEOUT, query).into_iter().collect()
+        self.trend.ask(cx, number, TREND_EVERY, TIMEOUT, query).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {

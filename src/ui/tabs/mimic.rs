@@ -77,7 +77,7 @@ impl TabView for Mimic {
             let from = cx.now - SignedDuration::try_from(*window).ok()?;
             let buckets = usize::from(scale(cx, cx.area).place(*place).width.max(1)) * 2;
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
-            trend.query.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
+            trend.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
         });
         asks.collect()
     }

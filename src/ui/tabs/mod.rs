@@ -3,7 +3,7 @@
 pub(crate) mod alarms;
 pub(crate) mod bus;
 pub(crate) mod controllers;
-mod draw;
+pub(super) mod draw;
 mod periodic_query;
 mod prelude;
 pub(crate) mod registers;
@@ -17,10 +17,11 @@ pub(crate) mod users;
 use std::path::PathBuf;
 
 use crossterm::event::KeyEvent;
+use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use super::{
-    Effect, QueryId, UiAction, ViewContext,
+    Effect, UiAction, ViewContext,
     keys::{self, Hint},
     last_frame::Rows,
     session_lock,
@@ -79,6 +80,11 @@ pub trait TabView {
     /// where they are in the plant file.
     fn fingerprint(&self, _cx: &ViewContext) -> Rows {
         Rows::default()
+    }
+
+    /// The past moment that is selected, for a replay to begin at.
+    fn moment(&self, _cx: &ViewContext) -> Option<Timestamp> {
+        None
     }
 
     /// Esc: a step back, `false` where there is none.
@@ -211,13 +217,18 @@ impl Tab {
             .into_iter()
             .filter(|tab| tab.is_of_bench() || !cx.def().is_bench())
             .filter(|tab| *tab != Tab::Bus || !cx.def().lines.is_empty())
-            .filter(|tab| tab.is_offered(cx))
+            .filter(|tab| tab.is_offered(cx) && (tab.has_past() || !cx.is_past()))
             .collect()
     }
 
     /// The tab that a terminal begins with.
     pub fn home(def: &PlantDef) -> Tab {
         if def.is_bench() { Tab::Registers } else { Tab::Mimic }
+    }
+
+    /// Does it show the plant, so that it can show it as it was? A report is of a period of its own.
+    pub fn has_past(self) -> bool {
+        matches!(self, Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Bus)
     }
 
     /// Has it something to show where no plant file says what the registers of a device mean?
@@ -257,8 +268,8 @@ impl Tabs {
         let logged = if logging { self.registers.on_snapshot(cx) } else { Vec::new() };
         logged.into_iter().chain(self.shown_mut().on_snapshot(cx)).collect()
     }
-    /// Does the tab that asked still wait for the answer?
-    pub fn awaits(&self, id: QueryId) -> bool {
-        self.of(id.tab).awaits(id.number)
+    /// Does a tab still wait for the answer to its query?
+    pub fn awaits(&self, tab: Tab, number: u32) -> bool {
+        self.of(tab).awaits(number)
     }
 }

@@ -32,6 +32,8 @@ pub struct PeriodicQuery {
     wanted: bool,
     /// The operator did not wait for the last one.
     cancelled: bool,
+    /// The past that the last one was for.
+    past: Option<Timestamp>,
 }
 
 impl PeriodicQuery {
@@ -61,6 +63,13 @@ impl PeriodicQuery {
         timeout: SignedDuration,
         query: Query,
     ) -> Option<UiAction> {
+        let past = cx.is_past().then_some(cx.now);
+        if past.is_some() != self.past.is_some() {
+            // What is on its way is of the present, and a past is shown, or the other way round.
+            self.on_way = None;
+        }
+        self.wanted |= past != self.past;
+        self.past = past;
         self.due(cx.steady(), every, timeout).then(|| {
             *number = number.wrapping_add(1);
             self.asked(*number, cx.steady());
@@ -105,6 +114,7 @@ impl PeriodicQuery {
             took: self.took,
             wanted: false,
             cancelled: false,
+            past: self.past,
         };
     }
 
@@ -149,6 +159,21 @@ impl<T> Default for Answered<T> {
 }
 
 impl<T: FromAnswer> Answered<T> {
+    /// The query, if it is due; what was answered of the present does not stay on the screen in the past.
+    pub fn ask(
+        &mut self,
+        cx: &ViewContext,
+        number: (Tab, &mut u32),
+        every: SignedDuration,
+        timeout: SignedDuration,
+        query: Query,
+    ) -> Option<UiAction> {
+        if cx.is_past() != self.query.past.is_some() {
+            (self.value, self.trouble) = (None, None);
+        }
+        self.query.ask(cx, number, every, timeout, query)
+    }
+
     /// Takes the answer to query `number` if it is waited for.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.query.answered(number, cx.steady()).is_none() {

@@ -9,7 +9,7 @@ pub(super) use ratatui::{Frame, layout::Rect, style::Style};
 pub(super) use super::{
     Tab, TabView,
     draw::{self, around, open, row_style},
-    periodic_query::{Answered, PeriodicQuery, real},
+    periodic_query::{Answered, FromAnswer, PeriodicQuery, real},
     reports::period,
 };
 pub(super) use crate::{

@@ -278,7 +278,7 @@ impl Reports {
         }
         let Some(period) = self.period.clone() else { return Vec::new() };
         let number = (Tab::Reports, &mut self.number);
-        let query = self.report.query.ask(cx, number, every, real(cx, TIMEOUT_S), Query::Report { period });
+        let query = self.report.ask(cx, number, every, real(cx, TIMEOUT_S), Query::Report { period });
         query.into_iter().collect()
     }
 

@@ -56,6 +56,8 @@ pub struct Trends {
     /// Right edge of a view of the past; `None` is the present.
     end: Option<Timestamp>,
     cursor: Option<Timestamp>,
+    /// The instant of the replay that it follows.
+    replayed: Option<Timestamp>,
     /// The list of values instead of the curves: first row shown, row selected.
     values: Option<(usize, usize)>,
     /// When the tab last got a snapshot.
@@ -85,15 +87,16 @@ impl TabView for Trends {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.follow_replay(cx);
         // Either way: the time of a snapshot may lie a little before what was guessed until it came.
-        let away = |seen: Timestamp| cx.now.duration_since(seen).abs() > real(cx, UNSEEN_S);
+        let away = |seen: Timestamp| cx.present().duration_since(seen).abs() > real(cx, UNSEEN_S);
         let unseen = self.seen.is_none_or(away);
         if unseen {
             self.traces.clear();
             self.moved();
             self.hours.query.want();
         }
-        self.seen = Some(cx.now);
+        self.seen = Some(cx.present());
         self.push_live(cx);
         self.ask(cx)
     }
@@ -115,6 +118,10 @@ impl TabView for Trends {
         self.ask(cx)
     }
 
+    fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
+        self.cursor(cx)
+    }
+
     fn back(&mut self, cx: &ViewContext) -> bool {
         let cancelled = [&mut self.curves, &mut self.hours.query].map(|query| query.cancel(cx));
         cancelled.contains(&true)
@@ -129,8 +136,8 @@ impl TabView for Trends {
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        let asked = period::typed(cx.def(), text, cx.now)?;
-        if asked.to < cx.now {
+        let asked = period::typed(cx.def(), text, cx.present())?;
+        if asked.to < cx.present() {
             self.window = nearest(asked.to.duration_since(asked.from));
             (self.accumulate, self.since, self.end) = (false, None, Some(asked.to));
             self.moved();
@@ -169,6 +176,7 @@ impl Trends {
                 self.hours.query.want();
             }
             (Some(_), _) => {}
+            (None, Action::Side(by)) if cx.is_past() => return self.replayed_step(cx, by),
             (None, Action::Side(by)) => self.step(cx, by),
             (None, Action::Move(Motion::Pages(by))) => self.pan(cx, 4 * by),
             (None, Action::Move(motion)) => self.selected = motion.to(self.selected, self.pens(cx).len(), 1),
@@ -211,14 +219,44 @@ impl Trends {
         }
         let (window, end) = around((from, to));
         (self.accumulate, self.since, self.cursor) = (false, None, None);
-        (self.window, self.end) = (window, Some(end).filter(|end| *end < cx.now));
+        (self.window, self.end) = (window, Some(end).filter(|end| *end < cx.present()));
         self.moved();
+    }
+
+    /// While a past is shown its instant is in the view with the cursor on it; the present comes back with it.
+    fn follow_replay(&mut self, cx: &ViewContext) {
+        let instant = cx.is_past().then_some(cx.now);
+        if instant == self.replayed {
+            return;
+        }
+        self.replayed = instant;
+        match instant {
+            // Small steps move the cursor, not the curves.
+            Some(at) if self.end.is_some() && self.span(cx).holds(at) => self.cursor = Some(at),
+            Some(at) => self.go_to_moment(cx, at),
+            None => {
+                (self.end, self.cursor) = (None, None);
+                self.moved();
+            }
+        }
+    }
+
+    /// The instant of the replay a cell further to a side.
+    fn replayed_step(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
+        let cell = self.cell(cx) * i32::try_from(by).unwrap_or_default();
+        let to = cx.now.checked_add(cell).unwrap_or(cx.now).min(cx.present());
+        vec![UiAction::Replay(to)]
+    }
+
+    /// The width of a cell of the chart.
+    fn cell(&self, cx: &ViewContext) -> SignedDuration {
+        self.span(cx).width() / i32::from(cx.area.width.saturating_sub(12).max(10))
     }
 
     /// Puts the cursor on a moment, and a quarter of the window after it.
     fn go_to_moment(&mut self, cx: &ViewContext, at: Timestamp) {
         let after = SignedDuration::from_secs(WINDOWS[self.window]) / 4;
-        let end = at.checked_add(after).ok().filter(|end| *end < cx.now);
+        let end = at.checked_add(after).ok().filter(|end| *end < cx.present());
         (self.accumulate, self.since, self.end, self.cursor) = (false, None, end, Some(at));
         self.moved();
     }
@@ -242,10 +280,10 @@ impl Trends {
         let columns = chart::dots(cx.theme, cx.area.width, units.len());
         match (self.accumulate, self.end) {
             (true, None) => {
-                let day = midnight(cx.now, &cx.def().time_zone);
-                View::since(self.since.map_or(day, |since| since.max(day)), cx.now, columns)
+                let day = midnight(cx.present(), &cx.def().time_zone);
+                View::since(self.since.map_or(day, |since| since.max(day)), cx.present(), columns)
             }
-            (_, None) => View::live(cx.now, WINDOWS[self.window], columns),
+            (_, None) => View::live(cx.present(), WINDOWS[self.window], columns),
             (_, Some(end)) => View::ending(end, WINDOWS[self.window], columns),
         }
     }
@@ -253,7 +291,7 @@ impl Trends {
     /// The cursor, kept on the screen.
     fn cursor(&self, cx: &ViewContext) -> Option<Timestamp> {
         let view = self.span(cx);
-        let last = view.to.min(cx.now).checked_sub(SignedDuration::from_micros(1)).unwrap_or(view.to);
+        let last = view.to.min(cx.present()).checked_sub(SignedDuration::from_micros(1)).unwrap_or(view.to);
         self.cursor.map(|at| at.min(last).max(view.from))
     }
 
@@ -261,8 +299,7 @@ impl Trends {
     fn step(&mut self, cx: &ViewContext, by: isize) {
         let Some(at) = self.cursor(cx) else { return self.pan(cx, by) };
         let view = self.span(cx);
-        let cell = view.width() / i32::from(cx.area.width.saturating_sub(12).max(10));
-        let to = at.checked_add(cell * i32::try_from(by).unwrap_or_default()).unwrap_or(at);
+        let to = at.checked_add(self.cell(cx) * i32::try_from(by).unwrap_or_default()).unwrap_or(at);
         if to < view.from || (to >= view.to && self.end.is_some()) {
             self.pan(cx, by);
         }
@@ -272,13 +309,13 @@ impl Trends {
 
     /// Moves the view by quarters; a view of the whole day becomes a window.
     fn pan(&mut self, cx: &ViewContext, quarters: isize) {
-        let end = self.end.unwrap_or(cx.now);
+        let end = self.end.unwrap_or(cx.present());
         if self.accumulate {
             self.window = nearest(self.span(cx).width());
             self.accumulate = false;
         }
         let by = SignedDuration::from_secs(WINDOWS[self.window]) / 4 * i32::try_from(quarters).unwrap_or_default();
-        self.end = pan(end, by, cx.now);
+        self.end = pan(end, by, cx.present());
         self.moved();
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{model, screen, type_keys};
+use super::{model, replay::replayed, screen, type_keys};
 use crate::{
     text::{Language, translate},
     ui::{fixture::Fixture, tabs::Tab, theme::Theme, widgets::text::take_overwritten},
@@ -94,6 +94,13 @@ fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
                 type_keys(&mut model, keys);
                 let shown = screen(&mut model, width, height);
                 check(&fixture, &format!("{tab:?} {keys:?} {width}x{height}"), &shown);
+            }
+            for (keys, (width, height)) in ["", "?"].iter().flat_map(|keys| SIZES.map(|size| (keys, size))) {
+                let mut model = replayed(&fixture, tab);
+                model.language = Language::Pseudo;
+                type_keys(&mut model, keys);
+                let shown = screen(&mut model, width, height);
+                check(&fixture, &format!("{tab:?} {keys:?} {width}x{height} in the past"), &shown);
             }
         }
     }

@@ -69,7 +69,7 @@ fn sent_request(effects: &[Effect]) -> Option<&SessionRequest> {
 }
 
 fn answer(model: &mut Model, answer: Result<(), &str>) {
-    let id = QueryId { tab: Tab::Login, number: model.session_lock.last_request };
+    let id = QueryId { tab: Some(Tab::Login), number: model.session_lock.last_request };
     update(model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
 }
 
@@ -105,7 +105,7 @@ fn the_login_page_in_every_mood() {
 #[test]
 fn what_was_granted_and_is_not_on_disk_is_shown_as_not_recorded() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Supervisor));
-    let id = QueryId { tab: Tab::Users, number: model.session_lock.last_request };
+    let id = QueryId { tab: Some(Tab::Users), number: model.session_lock.last_request };
     update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
     assert!(!screen(&mut model, 80, 24).contains("RECORDED"));
     update(&mut model, Msg::RequestDone(id, Ok(Durability::NotRecorded)));
@@ -273,7 +273,7 @@ fn the_users_and_what_can_be_done_with_them() {
         let mut model = with(&Fixture::normal(), supervisor());
         let effects = type_keys(&mut model, keys);
         assert_eq!(sent_request(&effects), Some(&expect), "{keys}");
-        let id = QueryId { tab: Tab::Users, number: model.session_lock.last_request };
+        let id = QueryId { tab: Some(Tab::Users), number: model.session_lock.last_request };
         update(&mut model, Msg::RequestDone(id, Err("at least one Supervisor must remain".to_owned())));
         shows(&mut model, "at least one Supervisor must remain");
         update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
@@ -348,7 +348,7 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
     assert_eq!((words.as_str(), by.as_str(), action.as_str()), ("pump", "", ""));
     // The next search goes out at once, and an answer to the older one is not shown.
     let (_, words, by, ..) = asked(&type_keys(&mut model, "bto⏎")).expect("a query");
-    let older = QueryId { tab: Tab::Users, number: query.0.number + 1 };
+    let older = QueryId { tab: Some(Tab::Users), number: query.0.number + 1 };
     update(&mut model, Msg::Answer(older, Ok(Answer::Actions(Vec::new()))));
     assert!(screen(&mut model, 80, 24).contains("collecting data"));
     assert_eq!((words.as_str(), by.as_str()), ("pump", "to"));

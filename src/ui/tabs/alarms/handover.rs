@@ -69,8 +69,9 @@ impl Handover {
         let shown = self.period(cx)?;
         // What the shift before wrote down is for this one.
         let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
-        let query = Query::Actions { from, to: shown.to, limit: ROWS };
-        span::ask(cx, &mut self.actions.query, number, EVERY_S, Some(&shown), query)
+        let to = if cx.is_past() { shown.to.min(cx.now) } else { shown.to };
+        let query = Query::Actions { from, to, limit: ROWS };
+        span::ask(cx, &mut self.actions, number, EVERY_S, Some(&shown), query)
     }
 
     /// Draws it.

@@ -82,9 +82,9 @@ impl Journal {
         let to = cx.now + SignedDuration::from_secs(1);
         let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
         let limit = self.limit();
-        let mut ask = |periodic, query| span::ask(cx, periodic, number, EVERY_S, self.period.as_ref(), query);
-        let alarms = ask(&mut self.alarms.query, Query::Journal { from, to, limit });
-        let actions = ask(&mut self.actions.query, Query::Actions { from, to, limit });
+        let (alarms, actions) = (Query::Journal { from, to, limit }, Query::Actions { from, to, limit });
+        let alarms = span::ask(cx, &mut self.alarms, number, EVERY_S, self.period.as_ref(), alarms);
+        let actions = span::ask(cx, &mut self.actions, number, EVERY_S, self.period.as_ref(), actions);
         alarms.into_iter().chain(actions).collect()
     }
 
@@ -136,7 +136,7 @@ impl Journal {
     /// Alarms and operator actions in one list, newest first.
     fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
         let (alarms, actions) = self.records();
-        let alarms = alarms.iter().map(|row| (row.at, alarm_words(cx, row), cx.theme.normal()));
+        let alarms = alarms.iter().map(|row| (row.at, alarm_text(cx, row), cx.theme.normal()));
         let actions = actions.iter().map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
         let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.words.fit(text)).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.0));
@@ -144,7 +144,7 @@ impl Journal {
     }
 }
 
-fn alarm_words(cx: &ViewContext, row: &AlarmRecord) -> String {
+fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     // A state by its word, a number with its decimals, as everywhere else.
     let shown = |value: f64| match cx.def().tag_named(&row.subject) {
         Some(tag) => format!(" {}", cx.snapshot.format(tag, value)),

@@ -45,14 +45,21 @@ impl Metrics {
 
     /// Asks the history for a chosen shift if it is time.
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
-        let period = self.period.as_ref()?;
-        let query = Query::AlarmMetrics { from: period.from, to: period.to };
-        span::ask(cx, &mut self.figures.query, number, EVERY_S, Some(period), query)
+        let period = self.period(cx)?;
+        let to = if cx.is_past() { period.to.min(cx.now) } else { period.to };
+        let query = Query::AlarmMetrics { from: period.from, to };
+        span::ask(cx, &mut self.figures, number, EVERY_S, Some(&period), query)
+    }
+
+    /// The period that the history is asked for: the chosen one; of a past instant the 24 hours before it.
+    fn period(&self, cx: &ViewContext) -> Option<Period> {
+        let day = || Period::free(cx.now.checked_sub(SignedDuration::from_secs(24 * 3_600)).unwrap_or(cx.now), cx.now);
+        self.period.clone().or_else(|| cx.is_past().then(day))
     }
 
     /// The figures shown: of the chosen shift, or of the last 24 hours.
     fn figures<'a>(&'a self, cx: &ViewContext<'a>) -> Option<&'a PeriodMetrics> {
-        match self.period {
+        match self.period(cx) {
             Some(_) => self.figures.value.as_deref(),
             None => Some(&cx.snapshot.alarm_metrics.day),
         }
@@ -62,10 +69,12 @@ impl Metrics {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
-        let x = canvas.text(1, 0, t!("Now  "), theme.strong());
-        let (words, flood) = now_text(cx);
-        canvas.text(x, 0, &words, if flood { theme.trouble() } else { theme.normal() });
-        let what = match &self.period {
+        if !cx.is_past() {
+            let x = canvas.text(1, 0, t!("Now  "), theme.strong());
+            let (words, flood) = now_text(cx);
+            canvas.text(x, 0, &words, if flood { theme.trouble() } else { theme.normal() });
+        }
+        let what = match &self.period(cx) {
             None => t!("last 24 hours").to_owned(),
             Some(period) => period::words(cx, period),
         };

@@ -7,15 +7,15 @@ use crate::ui::tabs::prelude::*;
 const TIMEOUT_S: f64 = 30.0;
 
 /// The query, if it is due: every `seconds` for what is still going on, once in a while for the past.
-pub fn ask(
+pub fn ask<T: FromAnswer>(
     cx: &ViewContext,
-    periodic: &mut PeriodicQuery,
+    answered: &mut Answered<T>,
     number: &mut u32,
     seconds: f64,
     shown: Option<&Period>,
     query: Query,
 ) -> Option<UiAction> {
-    let past = shown.is_some_and(|shown| shown.to <= cx.now);
+    let past = shown.is_some_and(|shown| shown.to <= cx.present());
     let every = real(cx, if past { 20.0 * seconds } else { seconds });
-    periodic.ask(cx, (Tab::Alarms, number), every, real(cx, TIMEOUT_S), query)
+    answered.ask(cx, (Tab::Alarms, number), every, real(cx, TIMEOUT_S), query)
 }

@@ -87,7 +87,7 @@ impl Batches {
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
         let to = cx.now + SignedDuration::from_secs(1);
         let query = Query::Batches { from: to - SPAN, to, limit: ROWS };
-        self.rows.query.ask(cx, (Tab::Reports, number), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
+        self.rows.ask(cx, (Tab::Reports, number), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
     }
 
     /// Rows of the list on a tab of this height: the rest is about the selected batch.

@@ -48,7 +48,7 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         for effect in update(&mut self.model, msg) {
             match effect {
-                Effect::Query(id, query) if id.tab == Tab::Reports => self.asked.push((id, query)),
+                Effect::Query(id, query) if id.tab == Some(Tab::Reports) => self.asked.push((id, query)),
                 Effect::SaveReport { path, bytes, .. } => self.saved.push((path, bytes)),
                 Effect::SessionRequest(id, SessionRequest::Exported { file, sha256 }) => {
                     assert_eq!((file.ends_with(".csv"), sha256.len()), (true, 64));
@@ -269,10 +269,10 @@ fn a_report_that_takes_long_says_so_and_is_cancelled() {
     assert!(stand.screen().contains("collecting data") && !stand.screen().contains("Esc cancels"));
     stand.send(silent(30));
     assert!(stand.screen().contains("reading for 3 s of at most 20 s, Esc cancels"));
-    assert!(stand.model.tabs.awaits(id));
+    assert!(stand.model.tabs.reports.awaits(id.number));
     stand.press("⎋");
     assert!(stand.screen().contains("cancelled"));
-    assert!(!stand.model.tabs.awaits(id), "the history need not work on it");
+    assert!(!stand.model.tabs.reports.awaits(id.number), "the history need not work on it");
     stand.asked.clear();
     stand.send(silent(90));
     assert!(stand.asked.is_empty(), "a closed shift is not asked for again by itself");

@@ -5,6 +5,9 @@ use super::*;
 impl Trends {
     /// Appends what the snapshot knows to the curves of the shown group.
     pub(super) fn push_live(&mut self, cx: &ViewContext) {
+        if cx.is_past() {
+            return;
+        }
         for pen in self.pens(cx) {
             let sample = cx.snapshot.sample(pen.tag);
             let value = sample.good_value();
@@ -41,7 +44,7 @@ impl Trends {
 
     /// Asks what is due.
     pub(super) fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let (now, timeout, view) = (cx.now, real(cx, TIMEOUT_S), self.span(cx));
+        let (now, timeout, view) = (cx.present(), real(cx, TIMEOUT_S), self.span(cx));
         let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);
         // A curve of wide columns does not change its shape at every update; its newest values come live.
@@ -52,24 +55,21 @@ impl Trends {
         let to = view.to.min(now);
         let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
-        let mut due = |periodic: &mut PeriodicQuery, every, query| {
-            acts.extend(periodic.ask(cx, (Tab::Trends, &mut self.asked), every, timeout, query));
-        };
         if self.values.is_none() && !group.is_empty() {
-            due(&mut self.curves, often, series(&group, view.from, view.to, view.columns));
-            due(
-                &mut self.raised.query,
-                often.max(real(cx, 10.0)),
-                Query::Journal { from: view.from, to, limit: MARKS_MAX },
-            );
+            let curves = series(&group, view.from, view.to, view.columns);
+            acts.extend(self.curves.ask(cx, (Tab::Trends, &mut self.asked), often, timeout, curves));
+            let raised = Query::Journal { from: view.from, to, limit: MARKS_MAX };
+            let every = often.max(real(cx, 10.0));
+            acts.extend(self.raised.ask(cx, (Tab::Trends, &mut self.asked), every, timeout, raised));
         }
         let tags = match self.values {
             Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
             None => group,
         };
-        let hour = View::ending(now, 3_600, HOUR_COLUMNS);
+        let hour = View::ending(cx.now, 3_600, HOUR_COLUMNS);
         if !tags.is_empty() {
-            due(&mut self.hours.query, real(cx, 20.0), series(&tags, hour.from, hour.to, HOUR_COLUMNS));
+            let hours = series(&tags, hour.from, hour.to, HOUR_COLUMNS);
+            acts.extend(self.hours.ask(cx, (Tab::Trends, &mut self.asked), real(cx, 20.0), timeout, hours));
         }
         acts
     }

@@ -66,7 +66,7 @@ impl Stand {
     fn send(&mut self, msg: Msg) {
         let effects = update(&mut self.model, msg);
         self.asked.extend(effects.into_iter().filter_map(|effect| match effect {
-            Effect::Query(id, query) if id.tab == Tab::Trends => Some((id, query)),
+            Effect::Query(id, query) if id.tab == Some(Tab::Trends) => Some((id, query)),
             _ => None,
         }));
     }

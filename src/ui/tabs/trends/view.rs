@@ -84,7 +84,7 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     };
     x = canvas.text(x + 3, 0, &window, theme.normal());
     let (time, style) = match trends.end {
-        Some(_) => (t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.now, zone)), theme.focus()),
+        Some(_) => (t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.present(), zone)), theme.focus()),
         None if trends.ended => (t!("end of the log").to_owned(), theme.normal()),
         None if theme.glyphs == Glyphs::Braille => (t!("live ●").to_owned(), theme.normal()),
         None => (t!("live *").to_owned(), theme.normal()),
@@ -133,7 +133,7 @@ fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
         zone: &cx.def().time_zone,
         from: view.from,
         to: view.to,
-        now: cx.now,
+        now: cx.present(),
         curves: trends.drawn(cx).into_iter().map(curve).collect(),
         cursor: None,
         marks: marks.map(|record| (record.at, cx.theme.severity(record.priority))).collect(),
@@ -143,7 +143,7 @@ fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
 /// The time at the cursor with the value of every pen; only the time where that is too wide, the legend has the values.
 fn readout<'a>(trends: &Trends, cx: &ViewContext, at: Timestamp, room: u16) -> Line<'a> {
     let zone = &cx.def().time_zone;
-    let mut line = Line::from(Span::styled(moment_exact(at, cx.now, zone), cx.theme.strong()));
+    let mut line = Line::from(Span::styled(moment_exact(at, cx.present(), zone), cx.theme.strong()));
     let time = line.clone();
     for (n, pen) in trends.drawn(cx) {
         let text = at_cursor(trends, cx, pen.tag, at).unwrap_or_else(|| "----".to_owned());

@@ -137,7 +137,7 @@ impl Audit {
         let (from, to) = self.period.as_ref().map_or((until - SPAN, until), |period| (period.from, period.to));
         let (words, by, action) = (self.words.clone(), self.who.clone(), self.action.clone());
         let query = Query::Audit { from, to, words, by, action, limit: ROWS };
-        self.rows.query.ask(cx, (Tab::Users, number), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
+        self.rows.ask(cx, (Tab::Users, number), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
     }
 
     /// The history answered query `number`; the selected entry stays selected, but at the top the newest one is.

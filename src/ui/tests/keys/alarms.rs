@@ -61,7 +61,7 @@ fn a_selected_alarm_stays_selected_when_the_list_moves() {
 fn the_journal_is_asked_only_while_it_is_shown() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     let asks = |effects: Vec<Effect>| {
-        effects.iter().filter(|effect| matches!(effect, Effect::Query(id, _) if id.tab == Tab::Alarms)).count()
+        effects.iter().filter(|effect| matches!(effect, Effect::Query(id, _) if id.tab == Some(Tab::Alarms))).count()
     };
     let tick = || Msg::Tick { silent: Duration::ZERO };
     assert_eq!(asks(type_keys(&mut model, "3")), 0);
@@ -69,7 +69,7 @@ fn the_journal_is_asked_only_while_it_is_shown() {
     for number in [1, 2] {
         update(
             &mut model,
-            Msg::Answer(crate::ui::QueryId { tab: Tab::Alarms, number }, Ok(Answer::Journal(Vec::new()))),
+            Msg::Answer(crate::ui::QueryId { tab: Some(Tab::Alarms), number }, Ok(Answer::Journal(Vec::new()))),
         );
     }
     let half = |n: u64| Msg::Tick { silent: Duration::from_millis(500 * n) };

@@ -29,7 +29,7 @@ fn page() -> (Model, Option<(QueryId, LiveRead)>) {
 fn registers_of_the_device_are_read_live() {
     let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
     let (id, read) = asked(type_keys(&mut model, "R")).expect("it is asked for");
-    assert_eq!((id.tab, read.line, read.unit, read.not_before), (Tab::Bus, L1, 1, None));
+    assert_eq!((id.tab, read.line, read.unit, read.not_before), (Some(Tab::Bus), L1, 1, None));
     let (mut model, next) = page();
     assert!(next.is_some_and(|(_, read)| read.not_before.is_some()), "again, a period later");
     for (width, height) in [(80, 24), (120, 40)] {

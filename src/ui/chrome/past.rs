@@ -1,0 +1,56 @@
+//! The frame of a past that is shown: which instant, how long ago, whether it plays, and what happened then.
+
+use super::{Canvas, Model, ViewContext, width};
+use crate::{
+    plant::{record::AlarmRecord, time::elapsed},
+    t,
+    text::translate,
+    ui::{
+        keys::Hint,
+        replay::{Event, stamp},
+        tabs::alarms::action_text,
+        widgets::text::age,
+    },
+};
+
+/// The line above or below the tab: of slashes while a past is shown.
+pub(super) fn line(cx: &ViewContext, canvas: &mut Canvas) {
+    let (sign, style) =
+        if cx.is_past() { (cx.theme.pick('╱', '/'), cx.theme.strong()) } else { ('─', cx.theme.dim()) };
+    canvas.run(0, 0, canvas.width(), sign, style);
+}
+
+/// The line above the tab, with the instant in it.
+pub(super) fn rule(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
+    line(cx, canvas);
+    let Some(shown) = model.replay.shown() else { return };
+    let at = stamp(cx, shown.at);
+    let ago = t!("{ago} ago", ago = age(elapsed(shown.at, cx.present())));
+    let pace = match model.replay.pace() {
+        0 => t!("paused").to_owned(),
+        pace => t!("playing ×{pace}", pace),
+    };
+    let words = [t!(" PAST  {at}  {ago}  {pace} ", at, ago, pace), t!(" PAST  {at} ", at)];
+    let Some(words) = words.iter().find(|words| width(words) + 4 <= canvas.width()) else { return };
+    canvas.text(3, 0, words, cx.theme.focus());
+}
+
+/// What the replay waits for, why it got nowhere, or the event that it went to.
+pub(super) fn words(model: &Model, cx: &ViewContext) -> Option<String> {
+    model.replay.words().or_else(|| {
+        let event = model.replay.event()?;
+        let text = match event {
+            Event::Alarm(AlarmRecord { subject, message, event, priority, by, .. }) => {
+                let by = by.as_ref().map(|by| t!(" by {by}", by)).unwrap_or_default();
+                format!("{} {subject} {message}  {}{by}", cx.theme.priority_mark(*priority), translate(event.word()))
+            }
+            Event::Action(record) => action_text(cx, record).split_whitespace().collect::<Vec<_>>().join(" "),
+        };
+        Some(text)
+    })
+}
+
+/// Keys of the tab that only look.
+pub(super) fn own_keys(model: &Model, cx: &ViewContext) -> Vec<Hint> {
+    model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none()).collect()
+}

@@ -1,0 +1,123 @@
+//! What the parts of a terminal may read: the plant as it is, or as it was at an instant that is shown instead.
+
+use std::{sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use ratatui::layout::Rect;
+
+use super::{Clock, Model, UiAction, chrome, extension::Extension, replay::Replay, tabs::Tabs, theme::Theme};
+use crate::{
+    access::SessionStatus,
+    plant::{def::PlantDef, snapshot::Snapshot, time::elapsed},
+};
+
+/// What every tab, window and widget may read.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewContext<'a> {
+    /// The plant.
+    pub snapshot: &'a Snapshot,
+    /// The looks.
+    pub theme: &'a Theme,
+    /// Plant time now: the snapshot's, carried on while none comes; the instant of a past that is shown.
+    pub now: Timestamp,
+    /// What time it really is while a past is shown.
+    pub present: Option<Timestamp>,
+    /// Counts half seconds; stands still in the past.
+    pub phase: u32,
+    /// Where the shown tab draws, for queries that depend on its width.
+    pub area: Rect,
+    /// State that the embedding command adds.
+    pub extension: Option<&'a dyn Extension>,
+    /// The session: user, role and lock.
+    pub session: &'a SessionStatus,
+}
+
+impl<'a> ViewContext<'a> {
+    /// The plant's definition.
+    pub fn def(&self) -> &'a PlantDef {
+        &self.snapshot.def
+    }
+    /// The phase in which unacknowledged alarms are reversed: half of every two seconds.
+    pub fn flash(&self) -> bool {
+        self.phase % 4 < 2
+    }
+    /// The time that no setting of a clock moves: for what is asked again after a while.
+    pub fn steady(&self) -> Timestamp {
+        self.present().checked_sub(self.snapshot.stepped).unwrap_or(self.now)
+    }
+    /// What time it really is.
+    pub fn present(&self) -> Timestamp {
+        self.present.unwrap_or(self.now)
+    }
+    /// Is a past shown instead of the present?
+    pub fn is_past(&self) -> bool {
+        self.present.is_some()
+    }
+    /// Age of a tag's sample now.
+    pub fn age(&self, tag: crate::plant::def::TagId) -> Duration {
+        elapsed(self.snapshot.sample(tag).at, self.now)
+    }
+}
+
+impl Model {
+    /// What the parts of the terminal may read.
+    pub fn cx(&self) -> ViewContext<'_> {
+        context(self, self.screen)
+    }
+
+    /// The same of the present, also while a past is shown.
+    pub fn present_cx(&self) -> ViewContext<'_> {
+        present_context(self, self.screen)
+    }
+}
+
+/// What the parts of a terminal of this size may read.
+pub(super) fn context(model: &Model, screen: Rect) -> ViewContext<'_> {
+    past_context(present_context(model, screen), &model.replay)
+}
+
+/// What the parts may read that always show the present.
+pub(super) fn present_context(model: &Model, screen: Rect) -> ViewContext<'_> {
+    let Model { snapshot, theme, clock, extension, session, .. } = model;
+    view_context(snapshot, theme, *clock, screen, extension, session)
+}
+
+/// A past instead of the present, if one is shown.
+pub(super) fn past_context<'a>(present: ViewContext<'a>, replay: &'a Replay) -> ViewContext<'a> {
+    match replay.shown() {
+        Some(past) => ViewContext {
+            snapshot: &past.snapshot,
+            now: past.at,
+            present: Some(present.now),
+            phase: if replay.pace() == 0 { 0 } else { present.phase },
+            ..present
+        },
+        None => present,
+    }
+}
+
+/// The same of parts of a model, while others of it change.
+pub(super) fn view_context<'a>(
+    snapshot: &'a Snapshot,
+    theme: &'a Theme,
+    clock: Clock,
+    screen: Rect,
+    extension: &'a Option<Arc<dyn Extension>>,
+    session: &'a SessionStatus,
+) -> ViewContext<'a> {
+    let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
+    let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
+    let area = chrome::layout(screen).body;
+    let extension = extension.as_deref();
+    ViewContext { snapshot, theme, now, present: None, phase: clock.phase, area, extension, session }
+}
+
+/// Lets the tabs change while they read the rest of the model.
+pub(super) fn with_tabs(
+    model: &mut Model,
+    change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>,
+) -> Vec<UiAction> {
+    let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
+    let present = view_context(snapshot, theme, *clock, *screen, extension, session);
+    change(tabs, &past_context(present, replay))
+}

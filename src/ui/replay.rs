@@ -1,0 +1,341 @@
+//! Replay: the plant as it was at past instants, on every tab that has a past; commands are refused meanwhile.
+//!
+//! What stands above the tab, header and banner, stays that of the present.
+
+mod search;
+
+use std::{collections::VecDeque, sync::Arc};
+
+use jiff::{SignedDuration, Timestamp};
+
+use super::{
+    Effect, Model, QueryId, UiAction, ViewContext,
+    keys::{Key, char, code},
+    modal::{Modal, Prompt},
+    tabs::{TabView, draw},
+};
+use crate::{
+    history::{Answer, HistoryError, Query},
+    plant::{
+        past::Past,
+        record::{ActionRecord, AlarmRecord},
+        snapshot::Snapshot,
+    },
+    report::period_parser,
+    t,
+};
+use crossterm::event::KeyCode;
+use search::Search;
+
+/// Half a second of playing is so many times as long in the plant; 0 is paused.
+const PACES: [i32; 5] = [0, 1, 10, 60, 600];
+/// Snapshots that are fetched ahead while playing.
+const AHEAD_MAX: usize = 3;
+/// What a key means while the past is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// The next or previous alarm event or action of an operator.
+    Event(Direction),
+    /// So many seconds on.
+    Step(i64),
+    /// Play, faster with each press, then pause.
+    Play,
+    /// Ask for an instant.
+    GoTo,
+    /// Back to the present.
+    Leave,
+}
+
+/// A direction in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// Towards the past.
+    Earlier,
+    /// Towards the present.
+    Later,
+}
+
+/// Keys while the past is shown; they come before those of the tab.
+pub const KEYS: &[Key<Action>] = &[
+    Key::new(char('['), "", "previous alarm event or action of an operator", Action::Event(Direction::Earlier)),
+    Key::new(char(']'), "event", "next alarm event or action of an operator", Action::Event(Direction::Later)),
+    Key::new(char('<'), "", "a minute earlier", Action::Step(-60)),
+    Key::new(char('>'), "minute", "a minute later", Action::Step(60)),
+    Key::new(char(','), "", "a second earlier; pauses", Action::Step(-1)),
+    Key::new(char('.'), "second", "a second later; pauses", Action::Step(1)),
+    Key::new(char('*'), "play", "play ×1, ×10, ×60, ×600, then pause", Action::Play),
+    Key::new(char('@'), "time", "go to a past time", Action::GoTo),
+    Key::new(code(KeyCode::Esc), "present", "back to the present", Action::Leave),
+];
+
+/// A past instant of the plant.
+#[derive(Debug)]
+pub struct Shown {
+    /// The instant.
+    pub at: Timestamp,
+    /// The plant at it.
+    pub snapshot: Arc<Snapshot>,
+}
+
+/// What happened at an instant.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// An alarm event.
+    Alarm(AlarmRecord),
+    /// An action of an operator.
+    Action(ActionRecord),
+}
+
+impl Event {
+    /// When.
+    pub fn at(&self) -> Timestamp {
+        match self {
+            Event::Alarm(record) => record.at,
+            Event::Action(record) => record.at,
+        }
+    }
+}
+
+/// Which past is shown, if any, and where it goes from there.
+#[derive(Debug, Default)]
+pub struct Replay {
+    shown: Option<Shown>,
+    /// The query for the instant that is to be shown next.
+    goal: Option<u32>,
+    search: Option<Search>,
+    /// The event that was gone to.
+    event: Option<Event>,
+    /// Place in [`PACES`].
+    pace: usize,
+    /// Instants that will be played, each with its query and its answer.
+    ahead: VecDeque<(Timestamp, u32, Option<Shown>)>,
+    /// Why the last query led nowhere.
+    trouble: Option<String>,
+    /// Queries asked so far.
+    asked: u32,
+}
+
+impl Replay {
+    /// The past that is shown; `None` is the present.
+    pub fn shown(&self) -> Option<&Shown> {
+        self.shown.as_ref()
+    }
+
+    /// How many times as fast as the plant it plays; 0 is paused.
+    pub fn pace(&self) -> i32 {
+        PACES[self.pace]
+    }
+
+    /// The event that was gone to, while its instant is shown.
+    pub fn event(&self) -> Option<&Event> {
+        self.event.as_ref().filter(|event| self.shown().is_some_and(|shown| shown.at == event.at()))
+    }
+
+    /// What it waits for, or why it did not get there.
+    pub fn words(&self) -> Option<String> {
+        let waits = self.goal.is_some() || self.search.is_some();
+        self.trouble.clone().or_else(|| waits.then(|| t!("reading the history …").to_owned()))
+    }
+
+    /// Does it wait for this answer?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.goal == Some(number)
+            || self.search.as_ref().is_some_and(|search| search.queries.contains(&number))
+            || self.ahead.iter().any(|(_, query, shown)| *query == number && shown.is_none())
+    }
+
+    /// Back to the present.
+    pub fn leave(&mut self) {
+        *self = Replay { asked: self.asked, ..Replay::default() };
+    }
+
+    /// Asks for an instant, which is shown when the answer comes; what is played stops.
+    pub fn go_to(&mut self, at: Timestamp) -> Effect {
+        self.pause();
+        (self.search, self.trouble) = (None, None);
+        let effect = self.ask(Query::Past { at });
+        self.goal = Some(self.asked);
+        effect
+    }
+
+    fn ask(&mut self, query: Query) -> Effect {
+        self.asked = self.asked.wrapping_add(1);
+        Effect::Query(QueryId { tab: None, number: self.asked }, query)
+    }
+
+    fn pause(&mut self) {
+        self.pace = 0;
+        self.ahead.clear();
+    }
+
+    /// A key, at a present.
+    pub fn on_key(&mut self, action: Action, present: Timestamp) -> Vec<Effect> {
+        let Some(at) = self.shown().map(|shown| shown.at) else { return Vec::new() };
+        match action {
+            Action::Step(seconds) => {
+                let to = at.saturating_add(SignedDuration::from_secs(seconds)).unwrap_or(at).min(present);
+                vec![self.go_to(to)]
+            }
+            Action::Event(direction) => self.search(direction, at, present, 0),
+            Action::Play => {
+                self.pace = (self.pace + 1) % PACES.len();
+                (self.goal, self.search, self.trouble) = (None, None, None);
+                self.ahead.clear();
+                self.fetch_ahead(present)
+            }
+            // A window asks for it.
+            Action::GoTo => Vec::new(),
+            Action::Leave => {
+                self.leave();
+                Vec::new()
+            }
+        }
+    }
+
+    /// Half a second has passed: the next instant is shown if it has come. At the present the playing stops.
+    pub fn on_tick(&mut self, present: Timestamp) -> Vec<Effect> {
+        if let Some((.., shown @ Some(_))) = self.ahead.front_mut() {
+            self.shown = shown.take();
+            self.ahead.pop_front();
+        }
+        let effects = self.fetch_ahead(present);
+        if self.ahead.is_empty() {
+            self.pace = 0;
+        }
+        effects
+    }
+
+    fn fetch_ahead(&mut self, present: Timestamp) -> Vec<Effect> {
+        let step = SignedDuration::from_millis(500) * self.pace();
+        let mut effects = Vec::new();
+        while step > SignedDuration::ZERO && self.ahead.len() < AHEAD_MAX {
+            let last = self.ahead.back().map(|(at, ..)| *at).or_else(|| self.shown().map(|shown| shown.at));
+            let Some(at) = last.and_then(|last| last.checked_add(step).ok()).filter(|at| *at < present) else { break };
+            effects.push(self.ask(Query::Past { at }));
+            self.ahead.push_back((at, self.asked, None));
+        }
+        effects
+    }
+
+    /// An answer has come; `present` is the plant now.
+    pub fn on_answer(
+        &mut self,
+        number: u32,
+        answer: Result<Answer, HistoryError>,
+        present: &ViewContext,
+    ) -> Vec<Effect> {
+        if !self.awaits(number) {
+            return Vec::new();
+        }
+        match answer {
+            Err(error) => {
+                let why = match error {
+                    HistoryError::NotKept { first, .. } => {
+                        t!("no data: the history begins {at}", at = stamp(present, first))
+                    }
+                    other => other.to_string(),
+                };
+                self.pause();
+                (self.goal, self.search, self.trouble) = (None, None, Some(why));
+            }
+            Ok(Answer::Past(past)) => self.on_past(number, &past, present),
+            Ok(Answer::Journal(rows)) => {
+                if let Some(search) = &mut self.search {
+                    search.alarms = Some(rows);
+                }
+                return self.on_found(present);
+            }
+            Ok(Answer::Actions(rows)) => {
+                if let Some(search) = &mut self.search {
+                    search.actions = Some(rows);
+                }
+                return self.on_found(present);
+            }
+            Ok(_) => {}
+        }
+        Vec::new()
+    }
+
+    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) {
+        let mut snapshot = past.snapshot(present.snapshot.def.clone());
+        // Waiting and refreshing go by the time of the present.
+        (snapshot.speed, snapshot.stepped) = (present.snapshot.speed, present.snapshot.stepped);
+        let shown = Shown { at: past.at, snapshot: Arc::new(snapshot) };
+        if self.goal == Some(number) {
+            (self.goal, self.shown) = (None, Some(shown));
+        } else if let Some((.., place)) = self.ahead.iter_mut().find(|(_, query, _)| *query == number) {
+            *place = Some(shown);
+        }
+    }
+}
+
+/// Asks for an instant; Enter alone takes that of what is selected on the tab.
+pub fn ask_instant(cx: &ViewContext, tab: &dyn TabView) -> Modal {
+    let selected = tab.moment(cx);
+    let hint = t!("03:12   2026-11-20 22:15   -10m   -2h   -3d");
+    let hint = match selected {
+        Some(at) => t!("{hint}   Enter alone: {at}", hint, at = stamp(cx, at)),
+        None => hint.to_owned(),
+    };
+    Modal::Prompt(Prompt::new(t!("Replay: go to a past time"), hint, "").for_replay(selected))
+}
+
+/// `2026-11-20 03:12:07`, with milliseconds where it has some.
+pub fn stamp(cx: &ViewContext, at: Timestamp) -> String {
+    let form = if at.subsec_millisecond() == 0 { "%Y-%m-%d %H:%M:%S" } else { "%Y-%m-%d %H:%M:%S%.3f" };
+    draw::local(cx, at, form)
+}
+
+/// The instant that was typed: a time, a date with a time, or how long ago; nothing is the one that was selected.
+pub fn typed(cx: &ViewContext, text: &str, selected: Option<Timestamp>) -> Result<Vec<UiAction>, String> {
+    let present = cx.present();
+    let text = text.trim();
+    if let (true, Some(at)) = (text.is_empty(), selected) {
+        return Ok(vec![UiAction::Replay(at)]);
+    }
+    let at = match text.strip_prefix('-') {
+        Some(ago) => {
+            let span: jiff::Span =
+                ago.trim().parse().map_err(|_| t!("`{text}` is not a time ago: expected -10m, -2h or -3d", text))?;
+            let then = present.to_zoned(cx.def().time_zone.clone()).checked_sub(span.abs());
+            let then = then.and_then(|then| then.round(jiff::Unit::Second)).map_err(|error| error.to_string())?;
+            then.timestamp().min(present)
+        }
+        None => period_parser::past_instant(cx.def(), text, present).map_err(|error| error.to_string())?,
+    };
+    Ok(vec![UiAction::Replay(at)])
+}
+
+/// While the past is shown no command is given, and no form for one is opened.
+pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiAction> {
+    if model.replay.shown().is_none() {
+        return actions;
+    }
+    let count = actions.len();
+    let is_command = |action: &UiAction| match action {
+        UiAction::Command(_) | UiAction::SendCommand(..) | UiAction::Do(Effect::Command(..) | Effect::Extension(_)) => {
+            true
+        }
+        UiAction::Open(Modal::UserForm(_)) => false,
+        UiAction::Open(modal) => !modal.only_looks(),
+        UiAction::Show(_)
+        | UiAction::ShowDevice(_)
+        | UiAction::ShowParameter(_)
+        | UiAction::ShowOnMimic(_)
+        | UiAction::ShowOnTrends(..)
+        | UiAction::Replay(_)
+        | UiAction::SessionRequest(..)
+        | UiAction::Leave
+        | UiAction::Do(_) => false,
+    };
+    let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();
+    if rest.len() < count {
+        model.note = Some(refused());
+    }
+    rest
+}
+
+/// Said of a key that would give a command.
+pub(super) fn refused() -> &'static str {
+    t!("This is the past: no commands. Esc returns to the present")
+}
