@@ -1,5 +1,6 @@
 //! How far a long work has come.
 
+use super::say_error;
 use std::{
     io::{IsTerminal, Write, stderr},
     sync::{
@@ -63,6 +64,22 @@ pub fn cancelled_by_ctrl_c(stop: impl FnOnce() + Send + 'static) -> Arc<AtomicBo
         }
     });
     cancelled
+}
+
+/// Waits for the work of a station, and says how long that takes.
+pub async fn wait_for<T>(work: impl Future<Output = T>) -> T {
+    let began = Instant::now();
+    let mut next = tokio::time::interval_at((began + SILENT).into(), EVERY);
+    let mut work = std::pin::pin!(work);
+    loop {
+        tokio::select! {
+            done = &mut work => return done,
+            _ = next.tick() => {
+                let seconds = began.elapsed().as_secs();
+                say_error(&format!("the station works on it for {seconds} s; it goes on if this command is ended"));
+            }
+        }
+    }
 }
 
 /// Never 100 before all is done.

@@ -302,8 +302,13 @@ fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option
     };
     // In seven bits the sign of Enter would be a slash, which is another key.
     let shown = |hint: &Hint| Hint { key: cx.theme.enter(&hint.key), ..hint.clone() };
-    let (hints, tail): (Vec<Hint>, Vec<Hint>) = (hints.iter().map(shown).collect(), tail.iter().map(shown).collect());
+    let (hints, mut tail): (Vec<Hint>, Vec<Hint>) =
+        (hints.iter().map(shown).collect(), tail.iter().map(shown).collect());
     let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
+    // A quarter of the row is for the keys of every tab, the last ones first.
+    while 2 < tail.len() && canvas.width() / 4 < tail.iter().map(room).sum() {
+        tail.remove(0);
+    }
     let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
     let mut x = 1;
     for (n, hint) in hints.iter().enumerate().filter(|(_, hint)| !hint.label.is_empty()) {

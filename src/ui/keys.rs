@@ -55,12 +55,17 @@ pub struct Hint {
     pub help: String,
     /// The least role that may press it.
     pub needs: Option<Role>,
+    /// The key, where the hint is of one.
+    pub chord: Option<Chord>,
 }
 
 impl Hint {
     /// A hint that is no row of a table (keys that the plant file defines).
     pub fn new(key: impl Into<String>, label: impl Into<String>, help: impl Into<String>) -> Hint {
-        Hint { key: key.into(), label: label.into(), help: help.into(), needs: None }
+        let key = key.into();
+        let mut letters = key.chars();
+        let chord = letters.next().filter(|_| letters.next().is_none()).map(char);
+        Hint { key, label: label.into(), help: help.into(), needs: None, chord }
     }
     /// A hint of a window, which the help does not list.
     pub(crate) fn in_window(key: impl Into<String>, label: impl Into<String>) -> Hint {
@@ -109,11 +114,19 @@ pub fn hide<A: PartialEq>(table: &mut [Key<A>], lacking: &[(A, bool)]) {
 pub fn hints<A>(table: &[Key<A>]) -> Vec<Hint> {
     table
         .iter()
-        .map(|key| Hint { needs: key.needs, ..Hint::new(key.chord.name(), translate(key.label), translate(key.help)) })
+        .map(|key| Hint {
+            needs: key.needs,
+            chord: Some(key.chord),
+            ..Hint::new(key.chord.name(), translate(key.label), translate(key.help))
+        })
         .collect()
 }
 
 impl Chord {
+    /// As it is pressed.
+    pub fn event(self) -> KeyEvent {
+        KeyEvent::new(self.code, if self.ctrl { KeyModifiers::CONTROL } else { KeyModifiers::NONE })
+    }
     /// Was it this? Alt never matches: over a slow line a lone Esc and a letter arrive as Alt with that letter.
     pub fn is(self, event: KeyEvent) -> bool {
         event.code == self.code
@@ -169,6 +182,12 @@ pub enum Global {
     Dismiss,
     /// Show a past instant of the plant.
     Replay,
+    /// Go to anything by its name.
+    Palette,
+    /// The tab before.
+    Back,
+    /// The tab after it again.
+    Forward,
     /// Lock this terminal at once.
     Lock,
 }
@@ -188,6 +207,10 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(char('a'), "", "acknowledge the selected or most urgent alarm", Global::Acknowledge),
     Key::new(char('A'), "", "acknowledge all alarms (asks first)", Global::AcknowledgeAll),
     Key::new(code(KeyCode::Esc), "", "close a window; dismiss a message; previous page", Global::Dismiss),
+    Key::new(char(':'), "go to", "go to any tab, device, tag, alarm, key or past time by its name", Global::Palette),
+    Key::new(ctrl('p'), "", "go to anything by its name", Global::Palette),
+    Key::new(char('['), "", "back to the tab before", Global::Back),
+    Key::new(char(']'), "", "forward again", Global::Forward),
     Key::new(char('@'), "", "replay: the plant as it was at a past time", Global::Replay),
     Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
@@ -203,9 +226,10 @@ mod tests {
     use crate::ui::replay;
 
     fn assert_no_clash(name: &str, chords: Vec<Chord>) {
-        // Two keys mean the same in the past: a time is asked for, and a step back is made.
-        let replayed =
-            chords_of(replay::KEYS).into_iter().filter(|chord| ![char('@'), code(KeyCode::Esc)].contains(chord));
+        // These mean the same in the past: a time is asked for, a step is made, and Esc leads back.
+        let replayed = chords_of(replay::KEYS)
+            .into_iter()
+            .filter(|chord| ![char('@'), char('['), char(']'), code(KeyCode::Esc)].contains(chord));
         let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global())).chain(replayed).collect();
         for (n, chord) in all.iter().enumerate() {
             assert!(!all[..n].contains(chord), "{name}: {} means two things", chord.name());

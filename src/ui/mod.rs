@@ -1,6 +1,7 @@
 //! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
 
 mod context;
+mod dispatch;
 mod effects;
 pub(crate) mod bell;
 pub(crate) mod chrome;
@@ -17,6 +18,7 @@ pub(crate) mod replay;
 pub(crate) mod rights;
 pub(crate) mod tabs;
 pub(crate) mod theme;
+mod trail;
 pub(crate) mod last_command;
 pub(crate) mod widgets;
 
@@ -27,28 +29,31 @@ mod tests;
 
 pub use context::ViewContext;
 use context::{past_context, view_context, with_tabs};
+use dispatch::{lead, on_key};
 use effects::perform;
 use std::{sync::Arc, time::Duration};
 
-use crossterm::event::{KeyEvent, KeyEventKind};
+use crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
 use ratatui::{Frame, layout::Rect};
 
 use crate::{
     access::SessionStatus,
     history::{Answer, HistoryError},
     plant::{alarm::AlarmCommand, command::CommandKind, sample::Cause, snapshot::Snapshot},
+    t,
     text::Language,
 };
 use extension::Extension;
 use keys::Global;
 pub use last_command::LastCommand;
 use last_frame::LastFrame;
-use modal::{Confirm, Modal};
+use modal::{Confirm, Modal, Palette, palette};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use replay::Replay;
 use session_lock::SessionLock;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
+use trail::Trail;
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
 pub const SILENCE: Duration = Duration::from_secs(3);
@@ -80,6 +85,10 @@ pub struct Model {
     pub session: Arc<SessionStatus>,
     /// The lock, its warning, and requests on their way.
     pub session_lock: SessionLock,
+    /// Tabs that were shown, for back and forward.
+    pub trail: Trail,
+    /// What was last gone to by the palette, the latest first.
+    pub recent: Vec<palette::Target>,
     /// The window with work in it that waits for an unlock, and the tab that it stood on.
     pub kept: Option<(Tab, Modal)>,
     /// Commands given so far.
@@ -122,6 +131,8 @@ impl Model {
             terminal,
             session: Arc::default(),
             session_lock: SessionLock::default(),
+            trail: Trail::default(),
+            recent: Vec::new(),
             kept: None,
             commands_sent: 0,
             plants: 0,
@@ -166,14 +177,11 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Key(event) => {
             let active = session_lock::active(model);
             let actions = on_key(model, event);
+            let actions: Vec<UiAction> = actions.into_iter().flat_map(|action| lead(model, action)).collect();
             active.map(UiAction::Do).into_iter().chain(actions).collect()
         }
         Msg::Paste(text) => {
-            match &mut model.modal {
-                Some(modal) if model.session.locked && !modal.is_unlock() => {}
-                Some(modal) => modal.on_paste(&text),
-                None => model.tabs.shown_mut().on_paste(&text),
-            }
+            on_paste(model, &text);
             Vec::new()
         }
         Msg::Resize(width, height) => {
@@ -228,96 +236,15 @@ pub fn view(model: &Model, frame: &mut Frame) {
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
 }
 
-fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
-    model.note = None;
-    if keys::find(&keys::global(), event) == Some(Global::Lock) {
-        return session_lock::lock(model);
-    }
-    if session_lock::ask_before_work(model, event) {
-        return Vec::new();
-    }
-    let past = session_lock::is_past_unlock(model, event);
-    if let Some(show @ Global::Show(tab)) = keys::find(&keys::global(), event)
-        && model.modal.as_ref().is_some_and(|modal| !modal.takes_text())
-        && Tab::offered(&model.cx()).contains(&tab)
-    {
-        // The number of a tab leads there from every window that has no use for it.
-        model.modal = None;
-        return on_global(model, show);
-    }
-    if let Some(modal) = model.modal.take_if(|_| !past) {
-        let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
-        let cx = past_context(view_context(snapshot, theme, *clock, *screen, extension, session), replay);
-        let (rest, actions) = modal.on_key(&cx, tabs, event);
-        model.modal = rest;
-        return actions;
-    }
-    if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
-        return session_lock::on_typed(model, event);
-    }
-    if let Some(action) = keys::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some()) {
-        let present = model.present_cx().now;
-        let actions = match action {
-            replay::Action::GoTo => on_global(model, Global::Replay),
-            _ => model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect(),
-        };
-        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
-    }
-    match keys::find(&keys::global(), event) {
-        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
-        // No command goes to what is not visible.
-        Some(_) | None if model.small() => Vec::new(),
-        Some(global) => on_global(model, global),
-        None if !model.may_act(event) => Vec::new(),
-        None => with_tabs(model, |tabs, cx| tabs.shown_mut().on_key(cx, event)),
-    }
-}
-
-fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
-    match global {
-        Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => {
-            if tab == Tab::Alarms && model.tabs.shown != tab {
-                model.tabs.alarms.front();
+fn on_paste(model: &mut Model, text: &str) {
+    match model.modal.take() {
+        Some(mut modal) => {
+            if !model.session.locked || modal.is_unlock() {
+                modal.on_paste(&model.cx(), text);
             }
-            vec![UiAction::Show(tab)]
+            model.modal = Some(modal);
         }
-        Global::Show(_) => Vec::new(),
-        Global::Next => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
-        Global::Previous => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
-        Global::Lock => session_lock::lock(model),
-        Global::Acknowledge | Global::AcknowledgeAll | Global::Silence if model.replay.shown().is_some() => {
-            model.note = Some(replay::refused());
-            Vec::new()
-        }
-        // A bench has no history.
-        Global::Replay if model.snapshot.def.is_bench() || session_lock::is_closed(&model.session) => Vec::new(),
-        Global::Replay => vec![UiAction::Open(replay::ask_instant(&model.cx(), model.tabs.shown()))],
-        Global::Help => vec![UiAction::Open(Modal::Help(0))],
-        Global::Quit => vec![UiAction::Leave],
-        Global::Acknowledge => last_frame::acknowledge(model),
-        Global::AcknowledgeAll => {
-            let cx = model.cx();
-            let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
-            match listed {
-                Some(listed) => actions::acknowledge_all(&cx, listed.into_iter()),
-                None => actions::acknowledge_all(&cx, cx.snapshot.alarms.iter()),
-            }
-        }
-        // Where nothing sounds there is nothing to silence.
-        Global::Silence if model.snapshot.sound => vec![UiAction::Command(CommandKind::Alarm(AlarmCommand::Silence))],
-        Global::Silence => Vec::new(),
-        Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
-        Global::Dismiss => {
-            // A failure that is being read is dismissed first; everything else does not hold up the way back.
-            let failed = model.last_command.take().is_some_and(|pending| pending.is_trouble());
-            if !failed {
-                with_tabs(model, |tabs, cx| {
-                    tabs.shown_mut().back(cx);
-                    Vec::new()
-                });
-            }
-            Vec::new()
-        }
+        None => model.tabs.shown_mut().on_paste(text),
     }
 }
 

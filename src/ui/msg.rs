@@ -7,7 +7,8 @@ use jiff::Timestamp;
 
 use super::{
     extension::{Extension, ExtensionMessage},
-    modal::Modal,
+    keys::Chord,
+    modal::{Modal, palette::Target},
     tabs::{Tab, registers::Start},
 };
 use crate::{
@@ -131,6 +132,10 @@ pub enum UiAction {
     ShowOnMimic(Vec<TagId>),
     /// Show the curve of a tag over a stretch of time; a moment, which begins as it ends, with the cursor on it.
     ShowOnTrends(TagId, (Timestamp, Timestamp)),
+    /// Go to what was chosen in the palette.
+    Jump(Target),
+    /// Do what a key of the shown tab does.
+    Press(Chord),
     /// Show the plant as it was at an instant.
     Replay(Timestamp),
     /// Give a command and watch its outcome.

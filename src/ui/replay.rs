@@ -21,7 +21,7 @@ use crate::{
         record::{ActionRecord, AlarmRecord},
         snapshot::Snapshot,
     },
-    report::period_parser,
+    report::period_parser::{self, PeriodError},
     t,
 };
 use crossterm::event::KeyCode;
@@ -288,22 +288,25 @@ pub fn stamp(cx: &ViewContext, at: Timestamp) -> String {
 
 /// The instant that was typed: a time, a date with a time, or how long ago; nothing is the one that was selected.
 pub fn typed(cx: &ViewContext, text: &str, selected: Option<Timestamp>) -> Result<Vec<UiAction>, String> {
-    let present = cx.present();
-    let text = text.trim();
-    if let (true, Some(at)) = (text.is_empty(), selected) {
-        return Ok(vec![UiAction::Replay(at)]);
-    }
-    let at = match text.strip_prefix('-') {
-        Some(ago) => {
-            let span: jiff::Span =
-                ago.trim().parse().map_err(|_| t!("`{text}` is not a time ago: expected -10m, -2h or -3d", text))?;
-            let then = present.to_zoned(cx.def().time_zone.clone()).checked_sub(span.abs());
-            let then = then.and_then(|then| then.round(jiff::Unit::Second)).map_err(|error| error.to_string())?;
-            then.timestamp().min(present)
-        }
-        None => period_parser::past_instant(cx.def(), text, present).map_err(|error| error.to_string())?,
-    };
+    let at = selected.filter(|_| text.trim().is_empty()).map_or_else(|| instant(cx, text), Ok)?;
     Ok(vec![UiAction::Replay(at)])
+}
+
+/// The same without what was selected.
+pub fn instant(cx: &ViewContext, text: &str) -> Result<Timestamp, String> {
+    let (present, text) = (cx.present(), text.trim());
+    let wrong =
+        || t!("`{text}` is not a past time: expected 03:12, 2026-11-20 22:15, or how long ago: -10m -2h -3d", text);
+    let Some(ago) = text.strip_prefix('-') else {
+        return period_parser::past_instant(cx.def(), text, present).map_err(|error| match error {
+            PeriodError::InFuture(text) => t!("{text} lies in the future", text),
+            _ => wrong(),
+        });
+    };
+    let span: jiff::Span = ago.trim().parse().map_err(|_| wrong())?;
+    let then = present.to_zoned(cx.def().time_zone.clone()).checked_sub(span.abs());
+    let then = then.and_then(|then| then.round(jiff::Unit::Second)).map_err(|_| wrong())?;
+    Ok(then.timestamp().min(present))
 }
 
 /// While the past is shown no command is given, and no form for one is opened.
@@ -324,6 +327,8 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
         | UiAction::Replay(_)
+        | UiAction::Jump(_)
+        | UiAction::Press(_)
         | UiAction::SessionRequest(..)
         | UiAction::Leave
         | UiAction::Do(_) => false,

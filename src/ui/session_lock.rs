@@ -129,7 +129,7 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     }
     match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Redraw)) if event.modifiers.contains(keys::CONTROL) => {
-            super::on_global(model, global)
+            super::dispatch::on_global(model, global)
         }
         Some(_) | None => with_tabs(model, |tabs, cx| tabs.login.on_key(cx, event)),
     }
@@ -181,6 +181,8 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
             | UiAction::Replay(_)
+            | UiAction::Jump(_)
+            | UiAction::Press(_)
             | UiAction::SessionRequest(..)
             | UiAction::Do(_) => rest.push(action),
         }
@@ -273,7 +275,7 @@ pub(super) fn is_past_unlock(model: &Model, event: KeyEvent) -> bool {
 impl Modal {
     /// Does it at most choose what is seen, so that a locked terminal may open it?
     pub fn only_looks(&self) -> bool {
-        self.only_shows() || matches!(self, Modal::Prompt(_))
+        self.only_shows() || matches!(self, Modal::Prompt(_) | Modal::Palette(_))
     }
 
     /// Does it ask for the password of a locked terminal?

@@ -13,7 +13,7 @@ use crate::{
     access::{SessionRequest, io::audit_log},
     cli::{
         CliError, client, in_runtime,
-        progress::{Progress, cancelled_by_ctrl_c},
+        progress::{Progress, cancelled_by_ctrl_c, wait_for},
         run, say,
         source::query_station,
     },
@@ -58,7 +58,7 @@ async fn through_station(args: &Args, def: &Arc<PlantDef>, file: &Path) -> Resul
     let session = client::attach(Some(&def.name), &args.plant.login).await?;
     let before = imports(&session).await.map(|imports| imports.len());
     let request = SessionRequest::Import { file: file.display().to_string() };
-    let durability = session.request(request).await.map_err(CliError::Failed)?;
+    let durability = wait_for(session.request(request)).await.map_err(CliError::Failed)?;
     client::warn_not_recorded("imported", durability);
     match imports(&session).await.zip(before) {
         Some((imports, before)) => match imports[before..].iter().rfind(|import| Path::new(&import.file) == file) {

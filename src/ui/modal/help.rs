@@ -6,32 +6,35 @@ use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
-use crate::plant::number::to_u16;
 use crate::ui::{
-    ViewContext, keys,
+    UiAction, ViewContext, keys,
     keys::{Global, Hint},
     replay,
     tabs::{Tab, Tabs},
     widgets::{
-        list::Motion,
+        list::{Motion, first, on_screen},
         text::{pad, width},
     },
 };
 
-pub(super) fn on_key(row: u16, event: KeyEvent) -> Next {
+pub(super) fn on_key(selected: usize, cx: &ViewContext, tabs: &Tabs, event: KeyEvent) -> Next {
+    let rows = rows(cx, tabs);
     match event.code {
-        KeyCode::Char('q' | '?') | KeyCode::Enter => Next::Close,
+        KeyCode::Char('q' | '?') => Next::Close,
+        KeyCode::Enter => match rows.get(selected).and_then(|hint| hint.chord) {
+            Some(chord) => Next::Do(vec![UiAction::Press(chord)]),
+            None => Next::Close,
+        },
         _ => {
-            let moved = Motion::from_key(event).map_or(row, |motion| to_u16(motion.to(usize::from(row), ROWS_MAX, 10)));
+            let room = usize::from(cx.area.height.saturating_sub(2));
+            let moved = Motion::from_key(event).map_or(selected, |motion| motion.to(selected, rows.len(), room));
             Next::Stay(Modal::Help(moved))
         }
     }
 }
 
-/// No tab has more keys; the view stops at the last one.
-const ROWS_MAX: usize = 100;
-
-pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
+/// Headings and keys.
+fn rows(cx: &ViewContext, tabs: &Tabs) -> Vec<Hint> {
     let own = tabs.shown().hints(cx);
     let offered = Tab::offered(cx);
     let there =
@@ -40,25 +43,28 @@ pub(super) fn view(row: u16, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, b
     let heading = |text: &str| Hint::new("", text, "");
     let past = [heading(""), heading(t!("past"))].into_iter().chain(keys::hints(replay::KEYS)).filter(|_| cx.is_past());
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
-    let rows: Vec<Hint> = [heading(translate(tabs.shown.title()))]
+    [heading(translate(tabs.shown.title()))]
         .into_iter()
         .chain(own)
         .chain(past)
         .chain([heading(""), heading(t!("every tab"))])
         .chain(global)
-        .collect();
+        .collect()
+}
+
+pub(super) fn view(selected: usize, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
+    let rows = rows(cx, tabs);
     let keys = rows.iter().map(|hint| width(&hint.key)).max().unwrap_or(0);
     let inner = rows.iter().map(|hint| keys + 2 + width(&hint.help)).max().unwrap_or(0).max(40);
-    let shown = body.height.saturating_sub(2);
-    let first = row.min(to_u16(rows.len()).saturating_sub(shown));
+    let shown = usize::from(body.height.saturating_sub(2));
+    let first = first(selected, rows.len(), shown);
     let mut canvas = window(cx, frame, body, t!("keys"), (inner, rows.len()));
-    for (y, hint) in rows.iter().skip(usize::from(first)).enumerate() {
-        let y = to_u16(y);
+    for (y, n, hint) in on_screen(&rows, first, shown) {
         if hint.key.is_empty() {
             canvas.text(0, y, &hint.label, cx.theme.dim());
         } else {
             let x = canvas.text(0, y, &pad(&hint.key, keys + 2), cx.theme.strong());
-            canvas.text(x, y, &hint.help, cx.theme.normal());
+            canvas.text(x, y, &hint.help, if n == selected { cx.theme.focus() } else { cx.theme.normal() });
         }
     }
 }

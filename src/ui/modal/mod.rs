@@ -11,6 +11,7 @@ pub(crate) mod help;
 pub(crate) mod line;
 pub(crate) mod notice;
 pub(crate) mod number;
+pub(crate) mod palette;
 pub(crate) mod prompt;
 pub(crate) mod reason;
 pub(crate) mod confirmed_value;
@@ -30,6 +31,7 @@ pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use guidance::Guidance;
 pub use notice::Notice;
+pub use palette::Palette;
 pub use prompt::Prompt;
 pub use reason::Reason;
 pub use settings::Settings;
@@ -51,13 +53,15 @@ use crate::plant::{
 #[derive(Debug, Clone, PartialEq)]
 pub enum Modal {
     /// All keys; the number is the first row shown.
-    Help(u16),
+    Help(usize),
     /// Do it or not.
     Confirm(Confirm),
     /// A number for a tag.
     Entry(Entry),
     /// One of a few.
     Choice(Choice),
+    /// Go to anything by its name.
+    Palette(Box<Palette>),
     /// A text for the tab below.
     Prompt(Prompt),
     /// An action with a reason or a note.
@@ -123,6 +127,7 @@ impl Modal {
                 | Modal::Why(_)
                 | Modal::Settings(_)
                 | Modal::Bus(_)
+                | Modal::Palette(_)
                 | Modal::AuditEntry(_) => None,
             };
             return (back, Vec::new());
@@ -131,10 +136,11 @@ impl Modal {
             return (Some(self), vec![UiAction::Leave]);
         }
         let next = match self {
-            Modal::Help(row) => help::on_key(row, event),
+            Modal::Help(row) => help::on_key(row, cx, tabs, event),
             Modal::Confirm(confirm) => confirm.on_key(cx, event),
             Modal::Entry(entry) => entry.on_key(cx, event),
             Modal::Choice(choice) => choice.on_key(cx, event),
+            Modal::Palette(palette) => palette.on_key(cx, event),
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Reason(reason) => reason.on_key(cx, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
@@ -164,7 +170,12 @@ impl Modal {
         match self {
             Modal::Confirm(confirm) => confirm.takes_text(),
             Modal::Choice(_) => false,
-            Modal::Entry(_) | Modal::Prompt(_) | Modal::Reason(_) | Modal::Settings(_) | Modal::UserForm(_) => true,
+            Modal::Palette(_)
+            | Modal::Entry(_)
+            | Modal::Prompt(_)
+            | Modal::Reason(_)
+            | Modal::Settings(_)
+            | Modal::UserForm(_) => true,
             Modal::Help(_)
             | Modal::Notice(_)
             | Modal::Guidance(_)
@@ -188,6 +199,7 @@ impl Modal {
             Modal::Bus(window) => window.only_shows(),
             Modal::Entry(_)
             | Modal::Choice(_)
+            | Modal::Palette(_)
             | Modal::Prompt(_)
             | Modal::Reason(_)
             | Modal::Settings(_)
@@ -196,10 +208,11 @@ impl Modal {
     }
 
     /// Pasted text goes into a text line, or nowhere.
-    pub fn on_paste(&mut self, text: &str) {
+    pub fn on_paste(&mut self, cx: &ViewContext, text: &str) {
         match self {
             Modal::Entry(entry) => entry.paste(text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
+            Modal::Palette(palette) => palette.paste(cx, text),
             Modal::Reason(reason) => reason.paste(text),
             Modal::Settings(settings) => settings.on_paste(text),
             Modal::Confirm(confirm) => confirm.on_paste(text),
@@ -218,7 +231,11 @@ impl Modal {
     /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = match self {
-            Modal::Help(_) => vec![Hint::in_window("↑↓", t!("scroll")), Hint::in_window(t!("Esc"), t!("close"))],
+            Modal::Help(_) => vec![
+                Hint::in_window("↑↓", t!("select")),
+                Hint::in_window("⏎", t!("press it")),
+                Hint::in_window(t!("Esc"), t!("close")),
+            ],
             Modal::Confirm(confirm) if confirm.is_refused(cx) => vec![Hint::in_window(t!("Esc"), confirm.escape())],
             Modal::Confirm(confirm) => {
                 vec![Hint::in_window(confirm.key(), confirm.verb()), Hint::in_window(t!("Esc"), confirm.escape())]
@@ -233,6 +250,11 @@ impl Modal {
                     Hint::in_window(t!("Esc"), t!("cancel")),
                 ]
             }
+            Modal::Palette(_) => vec![
+                Hint::in_window("↑↓", t!("select")),
+                Hint::in_window("⏎", t!("go")),
+                Hint::in_window(t!("Esc"), t!("cancel")),
+            ],
             Modal::Prompt(_) => vec![Hint::in_window("⏎", t!("OK")), Hint::in_window(t!("Esc"), t!("cancel"))],
             Modal::Reason(reason) => reason.hints(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
@@ -260,6 +282,7 @@ impl Modal {
             Modal::Confirm(confirm) => confirm.view(cx, frame, body),
             Modal::Entry(entry) => entry.view(cx, frame, body),
             Modal::Choice(choice) => choice.view(cx, frame, body),
+            Modal::Palette(palette) => palette.view(cx, frame, body),
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
             Modal::Reason(reason) => reason.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),

@@ -29,6 +29,7 @@ use crate::{
     },
 };
 use filter::Filter;
+pub use go::faceplate;
 use handover::Handover;
 pub use handover::suppressed_words;
 use journal::Journal;

@@ -3,6 +3,7 @@
 mod numbers;
 mod alarms;
 mod interlocks;
+mod palette;
 
 use std::{sync::Arc, time::Duration};
 

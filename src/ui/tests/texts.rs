@@ -76,7 +76,7 @@ fn missed_words(line: &str, given: &BTreeSet<String>) -> Vec<String> {
 /// Draws every page and window with the texts of the test's language, in every size.
 fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
     let tabs: [(Tab, &[&str]); 8] = [
-        (Tab::Mimic, &["", "?", "q", "⏎", "s", "C", "w"]),
+        (Tab::Mimic, &["", "?", "q", "⏎", "s", "C", "w", ":", ":pv", "@", "@x⏎", "Z"]),
         (Tab::Trends, &["", "?", "p", "⏎"]),
         (Tab::Alarms, &["", "?", "v", "vv", "vvv", "vvvv", "vvvvv", "⏎", "z", "o"]),
         (Tab::Controllers, &["", "?", "⏎", "T", "f", "⏎p"]),

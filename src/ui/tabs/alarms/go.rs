@@ -33,7 +33,8 @@ impl Alarms {
     }
 }
 
-pub(super) fn faceplate(cx: &ViewContext, subject: Subject) -> Option<Faceplate> {
+/// The faceplate of what an alarm watches.
+pub fn faceplate(cx: &ViewContext, subject: Subject) -> Option<Faceplate> {
     match subject {
         Subject::Tag(tag) => Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]),
         Subject::Device(device) => {

@@ -83,11 +83,15 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         (false, _) => t!("window {window_text}", window_text = window_text(WINDOWS[trends.window])),
     };
     x = canvas.text(x + 3, 0, &window, theme.normal());
-    let (time, style) = match trends.end {
-        Some(_) => (t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.present(), zone)), theme.focus()),
-        None if trends.ended => (t!("end of the log").to_owned(), theme.normal()),
-        None if theme.glyphs == Glyphs::Braille => (t!("live ●").to_owned(), theme.normal()),
-        None => (t!("live *").to_owned(), theme.normal()),
+    let live = trends.end.is_none() && !cx.is_past();
+    let (time, style) = if !live {
+        (t!(" past {stretch} ", stretch = stretch(view.from, view.to, cx.present(), zone)), theme.focus())
+    } else if trends.ended {
+        (t!("end of the log").to_owned(), theme.normal())
+    } else if theme.glyphs == Glyphs::Braille {
+        (t!("live ●").to_owned(), theme.normal())
+    } else {
+        (t!("live *").to_owned(), theme.normal())
     };
     x = canvas.text(x + 3, 0, &time, style);
     // What is drawn of a wide column: least to greatest, so that no spike is lost.
@@ -95,7 +99,7 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     if column >= 60 && !brief {
         let column = t!("columns of {width}, min–max", width = window_text(column));
         x = canvas.text(x + 3, 0, &column, theme.normal());
-    } else if trends.end.is_none() && !brief && !trends.ended {
+    } else if live && !brief && !trends.ended {
         let rate = t!("update {rate_text}", rate_text = rate_text(RATES[trends.rate]));
         x = canvas.text(x + 3, 0, &rate, theme.normal());
     }

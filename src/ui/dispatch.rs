@@ -1,0 +1,132 @@
+//! What a key does: of a window, of the replay, of every tab, or of the shown tab.
+
+use super::*;
+
+/// Choices of the palette that are remembered.
+const RECENT_MAX: usize = 8;
+
+pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
+    model.note = None;
+    if keys::find(&keys::global(), event) == Some(Global::Lock) {
+        return session_lock::lock(model);
+    }
+    if session_lock::ask_before_work(model, event) {
+        return Vec::new();
+    }
+    let past = session_lock::is_past_unlock(model, event);
+    if let Some(show @ Global::Show(tab)) = keys::find(&keys::global(), event)
+        && model.modal.as_ref().is_some_and(|modal| !modal.takes_text())
+        && Tab::offered(&model.cx()).contains(&tab)
+    {
+        // The number of a tab leads there from every window that has no use for it.
+        model.modal = None;
+        return on_global(model, show);
+    }
+    if let Some(modal) = model.modal.take_if(|_| !past) {
+        let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
+        let cx = past_context(view_context(snapshot, theme, *clock, *screen, extension, session), replay);
+        let (rest, actions) = modal.on_key(&cx, tabs, event);
+        model.modal = rest;
+        return actions;
+    }
+    if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
+        return session_lock::on_typed(model, event);
+    }
+    if let Some(action) = keys::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some()) {
+        let present = model.present_cx().now;
+        let actions = match action {
+            replay::Action::GoTo => on_global(model, Global::Replay),
+            _ => model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect(),
+        };
+        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
+    }
+    match keys::find(&keys::global(), event) {
+        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
+        // No command goes to what is not visible.
+        Some(_) | None if model.small() => Vec::new(),
+        Some(global) => on_global(model, global),
+        None if !model.may_act(event) => Vec::new(),
+        None => on_tab_key(model, event),
+    }
+}
+
+/// A key of the shown tab; one that is none is answered with where they are listed.
+fn on_tab_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
+    let hints = model.tabs.shown().hints(&model.cx());
+    let is_known = hints.iter().any(|hint| hint.chord.is_some_and(|chord| chord.is(event)));
+    let actions = with_tabs(model, |tabs, cx| tabs.shown_mut().on_key(cx, event));
+    if actions.is_empty() && !is_known && matches!(event.code, KeyCode::Char(_)) {
+        model.note = Some(t!("This key does nothing here. ? lists the keys, : goes to anything by its name"));
+    }
+    actions
+}
+
+/// What the palette and the help lead to: the actions of a target, or of a key of the shown tab.
+pub(super) fn lead(model: &mut Model, action: UiAction) -> Vec<UiAction> {
+    match action {
+        UiAction::Jump(target) => {
+            model.recent.retain(|earlier| *earlier != target);
+            model.recent.insert(0, target);
+            model.recent.truncate(RECENT_MAX);
+            let actions = palette::actions(&model.cx(), target);
+            actions.into_iter().flat_map(|action| lead(model, action)).collect()
+        }
+        UiAction::Press(chord) => on_key(model, chord.event()),
+        other => vec![other],
+    }
+}
+
+pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
+    match global {
+        Global::Show(tab) if Tab::offered(&model.cx()).contains(&tab) => {
+            if tab == Tab::Alarms && model.tabs.shown != tab {
+                model.tabs.alarms.front();
+            }
+            vec![UiAction::Show(tab)]
+        }
+        Global::Show(_) => Vec::new(),
+        Global::Next => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
+        Global::Previous => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
+        Global::Lock => session_lock::lock(model),
+        Global::Acknowledge | Global::AcknowledgeAll | Global::Silence if model.replay.shown().is_some() => {
+            model.note = Some(replay::refused());
+            Vec::new()
+        }
+        // A bench has no history.
+        Global::Replay if model.snapshot.def.is_bench() || session_lock::is_closed(&model.session) => Vec::new(),
+        Global::Replay => vec![UiAction::Open(replay::ask_instant(&model.cx(), model.tabs.shown()))],
+        Global::Palette if session_lock::is_closed(&model.session) => Vec::new(),
+        Global::Palette => {
+            let palette = Palette::new(&model.cx(), model.tabs.shown(), &model.recent);
+            vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
+        }
+        Global::Back => model.trail.step(model.tabs.shown, false).map(UiAction::Show).into_iter().collect(),
+        Global::Forward => model.trail.step(model.tabs.shown, true).map(UiAction::Show).into_iter().collect(),
+        Global::Help => vec![UiAction::Open(Modal::Help(0))],
+        Global::Quit => vec![UiAction::Leave],
+        Global::Acknowledge => last_frame::acknowledge(model),
+        Global::AcknowledgeAll => {
+            let cx = model.cx();
+            let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
+            match listed {
+                Some(listed) => actions::acknowledge_all(&cx, listed.into_iter()),
+                None => actions::acknowledge_all(&cx, cx.snapshot.alarms.iter()),
+            }
+        }
+        // Where nothing sounds there is nothing to silence.
+        Global::Silence if model.snapshot.sound => vec![UiAction::Command(CommandKind::Alarm(AlarmCommand::Silence))],
+        Global::Silence => Vec::new(),
+        Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
+        Global::Dismiss => {
+            // A failure that is being read is dismissed first; everything else does not hold up the way back.
+            let failed = model.last_command.take().is_some_and(|pending| pending.is_trouble());
+            if !failed {
+                with_tabs(model, |tabs, cx| {
+                    tabs.shown_mut().back(cx);
+                    Vec::new()
+                });
+            }
+            Vec::new()
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! The palette: go to any tab, device, tag, alarm, key or past time by typing a part of its name.
+
+use std::cmp::Reverse;
+
+use crossterm::event::{KeyCode, KeyEvent};
+use jiff::Timestamp;
+use nucleo_matcher::{
+    Config, Matcher, Utf32Str,
+    pattern::{CaseMatching, Normalization, Pattern},
+};
+use ratatui::{Frame, layout::Rect};
+
+use super::{Faceplate, Guidance, Modal, Next, line::Line, window};
+use crate::{
+    plant::def::{AlarmId, DeviceId, TagId},
+    t,
+    text::translate,
+    ui::{
+        UiAction, ViewContext,
+        keys::{self, Chord},
+        modal::confirm::subject,
+        replay,
+        tabs::{Tab, TabView, alarms},
+        widgets::{
+            list::{Motion, first, on_screen},
+            text::{fit, pad, width},
+            value,
+        },
+    },
+};
+
+/// Rows that are listed at most: the best ones.
+const FOUND_MAX: usize = 100;
+/// Columns of the window, where there are as many.
+const WIDTH: u16 = 76;
+
+/// What a row leads to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Target {
+    /// A tab.
+    Tab(Tab),
+    /// A device, on the controllers tab.
+    Device(DeviceId),
+    /// The faceplate of a tag.
+    Tag(TagId),
+    /// The curve of a tag.
+    Trend(TagId),
+    /// What to do about an alarm.
+    Alarm(AlarmId),
+    /// What a key of the shown tab does.
+    Key(Chord),
+    /// A past instant.
+    Instant(Timestamp),
+}
+
+impl Target {
+    fn rank(self) -> u8 {
+        match self {
+            Target::Instant(_) | Target::Tab(_) => 0,
+            Target::Device(_) => 1,
+            Target::Tag(_) => 2,
+            Target::Trend(_) => 3,
+            Target::Alarm(_) => 4,
+            Target::Key(_) => 5,
+        }
+    }
+}
+
+/// A row.
+#[derive(Debug, Clone, PartialEq)]
+struct Row {
+    target: Target,
+    kind: &'static str,
+    name: String,
+    text: String,
+}
+
+/// What is typed, and what fits it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Palette {
+    line: Line,
+    rows: Vec<Row>,
+    /// Places of the rows that fit, the best first.
+    found: Vec<usize>,
+    /// The instant that was typed, before all of them.
+    instant: Option<Row>,
+    selected: usize,
+}
+
+impl Palette {
+    /// Everything that there is, what was chosen before at first.
+    pub fn new(cx: &ViewContext, tab: &dyn TabView, recent: &[Target]) -> Palette {
+        let mut rows = rows(cx, tab);
+        let place = |row: &Row| recent.iter().position(|target| *target == row.target).unwrap_or(recent.len());
+        rows.sort_by_key(place);
+        let mut palette = Palette { line: Line::default(), rows, found: Vec::new(), instant: None, selected: 0 };
+        palette.find(cx);
+        palette
+    }
+
+    fn find(&mut self, cx: &ViewContext) {
+        let text = self.line.text();
+        self.selected = 0;
+        self.instant = instant(cx, &text);
+        let pattern = Pattern::parse(&text, CaseMatching::Ignore, Normalization::Smart);
+        let mut matcher = Matcher::new(Config::DEFAULT);
+        let mut buffer = Vec::new();
+        let mut score = |row: &Row| {
+            let text = format!("{} {} {}", row.name, row.text, row.kind);
+            pattern.score(Utf32Str::new(&text, &mut buffer), &mut matcher)
+        };
+        // Of those that fit alike a tag stands before its curve and its alarms.
+        let rank = |row: &Row| if text.is_empty() { 0 } else { row.target.rank() };
+        let rows = self.rows.iter().enumerate();
+        let mut found: Vec<(Reverse<u32>, u8, usize)> =
+            rows.filter_map(|(place, row)| Some((Reverse(score(row)?), rank(row), place))).collect();
+        found.sort();
+        self.found = found.into_iter().take(FOUND_MAX).map(|(.., place)| place).collect();
+    }
+
+    fn listed(&self) -> Vec<&Row> {
+        self.instant.iter().chain(self.found.iter().filter_map(|place| self.rows.get(*place))).collect()
+    }
+
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
+        let listed = self.listed();
+        if keys::code(KeyCode::Enter).is(event) {
+            return match listed.get(self.selected) {
+                Some(row) => Next::Do(vec![UiAction::Jump(row.target)]),
+                None => Next::Stay(Modal::Palette(Box::new(self))),
+            };
+        }
+        let motion = Motion::from_key(event).filter(|motion| !matches!(motion, Motion::First | Motion::Last));
+        if let Some(motion) = motion {
+            self.selected = motion.to(self.selected, listed.len(), room(cx.area));
+        } else if self.line.on_key(event) {
+            self.find(cx);
+        }
+        Next::Stay(Modal::Palette(Box::new(self)))
+    }
+
+    pub(super) fn paste(&mut self, cx: &ViewContext, text: &str) {
+        self.line.paste(text);
+        self.find(cx);
+    }
+
+    pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
+        let inner = WIDTH.min(body.width.saturating_sub(4));
+        let room = room(body);
+        let mut canvas = window(cx, frame, body, t!("go to"), (inner, room + 3));
+        let x = canvas.text(0, 0, ": ", cx.theme.strong());
+        self.line.view(cx.theme, &mut canvas, x, 0);
+        let listed = self.listed();
+        if listed.is_empty() {
+            canvas.text(2, 2, t!("nothing fits"), cx.theme.dim());
+        }
+        let kinds = listed.iter().map(|row| width(row.kind)).max().unwrap_or(0).min(12);
+        let names = listed.iter().map(|row| width(&row.name)).max().unwrap_or(0).min(inner / 3);
+        let first = first(self.selected, listed.len(), room);
+        for (y, n, row) in on_screen(&listed, first, room) {
+            let style = if n == self.selected { cx.theme.focus() } else { cx.theme.normal() };
+            canvas.text(0, y + 2, if n == self.selected { cx.theme.pick("▸ ", "> ") } else { "  " }, cx.theme.strong());
+            let x = canvas.text(2, y + 2, &pad(&fit(row.kind, kinds), kinds + 2), cx.theme.dim());
+            let x = canvas.text(x, y + 2, &pad(&fit(&row.name, names), names), style);
+            let now = match row.target {
+                Target::Tag(tag) => value::show(cx, tag).with_unit(),
+                _ => String::new(),
+            };
+            let end = canvas.width();
+            let left = end.saturating_sub(x + 2 + if now.is_empty() { 0 } else { width(&now) + 2 });
+            canvas.text(x + 2, y + 2, &fit(&row.text, left), cx.theme.normal());
+            canvas.text_right(end, y + 2, &now, cx.theme.strong());
+        }
+    }
+}
+
+/// Rows of the list that the window has room for.
+fn room(body: Rect) -> usize {
+    usize::from(body.height.saturating_sub(5)).clamp(1, 16)
+}
+
+fn instant(cx: &ViewContext, text: &str) -> Option<Row> {
+    let at = text.starts_with(|c: char| c.is_ascii_digit() || c == '-').then(|| replay::instant(cx, text).ok())??;
+    let name = replay::stamp(cx, at);
+    Some(Row { target: Target::Instant(at), kind: t!("time"), name, text: t!("replay").to_owned() })
+}
+
+fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
+    let def = cx.def();
+    let row = |target, kind, name: &str, text: &str| Row { target, kind, name: name.to_owned(), text: text.to_owned() };
+    let tabs = Tab::offered(cx).into_iter();
+    let tabs = tabs.map(|tab| row(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
+    let alarm = |id: AlarmId, state: &str| {
+        row(Target::Alarm(id), t!("alarm"), &subject(cx, id), &format!("{}  {state}", def.alarm(id).message))
+    };
+    let active = cx.snapshot.alarms.iter().map(|active| alarm(active.id, translate(active.state.word())));
+    let is_active = |id: AlarmId| cx.snapshot.alarms.iter().any(|active| active.id == id);
+    let others = def.alarms.iter().filter(|def| !is_active(def.id)).map(|def| alarm(def.id, ""));
+    let keys = tab.hints(cx).into_iter().filter_map(|hint| {
+        let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
+        Some(row(Target::Key(hint.chord?), t!("key"), &hint.key, help))
+    });
+    let devices = def.devices.iter();
+    let devices = devices.map(|device| row(Target::Device(device.id), t!("device"), &device.name, &device.title));
+    let tags = def.tags.iter().map(|tag| row(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
+    let stored = def.tags.iter().filter(|tag| tag.is_stored());
+    let trends = stored.map(|tag| row(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
+    tabs.chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()
+}
+
+/// What a choice leads to.
+pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
+    match target {
+        Target::Tab(tab) => vec![UiAction::Show(tab)],
+        Target::Device(device) => vec![UiAction::ShowDevice(device)],
+        Target::Tag(tag) => {
+            let faceplate = Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]);
+            faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect()
+        }
+        Target::Trend(tag) => vec![UiAction::ShowOnTrends(tag, (cx.now, cx.now))],
+        Target::Alarm(id) => {
+            let faceplate = alarms::faceplate(cx, cx.def().alarm(id).subject);
+            vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate))))]
+        }
+        Target::Key(chord) => vec![UiAction::Press(chord)],
+        Target::Instant(at) => vec![UiAction::Replay(at)],
+    }
+}

@@ -1,0 +1,72 @@
+//! The tabs that were shown, one after the other: back and forward, as in a browser.
+
+use super::tabs::Tab;
+
+/// Tabs that are remembered.
+const TABS_MAX: usize = 32;
+
+/// What was shown before and behind the shown tab.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Trail {
+    before: Vec<Tab>,
+    behind: Vec<Tab>,
+    /// The tab that back or forward leads to.
+    on_way: Option<Tab>,
+}
+
+impl Trail {
+    /// Another tab is shown. What was gone back from is forgotten unless back or forward leads there.
+    pub fn note(&mut self, from: Tab, to: Tab) {
+        if from == to || self.on_way.take() == Some(to) {
+            return;
+        }
+        self.behind.clear();
+        self.before.push(from);
+        if TABS_MAX < self.before.len() {
+            self.before.remove(0);
+        }
+    }
+
+    /// The tab that was shown before this one, or after it.
+    pub fn step(&mut self, shown: Tab, forward: bool) -> Option<Tab> {
+        let (from, to) =
+            if forward { (&mut self.behind, &mut self.before) } else { (&mut self.before, &mut self.behind) };
+        let tab = from.pop()?;
+        to.push(shown);
+        self.on_way = Some(tab);
+        Some(tab)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn back_and_forward_lead_along_the_same_tabs() {
+        let mut trail = Trail::default();
+        let mut shown = Tab::Mimic;
+        let mut show = |trail: &mut Trail, tab: Tab| {
+            trail.note(shown, tab);
+            shown = tab;
+        };
+        for tab in [Tab::Trends, Tab::Trends, Tab::Alarms, Tab::Bus] {
+            show(&mut trail, tab);
+        }
+        for (shown, forward, expect) in [
+            (Tab::Bus, false, Some(Tab::Alarms)),
+            (Tab::Alarms, false, Some(Tab::Trends)),
+            (Tab::Trends, true, Some(Tab::Alarms)),
+            (Tab::Alarms, false, Some(Tab::Trends)),
+            (Tab::Trends, false, Some(Tab::Mimic)),
+            (Tab::Mimic, false, None),
+        ] {
+            let to = trail.step(shown, forward);
+            assert_eq!(to, expect, "{shown:?}");
+            trail.note(shown, to.unwrap_or(shown));
+        }
+        trail.note(Tab::Mimic, Tab::Users);
+        assert_eq!(trail.step(Tab::Users, true), None, "a new way has no forward");
+        assert_eq!(trail.step(Tab::Users, false), Some(Tab::Mimic));
+    }
+}
