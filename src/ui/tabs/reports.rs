@@ -2,6 +2,7 @@
 
 pub(super) mod period;
 mod batches;
+mod overlay;
 mod view;
 
 #[cfg(test)]
@@ -122,12 +123,14 @@ impl TabView for Reports {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.report.query.awaits(number) || self.batches.rows.query.awaits(number)
+        let overlay = self.batches.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number));
+        overlay || self.report.query.awaits(number) || self.batches.rows.query.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.report.on_answer(cx, number, &answer);
         self.batches.rows.on_answer(cx, number, &answer);
+        self.batches.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
         self.ask(cx)
     }
 
@@ -162,31 +165,35 @@ impl TabView for Reports {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.dismiss();
-        match self.batches.shown {
-            true => keys::find(&batches::keys(), event).map(|action| self.act_on_batches(cx, action)),
-            false => keys::find(&table(cx), event).map(|action| self.act(cx, action)),
+        match (self.batches.shown, &self.batches.overlay) {
+            (true, Some(_)) => keys::find(overlay::KEYS, event).map(|action| self.act_on_overlay(cx, action)),
+            (true, None) => keys::find(&batches::keys(), event).map(|action| self.act_on_batches(cx, action)),
+            (false, _) => keys::find(&table(cx), event).map(|action| self.act(cx, action)),
         }
         .unwrap_or_default()
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
         match self.batches.shown {
+            true if self.batches.overlay.take().is_some() => true,
             true => self.batches.rows.query.cancel(cx) || std::mem::take(&mut self.batches.shown),
             false => self.report.query.cancel(cx),
         }
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        match self.batches.shown {
-            true => keys::hints(&batches::keys()),
-            false => keys::hints(&table(cx)),
+        match (self.batches.shown, &self.batches.overlay) {
+            (true, Some(_)) => keys::hints(overlay::KEYS),
+            (true, None) => keys::hints(&batches::keys()),
+            (false, _) => keys::hints(&table(cx)),
         }
     }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
         let report = [KEYS, BATCHES, &motions!("", Action::Move)].concat();
-        vec![("reports", keys::chords_of(&report)), ("batches", keys::chords_of(&batches::keys()))]
+        let pages = [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(overlay::KEYS))];
+        [("reports", keys::chords_of(&report))].into_iter().chain(pages).collect()
     }
 }
 
@@ -224,6 +231,15 @@ impl Reports {
         self.ask(cx)
     }
 
+    fn act_on_overlay(&mut self, cx: &ViewContext, action: overlay::Action) -> Vec<UiAction> {
+        match (action, &mut self.batches.overlay) {
+            (overlay::Action::Tag(by), Some(overlay)) => overlay.act(by),
+            (overlay::Action::Tag(_), None) => {}
+            (overlay::Action::Back, _) => self.batches.overlay = None,
+        }
+        self.ask(cx)
+    }
+
     fn act_on_batches(&mut self, cx: &ViewContext, action: batches::Action) -> Vec<UiAction> {
         match action {
             batches::Action::Move(motion) => self.batches.select(cx, motion),
@@ -233,6 +249,8 @@ impl Reports {
                     self.show(Some(period));
                 }
             }
+            batches::Action::Mark => self.batches.mark(),
+            batches::Action::Overlay => self.batches.lay_over(cx),
             batches::Action::Trend => return self.batches.trend(cx).into_iter().collect(),
             batches::Action::Export => {
                 let bytes = report::batch::csv(self.batches.rows(), cx.def(), self.dialect);
@@ -274,7 +292,7 @@ impl Reports {
         let closed = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
         if self.batches.shown {
-            return self.batches.ask(cx, &mut self.number).into_iter().collect();
+            return self.batches.ask(cx, &mut self.number);
         }
         let Some(period) = self.period.clone() else { return Vec::new() };
         let number = (Tab::Reports, &mut self.number);

@@ -14,7 +14,7 @@ use ratatui::{buffer::Buffer, layout::Rect, style::Style, text::Line, widgets::W
 use unicode_width::UnicodeWidthStr;
 
 use self::{
-    axis::{Scale, time_ticks},
+    axis::{Scale, elapsed_ticks, time_ticks},
     raster::{Canvas, Raster},
     trace::{Span, Trace},
 };
@@ -32,8 +32,8 @@ const MARK_CELLS: i64 = 24;
 pub struct Chart<'a> {
     /// Looks.
     pub theme: &'a Theme,
-    /// The plant's local time, for the labels.
-    pub zone: &'a TimeZone,
+    /// The local time of the labels; `None` counts from the left edge.
+    pub zone: Option<&'a TimeZone>,
     /// Left edge.
     pub from: Timestamp,
     /// Right edge, may lie after `now`.

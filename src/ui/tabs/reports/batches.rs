@@ -1,5 +1,6 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
+use super::overlay::{self, Overlay};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::batch::Batch,
@@ -15,6 +16,10 @@ pub enum Action {
     Report,
     /// The curves of its time.
     Trend,
+    /// Mark it for the overlay, or no longer.
+    Mark,
+    /// The marked ones over each other.
+    Overlay,
     /// Write the list as CSV.
     Export,
     /// The reports of shifts.
@@ -25,6 +30,8 @@ pub enum Action {
 const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "report", "the whole report of its time", Action::Report),
     Key::new(char('t'), "trend", "the curves of its time", Action::Trend),
+    Key::new(char('o'), "overlay", "the curves of the marked batches over each other", Action::Overlay),
+    Key::new(char(' '), "mark", "mark the batch for the overlay", Action::Mark),
     Key::new(char('e'), "export", "write the list as CSV", Action::Export).needs(Role::Technician),
     Key::new(char('b'), "shifts", "the reports of shifts", Action::Back),
 ];
@@ -49,6 +56,10 @@ pub struct Batches {
     pub shown: bool,
     pub rows: Answered<Vec<BatchReport>>,
     selected: Selected<String>,
+    /// Labels of the marked ones.
+    marked: Vec<String>,
+    /// Some of them over each other, in place of the list.
+    pub overlay: Option<Overlay>,
 }
 
 impl Batches {
@@ -83,8 +94,34 @@ impl Batches {
         Some(UiAction::ShowOnTrends(tag, (report.batch.from, report.batch.until(cx.now))))
     }
 
+    /// Marks the selected batch, or no longer.
+    pub fn mark(&mut self) {
+        let Some(label) = self.labels().nth(self.place()) else { return };
+        match self.marked.iter().position(|marked| *marked == label) {
+            Some(place) => drop(self.marked.remove(place)),
+            None => self.marked.push(label),
+        }
+    }
+
+    /// Shows the marked batches of the rule of the selected one over each other; where none is marked, it and those before it.
+    pub fn lay_over(&mut self, cx: &ViewContext) {
+        let Some(selected) = self.rows().get(self.place()).map(|report| report.batch.clone()) else { return };
+        let Some(rule) = cx.def().batches.iter().find(|rule| rule.name == selected.name) else { return };
+        let alike = || self.rows().iter().map(|report| &report.batch).filter(|batch| batch.name == selected.name);
+        let marked: Vec<Batch> = alike().filter(|batch| self.marked.contains(&batch.label())).cloned().collect();
+        let latest = || alike().filter(|batch| batch.from <= selected.from).take(overlay::UNMARKED).cloned().collect();
+        self.overlay = Overlay::new(rule, if marked.is_empty() { latest() } else { marked });
+    }
+
     /// Asks the history when it is time to.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+        match &mut self.overlay {
+            Some(overlay) => overlay.ask(cx, number),
+            None => self.ask_list(cx, number).into_iter().collect(),
+        }
+    }
+
+    fn ask_list(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
         let to = cx.now + SignedDuration::from_secs(1);
         let query = Query::Batches { from: to - SPAN, to, limit: ROWS };
         self.rows.ask(cx, (Tab::Reports, number), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
@@ -98,6 +135,9 @@ impl Batches {
 
     /// Draws it, with a last row about the file.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect, file: (String, Style)) {
+        if let Some(overlay) = &self.overlay {
+            return overlay.view(cx, frame, area);
+        }
         let theme = cx.theme;
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let (columns, height) = (canvas.width(), canvas.height());
@@ -124,7 +164,8 @@ impl Batches {
         let (place, room) = (self.place(), self.room(cx, height));
         for (y, n, report) in on_screen(self.rows(), first(place, self.rows().len(), room), room) {
             let style = if n == place { theme.focus() } else { theme.normal() };
-            canvas.text(0, y + 2, &pad(&format!(" {}", row(cx, report)), columns), style);
+            let mark = if self.marked.contains(&report.batch.label()) { theme.pick("■", "*") } else { " " };
+            canvas.text(0, y + 2, &pad(&format!("{mark}{}", row(cx, report)), columns), style);
         }
         let y = to_u16(room.min(self.rows().len())) + 2;
         for (line, text) in details(cx, &self.rows()[place]).iter().enumerate() {

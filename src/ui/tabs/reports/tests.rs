@@ -73,6 +73,7 @@ impl Stand {
                 '←' => KeyCode::Left,
                 '→' => KeyCode::Right,
                 '↓' => KeyCode::Down,
+                '↑' => KeyCode::Up,
                 '⏎' => KeyCode::Enter,
                 '⎋' => KeyCode::Esc,
                 key => KeyCode::Char(key),
@@ -87,7 +88,10 @@ impl Stand {
             let answer = match query {
                 Query::Report { period } => Answer::Report(Box::new(report(period, full))),
                 Query::Batches { .. } => Answer::Batches(if full { batches() } else { Vec::new() }),
-                other => panic!("reports ask for reports and batches: {other:?}"),
+                Query::Series { tags, from, to, buckets } => {
+                    Answer::Series(vec![batches::rising(tags[0], (from, to), buckets)])
+                }
+                other => panic!("reports ask for reports, batches and curves: {other:?}"),
             };
             self.send(Msg::Answer(id, Ok(answer)));
         }

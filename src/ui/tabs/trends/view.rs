@@ -134,7 +134,7 @@ fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
     let marks = raised.filter(|record| names.contains(&&*record.subject));
     Chart {
         theme: cx.theme,
-        zone: &cx.def().time_zone,
+        zone: Some(&cx.def().time_zone),
         from: view.from,
         to: view.to,
         now: cx.present(),

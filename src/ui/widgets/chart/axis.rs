@@ -150,6 +150,19 @@ pub fn time_ticks(
     ticks
 }
 
+/// Round times since `from`, `0:30` in hours and minutes; with seconds where ticks are closer than a minute.
+pub fn elapsed_ticks(from: Timestamp, to: Timestamp, ticks_max: usize) -> Vec<(Timestamp, String)> {
+    let span = to.as_second() - from.as_second();
+    let room = ticks_max.max(1) as i64;
+    let step = TIME_STEPS.into_iter().find(|step| span / step <= room).unwrap_or(span.max(1));
+    let label = |second: i64| {
+        let (hours, minutes) = (second / 3_600, second / 60 % 60);
+        if step < 60 { format!("{hours}:{minutes:02}:{:02}", second % 60) } else { format!("{hours}:{minutes:02}") }
+    };
+    let tick = |n: i64| Some((Timestamp::from_second(from.as_second() + n * step).ok()?, label(n * step)));
+    (0..=span / step).filter_map(tick).collect()
+}
+
 /// The beginnings of months, or of every second, third … one.
 fn month_ticks(from: Timestamp, to: Timestamp, zone: &TimeZone, room: i64) -> Vec<(Timestamp, String)> {
     const SECONDS: i64 = 2_629_746;
@@ -180,6 +193,20 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn elapsed_time_counts_from_the_left_edge() {
+        let check = |seconds: i64, room: usize, expect: &str| {
+            let from = Timestamp::from_second(1_000_000_007).expect("a time");
+            let to = Timestamp::from_second(1_000_000_007 + seconds).expect("a time");
+            let labels: Vec<String> = elapsed_ticks(from, to, room).into_iter().map(|(_, label)| label).collect();
+            assert_eq!(labels.join(" "), expect, "{seconds} s, {room}");
+        };
+        check(1_800, 6, "0:00 0:05 0:10 0:15 0:20 0:25 0:30");
+        check(40, 4, "0:00:00 0:00:10 0:00:20 0:00:30 0:00:40");
+        check(30 * 3_600, 4, "0:00 12:00 24:00");
+        check(0, 4, "0:00:00");
+    }
 
     #[test]
     fn scales_end_at_round_numbers_and_never_hide_data() {

@@ -169,7 +169,11 @@ impl Chart<'_> {
     pub(super) fn time_labels(&self, plan: &Plan) -> Vec<(Timestamp, String)> {
         let seconds = self.to.as_second() - self.from.as_second();
         let cells_min = if seconds < 8 * 60 { 12 } else { 8 };
-        time_ticks(self.from, self.to, self.zone, plan.plot.width.into(), cells_min)
+        let cells = usize::from(plan.plot.width);
+        match self.zone {
+            Some(zone) => time_ticks(self.from, self.to, zone, cells, cells_min),
+            None => elapsed_ticks(self.from, self.to, cells / cells_min),
+        }
     }
 
     /// A line through the empty cells of its column, and the words above it, on whichever side there is room.

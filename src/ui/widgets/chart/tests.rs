@@ -31,7 +31,7 @@ fn curve<'a>(trace: &'a Trace, pen: usize, unit: &'a str) -> Curve<'a> {
 
 fn chart<'a>(theme: &'a Theme, curves: Vec<Curve<'a>>) -> Chart<'a> {
     let (from, to, now) = (at(0), at(120), at(120));
-    Chart { theme, zone: &ZONE, from, to, now, curves, cursor: None, marks: Vec::new() }
+    Chart { theme, zone: Some(&ZONE), from, to, now, curves, cursor: None, marks: Vec::new() }
 }
 
 fn picture(chart: &Chart, width: u16, height: u16) -> String {

@@ -1,0 +1,164 @@
+//! Several batches of one rule over each other: the curves of one tag, each from the begin of its batch on.
+
+use ratatui::widgets::Widget;
+
+use crate::ui::tabs::prelude::*;
+use crate::{
+    history::Series,
+    plant::{batch::Batch, def::BatchDef, number::to_usize},
+    ui::widgets::chart::{self, Chart, Curve, mark, trace::Trace},
+};
+
+/// Batches over each other at most: a pen has one of so many marks.
+pub const BATCHES_MAX: usize = 8;
+/// Those that are shown where none is marked: the selected one and those before it.
+pub const UNMARKED: usize = 3;
+/// How often the curve of a running batch is read again, and when an answer counts as lost (real time).
+const EVERY_S: f64 = 10.0;
+const TIMEOUT_S: f64 = 20.0;
+
+/// What a key means here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Another tag.
+    Tag(isize),
+    /// The list of batches.
+    Back,
+}
+
+/// Keys of this page.
+pub const KEYS: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Left), "", "previous tag", Action::Tag(-1)),
+    Key::new(code(KeyCode::Right), "tag", "next tag", Action::Tag(1)),
+    Key::new(char('o'), "list", "back to the list of batches", Action::Back),
+];
+
+/// State of the page.
+#[derive(Debug)]
+pub struct Overlay {
+    /// Each batch with the curve of the tag.
+    batches: Vec<(Batch, Answered<Vec<Series>>)>,
+    tags: Vec<TagId>,
+    tag: usize,
+}
+
+impl Overlay {
+    /// Of batches of one rule; `None` where it names no tag that has a curve.
+    pub fn new(rule: &BatchDef, batches: impl IntoIterator<Item = Batch>) -> Option<Overlay> {
+        let tags: Vec<TagId> = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
+        let batches = batches.into_iter().take(BATCHES_MAX).map(|batch| (batch, Answered::default())).collect();
+        (!tags.is_empty()).then_some(Overlay { batches, tags, tag: 0 })
+    }
+
+    pub fn act(&mut self, by: isize) {
+        self.tag = around(self.tag, by, self.tags.len());
+        self.batches.iter_mut().for_each(|(_, curve)| *curve = Answered::default());
+    }
+
+    /// The longest of them.
+    fn span(&self, now: Timestamp) -> SignedDuration {
+        let lasted = self.batches.iter().map(|(batch, _)| batch.until(now).duration_since(batch.from));
+        lasted.max().unwrap_or_default().max(SignedDuration::from_secs(60))
+    }
+
+    /// Asks for the curves: of an ended batch once.
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+        let (span, tag, columns) = (self.span(cx.now), self.tags[self.tag], chart::dots(cx.theme, cx.area.width, 1));
+        let ask = |(batch, curve): &mut (Batch, Answered<Vec<Series>>)| {
+            let every = if batch.to.is_some() { SignedDuration::MAX } else { real(cx, EVERY_S) };
+            // Its own figures, and columns as wide as those of the longest.
+            let to = batch.until(cx.now).max(batch.from + SignedDuration::from_secs(1));
+            let share = to.duration_since(batch.from).as_secs_f64() / span.as_secs_f64();
+            let buckets = to_usize(columns as f64 * share).max(2);
+            let query = Query::Series { tags: vec![tag], from: batch.from, to, buckets };
+            curve.ask(cx, (Tab::Reports, number), every, real(cx, TIMEOUT_S), query)
+        };
+        self.batches.iter_mut().filter_map(ask).collect()
+    }
+
+    pub fn awaits(&self, number: u32) -> bool {
+        self.batches.iter().any(|(_, curve)| curve.query.awaits(number))
+    }
+
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        self.batches.iter_mut().for_each(|(_, curve)| curve.on_answer(cx, number, answer));
+    }
+
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        let (theme, tag) = (cx.theme, self.tags[self.tag]);
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let (width, height) = (canvas.width(), canvas.height());
+        let def = cx.def().tag(tag);
+        let x = canvas.text(
+            1,
+            0,
+            &t!("{tag} of {count} batches", tag = def.name, count = self.batches.len()),
+            theme.strong(),
+        );
+        let trouble = self.batches.iter().find_map(|(_, curve)| curve.trouble.as_deref());
+        match trouble {
+            Some(trouble) => canvas.text(x + 2, 0, &fit(trouble, width.saturating_sub(x + 3)), theme.trouble()),
+            None => canvas.text(x + 2, 0, &fit(&def.label, width.saturating_sub(x + 3)), theme.normal()),
+        };
+        let legend = to_u16(self.batches.len()) + 1;
+        let traces: Vec<Trace> = self.batches.iter().map(|(batch, curve)| from_begin(batch, curve)).collect();
+        let curves = traces.iter().enumerate().map(|(pen, trace)| Curve {
+            trace,
+            pen,
+            unit: cx.snapshot.unit(tag),
+            fixed: None,
+            resolution: 10f64.powi(-i32::from(cx.snapshot.decimals[tag.index()])),
+            dashed: false,
+        });
+        let end = BEGIN.checked_add(self.span(cx.now)).unwrap_or(BEGIN);
+        let chart = Chart {
+            theme,
+            zone: None,
+            from: BEGIN,
+            to: end,
+            now: end,
+            curves: curves.collect(),
+            cursor: None,
+            marks: Vec::new(),
+        };
+        let plot = canvas.part(0, 1, width, height.saturating_sub(legend + 1)).area();
+        chart.render(plot, canvas.buffer());
+        let y = height.saturating_sub(legend);
+        let head = [t!("batch"), t!("begin"), t!("minutes"), t!("min"), t!("mean"), t!("max"), t!("good")];
+        canvas.text(3, y, &fit(&draw::columns(WIDTHS, head), width.saturating_sub(3)), theme.dim());
+        for (n, (batch, curve)) in self.batches.iter().enumerate() {
+            let y = y + 1 + to_u16(n);
+            canvas.text(1, y, mark(theme, n), theme.pen(n));
+            canvas.text(3, y, &fit(&row(cx, tag, batch, curve), width.saturating_sub(3)), theme.normal());
+        }
+    }
+}
+
+/// The begin of each batch on the common axis.
+const BEGIN: Timestamp = Timestamp::UNIX_EPOCH;
+const WIDTHS: [i16; 7] = [15, 12, -7, -9, -9, -9, -8];
+
+/// The curve of a batch, moved to the common begin.
+fn from_begin(batch: &Batch, curve: &Answered<Vec<Series>>) -> Trace {
+    let mut trace = Trace::default();
+    if let Some(series) = curve.value.iter().flatten().next() {
+        let from = BEGIN.checked_add(series.from.duration_since(batch.from)).unwrap_or(BEGIN);
+        trace.set_past(Series { from, ..series.clone() }, Timestamp::MAX);
+    }
+    trace
+}
+
+/// The figures of a batch.
+fn row(cx: &ViewContext, tag: TagId, batch: &Batch, curve: &Answered<Vec<Series>>) -> String {
+    let begin = moment(batch.from, cx.now, &cx.def().time_zone);
+    let lasted = format!("{:.1}", batch.until(cx.now).duration_since(batch.from).as_secs_f64() / 60.0);
+    let series = curve.value.iter().flatten().next();
+    let value = |value: Option<f64>| value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
+    let summary = series.and_then(|series| series.summary);
+    let good = series.map_or("–".to_owned(), |series| format!("{:.1} %", (series.good * 1_000.0).floor() / 10.0));
+    let [min, mean, max] = match summary {
+        Some((min, mean, max)) => [Some(min), Some(mean), Some(max)],
+        None => [None; 3],
+    };
+    draw::columns(WIDTHS, [&batch.label(), &begin, &lasted, &value(min), &value(mean), &value(max), &good])
+}
