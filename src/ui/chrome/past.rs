@@ -2,13 +2,12 @@
 
 use super::{Canvas, Model, ViewContext, width};
 use crate::{
-    plant::{record::AlarmRecord, time::elapsed},
+    plant::time::elapsed,
     t,
-    text::translate,
     ui::{
         keys::Hint,
         replay::{Event, stamp},
-        tabs::alarms::action_text,
+        tabs::alarms::{action_text, event_text},
         widgets::text::age,
     },
 };
@@ -40,10 +39,7 @@ pub(super) fn words(model: &Model, cx: &ViewContext) -> Option<String> {
     model.replay.words().or_else(|| {
         let event = model.replay.event()?;
         let text = match event {
-            Event::Alarm(AlarmRecord { subject, message, event, priority, by, .. }) => {
-                let by = by.as_ref().map(|by| t!(" by {by}", by)).unwrap_or_default();
-                format!("{} {subject} {message}  {}{by}", cx.theme.priority_mark(*priority), translate(event.word()))
-            }
+            Event::Alarm(record) => event_text(cx, record),
             Event::Action(record) => action_text(cx, record).split_whitespace().collect::<Vec<_>>().join(" "),
         };
         Some(text)

@@ -33,7 +33,7 @@ pub use go::faceplate;
 use handover::Handover;
 pub use handover::suppressed_words;
 use journal::Journal;
-pub use journal::action_text;
+pub use journal::{action_text, event_text};
 use keys::Action;
 use metrics::Metrics;
 

@@ -1,5 +1,9 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
+mod companions;
+
+use companions::{Companions, parts};
+
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
@@ -50,6 +54,7 @@ pub struct Mimic {
     motion: bool,
     /// Curves of the small trends, by the item's place.
     trends: Vec<(usize, Answered<Vec<Series>>)>,
+    companions: Companions,
     /// Queries asked so far.
     asked: u32,
 }
@@ -59,7 +64,7 @@ impl TabView for Mimic {
         let items = snapshot.def.mimic.items.iter().enumerate();
         let trends =
             items.filter(|(_, item)| matches!(item, MimicItem::Trend { .. })).map(|(n, _)| (n, Answered::default()));
-        Mimic { selected: None, motion: true, trends: trends.collect(), asked: 0 }
+        Mimic { selected: None, motion: true, trends: trends.collect(), companions: Companions::default(), asked: 0 }
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
@@ -72,26 +77,32 @@ impl TabView for Mimic {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let parts = parts(cx.def().mimic.size, cx.area);
+        let beside = self.companions.ask(cx, &parts, &mut self.asked);
         let asks = self.trends.iter_mut().filter_map(|(item, trend)| {
             let MimicItem::Trend { tag, window, place } = &cx.def().mimic.items[*item] else { return None };
             let from = cx.now - SignedDuration::try_from(*window).ok()?;
-            let buckets = usize::from(scale(cx, cx.area).place(*place).width.max(1)) * 2;
+            let buckets = usize::from(scale(cx, parts.picture).place(*place).width.max(1)) * 2;
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
             trend.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
         });
-        asks.collect()
+        asks.chain(beside).collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.trends.iter().any(|(_, trend)| trend.query.awaits(number))
+        self.companions.awaits(number) || self.trends.iter().any(|(_, trend)| trend.query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        self.companions.on_answer(cx, number, &answer);
         self.trends.iter_mut().for_each(|(_, trend)| trend.on_answer(cx, number, &answer));
         Vec::new()
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        let parts = parts(cx.def().mimic.size, area);
+        self.companions.view(cx, frame, &parts);
+        let area = parts.picture;
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let items = &cx.def().mimic.items;
         if list::is_shown(cx, area) {

@@ -3,7 +3,7 @@
 
 mod data;
 mod keys;
-mod span;
+pub(super) mod span;
 mod view;
 
 #[cfg(test)]

@@ -162,6 +162,13 @@ fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     )
 }
 
+/// An alarm event in words: `‹2›! TIC-1.PV temperature high  raised`.
+pub fn event_text(cx: &ViewContext, row: &AlarmRecord) -> String {
+    let by = row.by.as_ref().map(|by| t!(" by {by}", by)).unwrap_or_default();
+    let (mark, event) = (cx.theme.priority_mark(row.priority), translate(row.event.word()));
+    format!("{mark} {} {}  {event}{by}", row.subject, row.message)
+}
+
 /// An action in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.
 pub fn action_text(cx: &ViewContext, row: &ActionRecord) -> String {
     let change = match (&row.old, &row.new) {
