@@ -174,7 +174,7 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     past::line(cx, canvas);
     if let Some(note) = model.note {
         canvas.text(1, 0, &format!(" {note} "), cx.theme.strong());
-    } else if let Some(words) = past::words(model, cx) {
+    } else if let Some(words) = past::words(model, cx).filter(|_| cx.is_past() || !is_urgent(model)) {
         canvas.text(1, 0, &format!(" {} ", fit_words(&words, length.saturating_sub(4))), cx.theme.strong());
     } else if let Some(pending) = &model.last_command {
         let (text, style) = last_command_label(cx, pending);
@@ -189,6 +189,11 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
         };
         canvas.text(1, 0, &format!(" {text} "), style);
     }
+}
+
+/// Has the last command an outcome that must be read?
+fn is_urgent(model: &Model) -> bool {
+    model.last_command.as_ref().is_some_and(LastCommand::is_trouble)
 }
 
 /// A command and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.

@@ -7,6 +7,7 @@ const RECENT_MAX: usize = 8;
 
 pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     model.note = None;
+    model.replay.dismiss();
     if keys::find(&keys::global(), event) == Some(Global::Lock) {
         return session_lock::lock(model);
     }
@@ -25,14 +26,23 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
         let cx = past_context(view_context(snapshot, theme, *clock, *screen, extension, session), replay);
+        let before = cx.is_past().then(|| modal.clone());
         let (rest, actions) = modal.on_key(&cx, tabs, event);
         model.modal = rest;
+        if let (Some(before), Some(rest)) = (before, &model.modal)
+            && replay::gives_command(rest)
+        {
+            // A form for a command is not opened in the past, from a window neither.
+            (model.modal, model.note) = (Some(before), Some(replay::refused()));
+            return Vec::new();
+        }
         return actions;
     }
     if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
         return session_lock::on_typed(model, event);
     }
-    if let Some(action) = keys::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some()) {
+    let replayed = keys::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some());
+    if let Some(action) = replayed.filter(|action| *action == replay::Action::Leave || !model.small()) {
         let present = model.present_cx().now;
         let actions = match action {
             replay::Action::GoTo => on_global(model, Global::Replay),
@@ -66,7 +76,9 @@ pub(super) fn lead(model: &mut Model, action: UiAction) -> Vec<UiAction> {
     match action {
         UiAction::Jump(target) => {
             model.recent.retain(|earlier| *earlier != target);
-            model.recent.insert(0, target);
+            if !matches!(target, palette::Target::Instant(_)) {
+                model.recent.insert(0, target);
+            }
             model.recent.truncate(RECENT_MAX);
             let actions = palette::actions(&model.cx(), target);
             actions.into_iter().flat_map(|action| lead(model, action)).collect()
@@ -84,6 +96,10 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             }
             vec![UiAction::Show(tab)]
         }
+        Global::Show(_) if model.replay.shown().is_some() => {
+            model.note = Some(t!("This tab shows the present only: Esc returns to it"));
+            Vec::new()
+        }
         Global::Show(_) => Vec::new(),
         Global::Next => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), 1))],
         Global::Previous => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
@@ -100,8 +116,11 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             let palette = Palette::new(&model.cx(), model.tabs.shown(), &model.recent);
             vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
         }
-        Global::Back => model.trail.step(model.tabs.shown, false).map(UiAction::Show).into_iter().collect(),
-        Global::Forward => model.trail.step(model.tabs.shown, true).map(UiAction::Show).into_iter().collect(),
+        Global::Back | Global::Forward => {
+            let offered = Tab::offered(&model.cx());
+            let tab = model.trail.step(model.tabs.shown, global == Global::Forward);
+            tab.filter(|tab| offered.contains(tab)).map(UiAction::Show).into_iter().collect()
+        }
         Global::Help => vec![UiAction::Open(Modal::Help(0))],
         Global::Quit => vec![UiAction::Leave],
         Global::Acknowledge => last_frame::acknowledge(model),
@@ -119,6 +138,7 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.
+            model.replay.cancel();
             let failed = model.last_command.take().is_some_and(|pending| pending.is_trouble());
             if !failed {
                 with_tabs(model, |tabs, cx| {

@@ -27,7 +27,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 effects.extend(show(model, Tab::Mimic));
             }
             UiAction::ShowOnTrends(tag, span) => {
-                if model.replay.shown().is_some() {
+                if model.replay.shown().is_some() && span.0 == span.1 {
                     effects.push(model.replay.go_to(span.0));
                 }
                 with_tabs(model, |tabs, cx| {
@@ -37,6 +37,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 effects.extend(show(model, Tab::Trends));
             }
             UiAction::Replay(at) => effects.push(model.replay.go_to(at)),
+            UiAction::ReplayStep(by) => effects.extend(model.replay.step(by, model.present_cx().now)),
             // Became other actions before.
             UiAction::Jump(_) | UiAction::Press(_) => {}
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
@@ -78,6 +79,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
         | UiAction::Replay(_)
+        | UiAction::ReplayStep(_)
         | UiAction::Jump(_)
         | UiAction::Press(_)
         | UiAction::Command(_)

@@ -280,11 +280,17 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
 
 /// The history has answered the replay. A tab that has no past gives way to the one that the terminal begins with.
 fn on_replayed(model: &mut Model, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-    let Model { snapshot, theme, clock, extension, session, screen, replay, tabs, .. } = model;
+    if model.modal.as_ref().is_some_and(replay::gives_command) {
+        // What is being filled in is of the present.
+        model.replay.cancel();
+    }
+    let Model { snapshot, theme, clock, extension, session, screen, replay, tabs, trail, .. } = model;
     let present = view_context(snapshot, theme, *clock, *screen, extension, session);
     let asked = replay.on_answer(number, answer, &present);
     if replay.shown().is_some() && !tabs.shown.has_past() {
-        tabs.shown = Tab::home(&snapshot.def);
+        let home = Tab::home(&snapshot.def);
+        trail.note(tabs.shown, home);
+        tabs.shown = home;
     }
     let asked = asked.into_iter().map(UiAction::Do);
     asked.chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use crossterm::event::KeyEvent;
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::{
     extension::{Extension, ExtensionMessage},
@@ -132,6 +132,8 @@ pub enum UiAction {
     ShowOnMimic(Vec<TagId>),
     /// Show the curve of a tag over a stretch of time; a moment, which begins as it ends, with the cursor on it.
     ShowOnTrends(TagId, (Timestamp, Timestamp)),
+    /// Show the plant so long after the past that is shown.
+    ReplayStep(SignedDuration),
     /// Go to what was chosen in the palette.
     Jump(Target),
     /// Do what a key of the shown tab does.

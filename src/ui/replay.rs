@@ -57,6 +57,7 @@ pub enum Direction {
 
 /// Keys while the past is shown; they come before those of the tab.
 pub const KEYS: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Esc), "present", "back to the present", Action::Leave),
     Key::new(char('['), "", "previous alarm event or action of an operator", Action::Event(Direction::Earlier)),
     Key::new(char(']'), "event", "next alarm event or action of an operator", Action::Event(Direction::Later)),
     Key::new(char('<'), "", "a minute earlier", Action::Step(-60)),
@@ -65,7 +66,6 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('.'), "second", "a second later; pauses", Action::Step(1)),
     Key::new(char('*'), "play", "play ×1, ×10, ×60, ×600, then pause", Action::Play),
     Key::new(char('@'), "time", "go to a past time", Action::GoTo),
-    Key::new(code(KeyCode::Esc), "present", "back to the present", Action::Leave),
 ];
 
 /// A past instant of the plant.
@@ -100,8 +100,10 @@ impl Event {
 #[derive(Debug, Default)]
 pub struct Replay {
     shown: Option<Shown>,
-    /// The query for the instant that is to be shown next.
-    goal: Option<u32>,
+    /// The query for the instant that is to be shown next, and the instant.
+    goal: Option<(u32, Timestamp)>,
+    /// Where steps lead that were made meanwhile.
+    beyond: Option<Timestamp>,
     search: Option<Search>,
     /// The event that was gone to.
     event: Option<Event>,
@@ -139,7 +141,7 @@ impl Replay {
 
     /// Does it wait for this answer?
     pub fn awaits(&self, number: u32) -> bool {
-        self.goal == Some(number)
+        self.goal.is_some_and(|(goal, _)| goal == number)
             || self.search.as_ref().is_some_and(|search| search.queries.contains(&number))
             || self.ahead.iter().any(|(_, query, shown)| *query == number && shown.is_none())
     }
@@ -152,10 +154,37 @@ impl Replay {
     /// Asks for an instant, which is shown when the answer comes; what is played stops.
     pub fn go_to(&mut self, at: Timestamp) -> Effect {
         self.pause();
-        (self.search, self.trouble) = (None, None);
+        (self.search, self.trouble, self.beyond) = (None, None, None);
         let effect = self.ask(Query::Past { at });
-        self.goal = Some(self.asked);
+        self.goal = Some((self.asked, at));
         effect
+    }
+
+    /// Steps from where it is, or from where it goes: while an instant is on its way it is waited for, so that fast keys
+    /// neither outrun the history nor get lost.
+    pub fn step(&mut self, by: SignedDuration, present: Timestamp) -> Option<Effect> {
+        let on_way = self.goal.map(|(_, at)| self.beyond.unwrap_or(at));
+        let from = on_way.or(self.shown().map(|shown| shown.at))?;
+        let to = from.checked_add(by).unwrap_or(from).min(present);
+        match on_way {
+            Some(_) => {
+                self.beyond = Some(to);
+                None
+            }
+            None => Some(self.go_to(to)),
+        }
+    }
+
+    /// A key was pressed: why the last query led nowhere has been read.
+    pub fn dismiss(&mut self) {
+        self.trouble = None;
+    }
+
+    /// What is on its way is not waited for, where nothing of the past is shown yet.
+    pub fn cancel(&mut self) {
+        if self.shown.is_none() {
+            self.leave();
+        }
     }
 
     fn ask(&mut self, query: Query) -> Effect {
@@ -172,11 +201,8 @@ impl Replay {
     pub fn on_key(&mut self, action: Action, present: Timestamp) -> Vec<Effect> {
         let Some(at) = self.shown().map(|shown| shown.at) else { return Vec::new() };
         match action {
-            Action::Step(seconds) => {
-                let to = at.saturating_add(SignedDuration::from_secs(seconds)).unwrap_or(at).min(present);
-                vec![self.go_to(to)]
-            }
-            Action::Event(direction) => self.search(direction, at, present, 0),
+            Action::Step(seconds) => self.step(SignedDuration::from_secs(seconds), present).into_iter().collect(),
+            Action::Event(direction) => self.search(direction, at, present),
             Action::Play => {
                 self.pace = (self.pace + 1) % PACES.len();
                 (self.goal, self.search, self.trouble) = (None, None, None);
@@ -238,34 +264,36 @@ impl Replay {
                 self.pause();
                 (self.goal, self.search, self.trouble) = (None, None, Some(why));
             }
-            Ok(Answer::Past(past)) => self.on_past(number, &past, present),
+            Ok(Answer::Past(past)) => return self.on_past(number, &past, present).into_iter().collect(),
             Ok(Answer::Journal(rows)) => {
                 if let Some(search) = &mut self.search {
                     search.alarms = Some(rows);
                 }
-                return self.on_found(present);
+                return self.on_found();
             }
             Ok(Answer::Actions(rows)) => {
                 if let Some(search) = &mut self.search {
                     search.actions = Some(rows);
                 }
-                return self.on_found(present);
+                return self.on_found();
             }
             Ok(_) => {}
         }
         Vec::new()
     }
 
-    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) {
+    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) -> Option<Effect> {
         let mut snapshot = past.snapshot(present.snapshot.def.clone());
         // Waiting and refreshing go by the time of the present.
         (snapshot.speed, snapshot.stepped) = (present.snapshot.speed, present.snapshot.stepped);
         let shown = Shown { at: past.at, snapshot: Arc::new(snapshot) };
-        if self.goal == Some(number) {
+        if self.goal.is_some_and(|(goal, _)| goal == number) {
             (self.goal, self.shown) = (None, Some(shown));
+            return self.beyond.take().map(|at| self.go_to(at));
         } else if let Some((.., place)) = self.ahead.iter_mut().find(|(_, query, _)| *query == number) {
             *place = Some(shown);
         }
+        None
     }
 }
 
@@ -319,14 +347,14 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         UiAction::Command(_) | UiAction::SendCommand(..) | UiAction::Do(Effect::Command(..) | Effect::Extension(_)) => {
             true
         }
-        UiAction::Open(Modal::UserForm(_)) => false,
-        UiAction::Open(modal) => !modal.only_looks(),
+        UiAction::Open(modal) => gives_command(modal),
         UiAction::Show(_)
         | UiAction::ShowDevice(_)
         | UiAction::ShowParameter(_)
         | UiAction::ShowOnMimic(_)
         | UiAction::ShowOnTrends(..)
         | UiAction::Replay(_)
+        | UiAction::ReplayStep(_)
         | UiAction::Jump(_)
         | UiAction::Press(_)
         | UiAction::SessionRequest(..)
@@ -338,6 +366,11 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         model.note = Some(refused());
     }
     rest
+}
+
+/// Does a command come of this window? A form about users, as the password of a locked terminal, is not about the plant.
+pub(super) fn gives_command(modal: &Modal) -> bool {
+    !modal.only_looks() && !matches!(modal, Modal::UserForm(_))
 }
 
 /// Said of a key that would give a command.

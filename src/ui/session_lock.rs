@@ -12,6 +12,7 @@ use super::{
     modal::{Modal, Notice, UserForm, user_form::Purpose},
     replay::Replay,
     tabs::{Tab, TabView, Tabs, login},
+    trail::Trail,
 };
 use crate::{
     access::{Durability, SessionRequest, SessionStatus},
@@ -75,6 +76,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
         model.modal.take_if(|modal| !modal.is_quit());
         model.last_command = model.last_command.take_if(|_| user(&before) == user(&now));
         model.kept = None;
+        (model.trail, model.recent) = (Trail::default(), Vec::new());
     }
     let back = keep_work(model, &before, &now);
     with_tabs(model, |tabs, cx| {
@@ -103,7 +105,8 @@ fn keep_work(model: &mut Model, before: &SessionStatus, now: &SessionStatus) -> 
     match (before.locked, now.locked) {
         (false, true) => {
             let work = model.modal.take_if(|modal| !modal.only_shows());
-            model.kept = work.map(|work| (model.tabs.shown, work));
+            // What was filled in before a past was shown is not meant for it, nor for the present after it.
+            model.kept = work.filter(|_| model.replay.shown().is_none()).map(|work| (model.tabs.shown, work));
             None
         }
         (true, false) => {
@@ -181,6 +184,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
             | UiAction::Replay(_)
+            | UiAction::ReplayStep(_)
             | UiAction::Jump(_)
             | UiAction::Press(_)
             | UiAction::SessionRequest(..)
@@ -250,7 +254,8 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     let shown = model.tabs.shown;
     model.tabs = Tabs::new(&snapshot);
     (model.snapshot, model.last_command, model.kept) = (snapshot, None, None);
-    model.replay = Replay::default();
+    (model.replay, model.trail) = (Replay::default(), Trail::default());
+    model.recent.clear();
     model.plants = model.plants.wrapping_add(1);
     let words = vec![
         t!("The plant file changed").to_owned(),

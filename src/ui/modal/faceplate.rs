@@ -51,6 +51,8 @@ impl Faceplate {
             hints.push(Hint::in_window("↑↓", t!("select")));
         }
         match (self.toggle(cx), command_tag(cx, self.tag())) {
+            // Nothing is written in the past.
+            _ if cx.is_past() => {}
             (Some((tag, value)), _) => {
                 let words = format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(self.tag()).short);
                 hints.insert(0, Hint::in_window("t", &words));
@@ -157,6 +159,9 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     };
     let read = match def.access {
         Access::Write => t!("never").to_owned(),
+        Access::Read | Access::ReadWrite if cx.is_past() => {
+            t!("stored {age} before, {clock}", age = age(cx.age(tag)), clock = clock(sample.at, &cx.def().time_zone))
+        }
         Access::Read | Access::ReadWrite => {
             t!("{age} ago, {clock}", age = age(cx.age(tag)), clock = clock(sample.at, &cx.def().time_zone))
         }

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use crossterm::event::{KeyCode, KeyEvent};
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use nucleo_matcher::{
     Config, Matcher, Utf32Str,
     pattern::{CaseMatching, Normalization, Pattern},
@@ -31,6 +31,8 @@ use crate::{
 
 /// Rows that are listed at most: the best ones.
 const FOUND_MAX: usize = 100;
+/// What a name that is exactly what was typed counts more.
+const EXACT: u32 = 1_000;
 /// Columns of the window, where there are as many.
 const WIDTH: u16 = 76;
 
@@ -105,9 +107,14 @@ impl Palette {
         let pattern = Pattern::parse(&text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
+        let mut fits = |text: &str| pattern.score(Utf32Str::new(text, &mut buffer), &mut matcher);
         let mut score = |row: &Row| {
-            let text = format!("{} {} {}", row.name, row.text, row.kind);
-            pattern.score(Utf32Str::new(&text, &mut buffer), &mut matcher)
+            let all = fits(&format!("{} {} {}", row.name, row.text, row.kind))?;
+            // What is called so stands before what only mentions it, above all as a whole word at the end of its name.
+            let is_last =
+                |name: &str| name.rsplit(['.', '-', ' ']).next().is_some_and(|part| part.eq_ignore_ascii_case(&text));
+            let exact = is_last(&row.name) || row.text.eq_ignore_ascii_case(&text);
+            Some(all + fits(&row.name).unwrap_or(0) + if exact && !text.is_empty() { EXACT } else { 0 })
         };
         // Of those that fit alike a tag stands before its curve and its alarms.
         let rank = |row: &Row| if text.is_empty() { 0 } else { row.target.rank() };
@@ -180,7 +187,9 @@ fn room(body: Rect) -> usize {
 }
 
 fn instant(cx: &ViewContext, text: &str) -> Option<Row> {
-    let at = text.starts_with(|c: char| c.is_ascii_digit() || c == '-').then(|| replay::instant(cx, text).ok())??;
+    // A bench has no history.
+    let at = (!cx.def().is_bench() && text.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
+        .then(|| replay::instant(cx, text).ok())??;
     let name = replay::stamp(cx, at);
     Some(Row { target: Target::Instant(at), kind: t!("time"), name, text: t!("replay").to_owned() })
 }
@@ -200,7 +209,7 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
         let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
         Some(row(Target::Key(hint.chord?), t!("key"), &hint.key, help))
     });
-    let devices = def.devices.iter();
+    let devices = def.devices.iter().filter(|_| !def.is_bench());
     let devices = devices.map(|device| row(Target::Device(device.id), t!("device"), &device.name, &device.title));
     let tags = def.tags.iter().map(|tag| row(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
     let stored = def.tags.iter().filter(|tag| tag.is_stored());
@@ -217,7 +226,10 @@ pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
             let faceplate = Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]);
             faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect()
         }
-        Target::Trend(tag) => vec![UiAction::ShowOnTrends(tag, (cx.now, cx.now))],
+        Target::Trend(tag) => {
+            let before = cx.now.checked_sub(SignedDuration::from_mins(10)).unwrap_or(cx.now);
+            vec![UiAction::ShowOnTrends(tag, (before, cx.now))]
+        }
         Target::Alarm(id) => {
             let faceplate = alarms::faceplate(cx, cx.def().alarm(id).subject);
             vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate))))]

@@ -7,7 +7,7 @@ use crate::{
     history::Query,
     plant::record::{ActionRecord, AlarmRecord},
     t,
-    ui::{Effect, ViewContext},
+    ui::Effect,
 };
 
 /// An event is searched for in spans that grow: 1 h, a day, a month, a year.
@@ -15,33 +15,34 @@ const SEARCHED_H: [i64; 4] = [1, 24, 24 * 31, 24 * 366];
 /// Rows of one search; where a span has more, a shorter one is searched.
 const SEARCHED_ROWS: usize = 200;
 
-/// A search for the next event.
-#[derive(Debug)]
-pub(super) struct Search {
+/// Where the next event is searched for.
+#[derive(Debug, Clone, Copy)]
+struct Span {
     direction: Direction,
     from: Timestamp,
     to: Timestamp,
+    /// Until there are more events than one answer holds: then the span is the first half of that.
+    crowded: Option<Timestamp>,
     /// Place in [`SEARCHED_H`].
-    span: usize,
+    reach: usize,
+    /// The end of time, as it was when the key was pressed.
+    present: Timestamp,
+}
+
+/// A search for the next event.
+#[derive(Debug)]
+pub(super) struct Search {
+    span: Span,
     /// The queries, and what came.
     pub(super) queries: [u32; 2],
     pub(super) alarms: Option<Vec<AlarmRecord>>,
     pub(super) actions: Option<Vec<ActionRecord>>,
 }
 
-impl Replay {
-    /// Asks for the events of the next span in a direction.
-    pub(super) fn search(
-        &mut self,
-        direction: Direction,
-        at: Timestamp,
-        present: Timestamp,
-        span: usize,
-    ) -> Vec<Effect> {
-        self.pause();
-        (self.goal, self.trouble) = (None, None);
-        let by = SignedDuration::from_hours(SEARCHED_H[span]);
-        // The instant itself was gone to: it is neither next nor previous.
+impl Span {
+    /// The first span before or after an instant, which itself is neither next nor previous.
+    fn new(direction: Direction, at: Timestamp, reach: usize, present: Timestamp) -> Span {
+        let by = SignedDuration::from_hours(SEARCHED_H[reach]);
         let (from, to) = match direction {
             Direction::Earlier => (at.checked_sub(by).unwrap_or(Timestamp::MIN), at),
             Direction::Later => {
@@ -49,58 +50,82 @@ impl Replay {
                 (from, from.checked_add(by).unwrap_or(present).min(after(present)))
             }
         };
-        self.search_in(direction, (from, to), span)
+        Span { direction, from, to, crowded: None, reach, present }
     }
 
-    fn search_in(&mut self, direction: Direction, (from, to): (Timestamp, Timestamp), span: usize) -> Vec<Effect> {
-        if to <= from {
-            self.trouble = Some(t!("no later event").to_owned());
-            return Vec::new();
+    /// The first half of a crowded span; all of it where it cannot be halved.
+    fn half(self, from: Timestamp, end: Timestamp) -> Span {
+        let half = from.checked_add(end.duration_since(from) / 2).unwrap_or(end);
+        // Events are stored with microseconds.
+        let (to, crowded) = if after(from) < half { (half, Some(end)) } else { (end, None) };
+        Span { from, to, crowded, ..self }
+    }
+
+    /// Nothing was found: where to search on; `None` at the end of time.
+    fn next(self) -> Option<Span> {
+        let longest = SEARCHED_H.len() - 1;
+        match (self.direction, self.crowded) {
+            (Direction::Later, Some(end)) => Some(self.half(self.to, end)),
+            (Direction::Later, None) => {
+                let before = self.to.checked_sub(SignedDuration::from_micros(1)).unwrap_or(self.to);
+                Some(Span::new(self.direction, before, (self.reach + 1).min(longest), self.present))
+            }
+            (Direction::Earlier, _) if self.reach == longest => None,
+            (Direction::Earlier, _) => Some(Span::new(self.direction, self.from, self.reach + 1, self.present)),
         }
+        .filter(|next| next.from < next.to)
+    }
+}
+
+impl Replay {
+    /// Asks for the next event in a direction.
+    pub(super) fn search(&mut self, direction: Direction, at: Timestamp, present: Timestamp) -> Vec<Effect> {
+        self.pause();
+        (self.goal, self.trouble) = (None, None);
+        let span = Span::new(direction, at, 0, present);
+        self.search_in(Some(span).filter(|span| span.from < span.to), direction)
+    }
+
+    fn search_in(&mut self, span: Option<Span>, direction: Direction) -> Vec<Effect> {
+        let Some(span @ Span { from, to, .. }) = span else {
+            self.trouble = Some(match direction {
+                Direction::Earlier => t!("no earlier event within a year").to_owned(),
+                Direction::Later => t!("no later event").to_owned(),
+            });
+            return Vec::new();
+        };
         let limit = SEARCHED_ROWS;
         let alarms = self.ask(Query::Journal { from, to, limit });
         let first = self.asked;
         let actions = self.ask(Query::Actions { from, to, limit });
         let queries = [first, self.asked];
-        self.search = Some(Search { direction, from, to, span, queries, alarms: None, actions: None });
+        self.search = Some(Search { span, queries, alarms: None, actions: None });
         vec![alarms, actions]
     }
 
     /// Both answers of a search: goes to the nearest event, or searches on.
-    pub(super) fn on_found(&mut self, present: &ViewContext) -> Vec<Effect> {
+    pub(super) fn on_found(&mut self) -> Vec<Effect> {
         let both = |search: &mut Search| search.alarms.is_some() && search.actions.is_some();
-        let Some(search) = self.search.take_if(both) else { return Vec::new() };
-        let (alarms, actions) = (search.alarms.unwrap_or_default(), search.actions.unwrap_or_default());
+        let Some(Search { span, alarms, actions, .. }) = self.search.take_if(both) else { return Vec::new() };
+        let (alarms, actions) = (alarms.unwrap_or_default(), actions.unwrap_or_default());
         // The newest rows came: of too many, the oldest are missing.
         let cut = SEARCHED_ROWS <= alarms.len().max(actions.len());
         let events = alarms.into_iter().map(Event::Alarm).chain(actions.into_iter().map(Event::Action));
-        let events = events.filter(|event| (search.from..search.to).contains(&event.at()));
-        let (direction, from, to) = (search.direction, search.from, search.to);
-        let nearest = match direction {
+        let events = events.filter(|event| (span.from..span.to).contains(&event.at()));
+        let nearest = match span.direction {
             Direction::Earlier => events.max_by_key(Event::at),
-            Direction::Later if cut => {
-                let half = to.duration_since(from) / 2;
-                return self.search_in(direction, (from, from.checked_add(half).unwrap_or(to)), search.span);
-            }
-            Direction::Later => events.min_by_key(Event::at),
-        };
-        if let Some(event) = nearest {
-            let effect = self.go_to(event.at());
-            self.event = Some(event);
-            return vec![effect];
-        }
-        let longest = SEARCHED_H.len() - 1;
-        match direction {
-            Direction::Earlier if search.span == longest => {
-                self.trouble = Some(t!("no earlier event within a year").to_owned());
-                Vec::new()
-            }
-            Direction::Earlier => self.search(direction, from, present.now, search.span + 1),
             Direction::Later => {
-                let before = to.checked_sub(SignedDuration::from_micros(1)).unwrap_or(to);
-                self.search(direction, before, present.now, (search.span + 1).min(longest))
+                let half = span.half(span.from, span.to);
+                if cut && half.crowded.is_some() {
+                    return self.search_in(Some(half), span.direction);
+                }
+                events.min_by_key(Event::at)
             }
-        }
+        };
+        let Some(event) = nearest else { return self.search_in(span.next(), span.direction) };
+        let effect = self.go_to(event.at());
+        self.event = Some(event);
+        vec![effect]
     }
 }
 

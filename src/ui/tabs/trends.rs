@@ -3,6 +3,7 @@
 
 mod data;
 mod keys;
+mod replay;
 pub(super) mod span;
 mod view;
 
@@ -147,8 +148,10 @@ impl TabView for Trends {
         Ok(self.ask(cx))
     }
 
-    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
-        hints(KEYS)
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        let of_present = [Action::Live, Action::Mode, Action::Hold, Action::Cursor, Action::Rate, Action::GoTo];
+        let keys = KEYS.iter().filter(|key| !cx.is_past() || !of_present.contains(&key.action));
+        hints(&keys.copied().collect::<Vec<_>>())
     }
 
     #[cfg(test)]
@@ -176,7 +179,13 @@ impl Trends {
                 self.hours.query.want();
             }
             (Some(_), _) => {}
-            (None, Action::Side(by)) if cx.is_past() => return self.replayed_step(cx, by),
+            (None, Action::Side(by)) if cx.is_past() => return self.replay_by(self.cell(cx), by),
+            (None, Action::Move(Motion::Pages(by))) if cx.is_past() => {
+                return self.replay_by(SignedDuration::from_secs(WINDOWS[self.window]), by);
+            }
+            (None, Action::Live) if cx.is_past() => self.go_to_moment(cx, cx.now),
+            // The instant of the replay is in the view with the cursor on it, and nothing moves.
+            (None, Action::Mode | Action::Hold | Action::Cursor | Action::Rate | Action::GoTo) if cx.is_past() => {}
             (None, Action::Side(by)) => self.step(cx, by),
             (None, Action::Move(Motion::Pages(by))) => self.pan(cx, 4 * by),
             (None, Action::Move(motion)) => self.selected = motion.to(self.selected, self.pens(cx).len(), 1),
@@ -221,31 +230,6 @@ impl Trends {
         (self.accumulate, self.since, self.cursor) = (false, None, None);
         (self.window, self.end) = (window, Some(end).filter(|end| *end < cx.present()));
         self.moved();
-    }
-
-    /// While a past is shown its instant is in the view with the cursor on it; the present comes back with it.
-    fn follow_replay(&mut self, cx: &ViewContext) {
-        let instant = cx.is_past().then_some(cx.now);
-        if instant == self.replayed {
-            return;
-        }
-        self.replayed = instant;
-        match instant {
-            // Small steps move the cursor, not the curves.
-            Some(at) if self.end.is_some() && self.span(cx).holds(at) => self.cursor = Some(at),
-            Some(at) => self.go_to_moment(cx, at),
-            None => {
-                (self.end, self.cursor) = (None, None);
-                self.moved();
-            }
-        }
-    }
-
-    /// The instant of the replay a cell further to a side.
-    fn replayed_step(&mut self, cx: &ViewContext, by: isize) -> Vec<UiAction> {
-        let cell = self.cell(cx) * i32::try_from(by).unwrap_or_default();
-        let to = cx.now.checked_add(cell).unwrap_or(cx.now).min(cx.present());
-        vec![UiAction::Replay(to)]
     }
 
     /// The width of a cell of the chart.

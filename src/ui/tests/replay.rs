@@ -1,5 +1,7 @@
 //! Replay: what an operator sees of a past instant, and that nothing is done there.
 
+mod forms;
+
 use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
@@ -108,6 +110,8 @@ fn nothing_is_done_in_the_past() {
             screen(&mut model, 80, 24);
             let effects = type_keys(&mut model, keys);
             assert_eq!(sent_kind(&effects), None, "{tab:?} {keys:?}");
+            let form = model.modal.as_ref().filter(|modal| crate::ui::replay::gives_command(modal));
+            assert_eq!(form, None, "{tab:?} {keys:?}");
             let done = |effect: &Effect| matches!(effect, Effect::Extension(_) | Effect::Quit);
             // Two of them in a row are the question whether to leave and its answer.
             let quits = keys.contains('q');

@@ -38,6 +38,7 @@ pub(super) fn value_rows(
     let at = clock(sample.at, &cx.def().time_zone);
     let quality = match sample.quality {
         _ if def.access == Access::Write => t!("write only: it cannot be read").to_owned(),
+        Quality::Good if cx.is_past() => t!("good, stored {age} before, at {at}", age = age(cx.age(def.id)), at),
         Quality::Good => t!("good, read {age} ago at {at}", age = age(cx.age(def.id)), at),
         Quality::Uncertain(cause) => {
             t!(

@@ -101,6 +101,7 @@ pub(super) fn every_byte(
 
 pub(super) fn never_asked(cx: &ViewContext, def: &TagDef) -> &'static str {
     match (def.access, def.poll, &cx.snapshot.line(cx.def().device(def.device).line).state) {
+        _ if cx.is_past() => t!("requests are not kept in the history"),
         (Access::Write, ..) => t!("never: write only"),
         (_, Poll::Never, _) => t!("never: read on request only"),
         (_, _, LineState::Connected) => t!("not yet: not polled so far"),

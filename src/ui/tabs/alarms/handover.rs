@@ -251,7 +251,9 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
             running = running(lasts)
         ))
     });
-    lines.chain(devices).chain(sequences).chain(stubborn).collect()
+    let unknown =
+        cx.is_past().then(|| t!("tests, settings and outputs that did not follow: not kept in the history").to_owned());
+    lines.chain(devices).chain(sequences).chain(stubborn).chain(unknown).collect()
 }
 
 /// Values that are not good, and alarms that have been active for a day.

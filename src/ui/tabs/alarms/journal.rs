@@ -80,7 +80,8 @@ impl Journal {
     /// Asks the history if it is time.
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
         let to = cx.now + SignedDuration::from_secs(1);
-        let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, period.to));
+        let end = |period: &Period| if cx.is_past() { period.to.min(to) } else { period.to };
+        let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, end(period)));
         let limit = self.limit();
         let (alarms, actions) = (Query::Journal { from, to, limit }, Query::Actions { from, to, limit });
         let alarms = span::ask(cx, &mut self.alarms, number, EVERY_S, self.period.as_ref(), alarms);

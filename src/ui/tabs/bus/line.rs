@@ -26,6 +26,9 @@ const NEAR: f64 = 0.8;
 
 /// All rows of the page.
 pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
+    if cx.is_past() {
+        return past(cx, at);
+    }
     let mut rows = lines(cx, at);
     rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
@@ -40,6 +43,24 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     rows.extend(cycle(cx, report, width));
     rows.extend(counters(cx, at, report, width));
     rows
+}
+
+/// What the history has of a line: the minute in which the instant lies.
+fn past(cx: &ViewContext, at: &LineView) -> Vec<Row> {
+    let counters = &at.status.counters;
+    let words = match counters.requests {
+        0 => t!("no request is on record for this minute").to_owned(),
+        requests => t!(
+            "in this minute {requests} requests: {ok} answered, {timeouts} timeouts, {corrupt} corrupt, {exceptions} exceptions",
+            requests,
+            ok = counters.ok,
+            timeouts = counters.timeouts,
+            corrupt = counters.corrupt,
+            exceptions = counters.exceptions
+        ),
+    };
+    let kept = t!("Plan, frames, tests and registers are not kept in the history.");
+    vec![plain(words, cx.theme.normal()), plain(kept, cx.theme.dim())]
 }
 
 /// Every line with its state, to choose one; nothing where there is only one.

@@ -160,6 +160,7 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
             // What is never read by itself says nothing about the device.
             let tags = cx.def().tags_of(device.id);
             let tags = tags.filter(|tag| tag.access != Access::Write && tag.poll != Poll::Never);
+            let tags = tags.filter(|tag| tag.is_stored() || !cx.is_past());
             let (good, all) = tags.fold((0, 0), |(good, all), tag| {
                 (good + usize::from(cx.snapshot.sample(tag.id).quality.is_good()), all + 1)
             });

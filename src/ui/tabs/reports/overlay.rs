@@ -65,7 +65,9 @@ impl Overlay {
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
         let (span, tag, columns) = (self.span(cx.now), self.tags[self.tag], chart::dots(cx.theme, cx.area.width, 1));
         let ask = |(batch, curve): &mut (Batch, Answered<Vec<Series>>)| {
-            let every = if batch.to.is_some() { SignedDuration::MAX } else { real(cx, EVERY_S) };
+            // The past stays as it is.
+            let known = batch.to.is_some() && curve.trouble.is_none();
+            let every = if known { SignedDuration::MAX } else { real(cx, EVERY_S) };
             // Its own figures, and columns as wide as those of the longest.
             let to = batch.until(cx.now).max(batch.from + SignedDuration::from_secs(1));
             let share = to.duration_since(batch.from).as_secs_f64() / span.as_secs_f64();

@@ -186,7 +186,11 @@ fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Opt
         return;
     }
     let cursor = trends.cursor(cx);
-    let now = if trends.ended { t!("last") } else { t!("now") };
+    let now = match (trends.ended, cx.is_past()) {
+        (true, _) => t!("last"),
+        (false, true) => t!("then"),
+        (false, false) => t!("now"),
+    };
     let now = cursor.map_or(now.to_owned(), |at| t!("at {clock}", clock = clock(at, &cx.def().time_zone)));
     canvas.text(4, 0, t!("pen"), dim);
     for (end, text) in [
@@ -290,7 +294,8 @@ fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: us
     let label = name + 18 + wide / 4;
     let (value, low, high) = (label + 15, label + 23, label + 31);
     canvas.text(2, 1, t!("tag"), theme.dim());
-    for (end, text) in [(value, t!("now")), (low, t!("1 h min")), (high, t!("1 h max"))] {
+    let now = if cx.is_past() { t!("then") } else { t!("now") };
+    for (end, text) in [(value, now), (low, t!("1 h min")), (high, t!("1 h max"))] {
         canvas.text_right(end, 1, text, theme.dim());
     }
     canvas.text(high + 2, 1, t!("last hour"), theme.dim());
