@@ -1,12 +1,25 @@
 //! What the history costs: one commit, rows a second, bytes a sample, and reading a curve of a week; with `-- load`, what
-//! queries cost the recording; with `-- year`, what a year of 1,000 tags costs.
+//! queries cost the recording; with `-- import`, what an import does, with
+//! `-- calculated`, what calculated tags do; with `-- year`, what a year of 1,000 tags costs; with
+//! `-- station`, what a station of a shipped plant stores of it.
 #![allow(clippy::print_stdout, missing_docs)]
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
+#[path = "history/calculated.rs"]
+mod calculated;
+#[path = "history/cold.rs"]
+mod cold;
+#[path = "history/import.rs"]
+mod import;
 #[path = "history/load.rs"]
 mod load;
+#[path = "history/station.rs"]
+mod station;
 #[path = "history/year.rs"]
 mod year;
+#[allow(unused_imports, reason = "only the slave on TCP is needed")]
+#[path = "support/mod.rs"]
+mod support;
 
 use std::{hint::black_box, path::Path, sync::Arc, time::Duration, time::Instant};
 
@@ -118,11 +131,17 @@ criterion_group! {
 }
 fn main() {
     let words: Vec<String> = std::env::args().collect();
-    let behind = |name: &str| Some(&words[words.iter().position(|word| word == name)? + 1..]);
-    match (behind("load"), behind("year")) {
-        (Some(words), _) => load::main(words),
-        (None, Some(words)) => year::main(words),
-        (None, None) => {
+    let modes: [(&str, fn(&[String])); 5] = [
+        ("load", load::main),
+        ("import", import::main),
+        ("calculated", calculated::main),
+        ("year", year::main),
+        ("station", station::main),
+    ];
+    let mode = modes.iter().find_map(|(name, mode)| Some((words.iter().position(|word| word == name)?, mode)));
+    match mode {
+        Some((place, mode)) => mode(&words[place + 1..]),
+        None => {
             benches();
             Criterion::default().configure_from_args().final_summary();
         }

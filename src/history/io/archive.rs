@@ -18,8 +18,6 @@ mod delete;
 mod hour;
 mod merge;
 
-#[cfg(test)]
-pub(super) use adopt::parquet_files;
 use std::{
     fs::{self, File},
     ops::Range,
@@ -32,7 +30,7 @@ use jiff::{Timestamp, tz::TimeZone};
 use sha2::{Digest, Sha256};
 
 use super::{
-    files, sql,
+    disk, files, sql,
     store::{Store, engine, instant, utc},
 };
 use crate::{
@@ -41,7 +39,7 @@ use crate::{
         retention::Deletion,
         tiers::{HOUR, Tier, floor},
     },
-    profile::io::atomic::{sync_folder, with_suffix},
+    profile::io::atomic::with_suffix,
 };
 
 /// An hour is archived so long after its end: what a line sends late is in it by then.
@@ -77,11 +75,11 @@ pub type Steps<'a> = &'a mut dyn FnMut(&'static str) -> Result<(), HistoryError>
 
 impl Store {
     /// Does a job.
-    pub fn archive(&self, job: &Job, steps: Steps) -> Result<(), HistoryError> {
+    pub fn archive(&self, job: &Job) -> Result<(), HistoryError> {
         match job {
-            Job::Delete(deletion) => self.delete(deletion, steps),
-            Job::Hour(hour) => self.archive_hour(*hour, steps),
-            Job::Merge(tier, span) => self.merge_files(*tier, span.clone(), steps),
+            Job::Delete(deletion) => self.delete(deletion),
+            Job::Hour(hour) => self.archive_hour(*hour),
+            Job::Merge(tier, span) => self.merge_files(*tier, span.clone()),
         }
     }
 
@@ -180,7 +178,10 @@ impl Store {
         let folder = self.archive_folder();
         let path = free_path(&folder, tier, &span);
         let (last, new) = (folder.join(&path), folder.join(format!("{path}{UNFINISHED}")));
-        fs::create_dir_all(last.parent().unwrap_or(&folder)).map_err(|error| wrong(&new, &error))?;
+        disk::step("make the folder")
+            .and_then(|()| fs::create_dir_all(last.parent().unwrap_or(&folder)))
+            .and_then(|()| disk::step("write the file"))
+            .map_err(|error| wrong(&new, &error))?;
         let to = quoted(&new);
         let copy = sql::copy_to(tier, self.def.history.parquet, &format!("{rows} {order}"), &to);
         self.db.execute_batch(&copy).map_err(engine)?;
@@ -194,7 +195,7 @@ impl Store {
             return Err(HistoryError::Engine(format!("{path} does not hold what was written to it")));
         }
         if written.0 == 0 {
-            fs::remove_file(&new).map_err(|error| wrong(&new, &error))?;
+            disk::remove(&new).map_err(|error| wrong(&new, &error))?;
             return Ok(None);
         }
         let (bytes, sha256) = sync_and_hash(&new).map_err(|error| wrong(&new, &error))?;
@@ -205,11 +206,10 @@ impl Store {
     /// Removes files that the manifest does not name any more. One that stays is removed at the next start.
     fn remove_files(&self, files: &[ArchiveFile]) {
         for file in files {
-            if let Err(error) = fs::remove_file(self.archive_folder().join(&file.path)) {
+            if let Err(error) = disk::remove(&self.archive_folder().join(&file.path)) {
                 tracing::warn!(%error, path = file.path, "a file of the archive that was replaced is not removed");
             }
-            // Only an empty folder can be removed.
-            let _ = self.archive_folder().join(&file.path).parent().map(fs::remove_dir);
+            self.archive_folder().join(&file.path).parent().map(disk::remove_empty);
         }
     }
 
@@ -222,11 +222,9 @@ impl Store {
             quoted(&new),
             sql::parquet(Tier::Raw, self.def.history.parquet)
         );
+        disk::step("write the tags").map_err(|error| wrong(&new, &error))?;
         self.db.execute_batch(&copy).map_err(engine)?;
-        sync_and_hash(&new)
-            .and_then(|_| fs::rename(&new, &path))
-            .and_then(|()| sync_folder(&path))
-            .map_err(|error| wrong(&path, &error))
+        sync_and_hash(&new).and_then(|_| disk::rename(&new, &path)).map_err(|error| wrong(&path, &error))
     }
 }
 
@@ -239,9 +237,7 @@ struct NewFile {
 
 impl NewFile {
     fn rename(self) -> Result<ArchiveFile, HistoryError> {
-        fs::rename(&self.new, &self.last)
-            .and_then(|()| sync_folder(&self.last))
-            .map_err(|error| wrong(&self.last, &error))?;
+        disk::rename(&self.new, &self.last).map_err(|error| wrong(&self.last, &error))?;
         Ok(self.file)
     }
 }
@@ -317,6 +313,7 @@ pub(super) fn quoted(path: &Path) -> String {
 /// Bytes and SHA-256 of a file, which is on disk when this returns.
 pub fn sync_and_hash(path: &Path) -> std::io::Result<(u64, String)> {
     let mut file = File::open(path)?;
+    disk::step("sync of the file")?;
     file.sync_all()?;
     let mut hash = Sha256::new();
     let bytes = std::io::copy(&mut file, &mut hash)?;

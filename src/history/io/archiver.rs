@@ -102,7 +102,7 @@ impl Archiver {
             let Some(job) = store.archive_due(now, &left).map_err(nothing)? else {
                 return store.missing_files().map(ArchiveOutcome::Idle).map_err(nothing);
             };
-            match store.archive(&job, &mut |_| Ok(())) {
+            match store.archive(&job) {
                 Ok(()) => Ok(ArchiveOutcome::Did(job)),
                 Err(error) => Err((Some(job), error)),
             }

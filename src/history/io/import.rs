@@ -27,7 +27,7 @@ use crate::{
 /// Longest file.
 const BYTES_MAX: u64 = 512 << 20;
 /// Rows of an import that are stored with one commit: a station records meanwhile.
-const IMPORT_PIECE: usize = 20_000;
+const IMPORT_PIECE: usize = 10_000;
 
 /// An import that is being stored.
 #[derive(Debug)]

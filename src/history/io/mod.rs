@@ -44,6 +44,7 @@ pub struct JobRequest {
 }
 
 pub mod alarm_file;
+pub mod disk;
 pub mod sql;
 pub mod files;
 pub mod last;

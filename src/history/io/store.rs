@@ -15,7 +15,7 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
-    files,
+    disk, files,
     last::{self, LastCommit},
     samples::PIECE,
     sql,
@@ -228,6 +228,7 @@ impl Store {
     }
 
     pub(super) fn transaction<T>(&self, work: impl FnOnce() -> duckdb::Result<T>) -> Result<T, HistoryError> {
+        disk::step("transaction").map_err(|error| HistoryError::Engine(error.to_string()))?;
         let rollback = || self.db.execute_batch("ROLLBACK");
         let begin = || self.db.execute_batch("BEGIN");
         // A rollback that had no memory has left the last transaction open.

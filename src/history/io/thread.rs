@@ -105,15 +105,38 @@ pub(super) fn start_with(
         writer.end_reading();
         // A panic of the thread has already been reported by the panic hook.
         let _ = reading.join();
-        if let Some(opening) = opening {
-            // A log that is replayed just now is waited for: what waits would be lost.
-            writer.opened(ended(opening.await), clock.utc());
-        }
-        writer.finish(clock.utc());
-        outputs.publish(&mut writer);
+        finish(&mut writer, clock, opening, &mut outputs).await;
     };
     let join = spawn("history", writing).map_err(trouble)?;
     Ok(Handle { records, queries, jobs, status, restored: Some(restored), join })
+}
+
+/// Records until the last sender is dropped, on the runtime of the caller: for virtual time, where no other thread may
+/// take part. No query is answered. Errors as [`start`].
+pub async fn record_in_virtual_time(
+    path: &Path,
+    def: Arc<PlantDef>,
+    clock: Clock,
+    commit_every: Duration,
+    records: mpsc::Receiver<Vec<Record>>,
+) -> Result<HistoryStatus, HistoryError> {
+    files::refuse_foreign(path)?;
+    let mut writer = Writer::new(path.to_owned(), def, clock.utc());
+    let ((_requests, requests), (_jobs, jobs)) = (mpsc::channel(1), mpsc::channel(1));
+    let mut outputs = Outputs { status: watch::Sender::default(), restored: None };
+    let opening = run(&mut writer, clock, commit_every, records, requests, jobs, &mut outputs).await;
+    finish(&mut writer, clock, opening, &mut outputs).await;
+    Ok(writer.status().clone())
+}
+
+/// Stores what waits.
+async fn finish(writer: &mut Writer, clock: Clock, opening: Option<Opening>, outputs: &mut Outputs) {
+    if let Some(opening) = opening {
+        // A log that is replayed just now is waited for: what waits would be lost.
+        writer.opened(ended(opening.await), clock.utc());
+    }
+    writer.finish(clock.utc());
+    outputs.publish(writer);
 }
 
 /// A thread with a runtime of its own, only to wait for queues and times at once.

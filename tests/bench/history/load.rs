@@ -4,7 +4,7 @@
 //! `cargo bench --bench history -- load [SECONDS] [HOURS]`: for so many seconds (10) over a history of so many hours (2).
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     process::Command,
     sync::{
         Arc,
@@ -30,7 +30,7 @@ pub const TAGS: u16 = 1_000;
 /// Batches that the samples of a second come in.
 const BATCHES: u16 = 100;
 /// Where the history begins: some day at midnight.
-const BEGIN: i64 = 1_790_000_000;
+pub const BEGIN: i64 = 1_790_000_000;
 
 /// Prints what it measured. `words` are those of the command line behind `load`.
 pub fn main(words: &[String]) {
@@ -39,13 +39,18 @@ pub fn main(words: &[String]) {
         return fill(Path::new(&words[1]), number(2, 2));
     }
     let (seconds, hours) = (number(0, 10), number(1, 2));
+    let (_folder, path) = filled(hours);
+    run(&path, seconds, hours);
+}
+
+/// A history of so many hours, filled by a process of its own, so that its memory is not counted.
+pub fn filled(hours: i64) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("load.duckdb");
-    // In a process of its own, so that its memory is not counted.
     let own = std::env::current_exe().expect("this program");
     let filled = Command::new(own).args(["load", "fill"]).arg(&path).arg(hours.to_string()).status();
     assert!(filled.expect("a process").success(), "the history was not filled");
-    run(&path, seconds, hours);
+    (folder, path)
 }
 
 pub fn def() -> Arc<PlantDef> {
@@ -74,9 +79,9 @@ fn fill(path: &Path, hours: i64) {
 
 /// What is counted while it runs.
 #[derive(Default)]
-struct Counts {
-    stop: AtomicBool,
-    refused: AtomicU64,
+pub struct Counts {
+    pub stop: AtomicBool,
+    pub refused: AtomicU64,
     rss_max_kb: AtomicU64,
     anonymous_max_kb: AtomicU64,
     log_max: AtomicU64,
@@ -129,7 +134,7 @@ fn run(path: &Path, seconds: i64, hours: i64) {
 }
 
 /// Sends the samples of every second in even batches, as lines do.
-fn record(handle: &history::Handle, clock: Clock, counts: &Counts) {
+pub fn record(handle: &history::Handle, clock: Clock, counts: &Counts) {
     let began = Instant::now();
     for number in 0_u64.. {
         if counts.stop.load(Ordering::Relaxed) {
@@ -147,9 +152,10 @@ fn record(handle: &history::Handle, clock: Clock, counts: &Counts) {
 }
 
 /// How long each commit took, with the checkpoint behind some of them.
-fn commits(handle: &history::Handle, clock: Clock, counts: &Counts) -> Vec<Duration> {
+pub fn commits(handle: &history::Handle, clock: Clock, counts: &Counts) -> Vec<Duration> {
     let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
-    let (mut status, mut times, mut last) = (handle.status.clone(), Vec::new(), None);
+    let (mut status, mut times) = (handle.status.clone(), Vec::new());
+    let mut last = status.borrow_and_update().committed_at;
     while !counts.stop.load(Ordering::Relaxed) {
         runtime.block_on(status.changed()).expect("the thread runs");
         let began = status.borrow_and_update().committed_at;
@@ -204,7 +210,7 @@ fn back_up(handle: &history::Handle, to: &Path, counts: &Counts) -> (Vec<Duratio
     (times, failed)
 }
 
-fn spread(name: &str, mut times: Vec<Duration>) {
+pub fn spread(name: &str, mut times: Vec<Duration>) {
     times.sort();
     let at = |share: f64| times.get(((times.len() as f64 * share) as usize).min(times.len() - 1));
     let ms = |time: Option<&Duration>| time.map_or(f64::NAN, |time| time.as_secs_f64() * 1e3);

@@ -14,11 +14,16 @@ pub struct TcpSlave;
 impl TcpSlave {
     /// Serves on a free port of this machine.
     pub fn start() -> SocketAddr {
+        TcpSlave::start_with(super::answer)
+    }
+
+    /// The same with other answers to messages of unit and PDU.
+    pub fn start_with(answer: fn(&[u8]) -> Option<Vec<u8>>) -> SocketAddr {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let address = listener.local_addr().unwrap();
         thread::spawn(move || {
             for client in listener.incoming().map_while(Result::ok) {
-                thread::spawn(move || serve(client));
+                thread::spawn(move || serve(client, answer));
             }
         });
         address
@@ -26,7 +31,7 @@ impl TcpSlave {
 }
 
 /// Ends when the client leaves or sends what is no Modbus.
-fn serve(mut client: TcpStream) -> std::io::Result<()> {
+fn serve(mut client: TcpStream, answer: fn(&[u8]) -> Option<Vec<u8>>) -> std::io::Result<()> {
     client.set_nodelay(true)?;
     let (mut piece, mut heard, mut said) = (vec![0; 1 << 16], Vec::new(), Vec::new());
     loop {
@@ -37,7 +42,7 @@ fn serve(mut client: TcpStream) -> std::io::Result<()> {
         let mut start = 0;
         while let Mbap::Whole { end, .. } = mbap(&heard[start..]) {
             let frame = &heard[start..start + end];
-            if let Some(answer) = super::answer(&frame[6..]) {
+            if let Some(answer) = answer(&frame[6..]) {
                 said.extend_from_slice(&frame[..4]);
                 said.extend_from_slice(&(answer.len() as u16).to_be_bytes());
                 said.extend_from_slice(&answer);

@@ -16,7 +16,7 @@ use crate::{
     history::{
         ArchiveFile, HistoryError,
         io::{
-            sql,
+            disk, sql,
             store::{Store, engine, instant, utc},
         },
         tiers::{HOUR, Tier},
@@ -43,7 +43,7 @@ impl Store {
             return Ok(None);
         }
         let aside = with_suffix(&folder, &format!(".other-{}", now.strftime("%Y%m%dT%H%M%SZ")));
-        fs::rename(&folder, &aside).map_err(|error| wrong(&folder, &error))?;
+        disk::rename(&folder, &aside).map_err(|error| wrong(&folder, &error))?;
         Ok(Some(format!("its archive is that of another history and is set aside as {}", aside.display())))
     }
 
@@ -54,6 +54,10 @@ impl Store {
         let known = self.files(None)?;
         let names: HashSet<&str> = known.iter().map(|file| file.path.as_str()).collect();
         let mut unknown = Vec::new();
+        let tags = with_suffix(&folder.join(TAGS), UNFINISHED);
+        if tags.exists() {
+            remove(&tags);
+        }
         for path in parquet_files(&folder) {
             match described(&path) {
                 Some((tier, span)) if !names.contains(path.as_str()) => unknown.push((tier, span, path)),
@@ -66,6 +70,9 @@ impl Store {
         unknown.sort_by_key(|(tier, span, _)| (*tier, span.start - span.end, span.start));
         for (tier, span, path) in unknown {
             self.adopt_file(tier, span, path)?;
+        }
+        for folder in folders(&folder).filter(|folder| entries(folder).next().is_none()) {
+            disk::remove_empty(&folder);
         }
         self.adopt_deletions()?;
         Ok(missing)
@@ -81,16 +88,24 @@ impl Store {
         Ok((!named.is_empty()).then(|| format!("missing of its archive: {}{others}", named.join(", "))))
     }
 
-    /// What was deleted of an archive whose database was lost: what only the next wider tier has.
+    /// What was deleted of an archive whose database was lost: what only the next wider tier has rows of. The first month of
+    /// hours begins before anything was recorded.
     fn adopt_deletions(&self) -> Result<(), HistoryError> {
         let files = self.files(None)?;
-        let first = |tier: Tier| files.iter().filter(|file| file.tier == tier).map(|file| file.from).min();
+        let first = |tier: Tier| files.iter().filter(|file| file.tier == tier).min_by_key(|file| file.from);
         let end = |tier: Tier| files.iter().filter(|file| file.tier == tier).map(|file| file.to).max();
         for (tier, wider) in [(Tier::Raw, Tier::Minute), (Tier::Minute, Tier::Hour)] {
             let Some(begin) = first(wider) else { continue };
-            let Some(until) = first(tier).or_else(|| end(wider)).filter(|until| begin < *until) else { continue };
+            let until = first(tier).map(|file| file.from).or_else(|| end(wider)).filter(|until| begin.from < *until);
+            let Some(until) = until else { continue };
             if self.deleted_until(tier)?.is_none() {
-                self.enter_deleted(tier, "", until).map_err(engine)?;
+                let first = format!("SELECT min(utc) FROM {}", self.parquet(std::slice::from_ref(begin)));
+                // One that cannot be read tells nothing of what was deleted.
+                let first: Option<i64> = self.db.query_row(&first, [], |row| row.get(0)).unwrap_or_default();
+                if first.is_some_and(|first| first < until) {
+                    disk::step("enter a deletion").map_err(|error| wrong(&self.path, &error))?;
+                    self.enter_deleted(tier, "", until).map_err(engine)?;
+                }
             }
         }
         Ok(())
@@ -132,11 +147,19 @@ impl Store {
     }
 }
 
-/// The files below a folder, by their path from there.
-pub(in crate::history::io) fn parquet_files(folder: &Path) -> Vec<String> {
-    let below = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let files = Tier::ALL.into_iter().flat_map(|tier| below(folder.join(tier.word()))).flat_map(below);
-    files.filter_map(|path| Some(path.strip_prefix(folder).ok()?.to_str()?.to_owned())).collect()
+/// The files of an archive, by their path from there.
+fn parquet_files(archive: &Path) -> Vec<String> {
+    let files = folders(archive).flat_map(|folder| entries(&folder));
+    files.filter_map(|path| Some(path.strip_prefix(archive).ok()?.to_str()?.to_owned())).collect()
+}
+
+/// The folders of its days and months.
+fn folders(archive: &Path) -> impl Iterator<Item = PathBuf> {
+    Tier::ALL.into_iter().flat_map(|tier| entries(&archive.join(tier.word())))
+}
+
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
 /// Tier and span of a file, by its path; see [`super::free_path`].
@@ -163,7 +186,7 @@ fn described(path: &str) -> Option<(Tier, Range<i64>)> {
 }
 
 fn remove(path: &Path) {
-    if let Err(error) = fs::remove_file(path) {
+    if let Err(error) = disk::remove(path) {
         tracing::warn!(%error, path = %path.display(), "a leftover of the archive is not removed");
     }
 }

@@ -3,7 +3,6 @@
 use duckdb::params;
 use jiff::Timestamp;
 
-use super::Steps;
 use crate::history::{
     ArchiveFile, HistoryError,
     io::{
@@ -22,11 +21,10 @@ impl Store {
     }
 
     /// Deletes a file: from then on what wider tiers have of its time answers.
-    pub(super) fn delete(&self, deletion: &Deletion, steps: Steps) -> Result<(), HistoryError> {
+    pub(super) fn delete(&self, deletion: &Deletion) -> Result<(), HistoryError> {
         let file = &deletion.file;
         tracing::warn!(path = file.path, why = ?deletion.why, "a file of the archive is deleted");
         self.enter(&[], std::slice::from_ref(file), || self.enter_deleted(file.tier, &file.path, file.to))?;
-        steps("deletion entered")?;
         self.remove_files(std::slice::from_ref(file));
         Ok(())
     }

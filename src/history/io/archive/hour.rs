@@ -4,7 +4,7 @@ use std::{collections::HashMap, ops::Range};
 
 use duckdb::params;
 
-use super::{NewFile, Steps, overlapping};
+use super::{NewFile, overlapping};
 use crate::{
     history::{
         ArchiveFile, HistoryError,
@@ -27,7 +27,7 @@ impl Store {
     /// Archives the samples of an hour. Where files have it already, those came late, after a clock that was set back or
     /// by an import: they get a file of their own, and what was formed of the hour is formed again. Where its samples were
     /// deleted meanwhile, what was formed of them stays, and only what it lacks is added.
-    pub(super) fn archive_hour(&self, hour: i64, steps: Steps) -> Result<(), HistoryError> {
+    pub(super) fn archive_hour(&self, hour: i64) -> Result<(), HistoryError> {
         let span = hour..hour + HOUR;
         let deleted = self.deleted_until(Tier::Raw)?.is_some_and(|until| hour < until.as_microsecond());
         let replace = if deleted { sql::added } else { sql::others };
@@ -35,23 +35,19 @@ impl Store {
         let samples = sql::samples_of(&span);
         let raw = self.write_file(Tier::Raw, span.clone(), &samples, "ORDER BY tag, utc, rowid")?;
         let rows = raw.as_ref().map_or(0, |raw| raw.file.rows);
-        steps("samples written")?;
         // The first minutes of the next hour begin with values of this one.
         let formed = if late { hour..hour + 2 * HOUR } else { span.clone() };
         self.form(formed.clone())?;
-        steps("aggregates formed")?;
         let (mut new, mut old) = (Vec::from_iter(raw), Vec::new());
         for tier in [Tier::Minute, Tier::Hour] {
             let replaced = self.files(Some((tier, formed.clone())))?;
             new.extend(self.write_aggregates(tier, &formed, &replaced, replace)?);
             old.extend(replaced);
         }
-        steps("aggregates written")?;
         self.write_tags()?;
         // The samples last: with their file an hour is whole, see `adopt`.
         new.reverse();
         let new: Vec<ArchiveFile> = new.into_iter().map(NewFile::rename).collect::<Result<_, _>>()?;
-        steps("renamed")?;
         let within = [span.start, span.end].map(|at| instant(at).map(utc));
         self.enter(&new, &old, || {
             self.db.execute(sql::ENTER_WATCHED, params![within[0], within[1]])?;
@@ -59,7 +55,6 @@ impl Store {
             // What came meanwhile is not in the file: all of it once more.
             if deleted as u64 == rows { Ok(()) } else { Err(duckdb::Error::StatementChangedRows(deleted)) }
         })?;
-        steps("entered")?;
         self.remove_files(&old);
         Ok(())
     }

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::{NewFile, Steps};
+use super::NewFile;
 use crate::history::{
     ArchiveFile, HistoryError,
     io::{
@@ -21,7 +21,7 @@ const SORTED_AT_ONCE: u64 = 250_000;
 impl Store {
     /// Merges the files of a tier in a span. Samples follow each other as they are, so that nothing must be sorted that is
     /// larger than an hour; an hour of which there are two files is sorted again.
-    pub(super) fn merge_files(&self, tier: Tier, span: Range<i64>, steps: Steps) -> Result<(), HistoryError> {
+    pub(super) fn merge_files(&self, tier: Tier, span: Range<i64>) -> Result<(), HistoryError> {
         let mut old = self.files(Some((tier, span.clone())))?;
         old.retain(|file| span.start <= file.from && file.to <= span.end);
         let apart = old.windows(2).all(|pair| pair[0].to <= pair[1].from);
@@ -31,11 +31,8 @@ impl Store {
             Tier::Raw => self.hour_by_hour(&old, &span),
         };
         let new = self.write_file(tier, span, &rows, "")?;
-        steps("merged file written")?;
         let new: Vec<ArchiveFile> = new.map(NewFile::rename).transpose()?.into_iter().collect();
-        steps("merged file renamed")?;
         self.enter(&new, &old, || Ok(()))?;
-        steps("merged file entered")?;
         self.remove_files(&old);
         Ok(())
     }

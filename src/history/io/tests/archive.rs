@@ -47,7 +47,7 @@ pub(super) fn filled(db: &Path, rows: &[Record]) -> Store {
 /// Does all that is due at an hour.
 pub(super) fn archive_all(store: &Store, hour: i64) -> Vec<Job> {
     let due = || store.archive_due(sec(hour * HOUR_S + 600), &LeftOut::default()).unwrap();
-    let work = |job: &Job| store.archive(job, &mut |_| Ok(())).unwrap();
+    let work = |job: &Job| store.archive(job).unwrap();
     std::iter::from_fn(|| due().inspect(work)).collect()
 }
 
@@ -162,47 +162,6 @@ fn reopen(db: &Path) -> Store {
 }
 
 #[test]
-fn a_kill_at_any_step_loses_nothing_and_doubles_nothing() {
-    let rows = rows(26);
-    let (_one, db) = folder();
-    let expect = content(&filled(&db, &rows));
-    let (_two, undisturbed) = folder();
-    let undisturbed = filled(&undisturbed, &rows);
-    archive_all(&undisturbed, 26);
-    let formed = aggregates(&undisturbed);
-    let mut store = reopen(&db);
-    let mut kills = 0;
-    let mut steps_to_kill = 1;
-    loop {
-        let (mut steps, mut last) = (0, "");
-        let Some(job) = store.archive_due(sec(26 * HOUR_S + 600), &LeftOut::default()).unwrap() else { break };
-        let done = store.archive(&job, &mut |step| {
-            (steps, last) = (steps + 1, step);
-            if steps == steps_to_kill { Err(HistoryError::NotOpen) } else { Ok(()) }
-        });
-        match done {
-            Ok(()) => steps_to_kill = 1,
-            Err(HistoryError::NotOpen) => {
-                kills += 1;
-                drop(store);
-                store = reopen(&db);
-                assert!(content(&store) == expect, "after kill {kills}");
-                steps_to_kill = if last.ends_with("entered") { 1 } else { steps_to_kill + 1 };
-            }
-            Err(error) => panic!("{error}"),
-        }
-    }
-    assert_eq!(kills, 26 * 5 + 3 * 3);
-    assert_eq!(aggregates(&store), formed);
-    let known: Vec<String> = store.files(None).unwrap().into_iter().map(|file| file.path).collect();
-    let mut found = crate::history::io::archive::parquet_files(&store.archive_folder());
-    found.sort();
-    let mut known = known;
-    known.sort();
-    assert_eq!(found, known, "nothing is left over");
-}
-
-#[test]
 fn a_lost_database_takes_up_its_archive() {
     let rows = rows(30);
     let (_folder, db) = folder();
@@ -231,6 +190,24 @@ fn a_lost_database_takes_up_its_archive() {
     let words = opened.trouble.unwrap();
     assert!(words.contains("its archive is that of another history and is set aside as"), "{words}");
     assert_eq!(opened.store.files(None).unwrap(), []);
+}
+
+#[test]
+fn what_was_never_recorded_is_not_taken_for_deleted() {
+    let (_folder, db) = folder();
+    // The last two days of a month, which is then a file of hours.
+    let rows = [29, 30].map(|day| good(PV, day * 24 * HOUR_S + 60, day as f64));
+    let store = filled(&db, &rows);
+    archive_all(&store, 32 * 24);
+    assert_eq!(store.files(None).unwrap().iter().filter(|file| file.path.ends_with("month.parquet")).count(), 1);
+    drop(store);
+    assert_eq!(
+        Tier::ALL.map(|tier| reopen(&db).deleted_until(tier).unwrap()),
+        [None; 3],
+        "what is before is open to imports"
+    );
+    std::fs::remove_file(&db).unwrap();
+    assert_eq!(Tier::ALL.map(|tier| reopen(&db).deleted_until(tier).unwrap()), [None; 3], "the database was lost");
 }
 
 #[test]
@@ -305,7 +282,7 @@ fn a_merge_that_fails_does_not_hold_up_later_ones() {
     let (_folder, db) = folder();
     let store = filled(&db, &rows(50));
     while let Some(job @ Job::Hour(_)) = store.archive_due(sec(50 * HOUR_S + 600), &LeftOut::default()).unwrap() {
-        store.archive(&job, &mut |_| Ok(())).unwrap();
+        store.archive(&job).unwrap();
     }
     let lost = store.files(None).unwrap().into_iter().find(|file| file.tier == Tier::Raw).unwrap();
     let path = store.archive_folder().join(&lost.path);
@@ -313,7 +290,7 @@ fn a_merge_that_fails_does_not_hold_up_later_ones() {
     std::fs::remove_file(&path).unwrap();
     let (mut left, mut failed) = (LeftOut::default(), 0);
     while let Some(job) = store.archive_due(sec(50 * HOUR_S + 600), &left).unwrap() {
-        if let Err(error) = store.archive(&job, &mut |_| Ok(())) {
+        if let Err(error) = store.archive(&job) {
             let Job::Merge(tier, span) = job else { panic!("{job:?}") };
             assert!(error.is_damage_of_file(), "{error:?}");
             left.merges.push((tier, span));
@@ -343,19 +320,16 @@ fn what_was_deleted_is_answered_by_minutes() {
     drop(filled(&db, &rows));
     let rule = HistoryDef { keep_samples_days: Some(7), ..HistoryDef::default() };
     let open = || Store::open(&db, &keeping(rule), sec(50 * HOUR_S)).unwrap().store;
-    let mut store = open();
+    let store = open();
     archive_all(&store, 52);
     let (all, formed) = (content(&store), aggregates(&store));
-    // Eight days later the first day is too old. A kill in between changes nothing.
+    // Eight days later the first day is too old.
     let later = sec(8 * 24 * HOUR_S);
     let due = |store: &Store| store.archive_due(later, &LeftOut::default()).unwrap();
     let job = due(&store).unwrap();
     assert!(matches!(&job, Job::Delete(next) if next.file.path == "raw/date=1970-01-01/day.parquet"), "{job:?}");
-    assert_eq!(store.archive(&job, &mut |_| Err(HistoryError::NotOpen)), Err(HistoryError::NotOpen));
-    drop(store);
-    store = open();
     while let Some(job) = due(&store) {
-        store.archive(&job, &mut |_| Ok(())).unwrap();
+        store.archive(&job).unwrap();
     }
     assert_eq!(store.deleted_until(Tier::Raw).unwrap(), Some(sec(24 * HOUR_S)));
     let kept: Vec<_> = all.iter().copied().filter(|(_, sample)| sample.at >= sec(24 * HOUR_S)).collect();
@@ -378,7 +352,7 @@ fn what_was_deleted_is_answered_by_minutes() {
     let late = |tag, second| Record::Sample(tag, Sample::good(9e9, sec(second)));
     store.append(&[late(PV, HOUR_S + 10), late(TagId(3), HOUR_S + 10)]).unwrap();
     while let Some(job) = store.archive_due(sec(50 * HOUR_S + 600), &LeftOut::default()).unwrap() {
-        store.archive(&job, &mut |_| Ok(())).unwrap();
+        store.archive(&job).unwrap();
     }
     let [got, expect] = [&store, &plain].map(|store| series(store, PV, 0, 5 * HOUR_S, 5));
     assert_series(&[got], &[expect], "late");
