@@ -17,7 +17,7 @@ mod load;
 mod station;
 #[path = "history/year.rs"]
 mod year;
-#[allow(unused_imports, reason = "only the slave on TCP is needed")]
+#[allow(unused_imports, clippy::unwrap_used, reason = "only the slave on TCP is needed")]
 #[path = "support/mod.rs"]
 mod support;
 

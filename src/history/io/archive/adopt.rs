@@ -26,6 +26,8 @@ use crate::{
 
 /// Missing files that are named.
 const NAMED_MAX: usize = 3;
+/// Whether the rules of the plant have deleted the files of a tier up to an instant; not where only a start found none.
+const IS_DELETED: &str = "SELECT count(*) > 0 FROM deleted WHERE tier = ? AND path <> '' AND ? <= until_utc";
 
 impl Store {
     /// Gives the tags of the archive their numbers back, where the database does not know them. An archive whose numbers
@@ -112,9 +114,14 @@ impl Store {
     }
 
     /// Takes up a file that the manifest does not know, or removes it where its rows are known otherwise: a program ended
-    /// before it entered the file, or before it removed what it had replaced.
+    /// before it entered the file, or before it removed what it had replaced or deleted.
     fn adopt_file(&self, tier: Tier, span: Range<i64>, path: String) -> Result<(), HistoryError> {
         let file = self.archive_folder().join(&path);
+        let until = instant(span.end).map(utc);
+        if self.db.query_row(IS_DELETED, params![tier.word(), until], |row| row.get(0)).map_err(engine)? {
+            remove(&file);
+            return Ok(());
+        }
         let count = |sql: &str| self.db.query_row(sql, [], |row| row.get::<_, u64>(0)).map_err(engine);
         let Ok(rows) = count(&format!("SELECT count(*) FROM read_parquet({})", quoted(&file))) else {
             tracing::error!(path, "a file of the archive cannot be read and is not taken up");

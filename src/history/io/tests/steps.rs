@@ -148,24 +148,24 @@ fn assert_no_orphan(store: &Store, what: &str) {
     assert!(known.iter().all(|path| found.contains(path)), "{what}: {known:?}");
 }
 
-/// The folder of a database, as it lies on the disk at this moment; `cut`: what is not whole yet lacks its second half.
-fn copied(db: &Path, cut: bool) -> (tempfile::TempDir, PathBuf) {
-    fn copy(from: &Path, to: &Path, cut: bool) {
+/// The folder of a database, as it lies on the disk at this moment; what is not whole yet lacks its second half.
+fn copied(db: &Path) -> (tempfile::TempDir, PathBuf) {
+    fn copy(from: &Path, to: &Path) {
         fs::create_dir_all(to).unwrap();
         for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
             let (from, to) = (entry.path(), to.join(entry.file_name()));
             if from.is_dir() {
-                copy(&from, &to, cut);
+                copy(&from, &to);
                 continue;
             }
             let bytes = fs::copy(&from, &to).unwrap();
-            if cut && from.extension().is_some_and(|ending| ending == "new") {
+            if from.extension().is_some_and(|ending| ending == "new") {
                 fs::File::options().write(true).open(&to).unwrap().set_len(bytes / 2).unwrap();
             }
         }
     }
     let (folder, copied) = folder();
-    copy(db.parent().unwrap(), folder.path(), cut);
+    copy(db.parent().unwrap(), folder.path());
     (folder, copied)
 }
 
@@ -177,40 +177,35 @@ struct Step {
     after: State,
 }
 
-/// Starts what a kill in a job has left behind and finishes the job. The start is killed too, at each of its steps, where
-/// `kills` are counted.
-fn resume(db: &Path, cut: bool, job: &Step, what: &str, kills: Option<&Rc<Cell<usize>>>) {
-    let (_folder, db) = copied(db, cut);
-    let store = match kills {
-        None => start(&db),
-        Some(kills) => {
-            let (own, job, what, kills) = (db.clone(), job.clone(), what.to_owned(), Rc::clone(kills));
-            let mut before = disk(own.parent().unwrap());
-            let again = move |step: &'static str| {
-                kills.set(kills.get() + 1);
-                let now = disk(own.parent().unwrap());
-                if std::mem::replace(&mut before, now.clone()) == now {
-                    return Ok(());
-                }
-                resume(&own, cut, &job, &format!("{what}, and at its start before `{step}`"), None);
-                Ok(())
-            };
-            seen(again, || start(&db))
+/// What a start has found after a kill in a job: nothing is lost, nothing double, nothing left over.
+fn found(store: &Store, job: &Step, what: &str) -> State {
+    let found = state(store);
+    let [before, after] = [&job.before.samples, &job.after.samples];
+    assert!([before, after].contains(&&found.samples), "{what}: {:?}, expected {before:?} or {after:?}", found.samples);
+    assert_no_orphan(store, what);
+    found
+}
+
+/// Starts what a kill in a job has left behind, where the start is killed at each of its steps too, and finishes the job.
+fn resume(db: &Path, job: &Step, what: &str, kills: &Rc<Cell<usize>>) {
+    let (_folder, db) = copied(db);
+    let (own, again, kills) = (db.clone(), job.clone(), Rc::clone(kills));
+    let (named, mut before) = (what.to_owned(), disk(db.parent().unwrap()));
+    let kill = move |step: &'static str| {
+        kills.set(kills.get() + 1);
+        let now = disk(own.parent().unwrap());
+        if std::mem::replace(&mut before, now.clone()) != now {
+            let (_folder, own) = copied(&own);
+            found(&start(&own), &again, &format!("{named}, and at its start before `{step}`"));
         }
+        Ok(())
     };
-    let found = state(&store);
-    assert!(
-        found.samples == job.before.samples || found.samples == job.after.samples,
-        "{what}: found {:?}, expected {:?} or {:?}",
-        found.samples,
-        job.before.samples,
-        job.after.samples
-    );
-    if found != job.after {
+    let store = seen(kill, || start(&db));
+    if found(&store, job, what) != job.after {
         store.archive(&due(&store, job.until).unwrap_or_else(|| panic!("{what}: nothing is due"))).unwrap();
         assert_eq!(state(&store), job.after, "{what}");
+        assert_no_orphan(&store, what);
     }
-    assert_no_orphan(&store, what);
 }
 
 /// Does all jobs, each by `work`, which is told how it goes undisturbed.
@@ -255,18 +250,13 @@ fn a_kill_at_every_step_loses_and_doubles_nothing() {
             let [new, gone] =
                 [now.difference(&before), before.difference(&now)].map(|changed| leaves(changed.collect()));
             assert!(new <= 1 && gone <= 1, "{name}: more than one change before `{next}`: {:?}", &now ^ &before);
-            let unfinished = now.iter().any(|path| path.extension().is_some_and(|ending| ending == "new"));
             before = now;
             kills.set(kills.get() + 1);
             // What was only synced, and a folder that was there, leave the same behind.
             if std::mem::replace(&mut disk_before, disk_now.clone()) == disk_now {
                 return Ok(());
             }
-            let what = format!("{name}, killed before `{next}`");
-            resume(&db, false, &step, &what, Some(&again));
-            if unfinished {
-                resume(&db, true, &step, &format!("{what}, half written"), None);
-            }
+            resume(&db, &step, &format!("{name}, killed before `{next}`"), &again);
             Ok(())
         };
         seen(kill, || store.archive(job)).unwrap();
@@ -295,13 +285,13 @@ fn a_job_that_failed_at_any_step_is_done_by_the_next_try() {
             }
             assert_eq!(state(store).samples, step.before.samples, "{job:?}: {tried:?} at step {number}");
         }
-        let (_folder, db) = copied(db, false);
+        let (_folder, db) = copied(db);
         let other = start(&db);
         assert_eq!(nameless(state(&other)), nameless(step.after.clone()), "{job:?}");
         assert_no_orphan(&other, &format!("{job:?}"));
     });
     println!("{jobs} jobs, {failures} failures");
-    assert!(jobs > 15 && failures > 10 * jobs);
+    assert!(jobs > 15 && failures > 5 * jobs);
 }
 
 /// A file that could not be renamed or removed lies there until the next start, and has its name.
