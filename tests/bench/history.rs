@@ -131,7 +131,8 @@ criterion_group! {
 }
 fn main() {
     let words: Vec<String> = std::env::args().collect();
-    let modes: [(&str, fn(&[String])); 5] = [
+    type Mode = (&'static str, fn(&[String]));
+    let modes: [Mode; 5] = [
         ("load", load::main),
         ("import", import::main),
         ("calculated", calculated::main),

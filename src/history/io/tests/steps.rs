@@ -262,8 +262,11 @@ fn a_kill_at_every_step_loses_and_doubles_nothing() {
         seen(kill, || store.archive(job)).unwrap();
         assert_no_orphan(store, "undisturbed");
     });
-    println!("{jobs} jobs, {} kills, {} more at the start after one", kills.get(), again.get());
-    assert!(jobs > 15 && kills.get() > 10 * jobs && again.get() > 0);
+    let seen = (jobs, kills.get(), again.get());
+    assert!(
+        jobs > 15 && kills.get() > 10 * jobs && again.get() > 0,
+        "jobs, kills, more at the start after one: {seen:?}"
+    );
 }
 
 #[test]
@@ -290,8 +293,7 @@ fn a_job_that_failed_at_any_step_is_done_by_the_next_try() {
         assert_eq!(nameless(state(&other)), nameless(step.after.clone()), "{job:?}");
         assert_no_orphan(&other, &format!("{job:?}"));
     });
-    println!("{jobs} jobs, {failures} failures");
-    assert!(jobs > 15 && failures > 5 * jobs);
+    assert!(jobs > 15 && failures > 5 * jobs, "{jobs} jobs, {failures} failures");
 }
 
 /// A file that could not be renamed or removed lies there until the next start, and has its name.
