@@ -8,6 +8,7 @@ use std::{
     fs,
     hash::{DefaultHasher, Hash, Hasher},
     io,
+    os::unix::fs::MetadataExt,
     rc::Rc,
 };
 
@@ -128,10 +129,10 @@ fn paths(folder: &Path) -> BTreeSet<PathBuf> {
 }
 
 /// What lies on the disk, and when each of it was written; a file that says only that it is being opened is nothing.
-fn disk(folder: &Path) -> Vec<(PathBuf, u64, std::time::SystemTime)> {
+fn disk(folder: &Path) -> Vec<(PathBuf, u64, (i64, i64))> {
     let of = |path: PathBuf| {
         let there = fs::metadata(folder.join(&path)).unwrap();
-        (path, there.len(), there.modified().unwrap())
+        (path, there.len(), (there.mtime(), there.mtime_nsec()))
     };
     paths(folder).into_iter().filter(|path| path.extension().is_none_or(|ending| ending != "opening")).map(of).collect()
 }
@@ -208,7 +209,7 @@ fn resume(db: &Path, job: &Step, what: &str, kills: &Rc<Cell<usize>>) {
     }
 }
 
-/// Does all jobs, each by `work`, which is told how it goes undisturbed.
+/// Does all jobs, each by `work`, which is given how it goes undisturbed.
 fn all_jobs(mut work: impl FnMut(&Store, &Path, &Job, &Step)) -> usize {
     let (([_plain, _folder], [plain, db]), mut count) = (two_folders(), 0);
     let (plain, store) = (start(&plain), start(&db));
