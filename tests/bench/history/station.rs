@@ -143,7 +143,9 @@ fn sizes(files: &[ArchiveFile], days: u64) {
     for tier in Tier::ALL {
         let of_tier = || files.iter().filter(|file| file.tier == tier);
         let (rows, bytes) = of_tier().fold((0, 0), |(rows, bytes), file| (rows + file.rows, bytes + file.bytes));
+        // A file of a month may begin before the record.
         let span = of_tier().map(|file| file.to - file.from).sum::<i64>() as f64 / (24 * HOUR) as f64;
+        let span = span.min(days as f64);
         let year = bytes as f64 / span * 365.0 / 1e6;
         println!(
             "{}: {} files of {span:.1} days, {rows} rows, {:.2} bytes a row, {:.2} MB; a year of it has {year:.0} MB",
