@@ -43,7 +43,7 @@ impl<'a> ViewContext<'a> {
     }
     /// The time that no setting of a clock moves: for what is asked again after a while.
     pub fn steady(&self) -> Timestamp {
-        self.present().checked_sub(self.snapshot.stepped).unwrap_or(self.now)
+        self.present().checked_sub(self.snapshot.stepped).unwrap_or(self.present())
     }
     /// What time it really is.
     pub fn present(&self) -> Timestamp {
@@ -89,7 +89,7 @@ pub(super) fn past_context<'a>(present: ViewContext<'a>, replay: &'a Replay) -> 
             snapshot: &past.snapshot,
             now: past.at,
             present: Some(present.now),
-            phase: if replay.pace() == 0 { 0 } else { present.phase },
+            phase: if replay.speed() == 0 { 0 } else { present.phase },
             ..present
         },
         None => present,

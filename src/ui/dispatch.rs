@@ -1,6 +1,7 @@
 //! What a key does: of a window, of the replay, of every tab, or of the shown tab.
 
 use super::*;
+use modal::Next;
 
 /// Choices of the palette that are remembered.
 const RECENT_MAX: usize = 8;
@@ -27,7 +28,13 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
         let cx = past_context(view_context(snapshot, theme, *clock, *screen, extension, session), replay);
         let before = cx.is_past().then(|| modal.clone());
-        let (rest, actions) = modal.on_key(&cx, tabs, event);
+        let (rest, actions) = match modal.on_key(&cx, tabs, event) {
+            Next::Stay(modal) => (Some(modal), Vec::new()),
+            Next::Close => (None, Vec::new()),
+            Next::Do(actions) => (None, actions),
+            Next::Both(modal, actions) => (Some(modal), actions),
+            Next::Go(target) => return go(model, target),
+        };
         model.modal = rest;
         if let (Some(before), Some(rest)) = (before, &model.modal)
             && replay::gives_command(rest)
@@ -71,21 +78,19 @@ fn on_tab_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     actions
 }
 
-/// What the palette and the help lead to: the actions of a target, or of a key of the shown tab.
-pub(super) fn lead(model: &mut Model, action: UiAction) -> Vec<UiAction> {
-    match action {
-        UiAction::Jump(target) => {
+/// What was chosen in the palette or in the help.
+fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
+    match target {
+        Target::Key(chord) => return on_key(model, chord.event()),
+        // It is typed again as fast as it is found.
+        Target::Instant(_) => {}
+        Target::Tab(_) | Target::Device(_) | Target::Tag(_) | Target::Trend(_) | Target::Alarm(_) => {
             model.recent.retain(|earlier| *earlier != target);
-            if !matches!(target, palette::Target::Instant(_)) {
-                model.recent.insert(0, target);
-            }
+            model.recent.insert(0, target);
             model.recent.truncate(RECENT_MAX);
-            let actions = palette::actions(&model.cx(), target);
-            actions.into_iter().flat_map(|action| lead(model, action)).collect()
         }
-        UiAction::Press(chord) => on_key(model, chord.event()),
-        other => vec![other],
     }
+    palette::actions(&model.cx(), target)
 }
 
 pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
@@ -117,9 +122,9 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
         }
         Global::Back | Global::Forward => {
-            let offered = Tab::offered(&model.cx());
-            let tab = model.trail.step(model.tabs.shown, global == Global::Forward);
-            tab.filter(|tab| offered.contains(tab)).map(UiAction::Show).into_iter().collect()
+            let (offered, shown) = (Tab::offered(&model.cx()), model.tabs.shown);
+            let tab = model.visited.step(shown, &offered, global == Global::Forward);
+            tab.map(UiAction::Show).into_iter().collect()
         }
         Global::Help => vec![UiAction::Open(Modal::Help(0))],
         Global::Quit => vec![UiAction::Leave],

@@ -38,8 +38,6 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             }
             UiAction::Replay(at) => effects.push(model.replay.go_to(at)),
             UiAction::ReplayStep(by) => effects.extend(model.replay.step(by, model.present_cx().now)),
-            // Became other actions before.
-            UiAction::Jump(_) | UiAction::Press(_) => {}
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
             UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
             UiAction::SessionRequest(tab, request) => {
@@ -63,7 +61,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     if !tab.has_past() {
         model.replay.leave();
     }
-    model.trail.note(model.tabs.shown, tab);
+    model.visited.note(model.tabs.shown, tab);
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
     let effects = asked.into_iter().filter_map(|action| match action {
@@ -80,8 +78,6 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ShowOnTrends(..)
         | UiAction::Replay(_)
         | UiAction::ReplayStep(_)
-        | UiAction::Jump(_)
-        | UiAction::Press(_)
         | UiAction::Command(_)
         | UiAction::SendCommand(..)
         | UiAction::SessionRequest(..) => None,

@@ -18,7 +18,7 @@ pub(crate) mod replay;
 pub(crate) mod rights;
 pub(crate) mod tabs;
 pub(crate) mod theme;
-mod trail;
+mod visited;
 pub(crate) mod last_command;
 pub(crate) mod widgets;
 
@@ -29,7 +29,7 @@ mod tests;
 
 pub use context::ViewContext;
 use context::{past_context, view_context, with_tabs};
-use dispatch::{lead, on_key};
+use dispatch::on_key;
 use effects::perform;
 use std::{sync::Arc, time::Duration};
 
@@ -47,13 +47,13 @@ use extension::Extension;
 use keys::Global;
 pub use last_command::LastCommand;
 use last_frame::LastFrame;
-use modal::{Confirm, Modal, Palette, palette};
+use modal::{Confirm, Modal, Palette, Target, palette};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use replay::Replay;
 use session_lock::SessionLock;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
-use trail::Trail;
+use visited::Visited;
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
 pub const SILENCE: Duration = Duration::from_secs(3);
@@ -86,9 +86,9 @@ pub struct Model {
     /// The lock, its warning, and requests on their way.
     pub session_lock: SessionLock,
     /// Tabs that were shown, for back and forward.
-    pub trail: Trail,
+    pub visited: Visited,
     /// What was last gone to by the palette, the latest first.
-    pub recent: Vec<palette::Target>,
+    pub recent: Vec<Target>,
     /// The window with work in it that waits for an unlock, and the tab that it stood on.
     pub kept: Option<(Tab, Modal)>,
     /// Commands given so far.
@@ -131,7 +131,7 @@ impl Model {
             terminal,
             session: Arc::default(),
             session_lock: SessionLock::default(),
-            trail: Trail::default(),
+            visited: Visited::default(),
             recent: Vec::new(),
             kept: None,
             commands_sent: 0,
@@ -177,7 +177,6 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Key(event) => {
             let active = session_lock::active(model);
             let actions = on_key(model, event);
-            let actions: Vec<UiAction> = actions.into_iter().flat_map(|action| lead(model, action)).collect();
             active.map(UiAction::Do).into_iter().chain(actions).collect()
         }
         Msg::Paste(text) => {
@@ -284,12 +283,12 @@ fn on_replayed(model: &mut Model, number: u32, answer: Result<Answer, HistoryErr
         // What is being filled in is of the present.
         model.replay.cancel();
     }
-    let Model { snapshot, theme, clock, extension, session, screen, replay, tabs, trail, .. } = model;
+    let Model { snapshot, theme, clock, extension, session, screen, replay, tabs, visited, .. } = model;
     let present = view_context(snapshot, theme, *clock, *screen, extension, session);
     let asked = replay.on_answer(number, answer, &present);
     if replay.shown().is_some() && !tabs.shown.has_past() {
         let home = Tab::home(&snapshot.def);
-        trail.note(tabs.shown, home);
+        visited.note(tabs.shown, home);
         tabs.shown = home;
     }
     let asked = asked.into_iter().map(UiAction::Do);

@@ -7,8 +7,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     extension::{Extension, ExtensionMessage},
-    keys::Chord,
-    modal::{Modal, palette::Target},
+    modal::Modal,
     tabs::{Tab, registers::Start},
 };
 use crate::{
@@ -134,10 +133,6 @@ pub enum UiAction {
     ShowOnTrends(TagId, (Timestamp, Timestamp)),
     /// Show the plant so long after the past that is shown.
     ReplayStep(SignedDuration),
-    /// Go to what was chosen in the palette.
-    Jump(Target),
-    /// Do what a key of the shown tab does.
-    Press(Chord),
     /// Show the plant as it was at an instant.
     Replay(Timestamp),
     /// Give a command and watch its outcome.

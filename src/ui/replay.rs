@@ -28,9 +28,10 @@ use crossterm::event::KeyCode;
 use search::Search;
 
 /// Half a second of playing is so many times as long in the plant; 0 is paused.
-const PACES: [i32; 5] = [0, 1, 10, 60, 600];
+const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
 /// Snapshots that are fetched ahead while playing.
-const AHEAD_MAX: usize = 3;
+const PREFETCH_MAX: usize = 3;
+
 /// What a key means while the past is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
@@ -101,16 +102,16 @@ impl Event {
 pub struct Replay {
     shown: Option<Shown>,
     /// The query for the instant that is to be shown next, and the instant.
-    goal: Option<(u32, Timestamp)>,
+    requested: Option<(u32, Timestamp)>,
     /// Where steps lead that were made meanwhile.
-    beyond: Option<Timestamp>,
+    next: Option<Timestamp>,
     search: Option<Search>,
     /// The event that was gone to.
     event: Option<Event>,
-    /// Place in [`PACES`].
-    pace: usize,
+    /// Place in [`SPEEDS`].
+    speed: usize,
     /// Instants that will be played, each with its query and its answer.
-    ahead: VecDeque<(Timestamp, u32, Option<Shown>)>,
+    prefetched: VecDeque<(Timestamp, u32, Option<Shown>)>,
     /// Why the last query led nowhere.
     trouble: Option<String>,
     /// Queries asked so far.
@@ -124,8 +125,8 @@ impl Replay {
     }
 
     /// How many times as fast as the plant it plays; 0 is paused.
-    pub fn pace(&self) -> i32 {
-        PACES[self.pace]
+    pub fn speed(&self) -> i32 {
+        SPEEDS[self.speed]
     }
 
     /// The event that was gone to, while its instant is shown.
@@ -135,15 +136,15 @@ impl Replay {
 
     /// What it waits for, or why it did not get there.
     pub fn words(&self) -> Option<String> {
-        let waits = self.goal.is_some() || self.search.is_some();
+        let waits = self.requested.is_some() || self.search.is_some();
         self.trouble.clone().or_else(|| waits.then(|| t!("reading the history …").to_owned()))
     }
 
     /// Does it wait for this answer?
     pub fn awaits(&self, number: u32) -> bool {
-        self.goal.is_some_and(|(goal, _)| goal == number)
+        self.requested.is_some_and(|(requested, _)| requested == number)
             || self.search.as_ref().is_some_and(|search| search.queries.contains(&number))
-            || self.ahead.iter().any(|(_, query, shown)| *query == number && shown.is_none())
+            || self.prefetched.iter().any(|(_, query, shown)| *query == number && shown.is_none())
     }
 
     /// Back to the present.
@@ -154,21 +155,21 @@ impl Replay {
     /// Asks for an instant, which is shown when the answer comes; what is played stops.
     pub fn go_to(&mut self, at: Timestamp) -> Effect {
         self.pause();
-        (self.search, self.trouble, self.beyond) = (None, None, None);
+        (self.search, self.trouble, self.next) = (None, None, None);
         let effect = self.ask(Query::Past { at });
-        self.goal = Some((self.asked, at));
+        self.requested = Some((self.asked, at));
         effect
     }
 
     /// Steps from where it is, or from where it goes: while an instant is on its way it is waited for, so that fast keys
     /// neither outrun the history nor get lost.
     pub fn step(&mut self, by: SignedDuration, present: Timestamp) -> Option<Effect> {
-        let on_way = self.goal.map(|(_, at)| self.beyond.unwrap_or(at));
+        let on_way = self.requested.map(|(_, at)| self.next.unwrap_or(at));
         let from = on_way.or(self.shown().map(|shown| shown.at))?;
         let to = from.checked_add(by).unwrap_or(from).min(present);
         match on_way {
             Some(_) => {
-                self.beyond = Some(to);
+                self.next = Some(to);
                 None
             }
             None => Some(self.go_to(to)),
@@ -193,8 +194,8 @@ impl Replay {
     }
 
     fn pause(&mut self) {
-        self.pace = 0;
-        self.ahead.clear();
+        self.speed = 0;
+        self.prefetched.clear();
     }
 
     /// A key, at a present.
@@ -204,10 +205,10 @@ impl Replay {
             Action::Step(seconds) => self.step(SignedDuration::from_secs(seconds), present).into_iter().collect(),
             Action::Event(direction) => self.search(direction, at, present),
             Action::Play => {
-                self.pace = (self.pace + 1) % PACES.len();
-                (self.goal, self.search, self.trouble) = (None, None, None);
-                self.ahead.clear();
-                self.fetch_ahead(present)
+                self.speed = (self.speed + 1) % SPEEDS.len();
+                (self.requested, self.search, self.trouble) = (None, None, None);
+                self.prefetched.clear();
+                self.prefetch(present)
             }
             // A window asks for it.
             Action::GoTo => Vec::new(),
@@ -220,25 +221,25 @@ impl Replay {
 
     /// Half a second has passed: the next instant is shown if it has come. At the present the playing stops.
     pub fn on_tick(&mut self, present: Timestamp) -> Vec<Effect> {
-        if let Some((.., shown @ Some(_))) = self.ahead.front_mut() {
+        if let Some((.., shown @ Some(_))) = self.prefetched.front_mut() {
             self.shown = shown.take();
-            self.ahead.pop_front();
+            self.prefetched.pop_front();
         }
-        let effects = self.fetch_ahead(present);
-        if self.ahead.is_empty() {
-            self.pace = 0;
+        let effects = self.prefetch(present);
+        if self.prefetched.is_empty() {
+            self.speed = 0;
         }
         effects
     }
 
-    fn fetch_ahead(&mut self, present: Timestamp) -> Vec<Effect> {
-        let step = SignedDuration::from_millis(500) * self.pace();
+    fn prefetch(&mut self, present: Timestamp) -> Vec<Effect> {
+        let step = SignedDuration::from_millis(500) * self.speed();
         let mut effects = Vec::new();
-        while step > SignedDuration::ZERO && self.ahead.len() < AHEAD_MAX {
-            let last = self.ahead.back().map(|(at, ..)| *at).or_else(|| self.shown().map(|shown| shown.at));
+        while step > SignedDuration::ZERO && self.prefetched.len() < PREFETCH_MAX {
+            let last = self.prefetched.back().map(|(at, ..)| *at).or_else(|| self.shown().map(|shown| shown.at));
             let Some(at) = last.and_then(|last| last.checked_add(step).ok()).filter(|at| *at < present) else { break };
             effects.push(self.ask(Query::Past { at }));
-            self.ahead.push_back((at, self.asked, None));
+            self.prefetched.push_back((at, self.asked, None));
         }
         effects
     }
@@ -262,7 +263,7 @@ impl Replay {
                     other => other.to_string(),
                 };
                 self.pause();
-                (self.goal, self.search, self.trouble) = (None, None, Some(why));
+                (self.requested, self.search, self.trouble) = (None, None, Some(why));
             }
             Ok(Answer::Past(past)) => return self.on_past(number, &past, present).into_iter().collect(),
             Ok(Answer::Journal(rows)) => {
@@ -287,10 +288,10 @@ impl Replay {
         // Waiting and refreshing go by the time of the present.
         (snapshot.speed, snapshot.stepped) = (present.snapshot.speed, present.snapshot.stepped);
         let shown = Shown { at: past.at, snapshot: Arc::new(snapshot) };
-        if self.goal.is_some_and(|(goal, _)| goal == number) {
-            (self.goal, self.shown) = (None, Some(shown));
-            return self.beyond.take().map(|at| self.go_to(at));
-        } else if let Some((.., place)) = self.ahead.iter_mut().find(|(_, query, _)| *query == number) {
+        if self.requested.is_some_and(|(requested, _)| requested == number) {
+            (self.requested, self.shown) = (None, Some(shown));
+            return self.next.take().map(|at| self.go_to(at));
+        } else if let Some((.., place)) = self.prefetched.iter_mut().find(|(_, query, _)| *query == number) {
             *place = Some(shown);
         }
         None
@@ -355,8 +356,6 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         | UiAction::ShowOnTrends(..)
         | UiAction::Replay(_)
         | UiAction::ReplayStep(_)
-        | UiAction::Jump(_)
-        | UiAction::Press(_)
         | UiAction::SessionRequest(..)
         | UiAction::Leave
         | UiAction::Do(_) => false,

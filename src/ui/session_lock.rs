@@ -12,7 +12,7 @@ use super::{
     modal::{Modal, Notice, UserForm, user_form::Purpose},
     replay::Replay,
     tabs::{Tab, TabView, Tabs, login},
-    trail::Trail,
+    visited::Visited,
 };
 use crate::{
     access::{Durability, SessionRequest, SessionStatus},
@@ -76,7 +76,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
         model.modal.take_if(|modal| !modal.is_quit());
         model.last_command = model.last_command.take_if(|_| user(&before) == user(&now));
         model.kept = None;
-        (model.trail, model.recent) = (Trail::default(), Vec::new());
+        (model.visited, model.recent) = (Visited::default(), Vec::new());
     }
     let back = keep_work(model, &before, &now);
     with_tabs(model, |tabs, cx| {
@@ -185,8 +185,6 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             | UiAction::ShowOnTrends(..)
             | UiAction::Replay(_)
             | UiAction::ReplayStep(_)
-            | UiAction::Jump(_)
-            | UiAction::Press(_)
             | UiAction::SessionRequest(..)
             | UiAction::Do(_) => rest.push(action),
         }
@@ -254,7 +252,7 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     let shown = model.tabs.shown;
     model.tabs = Tabs::new(&snapshot);
     (model.snapshot, model.last_command, model.kept) = (snapshot, None, None);
-    (model.replay, model.trail) = (Replay::default(), Trail::default());
+    (model.replay, model.visited) = (Replay::default(), Visited::default());
     model.recent.clear();
     model.plants = model.plants.wrapping_add(1);
     let words = vec![

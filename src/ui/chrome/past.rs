@@ -25,7 +25,7 @@ pub(super) fn rule(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let Some(shown) = model.replay.shown() else { return };
     let at = stamp(cx, shown.at);
     let ago = t!("{ago} ago", ago = age(elapsed(shown.at, cx.present())));
-    let pace = match model.replay.pace() {
+    let pace = match model.replay.speed() {
         0 => t!("paused").to_owned(),
         pace => t!("playing ×{pace}", pace),
     };

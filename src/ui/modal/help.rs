@@ -5,9 +5,9 @@ use crate::text::translate;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Modal, Next, window};
+use super::{Modal, Next, Target, window};
 use crate::ui::{
-    UiAction, ViewContext, keys,
+    ViewContext, keys,
     keys::{Global, Hint},
     replay,
     tabs::{Tab, Tabs},
@@ -22,7 +22,7 @@ pub(super) fn on_key(selected: usize, cx: &ViewContext, tabs: &Tabs, event: KeyE
     match event.code {
         KeyCode::Char('q' | '?') => Next::Close,
         KeyCode::Enter => match rows.get(selected).and_then(|hint| hint.chord) {
-            Some(chord) => Next::Do(vec![UiAction::Press(chord)]),
+            Some(chord) => Next::Go(Target::Key(chord)),
             None => Next::Close,
         },
         _ => {

@@ -31,7 +31,7 @@ pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use guidance::Guidance;
 pub use notice::Notice;
-pub use palette::Palette;
+pub use palette::{Palette, Target};
 pub use prompt::Prompt;
 pub use reason::Reason;
 pub use settings::Settings;
@@ -95,6 +95,8 @@ pub enum Next {
     Do(Vec<UiAction>),
     /// It stays, and this is to be done.
     Both(Modal, Vec<UiAction>),
+    /// It is gone, and leads there.
+    Go(Target),
 }
 
 impl Modal {
@@ -110,8 +112,8 @@ impl Modal {
         }
     }
 
-    /// A key: what is left of the window, and what is to be done.
-    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> (Option<Modal>, Vec<UiAction>) {
+    /// A key.
+    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Esc).is(event) {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
@@ -130,12 +132,12 @@ impl Modal {
                 | Modal::Palette(_)
                 | Modal::AuditEntry(_) => None,
             };
-            return (back, Vec::new());
+            return back.map_or(Next::Close, Next::Stay);
         }
         if keys::ctrl('c').is(event) {
-            return (Some(self), vec![UiAction::Leave]);
+            return Next::Both(self, vec![UiAction::Leave]);
         }
-        let next = match self {
+        match self {
             Modal::Help(row) => help::on_key(row, cx, tabs, event),
             Modal::Confirm(confirm) => confirm.on_key(cx, event),
             Modal::Entry(entry) => entry.on_key(cx, event),
@@ -151,12 +153,6 @@ impl Modal {
             Modal::Bus(window) => window.on_key(cx, tabs, event),
             Modal::UserForm(form) => form.on_key(cx, event),
             Modal::AuditEntry(dialog) => dialog.on_key(event),
-        };
-        match next {
-            Next::Stay(modal) => (Some(modal), Vec::new()),
-            Next::Close => (None, Vec::new()),
-            Next::Do(acts) => (None, acts),
-            Next::Both(modal, acts) => (Some(modal), acts),
         }
     }
 

@@ -133,7 +133,7 @@ impl Palette {
         let listed = self.listed();
         if keys::code(KeyCode::Enter).is(event) {
             return match listed.get(self.selected) {
-                Some(row) => Next::Do(vec![UiAction::Jump(row.target)]),
+                Some(row) => Next::Go(row.target),
                 None => Next::Stay(Modal::Palette(Box::new(self))),
             };
         }
@@ -217,7 +217,7 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     tabs.chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()
 }
 
-/// What a choice leads to.
+/// What a choice leads to, but for a key, which is pressed.
 pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
     match target {
         Target::Tab(tab) => vec![UiAction::Show(tab)],
@@ -234,7 +234,7 @@ pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
             let faceplate = alarms::faceplate(cx, cx.def().alarm(id).subject);
             vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate))))]
         }
-        Target::Key(chord) => vec![UiAction::Press(chord)],
+        Target::Key(_) => Vec::new(),
         Target::Instant(at) => vec![UiAction::Replay(at)],
     }
 }

@@ -22,9 +22,9 @@ struct Span {
     from: Timestamp,
     to: Timestamp,
     /// Until there are more events than one answer holds: then the span is the first half of that.
-    crowded: Option<Timestamp>,
+    overfull: Option<Timestamp>,
     /// Place in [`SEARCHED_H`].
-    reach: usize,
+    place: usize,
     /// The end of time, as it was when the key was pressed.
     present: Timestamp,
 }
@@ -41,8 +41,8 @@ pub(super) struct Search {
 
 impl Span {
     /// The first span before or after an instant, which itself is neither next nor previous.
-    fn new(direction: Direction, at: Timestamp, reach: usize, present: Timestamp) -> Span {
-        let by = SignedDuration::from_hours(SEARCHED_H[reach]);
+    fn new(direction: Direction, at: Timestamp, place: usize, present: Timestamp) -> Span {
+        let by = SignedDuration::from_hours(SEARCHED_H[place]);
         let (from, to) = match direction {
             Direction::Earlier => (at.checked_sub(by).unwrap_or(Timestamp::MIN), at),
             Direction::Later => {
@@ -50,28 +50,28 @@ impl Span {
                 (from, from.checked_add(by).unwrap_or(present).min(after(present)))
             }
         };
-        Span { direction, from, to, crowded: None, reach, present }
+        Span { direction, from, to, overfull: None, place, present }
     }
 
-    /// The first half of a crowded span; all of it where it cannot be halved.
+    /// The first half of an overfull span; all of it where it cannot be halved.
     fn half(self, from: Timestamp, end: Timestamp) -> Span {
         let half = from.checked_add(end.duration_since(from) / 2).unwrap_or(end);
         // Events are stored with microseconds.
-        let (to, crowded) = if after(from) < half { (half, Some(end)) } else { (end, None) };
-        Span { from, to, crowded, ..self }
+        let (to, overfull) = if after(from) < half { (half, Some(end)) } else { (end, None) };
+        Span { from, to, overfull, ..self }
     }
 
     /// Nothing was found: where to search on; `None` at the end of time.
     fn next(self) -> Option<Span> {
         let longest = SEARCHED_H.len() - 1;
-        match (self.direction, self.crowded) {
+        match (self.direction, self.overfull) {
             (Direction::Later, Some(end)) => Some(self.half(self.to, end)),
             (Direction::Later, None) => {
                 let before = self.to.checked_sub(SignedDuration::from_micros(1)).unwrap_or(self.to);
-                Some(Span::new(self.direction, before, (self.reach + 1).min(longest), self.present))
+                Some(Span::new(self.direction, before, (self.place + 1).min(longest), self.present))
             }
-            (Direction::Earlier, _) if self.reach == longest => None,
-            (Direction::Earlier, _) => Some(Span::new(self.direction, self.from, self.reach + 1, self.present)),
+            (Direction::Earlier, _) if self.place == longest => None,
+            (Direction::Earlier, _) => Some(Span::new(self.direction, self.from, self.place + 1, self.present)),
         }
         .filter(|next| next.from < next.to)
     }
@@ -81,7 +81,7 @@ impl Replay {
     /// Asks for the next event in a direction.
     pub(super) fn search(&mut self, direction: Direction, at: Timestamp, present: Timestamp) -> Vec<Effect> {
         self.pause();
-        (self.goal, self.trouble) = (None, None);
+        (self.requested, self.trouble) = (None, None);
         let span = Span::new(direction, at, 0, present);
         self.search_in(Some(span).filter(|span| span.from < span.to), direction)
     }
@@ -116,7 +116,7 @@ impl Replay {
             Direction::Earlier => events.max_by_key(Event::at),
             Direction::Later => {
                 let half = span.half(span.from, span.to);
-                if cut && half.crowded.is_some() {
+                if cut && half.overfull.is_some() {
                     return self.search_in(Some(half), span.direction);
                 }
                 events.min_by_key(Event::at)

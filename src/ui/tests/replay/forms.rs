@@ -26,7 +26,6 @@ fn no_window_of_the_past_opens_a_form_for_a_command() {
 #[test]
 fn a_lock_keeps_no_work_of_the_past() {
     let mut model = replayed(&Fixture::alarm(), Tab::Mimic);
-    model.modal = crate::ui::tests::model(&Fixture::alarm(), Theme::FULL).modal;
     type_keys(&mut model, "@");
     let locked = SessionStatus { locked: true, ..(*model.session).clone() };
     update(&mut model, Msg::SessionStatus(Arc::new(locked)));

@@ -7,14 +7,14 @@ const TABS_MAX: usize = 32;
 
 /// What was shown before and behind the shown tab.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Trail {
+pub struct Visited {
     before: Vec<Tab>,
     behind: Vec<Tab>,
     /// The tab that back or forward leads to.
     on_way: Option<Tab>,
 }
 
-impl Trail {
+impl Visited {
     /// Another tab is shown. What was gone back from is forgotten unless back or forward leads there.
     pub fn note(&mut self, from: Tab, to: Tab) {
         if from == to || self.on_way.take() == Some(to) {
@@ -27,10 +27,11 @@ impl Trail {
         }
     }
 
-    /// The tab that was shown before this one, or after it.
-    pub fn step(&mut self, shown: Tab, forward: bool) -> Option<Tab> {
+    /// The tab that was shown before this one, or after it, of those that are offered now.
+    pub fn step(&mut self, shown: Tab, offered: &[Tab], forward: bool) -> Option<Tab> {
         let (from, to) =
             if forward { (&mut self.behind, &mut self.before) } else { (&mut self.before, &mut self.behind) };
+        from.retain(|tab| offered.contains(tab));
         let tab = from.pop()?;
         to.push(shown);
         self.on_way = Some(tab);
@@ -44,14 +45,14 @@ mod tests {
 
     #[test]
     fn back_and_forward_lead_along_the_same_tabs() {
-        let mut trail = Trail::default();
+        let mut visited = Visited::default();
         let mut shown = Tab::Mimic;
-        let mut show = |trail: &mut Trail, tab: Tab| {
-            trail.note(shown, tab);
+        let mut show = |visited: &mut Visited, tab: Tab| {
+            visited.note(shown, tab);
             shown = tab;
         };
         for tab in [Tab::Trends, Tab::Trends, Tab::Alarms, Tab::Bus] {
-            show(&mut trail, tab);
+            show(&mut visited, tab);
         }
         for (shown, forward, expect) in [
             (Tab::Bus, false, Some(Tab::Alarms)),
@@ -61,12 +62,14 @@ mod tests {
             (Tab::Trends, false, Some(Tab::Mimic)),
             (Tab::Mimic, false, None),
         ] {
-            let to = trail.step(shown, forward);
+            let to = visited.step(shown, &Tab::ALL, forward);
             assert_eq!(to, expect, "{shown:?}");
-            trail.note(shown, to.unwrap_or(shown));
+            visited.note(shown, to.unwrap_or(shown));
         }
-        trail.note(Tab::Mimic, Tab::Users);
-        assert_eq!(trail.step(Tab::Users, true), None, "a new way has no forward");
-        assert_eq!(trail.step(Tab::Users, false), Some(Tab::Mimic));
+        visited.note(Tab::Mimic, Tab::Users);
+        assert_eq!(visited.step(Tab::Users, &Tab::ALL, true), None, "a new way has no forward");
+        assert_eq!(visited.step(Tab::Users, &Tab::ALL, false), Some(Tab::Mimic));
+        visited.note(Tab::Users, Tab::Mimic);
+        assert_eq!(visited.step(Tab::Mimic, &[Tab::Mimic, Tab::Trends], false), None, "one that is not there any more");
     }
 }
