@@ -75,6 +75,14 @@ struct Row {
     kind: &'static str,
     name: String,
     text: String,
+    /// All of its words, to be searched.
+    words: String,
+}
+
+impl Row {
+    fn new(target: Target, kind: &'static str, name: &str, text: &str) -> Row {
+        Row { target, kind, name: name.to_owned(), text: text.to_owned(), words: format!("{name} {text} {kind}") }
+    }
 }
 
 /// What is typed, and what fits it.
@@ -109,7 +117,7 @@ impl Palette {
         let mut buffer = Vec::new();
         let mut fits = |text: &str| pattern.score(Utf32Str::new(text, &mut buffer), &mut matcher);
         let mut score = |row: &Row| {
-            let all = fits(&format!("{} {} {}", row.name, row.text, row.kind))?;
+            let all = fits(&row.words)?;
             // What is called so stands before what only mentions it, above all as a whole word at the end of its name.
             let is_last =
                 |name: &str| name.rsplit(['.', '-', ' ']).next().is_some_and(|part| part.eq_ignore_ascii_case(&text));
@@ -190,30 +198,28 @@ fn instant(cx: &ViewContext, text: &str) -> Option<Row> {
     // A bench has no history.
     let at = (!cx.def().is_bench() && text.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
         .then(|| replay::instant(cx, text).ok())??;
-    let name = replay::stamp(cx, at);
-    Some(Row { target: Target::Instant(at), kind: t!("time"), name, text: t!("replay").to_owned() })
+    Some(Row::new(Target::Instant(at), t!("time"), &replay::stamp(cx, at), t!("replay")))
 }
 
 fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let def = cx.def();
-    let row = |target, kind, name: &str, text: &str| Row { target, kind, name: name.to_owned(), text: text.to_owned() };
     let tabs = Tab::offered(cx).into_iter();
-    let tabs = tabs.map(|tab| row(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
+    let tabs = tabs.map(|tab| Row::new(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
     let alarm = |id: AlarmId, state: &str| {
-        row(Target::Alarm(id), t!("alarm"), &subject(cx, id), &format!("{}  {state}", def.alarm(id).message))
+        Row::new(Target::Alarm(id), t!("alarm"), &subject(cx, id), &format!("{}  {state}", def.alarm(id).message))
     };
     let active = cx.snapshot.alarms.iter().map(|active| alarm(active.id, translate(active.state.word())));
     let is_active = |id: AlarmId| cx.snapshot.alarms.iter().any(|active| active.id == id);
     let others = def.alarms.iter().filter(|def| !is_active(def.id)).map(|def| alarm(def.id, ""));
     let keys = tab.hints(cx).into_iter().filter_map(|hint| {
         let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
-        Some(row(Target::Key(hint.chord?), t!("key"), &hint.key, help))
+        Some(Row::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))
     });
     let devices = def.devices.iter().filter(|_| !def.is_bench());
-    let devices = devices.map(|device| row(Target::Device(device.id), t!("device"), &device.name, &device.title));
-    let tags = def.tags.iter().map(|tag| row(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
+    let devices = devices.map(|device| Row::new(Target::Device(device.id), t!("device"), &device.name, &device.title));
+    let tags = def.tags.iter().map(|tag| Row::new(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
     let stored = def.tags.iter().filter(|tag| tag.is_stored());
-    let trends = stored.map(|tag| row(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
+    let trends = stored.map(|tag| Row::new(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
     tabs.chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()
 }
 

@@ -39,16 +39,12 @@ fn plant() -> Plant {
 }
 
 fn read(plant: &mut Plant, second: i64, sv: f64, high: f64) -> Effects {
-    let values = vec![(SV, sv), (DP, 1.0), (FAULT, 0.0), (HIGH, high)];
-    let response_time = std::time::Duration::from_millis(12);
-    plant.on_event(Event::Read {
-        at: at(second),
-        device: TIC,
-        values,
-        texts: Vec::new(),
-        response_time,
-        exchange: None,
-    })
+    read_values(plant, second, vec![(SV, sv), (DP, 1.0), (FAULT, 0.0), (HIGH, high)])
+}
+
+fn read_values(plant: &mut Plant, second: i64, values: Vec<(TagId, f64)>) -> Effects {
+    let (device, response_time) = (TIC, std::time::Duration::from_millis(12));
+    plant.on_event(Event::Read { at: at(second), device, values, texts: Vec::new(), response_time, exchange: None })
 }
 
 /// The read of the device that a restore begins with.
@@ -183,17 +179,7 @@ fn nothing_is_written_before_every_value_was_read() {
     let mut plant = plant();
     let request = restore_request(&plant, set(40.0, 80.0));
     command(&mut plant, 1, CommandKind::Restore(Box::new(request.clone())));
-    let only_sv = |plant: &mut Plant, second| {
-        let (values, response_time) = (vec![(SV, 500.0), (DP, 1.0)], std::time::Duration::from_millis(12));
-        plant.on_event(Event::Read {
-            at: at(second),
-            device: TIC,
-            values,
-            texts: Vec::new(),
-            response_time,
-            exchange: None,
-        })
-    };
+    let only_sv = |plant: &mut Plant, second| read_values(plant, second, vec![(SV, 500.0), (DP, 1.0)]);
     assert_eq!(written(&only_sv(&mut plant, 2)), [], "SV-H is still of yesterday");
     assert_eq!(plant.restore_of(TIC).map(|run| run.state), Some(State::Reading));
     // The device goes on answering for SV alone: in the end it is given up, and said so.
