@@ -55,7 +55,7 @@ fn rows(cx: &ViewContext, tabs: &Tabs) -> Vec<Hint> {
 pub(super) fn view(selected: usize, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
     let rows = rows(cx, tabs);
     let keys = rows.iter().map(|hint| width(&hint.key)).max().unwrap_or(0);
-    let inner = rows.iter().map(|hint| keys + 2 + width(&hint.help)).max().unwrap_or(0).max(40);
+    let inner = rows.iter().map(|hint| keys + 4 + width(&hint.help)).max().unwrap_or(0).max(40);
     let shown = usize::from(body.height.saturating_sub(2));
     let first = first(selected, rows.len(), shown);
     let mut canvas = window(cx, frame, body, t!("keys"), (inner, rows.len()));
@@ -63,7 +63,8 @@ pub(super) fn view(selected: usize, cx: &ViewContext, tabs: &Tabs, frame: &mut F
         if hint.key.is_empty() {
             canvas.text(0, y, &hint.label, cx.theme.dim());
         } else {
-            let x = canvas.text(0, y, &pad(&hint.key, keys + 2), cx.theme.strong());
+            let mark = if n == selected { cx.theme.pick("▸", ">") } else { " " };
+            let x = canvas.text(0, y, &pad(&format!("{mark} {}", hint.key), keys + 4), cx.theme.strong());
             canvas.text(x, y, &hint.help, if n == selected { cx.theme.focus() } else { cx.theme.normal() });
         }
     }

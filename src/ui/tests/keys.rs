@@ -215,6 +215,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
         update(&mut model, Msg::Answer(id, Ok(answer)));
     }
     insta::assert_snapshot!("journal_80x24", screen(&mut model, 80, 24));
+    insta::assert_snapshot!("journal_120x40", screen(&mut model, 120, 40));
 }
 
 #[test]
