@@ -96,3 +96,16 @@ fn a_line_of_the_past_says_what_is_known_of_it() {
     assert!(shown.contains("no request is on record for this minute"), "{shown}");
     assert!(!shown.contains("no data from this line yet") && !shown.contains("TX"), "{shown}");
 }
+
+#[test]
+fn a_tiny_screen_takes_no_key_but_the_way_back() {
+    let mut model = replayed(&Fixture::alarm(), Tab::Mimic);
+    let shown = screen(&mut model, 40, 10);
+    assert!(shown.contains("UNACK 00:41  TIC-1.PV"), "the banner is of the present: {shown}");
+    for key in ["@", "<", "]", "*", ":", "?"] {
+        assert_eq!((type_keys(&mut model, key), &model.modal), (Vec::new(), &None), "{key}");
+    }
+    assert_eq!(shown_at(&model), Some(ago(600)));
+    type_keys(&mut model, "⎋");
+    assert_eq!(shown_at(&model), None);
+}
