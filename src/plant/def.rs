@@ -13,7 +13,7 @@ pub use super::{
     history_def::{HistoryDef, ParquetVersion},
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Serial, Transport},
-    mimic_def::MimicDef,
+    mimic_def::{MimicDef, MimicPage, Picture},
     role::{Reauthentication, Role},
 };
 pub(crate) use super::{

@@ -1,4 +1,4 @@
-//! The mimic of the process as its profile describes it.
+//! The mimic of the process: pages of pictures that the plant file draws in text.
 
 use std::time::Duration;
 
@@ -6,15 +6,40 @@ use serde::{Deserialize, Serialize};
 
 use super::id::{DeviceId, TagId};
 
-/// The mimic of the process, on a canvas of nominal cells that is stretched to the screen.
+/// The mimic of the process.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct MimicDef {
-    /// Nominal size, columns and rows; 80 by 18 fits a terminal of 80 by 24.
+    /// Its pages, the first is shown first; none where the plant file draws none.
+    pub pages: Vec<MimicPage>,
+    /// Commands offered on the mimic tab.
+    pub commands: Vec<MimicCommand>,
+}
+
+/// A page of the mimic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MimicPage {
+    /// Its heading.
+    pub name: String,
+    /// The same process for terminals of several sizes, the smallest picture first.
+    pub pictures: Vec<Picture>,
+}
+
+/// A picture on a canvas of nominal cells, which may be stretched to the screen.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Picture {
+    /// Columns and rows; 80 by 18 fits a terminal of 80 by 24.
     pub size: (u16, u16),
     /// What is drawn, in this order.
     pub items: Vec<MimicItem>,
-    /// Commands offered on the mimic tab.
-    pub commands: Vec<MimicCommand>,
+}
+
+impl MimicPage {
+    /// The largest picture that fits into so many columns and rows; the smallest where none does.
+    pub fn picture(&self, room: (u16, u16)) -> &Picture {
+        static EMPTY: Picture = Picture { size: (1, 1), items: Vec::new() };
+        let fits = |picture: &&Picture| picture.size.0 <= room.0 && picture.size.1 <= room.1;
+        self.pictures.iter().rev().find(fits).or(self.pictures.first()).unwrap_or(&EMPTY)
+    }
 }
 
 /// A rectangle on the nominal canvas.
@@ -30,27 +55,33 @@ pub struct MimicRect {
     pub height: u16,
 }
 
-/// One element of the mimic.
+impl MimicRect {
+    /// Does `other` lie inside?
+    pub fn contains(&self, other: &MimicRect) -> bool {
+        self.x <= other.x
+            && self.y <= other.y
+            && other.x.saturating_add(other.width) <= self.x.saturating_add(self.width)
+            && other.y.saturating_add(other.height) <= self.y.saturating_add(self.height)
+    }
+}
+
+/// One element of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum MimicItem {
-    /// A vessel with liquid that follows a level tag.
-    Tank {
+    /// A box; with a level its liquid follows it.
+    Vessel {
         /// Where.
         place: MimicRect,
-        /// `TK-1 control`.
+        /// `TK-1 control`, written into the upper edge.
         label: String,
-        /// Level, if measured; its range is the height of the vessel.
+        /// Level, if it holds a liquid; its range is the height of the vessel.
         level: Option<TagId>,
-        /// Temperature shown inside.
-        temperature: Option<TagId>,
-        /// Heating power or output; drawn as a heater at the bottom while above zero.
-        heater: Option<TagId>,
-        /// Agitator run signal.
-        agitator: Option<TagId>,
+        /// All that is shown inside.
+        inside: Vec<TagId>,
     },
     /// A valve, open while its tag is not zero.
     Valve {
-        /// Where (width and height unused).
+        /// Where: the columns of its pipe that it takes.
         place: MimicRect,
         /// `SV-1`.
         label: String,
@@ -68,12 +99,35 @@ pub enum MimicItem {
         /// State.
         tag: TagId,
     },
-    /// A pipe along points (column, row), with flow from first to last while every tag is not zero.
+    /// An agitator, which turns while its tag is not zero.
+    Agitator {
+        /// Where.
+        place: MimicRect,
+        /// Run signal.
+        tag: TagId,
+    },
+    /// A heater, which glows while its tag is not zero.
+    Heater {
+        /// Where.
+        place: MimicRect,
+        /// Power or output.
+        tag: TagId,
+    },
+    /// A pipe along points (column, row), with flow from first to last.
     Pipe {
         /// Corners of the pipe.
         points: Vec<(u16, u16)>,
-        /// All of these must be on for flow.
-        flow: Vec<TagId>,
+        /// It flows while all tags of one of these are not zero: of its own, or of a pipe that leads into it.
+        flow: Vec<Vec<TagId>>,
+        /// Its direction is drawn: arrows travel along it.
+        directed: bool,
+    },
+    /// Where three or four pipes meet.
+    Joint {
+        /// Column and row.
+        at: (u16, u16),
+        /// The branches: right 1, down 2, left 4, up 8.
+        branches: u8,
     },
     /// A value with unit and quality.
     Value {
@@ -81,6 +135,13 @@ pub enum MimicItem {
         place: MimicRect,
         /// Shown before the value.
         label: String,
+        /// What.
+        tag: TagId,
+    },
+    /// A value on its range, with the limits of its alarms: upright where it is higher than one row.
+    Bar {
+        /// Where.
+        place: MimicRect,
         /// What.
         tag: TagId,
     },
@@ -112,6 +173,13 @@ pub enum MimicItem {
         tag: TagId,
         /// How far back.
         window: Duration,
+    },
+    /// Leads to another page.
+    Link {
+        /// Where.
+        place: MimicRect,
+        /// The number of the page, from 0.
+        page: usize,
     },
     /// Plain words.
     Text {

@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report, Severity};
+use miette::{
+    GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, MietteError, MietteSpanContents, Report,
+    Severity, SourceCode, SourceSpan, SpanContents,
+};
 
 use super::reader::At;
 use crate::plant::visible::{same_length, visible};
@@ -213,7 +216,29 @@ impl Problem {
         let labels = std::iter::once(primary)
             .chain(second.map(|(span, text)| LabeledSpan::at(span.start..span.end, shown(text))));
         Report::new(diagnostic.with_labels(labels))
-            .with_source_code(NamedSource::new(shown(&source.file), same_length(&source.text)))
+            .with_source_code(DrawnText { file: shown(&source.file), text: same_length(&source.text).to_string() })
+    }
+}
+
+/// A text for drawing, whose columns count characters as an editor does: miette counts bytes.
+struct DrawnText {
+    file: String,
+    text: String,
+}
+
+impl SourceCode for DrawnText {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        before: usize,
+        after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let inner = self.text.read_span(span, before, after)?;
+        let start = self.text.get(..span.offset()).unwrap_or("");
+        let line = start.rsplit('\n').next().unwrap_or("").chars().count();
+        let column = if inner.column() == 0 { 0 } else { line };
+        let (data, span, rows) = (inner.data(), *inner.span(), inner.line_count());
+        Ok(Box::new(MietteSpanContents::new_named(self.file.clone(), data, span, inner.line(), column, rows)))
     }
 }
 

@@ -1,211 +1,70 @@
-//! What is drawn: the items and commands of the mimic, and the pens of the trends.
+//! What is drawn: the pages and commands of the mimic, and the pens of the trends.
 
-use std::time::Duration;
+use std::collections::BTreeMap;
 
 use super::{
-    diagnostic::{Problems, Span},
+    diagnostic::Problems,
     names::{Defs, Unique, check_writable, number_of},
-    reader::{At, OptionalKey, Raw, kind_of, text, toml_tables},
+    picture::{SymbolKind, Vocabulary, picture},
+    reader::{At, Raw, Value, text},
     schema::{CommandTable, MimicTable, TrendTable},
 };
 use crate::plant::{
-    def::{MimicCommand, MimicDef, MimicItem, MimicRect, Pen, TagId, TrendGroup},
-    keyword::keyword_enum,
+    def::{MimicCommand, MimicDef, MimicPage, Pen, Picture, TagId, TrendGroup},
     tag::{Poll, TagDef},
 };
 
+/// What a terminal of 80 by 24 leaves for the mimic.
+const USUAL_ROOM: (u16, u16) = (80, 18);
+
 /// The mimic of the process.
 pub(super) fn mimic(table: &MimicTable, defs: &Defs, problems: &mut Problems) -> MimicDef {
-    let size = table.size.map_or((80, 18), |size| (size.value[0], size.value[1]));
-    if size.0 == 0 || size.1 == 0 || size.0 > 500 || size.1 > 200 {
-        let at = table.size.map_or(table.at, |size| size.at);
-        problems.add(at, "a canvas of this size cannot be drawn").label("expected [80, 18] for a terminal of 80 by 24");
-    }
-    let items = table.items.iter().filter_map(|item| {
-        let item = item_of(item.value.clone(), defs, problems)?;
-        check_inside(&item.value, item.at, size, problems);
-        Some(item.value)
+    let aliases = aliases(&table.aliases, problems);
+    let pages = table.pages.iter().map(|page| (text(&page.value.name), &page.value.pictures));
+    let pages = std::iter::once((text(&table.name), &table.pictures)).chain(pages);
+    let titled: Vec<(String, &[At<String>])> =
+        pages.filter_map(|(name, pictures)| Some((name, &pictures.as_ref()?.value.0[..]))).collect();
+    let names: Vec<String> = titled.iter().map(|(name, _)| name.clone()).collect();
+    let vocabulary = Vocabulary { defs, aliases: &aliases, pages: &names };
+    let pages = titled.into_iter().map(|(name, texts)| {
+        let mut pictures: Vec<Picture> = texts.iter().map(|text| picture(text, &vocabulary, problems)).collect();
+        pictures.sort_by_key(|picture| (picture.size.0, picture.size.1));
+        if let (Some(least), Some(first)) = (pictures.first(), texts.first()) {
+            check_smallest(least, first, problems);
+        }
+        MimicPage { name, pictures }
     });
-    let items = items.collect();
+    let pages = pages.collect();
     let mut keys = Unique::default();
     let commands = table.commands.iter().filter_map(|command| self::command(&command.value, defs, &mut keys, problems));
-    MimicDef { size, items, commands: commands.collect() }
+    MimicDef { pages, commands: commands.collect() }
 }
 
-/// Declares the tables of the items: every item has a kind and a place.
-macro_rules! items {
-    ($($name:ident, $what:literal { $($mode:ident $key:literal $field:ident: $type:ty,)* })*) => { $(
-        toml_tables!(
-            #[doc = $what]
-            $name, $what {
-                need "kind" _kind: String,
-                need "x" x: u16,
-                need "y" y: u16,
-                opt "width" width: u16,
-                opt "height" height: u16,
-                $($mode $key $field: $type,)*
-            }
-        );
-        impl $name {
-            fn place(&self) -> MimicRect {
-                let cells = |value: Option<At<u16>>, usual| value.value_or(usual);
-                MimicRect { x: cells(self.x, 0), y: cells(self.y, 0), width: cells(self.width, 1), height: cells(self.height, 1) }
-            }
-        }
-    )* };
-}
-
-items! {
-    TankItem, "a tank" {
-        opt "label" label: String,
-        opt "level" level: String,
-        opt "temperature" temperature: String,
-        opt "heater" heater: String,
-        opt "agitator" agitator: String,
-    }
-    ValveItem, "a valve" { need "label" label: String, need "tag" tag: String, opt "vertical" vertical: bool, }
-    PumpItem, "a pump" { need "label" label: String, need "tag" tag: String, }
-    ValueItem, "a value" { opt "label" label: String, need "tag" tag: String, }
-    ControllerItem, "a controller" { need "device" device: String, }
-    SequenceItem, "a sequence" {
-        opt "label" label: String,
-        need "step" step: String,
-        opt "remaining" remaining: String,
-        list "states" states: String,
-    }
-    TrendItem, "a trend" { need "tag" tag: String, need "window" window: Duration, }
-    TextItem, "a text" { need "text" text: String, }
-}
-
-toml_tables! {
-    /// A pipe has no place but its points.
-    PipeItem, "a pipe" { need "kind" _kind: String, list "points" points: [u16; 2], list "flow" flow: String, }
-}
-
-keyword_enum! {
-    #[derive(Debug, Clone, Copy)]
-    enum ItemKind: "kind" {
-        Tank => "tank",
-        Valve => "valve",
-        Pump => "pump",
-        Pipe => "pipe",
-        Value => "value",
-        Controller => "controller",
-        Sequence => "sequence",
-        Trend => "trend",
-        Text => "text",
+/// A usual terminal shows no picture that is larger than its room.
+fn check_smallest(picture: &Picture, text: &At<String>, problems: &mut Problems) {
+    let ((width, height), (columns, rows)) = (picture.size, USUAL_ROOM);
+    if width > columns || height > rows {
+        let message =
+            format!("a terminal of 80 by 24 shows a list instead of this picture of {width} by {height} cells");
+        problems.warn(text.at, message).label("expected at most 80 by 18, or a smaller picture beside it");
     }
 }
 
-/// Reads an item by its kind. The problems of a wrong item are added even where `None` is returned.
-fn item_of(raw: Raw, defs: &Defs, problems: &mut Problems) -> Option<At<MimicItem>> {
-    let at = raw.at;
-    let kind = kind_of::<ItemKind>(&raw, "a mimic item", "kind", problems)?;
-    let layers = &[raw];
-    let value = match kind {
-        ItemKind::Tank => {
-            let item = TankItem::of(layers, problems);
-            MimicItem::Tank {
-                place: item.place(),
-                label: text(&item.label),
-                level: defs.tag_id(&item.level, problems),
-                temperature: defs.tag_id(&item.temperature, problems),
-                heater: defs.tag_id(&item.heater, problems),
-                agitator: defs.tag_id(&item.agitator, problems),
-            }
+/// Reads the short names of symbols.
+fn aliases(table: &Option<At<Raw>>, problems: &mut Problems) -> BTreeMap<String, At<String>> {
+    let rows = table.iter().flat_map(|table| &table.value.table);
+    let mut aliases = BTreeMap::new();
+    for (name, (at, node)) in rows {
+        if name.contains('.') || SymbolKind::ALL.iter().any(|kind| kind.word() == name) {
+            problems
+                .add(*at, format!("`{name}` cannot be an alias"))
+                .label("expected a word that is no symbol and no tag");
         }
-        ItemKind::Valve => {
-            let item = ValveItem::of(layers, problems);
-            let tag = defs.tag_id(&item.tag, problems)?;
-            let vertical = item.vertical.value_or(false);
-            MimicItem::Valve { place: item.place(), label: text(&item.label), tag, vertical }
-        }
-        ItemKind::Pump => {
-            let item = PumpItem::of(layers, problems);
-            MimicItem::Pump { place: item.place(), label: text(&item.label), tag: defs.tag_id(&item.tag, problems)? }
-        }
-        ItemKind::Pipe => pipe(PipeItem::of(layers, problems), defs, problems),
-        ItemKind::Value => {
-            let item = ValueItem::of(layers, problems);
-            // The one item that can show words as well as a number.
-            let tag = defs.names.full(item.tag.as_ref()?, problems)?;
-            MimicItem::Value { place: item.place(), label: text(&item.label), tag }
-        }
-        ItemKind::Controller => controller(ControllerItem::of(layers, problems), defs, problems)?,
-        ItemKind::Sequence => sequence(SequenceItem::of(layers, problems), defs, problems)?,
-        ItemKind::Trend => {
-            let item = TrendItem::of(layers, problems);
-            let tag = defs.tag_id(&item.tag, problems)?;
-            MimicItem::Trend { place: item.place(), tag, window: item.window.value_or(Duration::ZERO) }
-        }
-        ItemKind::Text => {
-            let item = TextItem::of(layers, problems);
-            MimicItem::Text { place: item.place(), text: text(&item.text) }
-        }
-    };
-    Some(At { value, at })
-}
-
-fn pipe(item: PipeItem, defs: &Defs, problems: &mut Problems) -> MimicItem {
-    if item.points.len() < 2 {
-        problems.add(item.at, "a pipe needs at least two points").label("expected points = [[5, 4], [5, 9]]");
-    }
-    for pair in item.points.windows(2) {
-        let (a, b) = (pair[0].value, pair[1].value);
-        if a[0] != b[0] && a[1] != b[1] {
-            problems.add(pair[1].at, "a pipe runs along rows and columns").label(format!("slanting from {a:?}"));
+        if let Some(text) = String::read(&node.value, node.at, problems) {
+            aliases.insert(name.clone(), At { value: text, at: node.at });
         }
     }
-    MimicItem::Pipe {
-        points: item.points.iter().map(|point| (point.value[0], point.value[1])).collect(),
-        flow: item.flow.iter().filter_map(|tag| Some(defs.tag(tag, problems)?.id)).collect(),
-    }
-}
-
-fn controller(item: ControllerItem, defs: &Defs, problems: &mut Problems) -> Option<MimicItem> {
-    let name = item.device.as_ref()?;
-    let device = defs.device(name, problems)?;
-    if defs.devices[device.index()].faceplate.is_none() {
-        problems.add(name.at, format!("{} is no controller", name.value)).label("its profile has no [faceplate]");
-    }
-    Some(MimicItem::Controller { place: item.place(), device })
-}
-
-fn sequence(item: SequenceItem, defs: &Defs, problems: &mut Problems) -> Option<MimicItem> {
-    let name = item.step.as_ref()?;
-    let step = defs.tag(name, problems)?;
-    if step.enum_labels.is_empty() {
-        problems.add(name.at, format!("{} has no steps", step.name)).label("expected a tag with an `enum`");
-    }
-    Some(MimicItem::Sequence {
-        place: item.place(),
-        label: text(&item.label),
-        step: step.id,
-        remaining: defs.tag_id(&item.remaining, problems),
-        states: item.states.iter().filter_map(|tag| Some(defs.tag(tag, problems)?.id)).collect(),
-    })
-}
-
-/// Nothing may lie outside the canvas: it would not be drawn.
-fn check_inside(item: &MimicItem, at: Span, size: (u16, u16), problems: &mut Problems) {
-    let corner = |place: &MimicRect| (place.x.saturating_add(place.width), place.y.saturating_add(place.height));
-    let (right, bottom) = match item {
-        MimicItem::Tank { place, .. }
-        | MimicItem::Valve { place, .. }
-        | MimicItem::Pump { place, .. }
-        | MimicItem::Value { place, .. }
-        | MimicItem::Controller { place, .. }
-        | MimicItem::Sequence { place, .. }
-        | MimicItem::Trend { place, .. }
-        | MimicItem::Text { place, .. } => corner(place),
-        MimicItem::Pipe { points, .. } => points
-            .iter()
-            .fold((0, 0), |(x, y), point| (x.max(point.0.saturating_add(1)), y.max(point.1.saturating_add(1)))),
-    };
-    if right > size.0 || bottom > size.1 {
-        let problem = problems.add(at, "this item reaches out of the mimic");
-        problem.label(format!("to column {right}, row {bottom} of {} by {}", size.0, size.1));
-    }
+    aliases
 }
 
 /// Letters that mean something on every screen, so that no plant can give them another meaning.

@@ -27,6 +27,7 @@ pub mod line;
 mod lint;
 pub(crate) mod names;
 mod mimic;
+mod picture;
 pub(crate) mod new_plant;
 mod plant;
 mod own;

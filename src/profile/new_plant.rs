@@ -88,7 +88,7 @@ impl NewPlant {
     fn write(&self, out: &mut String) -> std::fmt::Result {
         writeln!(
             out,
-            "# OptionalKey by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
+            "# Made by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
         )?;
         writeln!(out, "# `sightglass profiles` lists the device profiles, and README.md beside them every key.\n")?;
         writeln!(out, "title = {}", quoted(&self.title))?;
@@ -193,26 +193,10 @@ impl NewPlant {
     }
 
     fn screens(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(out, "[mimic]\nsize = [80, 18]\nitem = [")?;
         let controllers: Vec<&NewDevice> = self.devices.iter().filter(|device| device.controller).take(2).collect();
         let columns = if controllers.is_empty() { 2 } else { 1 };
         let shown: Vec<(String, &TagDef)> = self.shown().filter(|(_, tag)| !tag.is_text()).collect();
-        for (n, (name, tag)) in shown.iter().take(SHOWN_MAX.min(columns * ROWS)).enumerate() {
-            let (x, y, label) = (1 + 40 * (n / ROWS), n % ROWS, quoted(&tag.short));
-            writeln!(
-                out,
-                "    {{ kind = \"value\", x = {x}, y = {y}, width = 38, label = {label}, tag = {} }},",
-                quoted(name)
-            )?;
-        }
-        for (n, device) in controllers.iter().enumerate() {
-            let (y, name) = (7 * n, quoted(&device.name));
-            writeln!(
-                out,
-                "    {{ kind = \"controller\", x = 50, y = {y}, width = 30, height = 6, device = {name} }},"
-            )?;
-        }
-        writeln!(out, "]\n")?;
+        writeln!(out, "{}", picture(&shown[..shown.len().min(SHOWN_MAX.min(columns * ROWS))], &controllers))?;
         let pens = shown.iter().filter(|(_, tag)| is_number(tag)).take(PENS_MAX);
         let pens: Vec<String> = pens.map(|(name, _)| format!("    {{ tag = {} }},", quoted(name))).collect();
         if pens.is_empty() {
@@ -228,6 +212,28 @@ impl NewPlant {
             of_profile.chain(device.own_tags().0).map(|tag| (format!("{}.{}", device.name, tag.short), tag))
         })
     }
+}
+
+/// A picture to begin with: the values in columns, with the controllers beside them.
+fn picture(shown: &[(String, &TagDef)], controllers: &[&NewDevice]) -> String {
+    let cell = |row: usize, column: usize| {
+        let (name, tag) = shown.get(column * ROWS + row)?;
+        Some(format!("{:.12} {{{name}}}", tag.short))
+    };
+    let mut rows: Vec<String> = Vec::new();
+    for row in 0..ROWS {
+        let right = match controllers.get(row / 7).filter(|_| row % 7 == 0) {
+            Some(device) => Some(format!("{{controller {} 30x6}}", device.name)),
+            None => cell(row, 1),
+        };
+        let text = format!(" {:<47} {}", cell(row, 0).unwrap_or_default(), right.unwrap_or_default());
+        rows.push(text.trim_end().to_owned());
+    }
+    let text = rows.join("\n");
+    format!(
+        "# Drawn as it will be shown: see `sightglass profiles --format`.\n[mimic]\npicture = '''\n{}\n'''\n",
+        text.trim_end()
+    )
 }
 
 impl NewDevice {

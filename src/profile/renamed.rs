@@ -41,6 +41,7 @@ const RENAMED: &[(&str, &str, &str)] = &[
     ("an expectation", "step", "event"),
     ("the rules for alarms", "burst", "first_out_window"),
     ("a tag", "class", "poll_class"),
+    ("the mimic", "item", "picture"),
     ("poll class", "hard", "critical"),
     ("poll class", "soft", "normal"),
     ("poll class", "idle", "background"),

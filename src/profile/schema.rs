@@ -12,7 +12,7 @@ pub(super) use self::device::{
 };
 use super::{
     condition::AlarmTable,
-    reader::{Choice, Raw, toml_tables},
+    reader::{Choice, Raw, Texts, toml_tables},
 };
 use crate::plant::def::{Parity, ParquetVersion, Role, Rs485};
 
@@ -138,9 +138,17 @@ toml_tables! {
 
     /// The mimic of the process.
     MimicTable, "the mimic" {
-        opt "size" size: [u16; 2],
-        list "item" items: Raw,
+        opt "name" name: String,
+        opt "picture" pictures: Texts,
+        opt "alias" aliases: Raw,
+        list "page" pages: PageTable,
         list "command" commands: CommandTable,
+    }
+
+    /// A further page of the mimic.
+    PageTable, "a page of the mimic" {
+        need "name" name: String,
+        opt "picture" pictures: Texts,
     }
 
     /// A command on the mimic.

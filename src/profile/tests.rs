@@ -7,6 +7,7 @@ mod calculated;
 mod inline;
 mod interlocks;
 mod messages;
+mod pictures;
 mod text_tags;
 
 use proptest::prelude::*;
@@ -54,9 +55,9 @@ priority = "high"
 message = "hot"
 
 [mimic]
-item = [
-    { kind = "value", x = 1, y = 1, tag = "D1.T" },
-]
+picture = '''
+ {D1.T  }
+'''
 "#;
 
 pub(super) const METER: &str = r#"vendor = "ACME"
@@ -231,11 +232,7 @@ fn a_mistyped_word_brings_the_right_one() {
         "tag = \"D1.DPP\"\nhigh",
         &["[small.toml:25:7]", "unknown tag `D1.DPP`", "did you mean `D1.DP`?"],
     );
-    check(
-        "tag = \"D1.T\" }",
-        "tag = \"D1.MOD\" }",
-        &["[small.toml:33:43]", "unknown tag `D1.MOD`", "did you mean `D1.MODE`?"],
-    );
+    check("{D1.T  }", "{D1.MOD}", &["[small.toml:33:3]", "unknown tag `D1.MOD`", "did you mean `D1.MODE`?"]);
     check("decimals_from = \"DP\"", "decimals_from = \"PD\"", &["unknown tag `PD` in D1", "did you mean `DP`?"]);
     check(
         "line = \"L1\"\nunit = 2",
@@ -248,7 +245,6 @@ fn a_mistyped_word_brings_the_right_one() {
         &["[small.toml:2:13]", "unknown time zone `Asia/Bankok`", "did you mean `Asia/Bangkok`?"],
     );
     check("value = \"on\"", "value = \"onn\"", &["`onn` is not a state of D1.MODE", "did you mean `on`?"]);
-    check("kind = \"value\"", "kind = \"valve_\"", &["unknown kind `valve_`", "did you mean `valve`?"]);
     check("mode = \"rtu\"", "mode = \"asci\"", &["unknown mode `asci`", "did you mean `ascii`?"]);
     check(
         "priority = \"high\"",

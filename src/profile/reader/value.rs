@@ -137,6 +137,20 @@ impl Value for Numbered {
     }
 }
 
+/// A string, or an array of them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Texts(pub Vec<At<String>>);
+
+impl Value for Texts {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let mut text = |value: &Node, at| String::read(value, at, problems).map(|value| At { value, at });
+        Some(Texts(match value {
+            Node::Array(array) => array.iter().filter_map(|item| text(&item.value, item.at)).collect(),
+            _ => text(value, at).into_iter().collect(),
+        }))
+    }
+}
+
 /// A number, or a word that stands for one: `value = "RUN"`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {

@@ -2,16 +2,16 @@
 
 mod companions;
 
-use companions::{Companions, parts};
+use companions::{Companions, Parts, parts};
 
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::def::{MimicCommand, MimicItem, MimicRect},
+    plant::def::{MimicCommand, MimicItem, MimicRect, Picture},
     ui::{
         interlock,
         modal::Choice,
-        widgets::mimic::{CanvasScale, list, panel, pipe, place, tags, tank::Tank, title, trend, unit},
+        widgets::mimic::{CanvasScale, bar, list, panel, pipe, place, tags, title, trend, unit, vessel},
     },
 };
 
@@ -28,6 +28,8 @@ pub enum Action {
     Actuators,
     /// Stop or start the motion of agitators and arrows.
     Motion,
+    /// Show a page so many further on.
+    Page(isize),
 }
 
 /// Keys of this tab; the plant file adds its own, and [`Mimic::hints`] lists the four arrows as one.
@@ -40,6 +42,8 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
     Key::new(char('C'), "commands", "all valves, pumps and heaters with their commands", Action::Actuators),
     Key::new(char('M'), "", "animation of agitators and arrows on or off", Action::Motion),
+    Key::new(code(KeyCode::PageUp), "", "the page before", Action::Page(-1)),
+    Key::new(code(KeyCode::PageDown), "page", "the next page of the mimic", Action::Page(1)),
 ];
 
 /// The small trends are asked again after so many seconds (real time).
@@ -47,11 +51,15 @@ const EVERY_S: f64 = 10.0;
 const TIMEOUT_S: f64 = 30.0;
 
 /// State of this tab.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Mimic {
-    /// The selected item, by its place in the mimic.
+    /// The page that is shown.
+    page: usize,
+    /// The selected item, by its place in the picture.
     selected: Option<usize>,
-    motion: bool,
+    /// Page and size of the picture that the selection and the trends are of.
+    picture: (usize, (u16, u16)),
+    still: bool,
     /// Curves of the small trends, by the item's place.
     trends: Vec<(usize, Answered<Vec<Series>>)>,
     companions: Companions,
@@ -60,11 +68,8 @@ pub struct Mimic {
 }
 
 impl TabView for Mimic {
-    fn new(snapshot: &Snapshot) -> Mimic {
-        let items = snapshot.def.mimic.items.iter().enumerate();
-        let trends =
-            items.filter(|(_, item)| matches!(item, MimicItem::Trend { .. })).map(|(n, _)| (n, Answered::default()));
-        Mimic { selected: None, motion: true, trends: trends.collect(), companions: Companions::default(), asked: 0 }
+    fn new(_snapshot: &Snapshot) -> Mimic {
+        Mimic::default()
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
@@ -73,16 +78,19 @@ impl TabView for Mimic {
             Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label))
                 .needs(Role::Technician)
         });
-        commands.chain([Hint::new("←↑↓→", t!("select"), t!("select an item"))]).chain(keys::hints(KEYS)).collect()
+        let mut table = KEYS.to_vec();
+        keys::hide(&mut table, &[(Action::Page(1), cx.def().mimic.pages.len() < 2)]);
+        commands.chain([Hint::new("←↑↓→", t!("select"), t!("select an item"))]).chain(keys::hints(&table)).collect()
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let parts = parts(cx.def().mimic.size, cx.area);
+        let (picture, parts) = self.shown(cx, cx.area);
+        self.follow(picture);
         let beside = self.companions.ask(cx, &parts, &mut self.asked);
         let asks = self.trends.iter_mut().filter_map(|(item, trend)| {
-            let MimicItem::Trend { tag, window, place } = &cx.def().mimic.items[*item] else { return None };
+            let MimicItem::Trend { tag, window, place } = picture.items.get(*item)? else { return None };
             let from = cx.now - SignedDuration::try_from(*window).ok()?;
-            let buckets = usize::from(scale(cx, parts.picture).place(*place).width.max(1)) * 2;
+            let buckets = usize::from(scale(picture, parts.picture).place(*place).width.max(1)) * 2;
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
             trend.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
         });
@@ -100,22 +108,29 @@ impl TabView for Mimic {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        let parts = parts(cx.def().mimic.size, area);
+        let (picture, parts) = self.shown(cx, area);
         self.companions.view(cx, frame, &parts);
+        self.headings(cx, &mut Canvas::new(frame.buffer_mut(), area));
         let area = parts.picture;
+        let items = &picture.items;
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        let items = &cx.def().mimic.items;
-        if list::is_shown(cx, area) {
-            return list::view(cx, &mut canvas, self.selected);
+        if items.is_empty() {
+            canvas.text(1, 1, t!("the plant file defines no mimic"), cx.theme.dim());
         }
-        let scale = scale(cx, area);
+        if list::is_shown(cx, picture, area) {
+            return list::view(cx, &mut canvas, items, self.selected);
+        }
+        let scale = scale(picture, area);
+        // A picture that is not stretched stands in the middle.
+        let spare = area.width.saturating_sub(scale.column(picture.size.0));
+        let mut canvas = canvas.part(spare / 2, 0, area.width - spare / 2, area.height);
         for (n, item) in items.iter().enumerate() {
             self.item(cx, &mut canvas, item, n, scale);
         }
         // When all is drawn it is known where there is room for a mark.
         for item in items {
             if let MimicItem::Valve { place, tag, vertical, .. } = item {
-                let (x, y) = scale.spot(*place);
+                let (x, y) = scale.spot(*place, *vertical);
                 let above = y.saturating_sub(1);
                 let rows = if *vertical { [y, y + 1, above] } else { [above, y + 1, y + 2] };
                 unit::mark(cx, &mut canvas, x + 1, &rows, *tag);
@@ -125,9 +140,6 @@ impl TabView for Mimic {
                 let y = at.y + at.height / 2;
                 unit::mark(cx, &mut canvas, at.x, &[y + 1, y.saturating_sub(1), y + 2, y], *tag);
             }
-        }
-        if items.is_empty() {
-            canvas.text(1, 1, t!("the plant file defines no mimic"), cx.theme.dim());
         }
     }
 
@@ -145,14 +157,55 @@ impl TabView for Mimic {
 }
 
 impl Mimic {
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let items = &cx.def().mimic.items;
-        match action {
-            Action::Move(dx, dy) if list::is_shown(cx, cx.area) => {
-                self.selected = list::neighbour(items, self.selected, (dx, dy));
+    /// The picture for the room there is, and the parts of the tab; a row above is left for the names of several pages.
+    fn shown<'a>(&self, cx: &ViewContext<'a>, area: Rect) -> (&'a Picture, Parts) {
+        static NONE: Picture = Picture { size: (1, 1), items: Vec::new() };
+        let pages = &cx.snapshot.def.mimic.pages;
+        let headings = if pages.len() > 1 { 1.min(area.height) } else { 0 };
+        let area = Rect { y: area.y + headings, height: area.height - headings, ..area };
+        let picture = pages.get(self.page).map_or(&NONE, |page| page.picture((area.width, area.height)));
+        (picture, parts(picture.size, area))
+    }
+
+    /// The selection and the trends are those of one picture: another page or another size begins with its own.
+    fn follow(&mut self, picture: &Picture) {
+        if std::mem::replace(&mut self.picture, (self.page, picture.size)) != (self.page, picture.size) {
+            self.selected = None;
+            let items = picture.items.iter().enumerate();
+            let trends = items.filter(|(_, item)| matches!(item, MimicItem::Trend { .. }));
+            self.trends = trends.map(|(n, _)| (n, Answered::default())).collect();
+        }
+    }
+
+    /// The names of the pages, the shown one marked.
+    fn headings(&self, cx: &ViewContext, canvas: &mut Canvas) {
+        let pages = &cx.def().mimic.pages;
+        if pages.len() > 1 {
+            let mut x = 1;
+            for (n, page) in pages.iter().enumerate() {
+                x = canvas.text(x, 0, &format!(" {} ", page.name), cx.theme.tab(n == self.page)) + 1;
             }
+        }
+    }
+
+    /// Shows another page of the mimic, from its first item.
+    pub fn show_page(&mut self, cx: &ViewContext, page: usize) -> Vec<UiAction> {
+        self.page = page;
+        self.on_snapshot(cx)
+    }
+
+    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+        let (picture, parts) = self.shown(cx, cx.area);
+        let items = &picture.items;
+        let listed = list::is_shown(cx, picture, parts.picture);
+        match action {
+            Action::Move(dx, dy) if listed => self.selected = list::neighbour(items, self.selected, (dx, dy)),
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
-            Action::Motion => self.motion = !self.motion,
+            Action::Motion => self.still = !self.still,
+            Action::Page(by) => {
+                let pages = cx.def().mimic.pages.len();
+                return if pages > 1 { self.show_page(cx, around(self.page, by, pages)) } else { Vec::new() };
+            }
             Action::Actuators => {
                 let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
                 return open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate));
@@ -162,38 +215,58 @@ impl Mimic {
                 let item = self.selected.and_then(|n| items.get(n));
                 return Why::open(item.and_then(|item| Why::of_all(cx, tags(cx, item))));
             }
-            Action::Open => {
-                let item = self.selected.and_then(|n| items.get(n));
-                let faceplate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
-                return open(faceplate.map(Modal::Faceplate));
-            }
+            Action::Open => match self.selected.and_then(|n| items.get(n)) {
+                Some(MimicItem::Link { page, .. }) => return self.show_page(cx, *page),
+                item => {
+                    let faceplate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
+                    return open(faceplate.map(Modal::Faceplate));
+                }
+            },
         }
         Vec::new()
     }
 
-    /// Selects the first item that shows one of these tags; none if the mimic has none of them.
+    /// Selects the first item that shows one of these tags, on whatever page; none if the mimic has none of them.
     pub fn select(&mut self, cx: &ViewContext, wanted: &[TagId]) {
         let shows = |item: &MimicItem| tags(cx, item).iter().any(|tag| wanted.contains(tag));
-        self.selected = cx.def().mimic.items.iter().position(shows);
+        let pages = cx.def().mimic.pages.len();
+        for page in std::iter::once(self.page).chain(0..pages) {
+            let before = std::mem::replace(&mut self.page, page);
+            let (picture, _) = self.shown(cx, cx.area);
+            if let Some(item) = picture.items.iter().position(shows) {
+                self.follow(picture);
+                self.selected = Some(item);
+                return;
+            }
+            self.page = before;
+        }
+        self.selected = None;
     }
 
     fn item(&self, cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, n: usize, scale: CanvasScale) {
         let selected = self.selected == Some(n);
-        let motion = self.motion && cx.theme.motion;
+        let motion = !self.still && cx.theme.motion;
         match item {
-            MimicItem::Tank { place, label, level, temperature, heater, agitator } => {
-                let tank =
-                    Tank { label, level: *level, temperature: *temperature, heater: *heater, agitator: *agitator };
-                tank.view(cx, canvas, scale.place(*place), selected, motion);
+            MimicItem::Vessel { place, label, level, .. } => {
+                vessel::view(cx, canvas, scale.place(*place), label, *level, selected);
             }
             MimicItem::Valve { place, label, tag, vertical } => {
-                unit::valve(cx, canvas, scale.spot(*place), label, *tag, *vertical, selected)
+                unit::valve(cx, canvas, scale.spot(*place, *vertical), label, *tag, *vertical, selected)
             }
             MimicItem::Pump { place, label, tag } => unit::pump(cx, canvas, scale.place(*place), label, *tag, selected),
-            MimicItem::Pipe { points, flow } => pipe::view(cx, canvas, points, flow, scale, motion),
+            MimicItem::Agitator { place, tag } => {
+                vessel::agitator(cx, canvas, scale.place(*place), *tag, selected, motion)
+            }
+            MimicItem::Heater { place, tag } => vessel::heater(cx, canvas, scale.place(*place), *tag, selected),
+            MimicItem::Pipe { points, flow, directed } => {
+                pipe::view(cx, canvas, points, flow, scale, (*directed, motion))
+            }
+            MimicItem::Joint { at, branches } => pipe::joint(cx, canvas, *at, *branches, scale),
             MimicItem::Value { place, label, tag } => {
                 unit::labelled(cx, canvas, scale.place(*place), label, *tag, selected)
             }
+            MimicItem::Bar { place, tag } => bar::view(cx, canvas, scale.place(*place), *tag, selected),
+            MimicItem::Link { place, .. } => unit::link(cx, canvas, scale.place(*place), &title(cx, item), selected),
             MimicItem::Controller { place, device } => {
                 panel::controller(cx, canvas, scale.place(*place), cx.def().device(*device), selected)
             }
@@ -214,8 +287,8 @@ impl Mimic {
     }
 }
 
-fn scale(cx: &ViewContext, area: Rect) -> CanvasScale {
-    CanvasScale::new(cx.def().mimic.size, (area.width, area.height))
+fn scale(picture: &Picture, area: Rect) -> CanvasScale {
+    CanvasScale::new(picture.size, (area.width, area.height))
 }
 
 /// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
@@ -274,7 +347,7 @@ mod tests {
 
     #[test]
     fn arrow_keys_reach_every_item() {
-        let items = Fixture::normal().def.mimic.items;
+        let items = Fixture::normal().def.mimic.pages[0].pictures[0].items.clone();
         let mut reached = vec![false; items.len()];
         let mut open: Vec<usize> = neighbour(&items, None, (1, 0)).into_iter().collect();
         while let Some(n) = open.pop() {

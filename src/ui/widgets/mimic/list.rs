@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use super::{label_style, place, put_value, tags, title};
 use crate::{
     plant::{
-        def::{MimicItem, TagId},
+        def::{MimicItem, Picture, TagId},
         number::to_u16,
     },
     ui::{
@@ -20,27 +20,51 @@ use crate::{
 /// Columns of half a row for a value with its unit and its alarm mark.
 const VALUE: u16 = 18;
 
-/// Is the list shown, because the mimic does not fit? Tanks and curves that are cut at the bottom still tell their values.
-pub fn is_shown(cx: &ViewContext, area: Rect) -> bool {
-    let mimic = &cx.def().mimic;
+/// Is the list shown, because the mimic does not fit? Vessels and curves that are cut at the bottom still tell their values.
+pub fn is_shown(cx: &ViewContext, picture: &Picture, area: Rect) -> bool {
     let bottom = |item: &MimicItem| {
         let Some(place) = place(item) else { return 0 };
-        let rows = match item {
-            MimicItem::Tank { .. } | MimicItem::Trend { .. } => place.height.min(2 + to_u16(tags(cx, item).len())),
-            _ => place.height.max(1),
+        let rows = if inside(item).is_some() {
+            1
+        } else if matches!(item, MimicItem::Trend { .. }) {
+            place.height.min(2 + to_u16(tags(cx, item).len()))
+        } else {
+            place.height.max(1)
         };
         place.y.saturating_add(rows)
     };
-    let cut = || mimic.items.iter().any(|item| area.height < bottom(item));
-    area.width < mimic.size.0 || area.height < mimic.size.1 && cut()
+    let cut = || picture.items.iter().any(|item| area.height < bottom(item));
+    area.width < picture.size.0 || area.height < picture.size.1 && cut()
+}
+
+fn inside(item: &MimicItem) -> Option<&Vec<TagId>> {
+    if let MimicItem::Vessel { inside, .. } = item { Some(inside) } else { None }
 }
 
 /// The items of each row: two in a row where one is short.
 fn rows(items: &[MimicItem]) -> Vec<Vec<usize>> {
-    let all = items.iter().enumerate().filter(|(_, item)| place(item).is_some());
-    // Controllers and tanks have more values than fit into half a row.
+    let vessels: Vec<&Vec<TagId>> = items.iter().filter_map(inside).collect();
+    // What stands in a vessel is in its row.
+    let is_inside = |item: &MimicItem| match item {
+        MimicItem::Value { tag, .. }
+        | MimicItem::Agitator { tag, .. }
+        | MimicItem::Heater { tag, .. }
+        | MimicItem::Bar { tag, .. } => vessels.iter().any(|vessel| vessel.contains(tag)),
+        MimicItem::Vessel { .. }
+        | MimicItem::Valve { .. }
+        | MimicItem::Pump { .. }
+        | MimicItem::Pipe { .. }
+        | MimicItem::Joint { .. }
+        | MimicItem::Controller { .. }
+        | MimicItem::Sequence { .. }
+        | MimicItem::Trend { .. }
+        | MimicItem::Link { .. }
+        | MimicItem::Text { .. } => false,
+    };
+    let all = items.iter().enumerate().filter(|(_, item)| place(item).is_some() && !is_inside(item));
+    // Controllers and vessels have more values than fit into half a row.
     let (wide, narrow): (Vec<_>, Vec<_>) =
-        all.partition(|(_, item)| matches!(item, MimicItem::Controller { .. } | MimicItem::Tank { .. }));
+        all.partition(|(_, item)| matches!(item, MimicItem::Controller { .. } | MimicItem::Vessel { .. }));
     let row = |row: &[(usize, &MimicItem)]| row.iter().map(|(n, _)| *n).collect();
     wide.chunks(1).map(row).chain(narrow.chunks(2).map(row)).collect()
 }
@@ -56,8 +80,7 @@ pub fn neighbour(items: &[MimicItem], selected: Option<usize>, (dx, dy): (i32, i
 }
 
 /// Every item with its values; the page with the selected one.
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: Option<usize>) {
-    let items = &cx.def().mimic.items;
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, items: &[MimicItem], selected: Option<usize>) {
     let (all, half) = (canvas.width(), canvas.width() / 2);
     let rows = rows(items);
     let names = half.saturating_sub(VALUE).clamp(11, 24);
@@ -102,11 +125,11 @@ fn item(cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, names: u16, sel
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::fixture::Fixture;
+    use crate::ui::fixture::{Fixture, with_cx};
 
     #[test]
     fn arrows_move_by_rows_and_columns_of_the_list() {
-        let items = Fixture::normal().def.mimic.items;
+        let items = Fixture::normal().def.mimic.pages[0].pictures[0].items.clone();
         let rows = rows(&items);
         assert_eq!(neighbour(&items, None, (0, 1)), Some(rows[0][0]));
         let mut selected = Some(rows[0][0]);
@@ -119,7 +142,12 @@ mod tests {
         assert_eq!(neighbour(&items, Some(pair[0]), (1, 0)), Some(pair[1]));
         assert_eq!(neighbour(&items, Some(pair[1]), (1, 0)), Some(pair[1]), "the last column");
         assert_eq!(neighbour(&items, Some(pair[1]), (-1, 0)), Some(pair[0]));
-        let listed = items.iter().filter(|item| place(item).is_some()).count();
-        assert_eq!(rows.iter().map(Vec::len).sum::<usize>(), listed, "every item has its place");
+        let listed: Vec<TagId> = with_cx(&Fixture::normal().snapshot(), |cx| {
+            rows.iter().flatten().flat_map(|n| tags(cx, &items[*n])).collect()
+        });
+        let all = with_cx(&Fixture::normal().snapshot(), |cx| {
+            items.iter().flat_map(|item| tags(cx, item)).collect::<Vec<_>>()
+        });
+        assert!(all.iter().all(|tag| listed.contains(tag)), "every value has its place");
     }
 }

@@ -1,22 +1,26 @@
 //! The parts of the mimic, on a canvas of nominal cells that is stretched to the screen.
 
+pub(crate) mod bar;
 pub(crate) mod list;
 pub(crate) mod panel;
 pub(crate) mod pipe;
-pub(crate) mod tank;
 pub(crate) mod trend;
 pub(crate) mod unit;
+pub(crate) mod vessel;
 
 use ratatui::style::Style;
 
 use super::text::Canvas;
 use crate::{
     plant::{
-        def::{MimicItem, MimicRect, TagId},
+        def::{Condition, Level, MimicItem, MimicRect, Subject, TagId},
         number::to_u16,
     },
     ui::ViewContext,
 };
+
+/// A picture is stretched from here on.
+const STRETCH_MIN: f64 = 1.15;
 
 /// Maps nominal cells to cells of the screen. Never shrinks: what does not fit is cut off at the right and bottom.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +45,11 @@ pub struct Bounds {
 impl CanvasScale {
     /// From the nominal size of the mimic to the room there is.
     pub fn new(nominal: (u16, u16), room: (u16, u16)) -> CanvasScale {
-        let scale = |nominal: u16, room: u16| (f64::from(room) / f64::from(nominal.max(1))).max(1.0);
+        let scale = |nominal: u16, room: u16| {
+            let scale = f64::from(room) / f64::from(nominal.max(1));
+            // A little more room would only make the spaces uneven.
+            if scale < STRETCH_MIN { 1.0 } else { scale }
+        };
         CanvasScale { x: scale(nominal.0, room.0), y: scale(nominal.1, room.1) }
     }
     /// The left edge of a nominal column.
@@ -67,9 +75,11 @@ impl CanvasScale {
         let bottom = self.row(place.y.saturating_add(place.height.max(1)));
         Bounds { x, y, width: right.saturating_sub(x).max(1), height: bottom.saturating_sub(y).max(1) }
     }
-    /// Where a single symbol stands.
-    pub fn spot(self, place: MimicRect) -> (u16, u16) {
-        (self.middle_column(place.x), self.middle_row(place.y))
+    /// Where a symbol stands that takes some columns of a pipe; the first one in an upright pipe.
+    pub fn spot(self, place: MimicRect, upright: bool) -> (u16, u16) {
+        let at = self.place(place);
+        let x = if upright { self.middle_column(place.x) } else { at.x + at.width.saturating_sub(1) / 2 };
+        (x, self.middle_row(place.y))
     }
 }
 
@@ -81,12 +91,13 @@ fn middle(near: u16, far: u16) -> u16 {
 /// The tags of an item, the most telling first; none for pipes and words.
 pub fn tags(cx: &ViewContext, item: &MimicItem) -> Vec<TagId> {
     match item {
-        MimicItem::Tank { level, temperature, heater, agitator, .. } => {
-            [*temperature, *level, *heater, *agitator].into_iter().flatten().collect()
-        }
+        MimicItem::Vessel { inside, .. } => inside.clone(),
         MimicItem::Valve { tag, .. }
         | MimicItem::Pump { tag, .. }
+        | MimicItem::Agitator { tag, .. }
+        | MimicItem::Heater { tag, .. }
         | MimicItem::Value { tag, .. }
+        | MimicItem::Bar { tag, .. }
         | MimicItem::Trend { tag, .. } => vec![*tag],
         MimicItem::Controller { device, .. } => match &cx.def().device(*device).faceplate {
             Some(faceplate) => [
@@ -106,22 +117,29 @@ pub fn tags(cx: &ViewContext, item: &MimicItem) -> Vec<TagId> {
         MimicItem::Sequence { step, remaining, states, .. } => {
             [*step].into_iter().chain(*remaining).chain(states.iter().copied()).collect()
         }
-        MimicItem::Pipe { .. } | MimicItem::Text { .. } => Vec::new(),
+        MimicItem::Pipe { .. } | MimicItem::Joint { .. } | MimicItem::Link { .. } | MimicItem::Text { .. } => {
+            Vec::new()
+        }
     }
 }
 
 /// What the item is called.
 pub fn title(cx: &ViewContext, item: &MimicItem) -> String {
     match item {
-        MimicItem::Tank { label, .. }
+        MimicItem::Vessel { label, .. }
         | MimicItem::Valve { label, .. }
         | MimicItem::Pump { label, .. }
         | MimicItem::Sequence { label, .. } => label.clone(),
-        MimicItem::Value { tag, .. } | MimicItem::Trend { tag, .. } => cx.def().tag(*tag).label.clone(),
+        MimicItem::Value { tag, .. }
+        | MimicItem::Agitator { tag, .. }
+        | MimicItem::Heater { tag, .. }
+        | MimicItem::Bar { tag, .. }
+        | MimicItem::Trend { tag, .. } => cx.def().tag(*tag).label.clone(),
         MimicItem::Controller { device, .. } => {
             format!("{} {}", cx.def().device(*device).name, cx.def().device(*device).title)
         }
-        MimicItem::Pipe { .. } => String::new(),
+        MimicItem::Pipe { .. } | MimicItem::Joint { .. } => String::new(),
+        MimicItem::Link { page, .. } => cx.def().mimic.pages.get(*page).map_or(String::new(), |page| page.name.clone()),
         MimicItem::Text { text, .. } => text.clone(),
     }
 }
@@ -129,14 +147,38 @@ pub fn title(cx: &ViewContext, item: &MimicItem) -> String {
 /// The place of an item that can be selected.
 pub fn place(item: &MimicItem) -> Option<MimicRect> {
     match item {
-        MimicItem::Tank { place, .. }
+        MimicItem::Vessel { inside, .. } if inside.is_empty() => None,
+        MimicItem::Vessel { place, .. }
         | MimicItem::Valve { place, .. }
         | MimicItem::Pump { place, .. }
+        | MimicItem::Agitator { place, .. }
+        | MimicItem::Heater { place, .. }
         | MimicItem::Value { place, .. }
+        | MimicItem::Bar { place, .. }
         | MimicItem::Controller { place, .. }
         | MimicItem::Sequence { place, .. }
-        | MimicItem::Trend { place, .. } => Some(*place),
-        MimicItem::Pipe { .. } | MimicItem::Text { .. } => None,
+        | MimicItem::Trend { place, .. }
+        | MimicItem::Link { place, .. } => Some(*place),
+        MimicItem::Pipe { .. } | MimicItem::Joint { .. } | MimicItem::Text { .. } => None,
+    }
+}
+
+/// The limits of a tag's alarms that stand on the scale of the value.
+pub(crate) fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = (f64, Level)> {
+    let of_tag = cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag));
+    of_tag.filter_map(|alarm| match alarm.condition {
+        Condition::Limit { level, limit, .. } => Some((limit, level)),
+        _ => None,
+    })
+}
+
+/// Cuts words out of the liquid that they stand in: a number is read on the ground, not on a fill.
+pub(super) fn cut(canvas: &mut Canvas, x: u16, y: u16, length: u16) {
+    const LIQUID: &str = "█▁▂▃▄▅▆▇▒░";
+    for column in x.saturating_sub(1)..x.saturating_add(length + 1).min(canvas.width()) {
+        if canvas.symbol(column, y).is_some_and(|symbol| LIQUID.contains(symbol)) {
+            canvas.glyph(column, y, ' ', Style::reset());
+        }
     }
 }
 
@@ -156,6 +198,7 @@ pub(super) fn put_value(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, t
     let shown = super::value::show(cx, tag);
     let taken = if super::text::width(&shown.text) + taken > room { 0 } else { taken };
     let text = shown.within(room - taken);
+    cut(canvas, x, y, super::text::width(&text) + taken);
     let x = canvas.text(x, y, &text, shown.style);
     match mark {
         // Without room for the mark its colour and its flashing stand on the number.

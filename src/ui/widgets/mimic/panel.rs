@@ -3,10 +3,10 @@
 use crate::t;
 use ratatui::style::Modifier;
 
-use super::{Bounds, alarm_mark, label_style, put_value, unit::states};
+use super::{Bounds, alarm_mark, label_style, limits, put_value, unit::states};
 use crate::{
     plant::{
-        def::{DeviceDef, Faceplate, Subject, TagId},
+        def::{DeviceDef, Faceplate, TagId},
         number::to_u16,
     },
     ui::{
@@ -85,7 +85,7 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, faceplate: &Faceplate) {
         let share = (value - min) / (max - min);
         share.is_finite().then(|| 1 + to_u16((share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round()))
     };
-    for limit in limits(cx, faceplate.pv) {
+    for (limit, _) in limits(cx, faceplate.pv) {
         if let Some(x) = column(limit) {
             canvas.glyph(x, y, '┃', theme.normal());
         }
@@ -99,12 +99,6 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, faceplate: &Faceplate) {
             alarm_mark(cx, faceplate.pv).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));
         canvas.glyph(x, y, '█', style);
     }
-}
-
-/// The limits of a tag's alarms.
-fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = f64> {
-    let of_tag = cx.def().alarms.iter().filter(move |alarm| alarm.subject == Subject::Tag(tag));
-    of_tag.filter_map(|alarm| alarm.condition.on_scale())
 }
 
 /// What a sequence panel shows.

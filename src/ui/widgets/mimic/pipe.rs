@@ -29,16 +29,23 @@ enum Way {
     Up,
 }
 
-/// Draws a pipe along its nominal points.
+/// Draws a pipe along its nominal points; `arrows` while its direction is known, `motion` lets them travel.
 pub fn view(
     cx: &ViewContext,
     canvas: &mut Canvas,
     points: &[(u16, u16)],
-    flow: &[TagId],
+    flow: &[Vec<TagId>],
     scale: CanvasScale,
-    motion: bool,
+    (arrows, motion): (bool, bool),
 ) {
-    let flowing = flow.iter().try_fold(!flow.is_empty(), |all, tag| value::is_on(cx, *tag).map(|on| all && on));
+    let all_on = |tags: &Vec<TagId>| tags.iter().try_fold(true, |all, tag| value::is_on(cx, *tag).map(|on| all && on));
+    let states: Vec<Option<bool>> = flow.iter().map(all_on).collect();
+    // One that flows is enough; else one that is unknown could.
+    let flowing = match states.contains(&Some(true)) {
+        true => Some(true),
+        false if states.contains(&None) => None,
+        false => Some(false),
+    };
     let style = match flowing {
         Some(true) => cx.theme.running(),
         Some(false) | None => cx.theme.dim(),
@@ -46,7 +53,8 @@ pub fn view(
     let steps = steps(points, scale);
     let shift = if motion { cx.phase as usize / 2 } else { 0 };
     for (n, step) in steps.iter().enumerate() {
-        let arrow = (n + ARROW_CELLS - shift % ARROW_CELLS) % ARROW_CELLS == ARROW_CELLS / 2 && step.from == step.to;
+        let arrow =
+            arrows && (n + ARROW_CELLS - shift % ARROW_CELLS) % ARROW_CELLS == ARROW_CELLS / 2 && step.from == step.to;
         let glyph = match flowing {
             Some(true) if arrow => arrow_head(step.to),
             Some(true) => bend(step.from, step.to, true),
@@ -55,6 +63,13 @@ pub fn view(
         };
         canvas.glyph(step.x, step.y, glyph, style);
     }
+}
+
+/// Draws the cell where pipes meet: branches right 1, down 2, left 4, up 8.
+pub fn joint(cx: &ViewContext, canvas: &mut Canvas, (x, y): (u16, u16), branches: u8, scale: CanvasScale) {
+    const JOINTS: [char; 16] = [' ', '─', '│', '┌', '─', '─', '┐', '┬', '│', '└', '│', '├', '┘', '┴', '┤', '┼'];
+    let glyph = JOINTS[usize::from(branches & 15)];
+    canvas.glyph(scale.middle_column(x), scale.middle_row(y), glyph, cx.theme.dim());
 }
 
 /// The cells of a pipe in the order of its flow. The ends reach to the edge of their nominal cells, so that they touch
@@ -79,9 +94,6 @@ fn steps(points: &[(u16, u16)], scale: CanvasScale) -> Vec<Step> {
             };
             steps.push(Step { x, y, from: way, to: way });
         }
-    }
-    if let ([only], Some(way)) = (corners.as_slice(), Some(Way::Right)) {
-        steps.push(Step { x: only.0, y: only.1, from: way, to: way });
     }
     steps
 }
@@ -163,7 +175,14 @@ mod tests {
         with_cx(&fixture.snapshot(), |cx| {
             let cx = ViewContext { phase, theme: &Theme::FULL, ..*cx };
             let mut canvas = Canvas::new(&mut buffer, area);
-            view(&cx, &mut canvas, &POINTS, &[fixture.tag("PLC-1.SV-1")], CanvasScale::new((10, 3), (10, 3)), true);
+            view(
+                &cx,
+                &mut canvas,
+                &POINTS,
+                &[vec![fixture.tag("PLC-1.SV-1")]],
+                CanvasScale::new((10, 3), (10, 3)),
+                (true, true),
+            );
         });
         buffer.content.chunks(10).map(|row| row.iter().map(|cell| cell.symbol()).collect()).collect()
     }

@@ -1,6 +1,6 @@
 //! Valves, pumps and single values: a shape that is filled while it works, a name and a word.
 
-use super::{Bounds, label_style, put_value};
+use super::{Bounds, cut, label_style, put_value};
 use crate::t;
 use crate::{
     plant::def::TagId,
@@ -92,7 +92,11 @@ pub fn labelled(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, 
     // In the row of the valve or pump beside it.
     let at = Bounds { y: at.y + at.height / 2, ..at };
     let style = if selected { cx.theme.focus() } else { cx.theme.dim() };
-    let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &fit(label, at.width / 2), style) + 1 };
+    let label = fit(label, at.width / 2);
+    if !label.is_empty() {
+        cut(canvas, at.x, at.y, width(&label));
+    }
+    let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &label, style) + 1 };
     let room = at.width.saturating_sub(x.saturating_sub(at.x));
     let end = put_value(cx, canvas, x, at.y, tag, room);
     if let Some((words, style)) = interlock::mark(cx, tag) {
@@ -131,4 +135,10 @@ fn word(cx: &ViewContext, tag: TagId, (on, off): (&str, &str)) -> String {
         (Some(false), true) => off.to_owned(),
         (Some(_), false) | (None, _) => shown.text,
     }
+}
+
+/// The way to another page: its name behind an arrow.
+pub fn link(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, page: &str, selected: bool) {
+    let x = canvas.text(at.x, at.y, cx.theme.pick("▸ ", "> "), cx.theme.strong());
+    canvas.text(x, at.y, page, label_style(cx, selected));
 }

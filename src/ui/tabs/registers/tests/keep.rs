@@ -98,7 +98,7 @@ fn a_recognised_device_is_saved_with_its_profile() {
     let (text, def) = bench.saved();
     let device = &def.devices[0];
     assert_eq!((device.name.as_str(), device.profile.as_str(), device.unit), ("bench", "fuji_pxr", 1));
-    assert!(device.faceplate.is_some() && text.contains("kind = \"controller\""), "{text}");
+    assert!(device.faceplate.is_some() && text.contains("{controller bench 30x6}"), "{text}");
     assert_eq!(def.lines[0].transport, Transport::tcp("10.0.0.7", 502));
     assert_eq!(def.shifts.len(), 2);
     bench.send(Msg::Saved(Tab::Registers, Ok("/tmp/x.toml".into())));

@@ -1,0 +1,187 @@
+//! Pictures of the mimic: what a drawing becomes, and what is said of a wrong one.
+
+use super::*;
+use crate::plant::def::{MimicItem, MimicRect, Picture};
+
+/// The small plant with this picture, which has rows from the eighth column on, and these aliases.
+fn with(picture: &str, aliases: &str) -> Result<PlantDef, Errors> {
+    let rows: Vec<&str> = picture.lines().skip(1).map(|row| row.get(8..).unwrap_or("")).collect();
+    let drawn = format!("'''\n{}\n'''\n\n[mimic.alias]\n{aliases}", rows.join("\n").trim_end());
+    load(PLANT.replace("'''\n {D1.T  }\n'''", &drawn).as_bytes(), METER, PLC)
+}
+
+fn drawn(picture: &str, aliases: &str) -> Picture {
+    let plant = with(picture, aliases).unwrap_or_else(|errors| panic!("{errors}"));
+    plant.mimic.pages[0].pictures[0].clone()
+}
+
+/// Corners of a pipe, in how many ways it flows, and whether its direction is known.
+type Pipe = (Vec<(u16, u16)>, usize, bool);
+
+fn pipes_of(picture: &Picture) -> Vec<Pipe> {
+    let pipe = |item: &MimicItem| match item {
+        MimicItem::Pipe { points, flow, directed } => Some((points.clone(), flow.len(), *directed)),
+        _ => None,
+    };
+    picture.items.iter().filter_map(pipe).collect()
+}
+
+fn check_wrong(picture: &str, expect: &[&str]) {
+    let text = with(picture, "").expect_err("the picture is wrong").to_string();
+    for piece in expect {
+        assert!(text.contains(piece), "no `{piece}` in\n{text}");
+    }
+    assert!(text.ends_with("1 problem\n"), "one mistake, one message\n{text}");
+}
+
+#[test]
+fn a_box_with_a_level_is_a_vessel() {
+    let picture = drawn(
+        "
+        ┌─ TK-1 hot ──┐
+        │ {level D1.T}│  in {D1.T   }
+        └─────────────┘",
+        "",
+    );
+    let MimicItem::Vessel { place, label, level, inside } = &picture.items[0] else { panic!("{picture:?}") };
+    assert_eq!((*place, label.as_str()), (MimicRect { x: 0, y: 0, width: 15, height: 3 }, "TK-1 hot"));
+    assert_eq!((level.is_some(), inside.len()), (true, 1));
+    let values: Vec<_> = picture
+        .items
+        .iter()
+        .filter_map(|item| match item {
+            MimicItem::Value { place, label, .. } => Some((place.x, place.width, label.as_str())),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(values, [(2, 12, ""), (17, 12, "in")], "words before a value are its label");
+    assert_eq!(picture.size, (29, 3));
+}
+
+#[test]
+fn a_pipe_is_followed_through_its_symbols_and_turns() {
+    let picture = drawn(
+        "
+        ┌───┐
+        │   ╞═{valve D1.MODE}═╗
+        └───┘                 ▼
+                            ┌─╨─┐
+                            └───┘",
+        "",
+    );
+    assert_eq!(pipes_of(&picture), [(vec![(5, 1), (22, 1), (22, 2)], 1, true)]);
+    let upright = drawn(
+        "
+        ┌─╥─┐
+        └─┼─┘
+          {V}
+          ▼
+          {D1.T}",
+        "V = \"valve D1.MODE V-1 flow=D1.T\"",
+    );
+    assert_eq!(pipes_of(&upright), [(vec![(2, 2), (2, 3)], 1, true)]);
+    assert!(
+        upright
+            .items
+            .iter()
+            .any(|item| matches!(item, MimicItem::Valve { vertical: true, label, .. } if label == "V-1"))
+    );
+}
+
+#[test]
+fn an_arrow_decides_the_direction_and_a_joint_gives_the_flow() {
+    let picture = drawn(
+        "
+        a ═{pump D1.MODE}═►═╗
+                            ╠═► c
+        b ═{pump PLC.OUT}═►═╝",
+        "",
+    );
+    let pipes = pipes_of(&picture);
+    assert_eq!(pipes.len(), 3, "{pipes:?}");
+    let into: Vec<_> = pipes.iter().filter(|(points, ..)| points.last() == Some(&(20, 1))).collect();
+    assert_eq!(into.len(), 2, "both lead into the joint: {pipes:?}");
+    let out = pipes.iter().find(|(points, ..)| points.first() == Some(&(20, 1))).expect("one leads out of it");
+    assert_eq!((out.1, out.2), (2, true), "it flows while one of two flows");
+    let joint = picture.items.iter().find(|item| matches!(item, MimicItem::Joint { .. }));
+    assert_eq!(joint, Some(&MimicItem::Joint { at: (20, 1), branches: 1 | 2 | 8 }));
+    let back = drawn(
+        "
+        a ═◄═{pump D1.MODE}═ b",
+        "",
+    );
+    assert_eq!(pipes_of(&back), [(vec![(19, 0), (2, 0)], 1, true)]);
+}
+
+#[test]
+fn a_circle_of_pipe_has_no_end() {
+    let picture = drawn(
+        "
+        ╔══►══╗
+        ║     ║
+        ╚═════╝",
+        "",
+    );
+    let pipes = pipes_of(&picture);
+    assert_eq!(pipes.len(), 1, "{pipes:?}");
+    assert_eq!(pipes[0].0.first(), pipes[0].0.last());
+}
+
+#[test]
+fn what_cannot_be_drawn_is_shown_in_the_picture() {
+    check_wrong("\n        {D1.T", &["[small.toml:33:1]", "`{` without `}` in its row"]);
+    check_wrong("\n        {D1.X  }", &["[small.toml:33:2]", "unknown tag `D1.X`", "did you mean `D1.T`?"]);
+    check_wrong("\n        {vlve D1.MODE}", &["unknown symbol `vlve`", "did you mean `valve`?"]);
+    check_wrong("\n        {trend D1.T 30}", &["`30` means nothing here", "expected a size as 30x5 or a window as 1h"]);
+    check_wrong("\n        {level D1.T}", &["a level outside of a box"]);
+    check_wrong(
+        "\n        ┌──┐\n        │  │",
+        &["[small.toml:33:1]", "not closed", "expected │ or └ in row 3, column 1"],
+    );
+    check_wrong("\n        ┌──┐\n        └── ┘", &["expected ┘ in row 2, column 4 of the picture"]);
+    check_wrong("\n        x ── y", &["a thin line that belongs to no closed box", "pipes are drawn with ═ and ║"]);
+    check_wrong("\n        a ═══   b", &["[small.toml:33:5]", "a gap in a pipe", "column 6, row 1 of the picture"]);
+    check_wrong("\n        a ═►═◄═ b", &["[small.toml:33:6]", "arrows of one pipe point against each other"]);
+    check_wrong(
+        "\n        a ══║\n            ║\n            c",
+        &["`║` in column 5, row 1 of the picture has no branch"],
+    );
+    check_wrong(
+        "\n        {trend D1.T 9x2}\n        x",
+        &["this covers something else", "row 2, column 1 of the picture"],
+    );
+}
+
+#[test]
+fn a_value_that_needs_more_room_is_warned_of() {
+    let warned = |picture: &str| {
+        let plant = PLANT.replace(" {D1.T  }", picture).replace("decimals_from = \"DP\"\n", "");
+        let plant = Text { file: "small.toml".to_owned(), bytes: plant.into_bytes() };
+        let meter = METER.replace("decimals_from = \"DP\"", "decimals = 1");
+        let find = |name: &str| {
+            let text = if name == "meter" { &meter } else { PLC };
+            Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
+        };
+        let (_, warnings) = build("small", &plant, &Library { find: &find, names: Vec::new() }).unwrap();
+        warnings.lines().filter(|line| line.contains("columns")).collect::<Vec<_>>()
+    };
+    assert_eq!(warned("{D1.T  }"), [""; 0]);
+    assert_eq!(warned("{D1.T}x"), ["small.toml:33:1: D1.T needs 8 columns, here are 6"]);
+}
+
+#[test]
+fn pages_have_names_and_link_to_each_other() {
+    let text = PLANT.replace(
+        "picture = '''\n {D1.T  }\n'''",
+        "name = \"Hot\"\npicture = '''\n {page Cold side}\n'''\n\n[[mimic.page]]\nname = \"Cold side\"\n\
+         picture = ['''\n {D1.T  } small\n''', '''\n {D1.T  }\n\n large\n''']\n",
+    );
+    let plant = load(text.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}"));
+    let names: Vec<&str> = plant.mimic.pages.iter().map(|page| page.name.as_str()).collect();
+    assert_eq!(names, ["Hot", "Cold side"]);
+    assert!(plant.mimic.pages[0].pictures[0].items.iter().any(|item| matches!(item, MimicItem::Link { page: 1, .. })));
+    let cold = &plant.mimic.pages[1];
+    assert_eq!(cold.pictures.len(), 2);
+    assert_eq!(cold.picture((80, 2)).size.1, 1, "the largest that fits");
+    assert_eq!(cold.picture((5, 1)).size, cold.pictures[0].size, "the smallest where none fits");
+}
