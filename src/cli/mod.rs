@@ -17,6 +17,7 @@ mod decode;
 mod init;
 mod log;
 mod menu;
+mod mimic;
 mod new;
 mod open;
 mod open_log;
@@ -106,7 +107,9 @@ enum Command {
     Experiments(experiments::Args),
     /// Check a plant or device file: print every error at once, or the read plan of each line
     Check(check::Args),
-    /// List the known profiles, or print one
+    /// Draw the mimic of a plant file with made-up values; with --watch again whenever the file is saved
+    Mimic(mimic::Args),
+    /// List the known profiles, print one, or the page about the format
     Profiles(profiles::Args),
     /// Write the report of a shift or period from the history, through the station while it runs
     Report(report::Args),
@@ -264,6 +267,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Sim(args)) => sim::main(args),
         Some(Command::Experiments(args)) => experiments::main(args),
         Some(Command::Check(args)) => check::main(args),
+        Some(Command::Mimic(args)) => mimic::main(&args),
         Some(Command::Profiles(args)) => profiles::main(args),
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Export(args)) => export::main(args),

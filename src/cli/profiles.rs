@@ -1,4 +1,4 @@
-//! `sightglass profiles`: lists the known profiles, or prints one.
+//! `sightglass profiles`: lists the known profiles, prints one, or the page about the format.
 
 use crate::profile::{self, Kind, Search};
 
@@ -8,11 +8,19 @@ use super::{CliError, say};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Print this profile instead of the list
+    #[arg(conflicts_with = "format")]
     name: Option<String>,
+    /// Print the page that explains every key of plant files and profiles, and the pictures of the mimic
+    #[arg(long)]
+    format: bool,
 }
 
 /// Lists or prints.
 pub fn main(args: Args) -> Result<(), CliError> {
+    if args.format {
+        say(profile::FORMAT_PAGE.trim_end());
+        return Ok(());
+    }
     let search = Search::usual();
     let Some(name) = args.name else {
         for listed in profile::list(&search) {

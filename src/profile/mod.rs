@@ -10,6 +10,9 @@
 //!
 //! Only `io` touches files; everything else works on texts.
 
+/// Every key of plant files and profiles, in words.
+pub const FORMAT_PAGE: &str = include_str!("../../profiles/README.md");
+
 mod access;
 mod address;
 mod alarm;

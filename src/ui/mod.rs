@@ -51,6 +51,7 @@ use modal::{Confirm, Modal, Palette, Target, palette};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use replay::Replay;
 use session_lock::SessionLock;
+pub(crate) use tabs::mimic::preview;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
 use visited::Visited;

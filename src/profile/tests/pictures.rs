@@ -185,3 +185,11 @@ fn pages_have_names_and_link_to_each_other() {
     assert_eq!(cold.picture((80, 2)).size.1, 1, "the largest that fits");
     assert_eq!(cold.picture((5, 1)).size, cold.pictures[0].size, "the smallest where none fits");
 }
+
+#[test]
+fn the_format_page_explains_every_symbol() {
+    use crate::profile::{FORMAT_PAGE, picture::SymbolKind};
+    for kind in SymbolKind::ALL.into_iter().filter(|kind| *kind != SymbolKind::Value) {
+        assert!(FORMAT_PAGE.contains(&format!("`{{{} ", kind.word())), "{}", kind.word());
+    }
+}

@@ -1,8 +1,10 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
 mod companions;
+mod preview;
 
 use companions::{Companions, Parts, parts};
+pub use preview::preview;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
