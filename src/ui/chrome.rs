@@ -172,7 +172,7 @@ fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
 fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let length = canvas.width();
     past::line(cx, canvas);
-    if let Some(note) = model.note {
+    if let Some(note) = &model.note {
         canvas.text(1, 0, &format!(" {note} "), cx.theme.strong());
     } else if let Some(words) = past::words(model, cx).filter(|_| cx.is_past() || !is_urgent(model)) {
         canvas.text(1, 0, &format!(" {} ", fit_words(&words, length.saturating_sub(4))), cx.theme.strong());

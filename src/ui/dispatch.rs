@@ -40,7 +40,7 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
             && replay::gives_command(rest)
         {
             // A form for a command is not opened in the past, from a window neither.
-            (model.modal, model.note) = (Some(before), Some(replay::refused()));
+            (model.modal, model.note) = (Some(before), Some(replay::refused().into()));
             return Vec::new();
         }
         return actions;
@@ -73,7 +73,7 @@ fn on_tab_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     let is_known = hints.iter().any(|hint| hint.chord.is_some_and(|chord| chord.is(event)));
     let actions = with_tabs(model, |tabs, cx| tabs.shown_mut().on_key(cx, event));
     if actions.is_empty() && !is_known && matches!(event.code, KeyCode::Char(_)) {
-        model.note = Some(t!("This key does nothing here. ? lists the keys, : goes to anything by its name"));
+        model.note = Some(t!("This key does nothing here. ? lists the keys, : goes to anything by its name").into());
     }
     actions
 }
@@ -102,7 +102,7 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             vec![UiAction::Show(tab)]
         }
         Global::Show(_) if model.replay.shown().is_some() => {
-            model.note = Some(t!("This tab shows the present only: Esc returns to it"));
+            model.note = Some(t!("This tab shows the present only: Esc returns to it").into());
             Vec::new()
         }
         Global::Show(_) => Vec::new(),
@@ -110,7 +110,7 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Previous => vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), -1))],
         Global::Lock => session_lock::lock(model),
         Global::Acknowledge | Global::AcknowledgeAll | Global::Silence if model.replay.shown().is_some() => {
-            model.note = Some(replay::refused());
+            model.note = Some(replay::refused().into());
             Vec::new()
         }
         // A bench has no history.
@@ -140,6 +140,8 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         // Where nothing sounds there is nothing to silence.
         Global::Silence if model.snapshot.sound => vec![UiAction::Command(CommandKind::Alarm(AlarmCommand::Silence))],
         Global::Silence => Vec::new(),
+        Global::Dump if session_lock::is_closed(&model.session) => Vec::new(),
+        Global::Dump => screen_dump::begin(model),
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.

@@ -281,7 +281,7 @@ impl Loop {
         });
     }
 
-    fn save(&self, tab: Tab, path: PathBuf, bytes: Vec<u8>, new: bool) {
+    fn save(&self, tab: Option<Tab>, path: PathBuf, bytes: Vec<u8>, new: bool) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         tokio::task::spawn_blocking(move || {
             let why = |error: io::Error| match error.kind() {

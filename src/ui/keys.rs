@@ -176,6 +176,8 @@ pub enum Global {
     AcknowledgeAll,
     /// End the sound of the alarms that sound now.
     Silence,
+    /// Save the screen as text and as a picture.
+    Dump,
     /// Redraw the screen.
     Redraw,
     /// Take the outcome of the last command off the screen.
@@ -214,6 +216,7 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(char('@'), "", "replay: the plant as it was at a past time", Global::Replay),
     Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
+    Key::new(char('P'), "", "save this screen as text and SVG in the folder of the reports", Global::Dump),
     Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
     Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),
     Key::new(char('q'), "quit", "quit (asks first, and lists what stops)", Global::Quit),

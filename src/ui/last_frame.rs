@@ -109,7 +109,7 @@ impl Model {
         }
         let seen = !last_frame.astray && last_frame.tab == self.tabs.shown && last_frame.rows.selected == now.selected;
         if !seen {
-            self.note = Some(changed());
+            self.note = Some(changed().into());
         }
         seen
     }
@@ -152,6 +152,6 @@ pub(super) fn acknowledge(model: &mut Model) -> Vec<UiAction> {
         Ok(_) => (Vec::new(), None),
         Err(why) => (Vec::new(), Some(why)),
     };
-    model.note = note;
+    model.note = note.map(Into::into);
     actions
 }

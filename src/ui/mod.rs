@@ -15,6 +15,7 @@ pub(crate) mod modal;
 pub(crate) mod msg;
 pub(crate) mod session_lock;
 pub(crate) mod replay;
+pub(crate) mod screen_dump;
 pub(crate) mod rights;
 pub(crate) mod tabs;
 pub(crate) mod theme;
@@ -31,7 +32,7 @@ pub use context::ViewContext;
 use context::{past_context, view_context, with_tabs};
 use dispatch::on_key;
 use effects::perform;
-use std::{sync::Arc, time::Duration};
+use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
 use ratatui::{Frame, layout::Rect};
@@ -50,6 +51,7 @@ use last_frame::LastFrame;
 use modal::{Confirm, Modal, Palette, Target, palette};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use replay::Replay;
+use screen_dump::ScreenDump;
 use session_lock::SessionLock;
 pub(crate) use tabs::mimic::preview;
 use tabs::{Tab, Tabs, alarms::actions};
@@ -101,7 +103,9 @@ pub struct Model {
     /// What the last frame showed; `None` before the first one.
     pub last_frame: Option<LastFrame>,
     /// Why the last key did nothing; until the next one.
-    pub note: Option<&'static str>,
+    pub note: Option<Cow<'static, str>>,
+    /// Files of the screen that are being saved.
+    pub screen_dump: ScreenDump,
     /// What ends when its operator leaves.
     pub leaving: Leaving,
 }
@@ -140,6 +144,7 @@ impl Model {
             extension: None,
             last_frame: None,
             note: None,
+            screen_dump: ScreenDump::default(),
             leaving: Leaving::default(),
         };
         update(&mut model, Msg::SessionStatus(session));
@@ -208,7 +213,11 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.tabs.of_mut(tab).on_log_failed(&why);
             Vec::new()
         }
-        Msg::Saved(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
+        Msg::Saved(Some(tab), result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
+        Msg::Saved(None, result) => {
+            screen_dump::on_saved(model, result);
+            Vec::new()
+        }
         Msg::Loaded(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_loaded(cx, result)),
         Msg::Undelivered(id, why) => {
             model.note_undelivered(id, why.into());

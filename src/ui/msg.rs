@@ -41,8 +41,8 @@ pub enum Msg {
     Extension(Arc<dyn Extension>),
     /// The history answered.
     Answer(QueryId, Result<Answer, HistoryError>),
-    /// A file of this tab was written, or why not.
-    Saved(Tab, Result<PathBuf, String>),
+    /// A file of this tab (`None`: of the screen) was written, or why not.
+    Saved(Option<Tab>, Result<PathBuf, String>),
     /// A log of this tab could not be written, and why.
     LogFailed(Tab, String),
     /// The text of a file that this tab wanted, or why not.
@@ -71,8 +71,8 @@ pub enum Effect {
     Extension(ExtensionMessage),
     /// Write a report or a capture; answered by [`Msg::Saved`].
     SaveReport {
-        /// The tab that wants it.
-        tab: Tab,
+        /// The tab that wants it; `None` is a screen dump.
+        tab: Option<Tab>,
         /// Where, relative to the working folder.
         path: PathBuf,
         /// What.
@@ -110,7 +110,7 @@ pub enum Effect {
 /// Identifies a query: who asked, and its running count. An answer to an older query is ignored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct QueryId {
-    /// The tab that asked; `None` is the replay, which is on all of them.
+    /// The tab that asked; `None` is the replay, for a request a screen dump: they are of all tabs.
     pub tab: Option<Tab>,
     /// Chosen by who asked.
     pub number: u32,

@@ -362,7 +362,7 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
     };
     let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();
     if rest.len() < count {
-        model.note = Some(refused());
+        model.note = Some(refused().into());
     }
     rest
 }

@@ -11,6 +11,7 @@ use super::{
     keys::{self, Global},
     modal::{Modal, Notice, UserForm, user_form::Purpose},
     replay::Replay,
+    screen_dump,
     tabs::{Tab, TabView, Tabs, login},
     visited::Visited,
 };
@@ -219,9 +220,10 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 /// which waits for its last request only.
 pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Durability, String>) -> Vec<UiAction> {
     if answer == Ok(Durability::NotRecorded) {
-        model.note = Some(t!("Done, but NOT RECORDED: the station cannot write to its disk"));
+        model.note = Some(t!("Done, but NOT RECORDED: the station cannot write to its disk").into());
     }
-    let (Some(tab), answer) = (id.tab, answer.map(drop)) else { return Vec::new() };
+    let answer = answer.map(drop);
+    let Some(tab) = id.tab else { return screen_dump::on_request_done(model, id.number, answer) };
     if matches!(tab, Tab::Reports | Tab::Bus) {
         // A file that waits to be written waits for its own answer, whatever was requested since.
         return with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_request_done(cx, answer));

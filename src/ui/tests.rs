@@ -27,10 +27,7 @@ pub fn draw(model: &mut Model, width: u16, height: u16) -> Buffer {
     terminal.backend().buffer().clone()
 }
 
-pub fn text(buffer: &Buffer) -> String {
-    let rows = buffer.content.chunks(usize::from(buffer.area.width.max(1)));
-    rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>().trim_end().to_owned() + "\n").collect()
-}
+pub(crate) use super::screen_dump::text;
 
 /// The screen as text, one line a row.
 pub fn screen(model: &mut Model, width: u16, height: u16) -> String {

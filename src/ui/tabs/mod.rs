@@ -48,7 +48,7 @@ impl Outgoing {
     }
     /// Writes it.
     fn write(self) -> UiAction {
-        UiAction::Do(Effect::SaveReport { tab: self.tab, path: self.path, bytes: self.bytes, new: false })
+        UiAction::Do(Effect::SaveReport { tab: Some(self.tab), path: self.path, bytes: self.bytes, new: false })
     }
 }
 

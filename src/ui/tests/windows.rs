@@ -175,7 +175,7 @@ fn an_alarm_is_shelved_for_half_an_hour_or_for_any_time_typed() {
 fn the_message_about_a_file_leaves_with_the_next_key() {
     let mut model = model(&Fixture::traffic(), Theme::FULL);
     type_keys(&mut model, "6F");
-    update(&mut model, Msg::Saved(Tab::Bus, Ok("L1.txt".into())));
+    update(&mut model, Msg::Saved(Some(Tab::Bus), Ok("L1.txt".into())));
     assert!(screen(&mut model, 80, 24).contains("written; read with: less L1.txt"));
     type_keys(&mut model, "↑");
     assert!(!screen(&mut model, 80, 24).contains("L1.txt"));

@@ -40,7 +40,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "previous page", Action::Turn(-1)),
     Key::new(code(KeyCode::Right), "page", "next page", Action::Turn(1)),
     Key::new(char('L'), "", "page Line", Action::Show(Page::Line)),
-    Key::new(char('P'), "", "page Plan", Action::Show(Page::Plan)),
+    Key::new(char('B'), "", "page Plan: the blocks that are read", Action::Show(Page::Plan)),
     Key::new(char('F'), "", "page Frames", Action::Show(Page::Frames)),
     Key::new(char('T'), "", "page Test", Action::Show(Page::Test)),
     Key::new(char('n'), "", "next line of the plant", Action::NextLine),

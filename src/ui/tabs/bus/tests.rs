@@ -58,7 +58,7 @@ fn run(
 fn every_page_well_and_in_trouble() {
     let moods = [("well", Fixture::traffic()), ("trouble", Fixture::traffic_trouble())];
     for (mood, fixture) in &moods {
-        for (page, keys) in [("line", "L"), ("plan", "P"), ("frames", "F"), ("test", "T")] {
+        for (page, keys) in [("line", "L"), ("plan", "B"), ("frames", "F"), ("test", "T")] {
             for (width, height) in [(80, 24), (120, 40)] {
                 let mut model = bus(fixture, Theme::FULL, keys);
                 insta::assert_snapshot!(format!("{page}_{mood}_{width}x{height}"), screen(&mut model, width, height));
@@ -116,7 +116,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
         .collect();
     let names: Vec<String> = saved.iter().map(|(_, path, _)| path.display().to_string()).collect();
     assert_eq!(names, ["reports/L1-2026-11-21-140231.txt", "reports/L1-2026-11-21-140231.pcapng"]);
-    assert!(saved.iter().all(|(tab, ..)| *tab == Tab::Bus));
+    assert!(saved.iter().all(|(tab, ..)| *tab == Some(Tab::Bus)));
     assert_eq!(String::from_utf8_lossy(&saved[0].2).lines().count(), 120);
     assert_eq!(saved[1].2[..4], [0x0A, 0x0D, 0x0D, 0x0A]);
     for (tab, path, _) in saved {
@@ -124,19 +124,19 @@ fn frames_are_saved_as_text_and_for_wireshark() {
     }
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("open with: wireshark reports/L1-2026-11-21-140231.pcapng"), "{shown}");
-    update(&mut model, Msg::Saved(Tab::Bus, Err("disk full".to_owned())));
+    update(&mut model, Msg::Saved(Some(Tab::Bus), Err("disk full".to_owned())));
     assert!(screen(&mut model, 80, 24).contains("NOT WRITTEN: disk full"));
 }
 
 #[test]
 fn the_tags_of_a_block_are_shown_with_their_values() {
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "P⏎");
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "B⏎");
     insta::assert_snapshot!("window_block", screen(&mut model, 80, 24));
 }
 
 #[test]
 fn why_goes_through_the_values_of_a_block() {
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Pw");
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Bw");
     let first = screen(&mut model, 80, 24);
     assert!(first.contains("why ") && first.contains(" 1/"), "{first}");
     type_keys(&mut model, "→");
@@ -308,7 +308,7 @@ fn no_size_breaks_a_page_or_a_window() {
     let mut fixture = Fixture::traffic_trouble();
     let scan = Scan { first: 1, last: 9, serials: vec![], timeout: Duration::from_millis(100) };
     fixture.line.test = Some(run(Diagnostic::Scan(scan), DiagnosticState::Running, 3, 9, Vec::new()));
-    for keys in ["L", "P", "F", "T", "P⏎", "F⏎", "Tt01 03", "Tf", "R", "Ts", "Tm"] {
+    for keys in ["L", "B", "F", "T", "B⏎", "F⏎", "Tt01 03", "Tf", "R", "Ts", "Tm"] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         for (width, height) in [(60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)] {
             assert!(screen(&mut model, width, height).lines().count() <= usize::from(height));

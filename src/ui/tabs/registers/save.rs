@@ -45,7 +45,7 @@ impl Registers {
         }
         let plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
         let bytes = plant.text(&self.profiles)?.into_bytes();
-        Ok(vec![UiAction::Do(Effect::SaveReport { tab: Tab::Registers, path, bytes, new: true })])
+        Ok(vec![UiAction::Do(Effect::SaveReport { tab: Some(Tab::Registers), path, bytes, new: true })])
     }
 
     fn new_plant(&self, cx: &ViewContext, stem: &str) -> Option<NewPlant> {

@@ -297,12 +297,12 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     let Stand { model, .. } = &stand;
     let shown = model.tabs.reports.report.value.as_ref().expect("a report is shown");
     assert_eq!(bytes, report::FORMATS[0].render(shown, &model.snapshot.def, CsvDialect::default()));
-    stand.send(Msg::Saved(Tab::Reports, Ok(path)));
+    stand.send(Msg::Saved(Some(Tab::Reports), Ok(path)));
     assert!(stand.screen().contains("✓ written reports/2026-11-21-afternoon-until-1402.csv"));
     stand.press(";e");
     let (_, bytes) = stand.saved.pop().expect("the key writes");
     assert!(bytes.starts_with(b"\xef\xbb\xbf"), "the other dialect is for spreadsheets");
-    stand.send(Msg::Saved(Tab::Reports, Err("disk full".to_owned())));
+    stand.send(Msg::Saved(Some(Tab::Reports), Err("disk full".to_owned())));
     assert!(stand.screen().contains("not written: disk full"));
     stand.reply = Err("needs Technician; tom is Viewer".to_owned());
     stand.press("e");

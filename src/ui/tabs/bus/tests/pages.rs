@@ -33,7 +33,7 @@ fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
         (0..4).for_each(|_| drop(update(model, Msg::Tick { silent: Duration::ZERO })));
     };
     assert_acts_only_on_what_was_drawn(&mut model, newer, "⏎");
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "P");
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "B");
     let other_plan = |model: &mut Model| {
         let mut fixture = Fixture::traffic();
         let mut report = fixture.line.report.as_deref().cloned().expect("the line has reported");
@@ -48,7 +48,7 @@ fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
 fn every_page_in_seven_bits_tells_what_is_wrong() {
     for (page, keys, words) in [
         ("line", "L", "! PLC-1: response timeout at 14:01:50"),
-        ("plan", "P", "! TIC-1"),
+        ("plan", "B", "! TIC-1"),
         ("frames", "F", "x CRC error: got 3C51"),
         ("test", "T", "scan for units"),
     ] {

@@ -101,7 +101,7 @@ fn a_recognised_device_is_saved_with_its_profile() {
     assert!(device.faceplate.is_some() && text.contains("{controller bench 30x6}"), "{text}");
     assert_eq!(def.lines[0].transport, Transport::tcp("10.0.0.7", 502));
     assert_eq!(def.shifts.len(), 2);
-    bench.send(Msg::Saved(Tab::Registers, Ok("/tmp/x.toml".into())));
+    bench.send(Msg::Saved(Some(Tab::Registers), Ok("/tmp/x.toml".into())));
     assert!(bench.screen(80, 24).contains("saved /tmp/x.toml"));
 }
 

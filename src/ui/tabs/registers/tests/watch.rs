@@ -92,7 +92,7 @@ fn a_log_that_cannot_be_written_ends_and_says_why() {
     bench.keys("j1002⏎");
     bench.answer(0, device);
     bench.keys("pL");
-    bench.send(Msg::Saved(Tab::Registers, Err("bench.toml: exists".to_owned())));
+    bench.send(Msg::Saved(Some(Tab::Registers), Err("bench.toml: exists".to_owned())));
     assert!(bench.screen(120, 40).contains("nothing was saved"), "another file than the log");
     bench.keys("⎋");
     assert!(bench.screen(120, 40).contains("logging"), "the log goes on");

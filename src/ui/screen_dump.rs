@@ -1,0 +1,81 @@
+//! The screen as files: what `P` saves for a hand-over mail, as text and as a picture.
+
+mod svg;
+#[cfg(test)]
+mod tests;
+
+use std::path::PathBuf;
+
+use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
+
+use super::{Effect, Model, QueryId, UiAction};
+use crate::{
+    access::{SessionRequest, audit_log::sha256},
+    t,
+};
+
+/// Files of a screen that wait to be put on record, the next one first.
+#[derive(Debug, Default)]
+pub struct ScreenDump {
+    files: Vec<(PathBuf, Vec<u8>)>,
+    /// The number of the request that puts the next one on record.
+    number: u32,
+}
+
+/// Takes the screen as it is and asks for it to be put on record.
+pub(super) fn begin(model: &mut Model) -> Vec<UiAction> {
+    let drawn = drawn(model);
+    let cx = model.present_cx();
+    let stamp = cx.now.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d-%H%M%S");
+    let name = format!("screen-{stamp}-{}", model.tabs.shown.title().to_lowercase());
+    let path = |end: &str| cx.def().report.folder.join(format!("{name}.{end}"));
+    let files = vec![(path("txt"), text(&drawn).into_bytes()), (path("svg"), svg::svg(&drawn).into_bytes())];
+    model.screen_dump.files = files;
+    next(model)
+}
+
+/// Requests the record of the next file.
+fn next(model: &mut Model) -> Vec<UiAction> {
+    let dump = &mut model.screen_dump;
+    let Some((path, bytes)) = dump.files.first() else { return Vec::new() };
+    dump.number = dump.number.wrapping_add(1);
+    let request = SessionRequest::Exported { file: path.display().to_string(), sha256: sha256(bytes) };
+    vec![UiAction::Do(Effect::SessionRequest(QueryId { tab: None, number: dump.number }, request))]
+}
+
+/// The record of a file was made, or refused.
+pub(super) fn on_request_done(model: &mut Model, number: u32, answer: Result<(), String>) -> Vec<UiAction> {
+    let dump = &mut model.screen_dump;
+    if number != dump.number || dump.files.is_empty() {
+        return Vec::new();
+    }
+    let (path, bytes) = dump.files.remove(0);
+    if let Err(why) = answer {
+        dump.files.clear();
+        model.note = Some(t!("The screen was not saved: {why}", why).into());
+        return Vec::new();
+    }
+    let save = UiAction::Do(Effect::SaveReport { tab: None, path, bytes, new: false });
+    std::iter::once(save).chain(next(model)).collect()
+}
+
+/// A file was written, or not.
+pub(super) fn on_saved(model: &mut Model, result: Result<PathBuf, String>) {
+    model.note = Some(match result {
+        Ok(path) => t!("Screen saved: {path}", path = path.display()).into(),
+        Err(why) => t!("The screen was not saved: {why}", why).into(),
+    });
+}
+
+fn drawn(model: &Model) -> Buffer {
+    let mut terminal =
+        Terminal::new(TestBackend::new(model.screen.width, model.screen.height)).unwrap_or_else(|never| match never {});
+    let frame = terminal.draw(|frame| super::view(model, frame));
+    frame.map(|frame| frame.buffer.clone()).unwrap_or_else(|never| match never {})
+}
+
+/// The characters of a screen, one line a row.
+pub(crate) fn text(buffer: &Buffer) -> String {
+    let rows = buffer.content.chunks(usize::from(buffer.area.width.max(1)));
+    rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>().trim_end().to_owned() + "\n").collect()
+}

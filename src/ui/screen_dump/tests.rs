@@ -1,0 +1,90 @@
+//! What `P` saves, and what must be on record before.
+
+use std::path::PathBuf;
+
+use ratatui::{
+    layout::Rect,
+    style::{Color, Style},
+};
+
+use super::*;
+use crate::{
+    access::Durability,
+    ui::{
+        Msg,
+        fixture::Fixture,
+        tests::{model, screen, type_keys},
+        theme::Theme,
+        update,
+    },
+};
+
+fn request(effects: &[Effect]) -> Option<(QueryId, String)> {
+    effects.iter().find_map(|effect| match effect {
+        Effect::SessionRequest(id, SessionRequest::Exported { file, .. }) => Some((*id, file.clone())),
+        _ => None,
+    })
+}
+
+fn saved(effects: &[Effect]) -> Option<(PathBuf, String)> {
+    effects.iter().find_map(|effect| match effect {
+        Effect::SaveReport { tab: None, path, bytes, .. } => {
+            Some((path.clone(), String::from_utf8_lossy(bytes).into_owned()))
+        }
+        _ => None,
+    })
+}
+
+#[test]
+fn a_screen_is_put_on_record_and_then_saved_twice() {
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    let shown = screen(&mut model, 80, 24);
+    let effects = type_keys(&mut model, "P");
+    let (id, file) = request(&effects).expect("a request");
+    assert!(file.ends_with("-mimic.txt") && saved(&effects).is_none(), "nothing is written before its record: {file}");
+    let effects = update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
+    let (path, text) = saved(&effects).expect("the text");
+    assert_eq!((path.display().to_string(), text), (file, shown));
+    let (id, file) = request(&effects).expect("a second request");
+    let effects = update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
+    let (path, picture) = saved(&effects).expect("the picture");
+    assert!(file.ends_with("-mimic.svg") && path.ends_with(&file) && picture.starts_with("<svg "));
+    assert!(picture.contains(">TK-1 control</text>") && picture.ends_with("</svg>\n"), "{picture}");
+    update(&mut model, Msg::Saved(None, Ok(path)));
+    assert!(screen(&mut model, 80, 24).contains("Screen saved: "), "its place is shown");
+}
+
+#[test]
+fn a_screen_that_is_not_recorded_is_not_saved() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    screen(&mut model, 80, 24);
+    let (id, _) = request(&type_keys(&mut model, "P")).expect("a request");
+    let effects = update(&mut model, Msg::RequestDone(id, Err("the station has gone".to_owned())));
+    assert_eq!((saved(&effects), request(&effects)), (None, None));
+    assert!(screen(&mut model, 80, 24).contains("The screen was not saved: the station has gone"));
+}
+
+#[test]
+fn a_picture_has_shapes_for_lines_and_text_for_words() {
+    let mut buffer = Buffer::empty(Rect::new(0, 0, 6, 2));
+    buffer.set_string(0, 0, "┌─ A&B", Style::new());
+    buffer.set_string(0, 1, "█⣿ ◆", Style::new().fg(Color::Rgb(255, 96, 96)).bg(Color::Indexed(16)));
+    insta::assert_snapshot!(svg::svg(&buffer));
+}
+
+#[test]
+fn no_line_of_any_screen_is_left_to_a_font() {
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    for tab in "1234567".chars() {
+        type_keys(&mut model, &tab.to_string());
+        screen(&mut model, 160, 50);
+        let picture = svg::svg(&drawn(&model));
+        let texts = picture.lines().filter(|line| line.starts_with("<text"));
+        let left: String = texts
+            .flat_map(str::chars)
+            .filter(|c| ('\u{2500}'..='\u{259F}').contains(c) || ('\u{2800}'..='\u{28FF}').contains(c))
+            .filter(|c| *c != '╱')
+            .collect();
+        assert_eq!(left, "", "tab {tab}");
+    }
+}
