@@ -39,6 +39,9 @@ pub struct Args {
     /// Run the plant, its line and its clock so many times faster
     #[arg(long, value_name = "N", default_value = "1", value_parser = speed)]
     speed: f64,
+    /// Begin with a tour: eight small tasks in five minutes
+    #[arg(long, conflicts_with_all = ["headless", "scenario", "plant"])]
+    tour: bool,
     /// Without a terminal: do the whole job and print what was done
     #[arg(long)]
     headless: bool,
@@ -115,7 +118,11 @@ async fn demonstrate(
         let drill = scenario.as_ref().map(|scenario| scenario.duration);
         headless(session, clock, args.duration.or(drill), args).await
     } else {
-        let options = ui::io::Options { extension: Some(extension(port)), ..ui::io::Options::new(ui::Leaving::Demo) };
+        let options = ui::io::Options {
+            tour: args.tour,
+            extension: Some(extension(port)),
+            ..ui::io::Options::new(ui::Leaving::Demo)
+        };
         tokio::select! {
             result = ui::io::run(session, options) => result.map_err(CliError::from),
             () = run::over(clock, args.duration) => Ok(()),

@@ -97,6 +97,11 @@ pub fn view(model: &Model, frame: &mut Frame) {
     past::rule(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.rule));
     model.tabs.shown().view(cx, frame, parts.body);
     status(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.status));
+    if let Some(tour) = &model.tour {
+        // The line above the tab says which past is shown.
+        let row = if cx.is_past() { parts.status } else { parts.rule };
+        tour.view(cx, &mut Canvas::new(frame.buffer_mut(), row));
+    }
     let hints = match &model.modal {
         Some(modal) => modal.hints(cx),
         None if cx.is_past() => [keys::hints(replay::KEYS), past::own_keys(model, cx)].concat(),

@@ -12,6 +12,9 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     if keys::find(&keys::global(), event) == Some(Global::Lock) {
         return session_lock::lock(model);
     }
+    if model.tour.is_some() && tour::SKIP.is(event) {
+        return Vec::new();
+    }
     if session_lock::ask_before_work(model, event) {
         return Vec::new();
     }
@@ -23,6 +26,11 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         // The number of a tab leads there from every window that has no use for it.
         model.modal = None;
         return on_global(model, show);
+    }
+    if keys::find(&keys::global(), event) == Some(Global::Dump)
+        && model.modal.as_ref().is_some_and(|modal| modal.only_looks() && !modal.takes_text())
+    {
+        return on_global(model, Global::Dump);
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;

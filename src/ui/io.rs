@@ -55,6 +55,8 @@ pub struct Options {
     pub theme: Theme,
     /// What ends with it.
     pub leaving: Leaving,
+    /// It begins with the tour of a demonstration.
+    pub tour: bool,
     /// What the embedding command adds.
     pub extension: Option<ExtensionPort>,
     /// What the registers of a bench begin with.
@@ -75,7 +77,14 @@ impl Options {
     /// Looks chosen by the environment.
     pub fn new(leaving: Leaving) -> Options {
         let theme = Theme::detect(|name| std::env::var(name).ok());
-        Options { theme, leaving, extension: None, start: Start::default(), profiles: OwnProfiles::default() }
+        Options {
+            theme,
+            leaving,
+            tour: false,
+            extension: None,
+            start: Start::default(),
+            profiles: OwnProfiles::default(),
+        }
     }
 }
 
@@ -108,6 +117,7 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let status = session.status.borrow_and_update().clone();
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
     model.leaving = options.leaving;
+    model.tour = options.tour.then(super::Tour::default);
     model.tabs.registers.profiles = options.profiles;
     let mut extension = options.extension;
     if let Some(port) = &mut extension {

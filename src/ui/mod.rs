@@ -19,6 +19,7 @@ pub(crate) mod screen_dump;
 pub(crate) mod rights;
 pub(crate) mod tabs;
 pub(crate) mod theme;
+mod tour;
 mod visited;
 pub(crate) mod last_command;
 pub(crate) mod widgets;
@@ -56,6 +57,8 @@ use session_lock::SessionLock;
 pub(crate) use tabs::mimic::preview;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
+pub(crate) use tour::Tour;
+use tour::TourEvent;
 use visited::Visited;
 
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
@@ -108,6 +111,8 @@ pub struct Model {
     pub screen_dump: ScreenDump,
     /// What ends when its operator leaves.
     pub leaving: Leaving,
+    /// The tour of a demonstration.
+    pub tour: Option<Tour>,
 }
 
 /// The terminal's sense of time, fed by ticks.
@@ -146,6 +151,7 @@ impl Model {
             note: None,
             screen_dump: ScreenDump::default(),
             leaving: Leaving::default(),
+            tour: None,
         };
         update(&mut model, Msg::SessionStatus(session));
         model
@@ -173,6 +179,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
+    let event = TourEvent::of(&msg);
     let keyed = matches!(msg, Msg::Key(_)) && model.is_as_drawn();
     if matches!(msg, Msg::Snapshot(_) | Msg::SessionStatus(_) | Msg::Answer(..) | Msg::Extension(_) | Msg::Tick { .. })
     {
@@ -231,7 +238,9 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     };
     let actions = session_lock::hold_back(model, actions);
     let actions = replay::refuse_commands(model, actions);
-    let effects = perform(model, actions);
+    let mut effects = perform(model, actions);
+    let actions = tour::follow(model, event);
+    effects.extend(perform(model, actions));
     model.close_confirmation();
     if keyed {
         model.note_keyed();

@@ -55,6 +55,16 @@ fn a_screen_is_put_on_record_and_then_saved_twice() {
 }
 
 #[test]
+fn a_window_that_only_shows_is_saved_too() {
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    screen(&mut model, 80, 24);
+    type_keys(&mut model, "?");
+    assert!(request(&type_keys(&mut model, "P")).is_some(), "help");
+    type_keys(&mut model, "⎋s");
+    assert_eq!(request(&type_keys(&mut model, "P")), None, "a form takes its letters itself");
+}
+
+#[test]
 fn a_screen_that_is_not_recorded_is_not_saved() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     screen(&mut model, 80, 24);
