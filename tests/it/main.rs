@@ -57,6 +57,7 @@ mod settings;
 mod shift;
 mod support;
 mod tampering;
+mod tasks;
 mod terminal;
 mod texts;
 mod tools;

@@ -38,6 +38,8 @@ impl Terminal {
         command.env("TERM", "xterm-256color");
         command.env("XDG_STATE_HOME", folder.path());
         command.env("XDG_RUNTIME_DIR", sockets);
+        // Reports go into a folder beside the plant.
+        command.cwd(folder.path());
         let child = pair.slave.spawn_command(command).unwrap();
         drop(pair.slave);
         let (sender, bytes) = channel();
@@ -59,6 +61,11 @@ impl Terminal {
         let writer = self.writer.as_mut().unwrap();
         writer.write_all(keys.as_bytes()).unwrap();
         writer.flush().unwrap();
+    }
+
+    /// Does the screen hold a text, as far as it was read?
+    pub fn shows(&self, text: &str) -> bool {
+        self.parser.screen().contents().contains(text)
     }
 
     /// Waits until the screen holds a text.

@@ -73,7 +73,9 @@ impl Field {
 impl Form {
     /// A form of these lines; the first is typed into.
     pub fn new(fields: Vec<Field>) -> Form {
-        Form { fields, at: 0, shown: false }
+        let mut form = Form { fields, at: 0, shown: false };
+        form.forget();
+        form
     }
 
     /// Lines of it.

@@ -81,7 +81,8 @@ impl UserForm {
                     .collect()
             }
             Purpose::Unlock(_) => vec![Field::secret(t!("password"))],
-            Purpose::Add => [Field::name(t!("name")), Field::role(t!("role"), Role::Technician)]
+            // What is given already stands above: Enter leads through what must be typed.
+            Purpose::Add => [Field::role(t!("role"), Role::Technician), Field::name(t!("name"))]
                 .into_iter()
                 .chain(twice())
                 .collect(),
@@ -171,7 +172,7 @@ impl UserForm {
         if let Some(why) = self.form.lacking() {
             return Err(why);
         }
-        let name = self.form.name(0);
+        let name = self.form.name(usize::from(self.purpose == Purpose::Add));
         Ok(match &self.purpose {
             Purpose::First => SessionRequest::FirstSupervisor { user: name, password: self.new_password(cx, 1)? },
             Purpose::Login => SessionRequest::Login { user: name, password: self.form.secret(1) },

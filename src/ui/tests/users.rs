@@ -289,7 +289,7 @@ fn the_users_and_what_can_be_done_with_them() {
         SessionRequest::ResetPassword { user: user.clone(), password: password() },
     );
     check(
-        "7njane⏎→⏎correct horse battery⏎correct horse battery⏎",
+        "7n↑→↓jane⏎correct horse battery⏎correct horse battery⏎",
         SessionRequest::AddUser { user: "jane".to_owned(), role: Role::Supervisor, password: password() },
     );
     let mut model = with(&Fixture::normal(), supervisor());
