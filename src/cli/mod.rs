@@ -12,6 +12,7 @@ mod demo;
 mod drill;
 mod experiments;
 mod export;
+mod help;
 mod history;
 mod decode;
 mod init;
@@ -61,7 +62,7 @@ Exit codes:
 /// The control room of a small plant in a terminal: process mimic, trends, alarms, controllers and shift reports over
 /// Modbus RTU and TCP.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT_CODES, args_conflicts_with_subcommands = true)]
+#[command(version, after_help = EXIT_CODES, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
 struct Args {
     #[command(subcommand)]
     command: Option<Command>,
@@ -111,6 +112,8 @@ enum Command {
     Mimic(mimic::Args),
     /// List the known profiles, print one, or the page about the format
     Profiles(profiles::Args),
+    /// Print a page of the manual, or the options of a command
+    Help(help::Args),
     /// Write the report of a shift or period from the history, through the station while it runs
     Report(report::Args),
     /// Write stored values of tags at a fixed interval as CSV
@@ -269,6 +272,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Check(args)) => check::main(args),
         Some(Command::Mimic(args)) => mimic::main(&args),
         Some(Command::Profiles(args)) => profiles::main(args),
+        Some(Command::Help(args)) => help::main(&args),
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Export(args)) => export::main(args),
         Some(Command::Sql(args)) => sql::main(args),

@@ -1,0 +1,75 @@
+//! `sightglass help`: the pages of the manual, and the options of each command.
+
+use clap::CommandFactory;
+
+use super::{CliError, say};
+use crate::profile::FORMAT_PAGE;
+
+/// The pages: name, what it is about, text.
+const TOPICS: [(&str, &str, &str); 7] = [
+    ("commands", "what each command does", include_str!("help/commands.md")),
+    ("screen", "tabs, keys, and what the signs mean", include_str!("help/screen.md")),
+    ("station", "a station on a panel PC: installation, users, rights", include_str!("help/station.md")),
+    ("audit-log", "the audit log: what it holds and what it promises", include_str!("help/audit.md")),
+    ("reliability", "what you can rely on, and what happens when something fails", include_str!("help/reliability.md")),
+    ("devices", "the shipped devices, and how well each is known", include_str!("help/devices.md")),
+    ("format", "every key of plant files and profiles, and the pictures of the mimic", FORMAT_PAGE),
+];
+
+/// Arguments of `help`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A page of the manual, or a command
+    #[arg(value_name = "TOPIC")]
+    topic: Option<String>,
+}
+
+/// Prints a page, the options of a command, or the list of pages.
+pub fn main(args: &Args) -> Result<(), CliError> {
+    let Some(topic) = &args.topic else {
+        say("sightglass help TOPIC\n");
+        for (name, about, _) in TOPICS {
+            say(&format!("  {name:12} {about}"));
+        }
+        say(
+            "\n`sightglass --help` lists the commands, `sightglass help COMMAND` the options of one; on the screen, ? lists the keys.",
+        );
+        return Ok(());
+    };
+    if let Some((_, _, text)) = TOPICS.iter().find(|(name, ..)| name == topic) {
+        say(text.trim_end());
+        return Ok(());
+    }
+    let mut program = super::Args::command();
+    match program.find_subcommand_mut(topic) {
+        Some(command) => {
+            say(&command.render_long_help().to_string());
+            Ok(())
+        }
+        None => {
+            let names: Vec<&str> = TOPICS.iter().map(|(name, ..)| *name).collect();
+            Err(CliError::Usage(format!("no page and no command `{topic}`; pages: {}", names.join(", "))))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_stands_on_the_page_of_commands() {
+        let page = TOPICS[0].2;
+        for command in super::super::Args::command().get_subcommands().map(clap::Command::get_name) {
+            assert!(page.contains(&format!("`sightglass {command}")), "{command}");
+        }
+    }
+
+    #[test]
+    fn a_page_is_no_command() {
+        for (name, about, text) in TOPICS {
+            assert!(super::super::Args::command().find_subcommand(name).is_none(), "{name}");
+            assert!(text.starts_with("# ") && !about.is_empty(), "{name}");
+        }
+    }
+}
