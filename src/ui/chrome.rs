@@ -7,7 +7,7 @@ mod past;
 use crate::t;
 use crate::text::translate;
 use header::header;
-use ratatui::{Frame, layout::Rect, style::Style};
+use ratatui::{Frame, style::Style};
 
 use banner::banner;
 pub use banner::{alarm_words, counts, history_text};
@@ -15,6 +15,7 @@ pub use banner::{alarm_words, counts, history_text};
 use super::{
     LastCommand, Model, SILENCE, ViewContext,
     keys::{self, Hint},
+    layout::{Size, layout},
     modal::Modal,
     replay, rights,
     tabs::Tab,
@@ -30,66 +31,13 @@ use crate::plant::{
     snapshot::LineStatus,
 };
 
-/// Least size in which the tabs make sense; 80x24 shows everything.
-const SIZE_MIN: (u16, u16) = (60, 16);
-
-/// Where the parts of the screen are. On a screen that is too small only the banner has a place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Layout {
-    /// Plant, lines, clock.
-    pub header: Rect,
-    /// Names of the tabs.
-    pub tabs: Rect,
-    /// The most urgent alarm.
-    pub banner: Rect,
-    /// The line between banner and body.
-    pub rule: Rect,
-    /// The tab.
-    pub body: Rect,
-    /// Outcome of the last command.
-    pub status: Rect,
-    /// Keys.
-    pub footer: Rect,
-    /// Too small for more than the banner.
-    pub small: bool,
-}
-
-/// Cuts the screen into its parts.
-pub fn layout(screen: Rect) -> Layout {
-    let row = |y: u16| Rect { y: screen.y.saturating_add(y), height: 1, ..screen }.intersection(screen);
-    let small = screen.width < SIZE_MIN.0 || screen.height < SIZE_MIN.1;
-    if small {
-        let none = Rect { width: 0, height: 0, ..screen };
-        return Layout {
-            header: none,
-            tabs: none,
-            banner: row(0),
-            rule: none,
-            body: none,
-            status: none,
-            footer: none,
-            small,
-        };
-    }
-    Layout {
-        header: row(0),
-        tabs: row(1),
-        banner: row(2),
-        rule: row(3),
-        body: Rect { y: screen.y + 4, height: screen.height - 6, ..screen },
-        status: row(screen.height - 2),
-        footer: row(screen.height - 1),
-        small,
-    }
-}
-
 /// Draws the whole screen.
 pub fn view(model: &Model, frame: &mut Frame) {
     let parts = layout(frame.area());
     let present = &super::context::present_context(model, frame.area());
     banner(model, present, &mut Canvas::new(frame.buffer_mut(), parts.banner));
-    if parts.small {
-        return too_small(model, present, frame);
+    if let Some(least) = model.lacks_room() {
+        return too_small(model, present, least, frame);
     }
     header(model, present, &mut Canvas::new(frame.buffer_mut(), parts.header));
     let cx = &super::context::context(model, frame.area());
@@ -105,6 +53,7 @@ pub fn view(model: &Model, frame: &mut Frame) {
     let hints = match &model.modal {
         Some(modal) => modal.hints(cx),
         None if cx.is_past() => [keys::hints(replay::KEYS), past::own_keys(model, cx)].concat(),
+        None if cx.size <= Size::Compact => compact_hints(model, cx),
         None => model.tabs.shown().hints(cx),
     };
     let typing = model.tabs.shown == Tab::Login && model.tabs.login.is_typing();
@@ -114,15 +63,23 @@ pub fn view(model: &Model, frame: &mut Frame) {
     let role = refused.first().and_then(lacks).map(|role| (role, refused));
     footer(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer), &may, role, global);
     if let Some(modal) = &model.modal {
-        modal.view(cx, &model.tabs, frame, parts.body);
+        // On the smallest screen a window has all rows below the banner but that of the keys.
+        let room = if cx.size <= Size::Compact { parts.body.union(parts.status) } else { parts.body };
+        modal.view(cx, &model.tabs, frame, room);
     }
 }
 
-/// All that is left below the banner of a small screen: its size and how to leave.
-fn too_small(model: &Model, cx: &ViewContext, frame: &mut Frame) {
+/// The keys of a screen without a row for the tabs: those that lead to the others, then those of the list.
+fn compact_hints(model: &Model, cx: &ViewContext) -> Vec<Hint> {
+    let others = Tab::offered(cx).into_iter().filter(|tab| *tab != model.tabs.shown);
+    let others = others.map(|tab| Hint::new(tab.number().to_string(), translate(tab.title()), tab.help()));
+    others.chain(model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none())).collect()
+}
+
+/// All that is left below the banner of a screen of less than this size: its size and how to leave.
+fn too_small(model: &Model, cx: &ViewContext, (width, height): (u16, u16), frame: &mut Frame) {
     let area = frame.area();
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
-    let (width, height) = SIZE_MIN;
     let size = t!("too small: {width}x{height}", width = area.width, height = area.height);
     let words = [
         t!("screen {size}, needs {width}x{height}", size, width, height),
@@ -178,7 +135,7 @@ fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let length = canvas.width();
     past::line(cx, canvas);
     if let Some(note) = &model.note {
-        canvas.text(1, 0, &format!(" {note} "), cx.theme.strong());
+        canvas.text(1, 0, &format!(" {} ", fit_words(note, length.saturating_sub(4))), cx.theme.strong());
     } else if let Some(words) = past::words(model, cx).filter(|_| cx.is_past() || !is_urgent(model)) {
         canvas.text(1, 0, &format!(" {} ", fit_words(&words, length.saturating_sub(4))), cx.theme.strong());
     } else if let Some(pending) = &model.last_command {

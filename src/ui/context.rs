@@ -5,7 +5,14 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use ratatui::layout::Rect;
 
-use super::{Clock, Model, UiAction, chrome, extension::Extension, replay::Replay, tabs::Tabs, theme::Theme};
+use super::{
+    Clock, Model, UiAction,
+    extension::Extension,
+    layout::{Size, layout},
+    replay::Replay,
+    tabs::Tabs,
+    theme::Theme,
+};
 use crate::{
     access::SessionStatus,
     plant::{def::PlantDef, snapshot::Snapshot, time::elapsed},
@@ -26,6 +33,8 @@ pub struct ViewContext<'a> {
     pub phase: u32,
     /// Where the shown tab draws, for queries that depend on its width.
     pub area: Rect,
+    /// How much the terminal can show.
+    pub size: Size,
     /// State that the embedding command adds.
     pub extension: Option<&'a dyn Extension>,
     /// The session: user, role and lock.
@@ -107,9 +116,9 @@ pub(super) fn view_context<'a>(
 ) -> ViewContext<'a> {
     let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
-    let area = chrome::layout(screen).body;
+    let (area, size) = (layout(screen).body, Size::of(screen));
     let extension = extension.as_deref();
-    ViewContext { snapshot, theme, now, present: None, phase: clock.phase, area, extension, session }
+    ViewContext { snapshot, theme, now, present: None, phase: clock.phase, area, size, extension, session }
 }
 
 /// Lets the tabs change while they read the rest of the model.

@@ -165,3 +165,25 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         }
     }
 }
+
+/// The screen has another size: a tab that it has no room for gives way to the values, as long as these are offered.
+pub(super) fn fit_screen(model: &mut Model) {
+    if Size::of(model.screen) == Size::Compact && !model.tabs.shown.is_compact() {
+        let offered = Tab::offered(&model.cx());
+        if let Some(values) = offered.first().copied() {
+            model.visited.note(model.tabs.shown, values);
+            model.tabs.shown = values;
+        }
+    }
+    close_unseen(model);
+}
+
+/// A window that cannot be seen must not take keys, and none that gives commands opens where it may not be seen whole.
+/// What it held is dropped, nothing is done.
+pub(super) fn close_unseen(model: &mut Model) {
+    let small = model.small();
+    let closes = |modal: &Modal| !modal.is_quit() && (small || !modal.only_shows());
+    if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
+        model.note = Some(effects::needs_room());
+    }
+}

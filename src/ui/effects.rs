@@ -56,8 +56,18 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
     effects
 }
 
+/// Shown where a small screen cannot show what a key leads to.
+pub(super) fn needs_room() -> &'static str {
+    t!("This needs a larger screen: 60x16")
+}
+
 /// Shows a tab; it asks at once for what it needs, and says what it has to say.
 pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
+    let fits = tab.is_compact() || tab == Tab::Login || !model.tabs.shown.is_compact();
+    if Size::of(model.screen) == Size::Compact && !fits {
+        model.note = Some(needs_room());
+        return Vec::new();
+    }
     if !tab.has_past() {
         model.replay.leave();
     }

@@ -205,6 +205,7 @@ pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&ViewContext) -> T) -> 
         present: None,
         phase: 0,
         area,
+        size: super::layout::Size::Normal,
         extension: None,
         session: &session(),
     })

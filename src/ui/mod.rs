@@ -11,6 +11,7 @@ pub(crate) mod glyph_filter;
 pub(crate) mod io;
 pub(crate) mod interlock;
 pub(crate) mod keys;
+pub(crate) mod layout;
 pub(crate) mod modal;
 pub(crate) mod msg;
 pub(crate) mod session_lock;
@@ -49,6 +50,7 @@ use extension::Extension;
 use keys::Global;
 pub use last_command::LastCommand;
 use last_frame::LastFrame;
+use layout::Size;
 use modal::{Confirm, Modal, Palette, Target, palette};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use replay::Replay;
@@ -157,9 +159,20 @@ impl Model {
         model
     }
 
+    /// The size that the shown tab needs, where the screen has only room for the banner.
+    pub fn lacks_room(&self) -> Option<(u16, u16)> {
+        match Size::of(self.screen) {
+            Size::Tiny if self.tabs.shown.is_compact() => Some(Size::Compact.least()),
+            Size::Compact if self.tabs.shown.is_compact() && self.replay.shown().is_none() => None,
+            // There is no row here that says that a past is shown.
+            Size::Tiny | Size::Compact => Some(Size::Narrow.least()),
+            Size::Narrow | Size::Normal | Size::Wide | Size::Overview => None,
+        }
+    }
+
     /// Is the screen too small for more than the banner?
     pub fn small(&self) -> bool {
-        chrome::layout(self.screen).small
+        self.lacks_room().is_some()
     }
 
     /// Doubts every value: nothing has been heard of them for too long.
@@ -198,10 +211,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Resize(width, height) => {
             model.screen = Rect::new(0, 0, width, height);
-            if model.small() {
-                // A window that cannot be seen must not take keys. What it held is dropped, nothing is done.
-                model.modal.take_if(|modal| !modal.is_quit());
-            }
+            dispatch::fit_screen(model);
             with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))
         }
         Msg::Begin(start) => with_tabs(model, |tabs, cx| tabs.registers.begin(cx, start)),
@@ -241,6 +251,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let mut effects = perform(model, actions);
     let actions = tour::follow(model, event);
     effects.extend(perform(model, actions));
+    dispatch::close_unseen(model);
     model.close_confirmation();
     if keyed {
         model.note_keyed();

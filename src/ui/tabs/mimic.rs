@@ -201,7 +201,7 @@ impl Mimic {
         let items = &picture.items;
         let listed = list::is_shown(cx, picture, parts.picture);
         match action {
-            Action::Move(dx, dy) if listed => self.selected = list::neighbour(items, self.selected, (dx, dy)),
+            Action::Move(dx, dy) if listed => self.selected = list::neighbour(cx, items, self.selected, (dx, dy)),
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
             Action::Motion => self.still = !self.still,
             Action::Page(by) => {

@@ -24,6 +24,7 @@ use super::{
     Effect, UiAction, ViewContext,
     keys::{self, Hint},
     last_frame::Rows,
+    layout::Size,
     session_lock,
 };
 use crate::{
@@ -218,6 +219,7 @@ impl Tab {
             .filter(|tab| tab.is_of_bench() || !cx.def().is_bench())
             .filter(|tab| *tab != Tab::Bus || !cx.def().lines.is_empty())
             .filter(|tab| tab.is_offered(cx) && (tab.has_past() || !cx.is_past()))
+            .filter(|tab| tab.is_compact() || cx.size != Size::Compact)
             .collect()
     }
 
@@ -229,6 +231,11 @@ impl Tab {
     /// Does it show the plant, so that it can show it as it was? A report is of a period of its own.
     pub fn has_past(self) -> bool {
         matches!(self, Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Bus)
+    }
+
+    /// Is it a list that the smallest screens have room for?
+    pub fn is_compact(self) -> bool {
+        matches!(self, Tab::Mimic | Tab::Alarms)
     }
 
     /// Has it something to show where no plant file says what the registers of a device mean?

@@ -60,7 +60,7 @@ fn a_screen_too_small_to_see_takes_no_commands() {
     let small = |keys: &str| {
         let mut model = model(&fixture, Theme::FULL);
         type_keys(&mut model, keys);
-        screen(&mut model, 50, 10);
+        screen(&mut model, 30, 10);
         model
     };
     for keys in ["s65⏎", "r⏎", "m⏎", "A⏎", "4⏎T↓⏎⏎", "4u", "4L⏎", "?", "5w⏎"] {
@@ -77,7 +77,7 @@ fn a_screen_too_small_to_see_takes_no_commands() {
     let mut model = small("3↓↓");
     assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()), "the banner's");
     type_keys(&mut model, "q");
-    assert!(screen(&mut model, 50, 10).contains("Quit? ⏎ quit  Esc cancel"));
+    assert!(screen(&mut model, 30, 10).contains("Quit? ⏎ quit  Esc cancel"));
     assert_eq!(type_keys(&mut model, "⎋"), []);
     assert_eq!(type_keys(&mut model, "q⏎"), [Effect::Quit]);
 }

@@ -7,7 +7,7 @@ use std::{collections::HashSet, sync::Arc, time::Duration};
 use jiff::SignedDuration;
 use ratatui::buffer::Buffer;
 
-use super::{draw, model, screen, text, type_keys};
+use super::{draw, model, screen, sent_kind, text, type_keys};
 use crate::{
     plant::{
         alarm::AlarmState,
@@ -169,13 +169,46 @@ fn a_tiny_screen_still_shows_the_alarm() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
     let shown = screen(&mut model, 50, 5);
     assert!(shown.contains("‹2›! UNACK 00:41  TIC-1.PV"), "{shown}");
-    assert!(shown.contains("screen too small: 50x5, needs 60x16"), "{shown}");
+    assert!(shown.contains("screen too small: 50x5, needs 36x8"), "{shown}");
+}
+
+/// Values whole, each with its alarm; a window that might not be seen whole does not open.
+#[test]
+fn a_small_screen_lists_values_and_alarms() {
+    let mut fixture = Fixture::alarm();
+    fixture.set("TIC-1.MV", 100.0);
+    for (width, height) in [(36, 8), (40, 12), (59, 40)] {
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "6");
+        let first = screen(&mut model, width, height);
+        assert_eq!(model.tabs.shown, Tab::Mimic, "the values stand in for a tab without room");
+        let mut seen = first.clone();
+        for _ in 0..fixture.def.mimic.pages[0].pictures[0].items.len() {
+            type_keys(&mut model, "↓");
+            seen += &screen(&mut model, width, height);
+        }
+        assert!(first.contains("‹2›! UNACK 00:41") && !seen.contains("##"), "{seen}");
+        let has = |words: [&str; 3]| seen.lines().any(|line| words.iter().all(|word| line.contains(word)));
+        assert!(has(["TIC-1.PV", "72.4 °C", "‹2›!"]) && has(["TIC-1.MV", "100.0 %", ""]), "{seen}");
+        assert_eq!(type_keys(&mut model, "r"), []);
+        assert_eq!((&model.modal, model.note.is_some()), (&None, true), "nothing is written here");
+        type_keys(&mut model, "3t");
+        assert_eq!(model.tabs.shown, Tab::Alarms, "no key leads to a tab without room");
+        assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()));
+    }
+}
+
+#[test]
+fn a_value_without_trust_says_so_on_a_small_screen() {
+    let shown = screen(&mut model(&Fixture::line_down(), Theme::FULL), 40, 20);
+    assert!(shown.lines().any(|line| line.contains("TIC-1.PV") && line.contains("64.2? °C") && line.contains("12s")));
+    assert!(shown.contains("---- not connected"), "{shown}");
 }
 
 #[test]
 fn a_screen_of_any_width_says_that_it_is_too_small() {
     for (width, expect) in
-        [(50, "screen too small: 50x6, needs 60x16"), (30, "too small: 30x6, needs 60x16"), (20, "too small: 20x6")]
+        [(50, "screen too small: 50x6, needs 36x8"), (30, "too small: 30x6, needs 36x8"), (20, "too small: 20x6")]
     {
         let mut model = model(&Fixture::normal(), Theme::FULL);
         assert_eq!(screen(&mut model, width, 6).lines().nth(1), Some(expect));

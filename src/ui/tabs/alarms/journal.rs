@@ -5,6 +5,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::record::{ActionRecord, AlarmRecord},
     report::Period,
+    ui::layout::Size,
 };
 
 /// Without a chosen period the journal reaches back so far.
@@ -13,8 +14,6 @@ const SPAN: SignedDuration = SignedDuration::from_hours(24);
 const ROWS: usize = 500;
 /// The same while something is searched for.
 const SEARCHED_ROWS: usize = 2_000;
-/// From so many columns on the texts of alarms are whole.
-const WIDE: u16 = 110;
 /// How often it is queried again, real time.
 const EVERY_S: f64 = 5.0;
 /// What may be typed, for the entry window.
@@ -158,7 +157,7 @@ fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     let reason = row.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let mark = cx.theme.priority_mark(row.priority);
     // Texts are cut only where there is no room.
-    let (message, event) = if cx.area.width < WIDE { (22, 12) } else { (44, 22) };
+    let (message, event) = if cx.size < Size::Wide { (22, 12) } else { (44, 22) };
     format!(
         "{mark} {} {} {}{number}{by}{reason}",
         pad(&row.subject, 12),

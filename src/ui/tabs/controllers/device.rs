@@ -10,12 +10,13 @@ use crate::{
     plant::ne107::{Reason, Signal},
     ui::{
         chrome::{command_label, outcome_words},
+        layout::Size,
         modal::faceplate::{device_text, retry_text},
     },
 };
 
-/// From this size on faceplate and table stand side by side.
-const WIDE: (u16, u16) = (110, 30);
+/// The faceplate beside the table needs so many rows.
+const PANEL_ROWS: u16 = 24;
 /// Columns of the faceplate beside the table.
 const PANEL: u16 = 36;
 
@@ -23,7 +24,7 @@ const PANEL: u16 = 36;
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Table, trend: Option<&Series>) {
     heading(cx, device, canvas);
     let (wide, high) = (canvas.width(), canvas.height());
-    if device.faceplate.is_some() && wide >= WIDE.0 && high + 6 >= WIDE.1 {
+    if device.faceplate.is_some() && Size::is_wide(wide) && PANEL_ROWS <= high {
         faceplate::panel(cx, &mut canvas.part(1, 2, PANEL, high.saturating_sub(2)), device, trend);
         let left = PANEL + 3;
         below(cx, &mut canvas.part(left, 1, wide.saturating_sub(left), high.saturating_sub(1)), device, table);

@@ -20,6 +20,7 @@ use crate::{
         snapshot::ActiveAlarm,
     },
     ui::{
+        layout::Size,
         modal::{
             confirm::subject,
             faceplate::{device_text, line_state_text},
@@ -28,8 +29,6 @@ use crate::{
     },
 };
 
-/// From so many columns on there are companions.
-const WIDE_MIN: u16 = 110;
 /// Least and greatest width of the column beside the mimic.
 const SIDE: (u16, u16) = (30, 56);
 /// The mimic grows by so much at most: what is left is for the companions.
@@ -67,7 +66,7 @@ pub struct Parts {
 pub fn parts(nominal: (u16, u16), area: Rect) -> Parts {
     let alone = Parts { picture: area, side: None, trend: None };
     let room = area.width.saturating_sub(nominal.0.saturating_add(1));
-    if area.width < WIDE_MIN || room < SIDE.0 {
+    if !Size::is_wide(area.width) || room < SIDE.0 {
         return alone;
     }
     let grown = |cells: u16| to_u16((f64::from(cells) * GROWS).round());
