@@ -27,6 +27,7 @@ use crate::{
     plant::{event::LineState, line_minute::LineMinute, line_report::LineReport, snapshot::LineStatus},
     ui::{
         keys::{find, hide, hints},
+        layout::Size,
         modal::Settings,
         widgets::line_trend::{self, line_trend},
     },
@@ -39,6 +40,8 @@ const ASK_EVERY: SignedDuration = SignedDuration::from_secs(60);
 const TIMEOUT: SignedDuration = SignedDuration::from_secs(10);
 /// Rows of the day.
 const DAY_HEIGHT: u16 = 3;
+/// Least rows of the recent frames below them.
+const FRAMES_MIN: u16 = 4;
 
 /// What is shown of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -236,7 +239,11 @@ impl TabView for Bus {
             Page::Line => {
                 let rows = line::rows(cx, &at, width);
                 rows::draw(cx, &mut page, &rows, self.scroll.first(rows.len(), self.room(cx) - 1));
-                self.day(cx, &mut page, to_u16(rows.len()));
+                let used = self.day(cx, &mut page, to_u16(rows.len()));
+                let left = page.height().saturating_sub(used + 1);
+                if Size::Wide <= cx.size && FRAMES_MIN < left {
+                    frames::recent(cx, &at, &mut page.part(0, used + 1, width, left));
+                }
             }
             Page::Plan => self.plan.view(cx, &at, &mut page),
             Page::Frames => self.frames.view(cx, &at, &mut page),
@@ -266,15 +273,16 @@ impl Bus {
         usize::from(cx.area.height.saturating_sub(1)).max(2)
     }
 
-    /// How the line did over the last day, below the rows where there is room for it.
-    fn day(&self, cx: &ViewContext, page: &mut Canvas, rows: u16) {
+    /// How the line did over the last day, below the rows where there is room for it; returns the row after it.
+    fn day(&self, cx: &ViewContext, page: &mut Canvas, rows: u16) -> u16 {
         let (width, height) = (page.width(), page.height());
         if height < rows + DAY_HEIGHT {
-            return;
+            return height;
         }
         let below = (rows + 1).min(height - DAY_HEIGHT);
         let mut day = page.part(1, below, width.saturating_sub(2), DAY_HEIGHT);
         line_trend(cx, &mut day, self.minutes.value.as_deref().unwrap_or_default());
+        below + DAY_HEIGHT
     }
 
     /// So many lines on, around the end.

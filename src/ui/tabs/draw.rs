@@ -1,7 +1,16 @@
 //! What several tabs draw and open alike.
 
 use super::prelude::*;
-use crate::plant::record::ActionRecord;
+use ratatui::widgets::Widget;
+
+use crate::{
+    history::Series,
+    plant::{def::Pen, number::to_usize, record::ActionRecord},
+    ui::{
+        tabs::trends::span::View,
+        widgets::chart::{Chart, Curve, mark, trace::Trace},
+    },
+};
 
 /// Opens a window, if there is one.
 pub fn open(window: impl Into<Option<Modal>>) -> Vec<UiAction> {
@@ -33,6 +42,12 @@ pub fn columns<const N: usize>(widths: [i16; N], cells: [&str; N]) -> String {
     cells.into_iter().zip(widths).filter_map(cell).collect::<Vec<_>>().join(" ")
 }
 
+/// A share as a bar: `██████────`.
+pub fn bar(cx: &ViewContext, share: f64, cells: usize) -> String {
+    let full = to_usize((share.clamp(0.0, 1.0) * cells as f64).round()).max(usize::from(0.0 < share));
+    "█".repeat(full) + &cx.theme.pick("─", "-").repeat(cells - full)
+}
+
 /// `60.0 °C → 70.0 °C`: what an operator action has changed.
 pub fn change(cx: &ViewContext, action: &ActionRecord) -> String {
     let arrow = cx.theme.pick("→", "->");
@@ -42,6 +57,44 @@ pub fn change(cx: &ViewContext, action: &ActionRecord) -> String {
         (Some(old), None) => old.to_string(),
         (None, None) => String::new(),
     }
+}
+
+/// Curves of these pens with their names above, from what the history has answered of them.
+pub fn curves(cx: &ViewContext, canvas: &mut Canvas, title: &str, view: View, pens: &[Pen], series: &[Series]) {
+    let theme = cx.theme;
+    let mut x = canvas.text(1, 0, title, theme.dim());
+    for (n, pen) in pens.iter().enumerate() {
+        let words = format!("{} {}", mark(theme, n), cx.def().tag(pen.tag).name);
+        x = canvas.text(x + 3, 0, &words, theme.pen(n));
+    }
+    let trace = |pen: &Pen| {
+        let mut trace = Trace::default();
+        if let Some(series) = series.iter().find(|series| series.tag == pen.tag) {
+            trace.set_past(series.clone(), Timestamp::MAX);
+        }
+        trace
+    };
+    let traces: Vec<Trace> = pens.iter().map(trace).collect();
+    let curve = |(n, (pen, trace)): (usize, (&Pen, _))| Curve {
+        trace,
+        pen: n,
+        unit: cx.snapshot.unit(pen.tag),
+        fixed: pen.scale,
+        resolution: 10f64.powi(-i32::from(cx.snapshot.decimals[pen.tag.index()])),
+        dashed: false,
+    };
+    let chart = Chart {
+        theme,
+        zone: Some(&cx.def().time_zone),
+        from: view.from,
+        to: view.to,
+        now: cx.now,
+        curves: pens.iter().zip(&traces).enumerate().map(curve).collect(),
+        cursor: None,
+        marks: Vec::new(),
+    };
+    let area = canvas.part(0, 1, canvas.width(), canvas.height().saturating_sub(1)).area();
+    chart.render(area, canvas.buffer());
 }
 
 /// A local time in this form of `strftime`.

@@ -254,6 +254,19 @@ impl Ring {
     }
 }
 
+/// The newest frames below what else is shown of a line, as many as there is room for.
+pub fn recent(cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
+    let Some(report) = at.report else { return };
+    let ring = Ring { held: report.frames.clone(), ..Ring::default() };
+    let (shown, width) = (ring.shown(), canvas.width());
+    canvas.run(0, 0, width, '─', cx.theme.dim());
+    canvas.text(1, 0, t!(" recent frames, newest below "), cx.theme.dim());
+    let room = usize::from(canvas.height().saturating_sub(1));
+    for (y, _, frame) in on_screen(&shown, shown.len().saturating_sub(room), room) {
+        ring.row(cx, frame, false, &mut canvas.part(0, y + 1, width, 1));
+    }
+}
+
 /// Without what the columns before it say: `read holding 41001–41003 (0x03E8, 3)`.
 fn short(summary: &str) -> String {
     let rest = summary.strip_prefix("unit ").and_then(|rest| rest.split_once(' ')).map_or(summary, |(_, rest)| rest);

@@ -6,7 +6,7 @@ use worries::worries;
 
 use super::{
     LineView,
-    rows::{self, Row, bar, flow, number, plain, words},
+    rows::{self, Row, flow, number, plain, words},
     state_text,
 };
 use crate::ui::tabs::prelude::*;
@@ -113,7 +113,7 @@ fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     let (style, mark) = if now < 0.9 { (theme.normal(), "") } else { (theme.trouble(), "! ") };
     let part = vec![
         (format!("{mark}{:>3.0} % ", now * 100.0), style),
-        (bar(cx, now, 12), style),
+        (draw::bar(cx, now, 12), style),
         (t!(" {minute} % of the last minute ", minute = format!("{:>3.0}", minute * 100.0)), theme.normal()),
         (spark::shares(&report.busy, usize::from(width.saturating_sub(60)).min(60), theme.glyphs), theme.dim()),
     ];
@@ -272,7 +272,7 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
             span(stats.response_time.last()),
             span(stats.response_time.p99()),
             span(stats.response_time.max()),
-            share.map_or(String::new(), |share| bar(cx, share, 8)),
+            share.map_or(String::new(), |share| draw::bar(cx, share, 8)),
         ]);
     }
     let (heading, lines) = rows::table(&columns, &lines, width.saturating_sub(2));

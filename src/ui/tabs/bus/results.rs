@@ -4,7 +4,7 @@ use super::{
     LineView,
     frames::{broken, bytes_text},
     line::{ms, short_ms},
-    rows::{Row, bar, plain},
+    rows::{Row, plain},
     window::{dissection_rows, exchange_rows},
 };
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
@@ -108,7 +108,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
         let share = f64::from(run.done) / f64::from(run.total);
         let left = remaining(cx, run).map_or(String::new(), |left| t!(", {ms} left", ms = ms(left)));
         let words = t!(" {done} of {total}{left}   {now}", done = run.done, total = run.total, left, now = run.now);
-        rows.push(vec![(bar(cx, share, 20), theme.normal()), (words, theme.normal())]);
+        rows.push(vec![(draw::bar(cx, share, 20), theme.normal()), (words, theme.normal())]);
     }
     rows
 }

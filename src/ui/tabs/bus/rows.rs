@@ -1,6 +1,5 @@
 //! Rows of styled words that scroll, words that flow into rows, and tables that leave out columns where there is no room.
 
-use crate::plant::number::to_usize;
 use crate::ui::tabs::prelude::*;
 
 /// A row of the screen: words with their looks, one behind the other.
@@ -98,12 +97,6 @@ pub fn table<const N: usize>(columns: &[Column; N], lines: &[[String; N]], room:
     };
     let heading = line(&|n| columns[n].title.to_owned());
     (heading, lines.iter().map(|cells| line(&|n| cells[n].clone())).collect())
-}
-
-/// A share as a bar: `██████────`.
-pub fn bar(cx: &ViewContext, share: f64, cells: usize) -> String {
-    let full = to_usize((share.clamp(0.0, 1.0) * cells as f64).round()).max(usize::from(0.0 < share));
-    "█".repeat(full) + &cx.theme.pick("─", "-").repeat(cells - full)
 }
 
 #[cfg(test)]

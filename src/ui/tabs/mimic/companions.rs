@@ -2,8 +2,6 @@
 
 use std::{cmp::Reverse, collections::BTreeSet};
 
-use ratatui::widgets::Widget;
-
 use crate::ui::tabs::{
     alarms::{action_text, event_text},
     prelude::*,
@@ -25,7 +23,7 @@ use crate::{
             confirm::subject,
             faceplate::{device_text, line_state_text},
         },
-        widgets::chart::{self, Chart, Curve, mark, trace::Trace},
+        widgets::chart,
     },
 };
 
@@ -187,43 +185,9 @@ impl Companions {
 
     /// The first group of pens over the last hour.
     fn trend(&self, cx: &ViewContext, canvas: &mut Canvas) {
-        let (theme, pens, view) = (cx.theme, pens(cx), view(cx, canvas.area()));
         let Some(group) = cx.def().trends.first() else { return };
-        let mut x = canvas.text(1, 0, &t!("{name}, last hour", name = group.name), theme.dim());
-        let empty: &[Series] = &[];
-        let series = self.curves.value.as_deref().unwrap_or(empty);
-        let trace = |pen: &Pen| {
-            let mut trace = Trace::default();
-            if let Some(series) = series.iter().find(|series| series.tag == pen.tag) {
-                trace.set_past(series.clone(), Timestamp::MAX);
-            }
-            trace
-        };
-        let traces: Vec<Trace> = pens.iter().map(trace).collect();
-        let curve = |(n, (pen, trace)): (usize, (&Pen, _))| Curve {
-            trace,
-            pen: n,
-            unit: cx.snapshot.unit(pen.tag),
-            fixed: pen.scale,
-            resolution: 10f64.powi(-i32::from(cx.snapshot.decimals[pen.tag.index()])),
-            dashed: false,
-        };
-        for (n, pen) in pens.iter().enumerate() {
-            let words = format!("{} {}", mark(theme, n), cx.def().tag(pen.tag).name);
-            x = canvas.text(x + 3, 0, &words, theme.pen(n));
-        }
-        let chart = Chart {
-            theme,
-            zone: Some(&cx.def().time_zone),
-            from: view.from,
-            to: view.to,
-            now: cx.now,
-            curves: pens.iter().zip(&traces).enumerate().map(curve).collect(),
-            cursor: None,
-            marks: Vec::new(),
-        };
-        let area = canvas.part(0, 1, canvas.width(), canvas.height().saturating_sub(1)).area();
-        chart.render(area, canvas.buffer());
+        let (title, view) = (t!("{name}, last hour", name = group.name), view(cx, canvas.area()));
+        draw::curves(cx, canvas, &title, view, &pens(cx), self.curves.value.as_deref().unwrap_or_default());
     }
 }
 

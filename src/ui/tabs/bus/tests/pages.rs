@@ -150,3 +150,13 @@ fn a_map_that_fails_shows_its_ranges_and_the_whole_reason() {
         );
     }
 }
+
+#[test]
+fn a_wide_screen_shows_line_devices_and_frames_together() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "L");
+    for (width, height, frames) in [(80, 40, false), (120, 40, true), (160, 50, true)] {
+        let shown = screen(&mut model, width, height);
+        let is_seen = shown.contains("recent frames") && shown.contains(" RX ");
+        assert!(is_seen == frames && shown.contains("TIC-1") && shown.contains("settings"), "{shown}");
+    }
+}
