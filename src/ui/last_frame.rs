@@ -146,6 +146,12 @@ impl Model {
 
 /// Acknowledges what `a` is for; says so where that needs none.
 pub(super) fn acknowledge(model: &mut Model) -> Vec<UiAction> {
+    let cx = model.cx();
+    let marked = if model.lists() { model.tabs.alarms.marked(&cx) } else { Vec::new() };
+    if !marked.is_empty() && !cx.is_past() {
+        // The window names those that it is about.
+        return actions::acknowledge_all(&cx, marked.into_iter());
+    }
     let (actions, note) = match model.alarm_seen() {
         Ok(Some(alarm)) if alarm.state.needs_acknowledgement() => (actions::acknowledge(&model.cx(), alarm), None),
         Ok(Some(alarm)) if model.lists() => (actions::acknowledged(&model.cx(), alarm), None),

@@ -3,6 +3,7 @@
 
 mod go;
 pub(crate) mod actions;
+mod columns;
 mod filter;
 pub(crate) mod guidance;
 mod handover;
@@ -10,6 +11,9 @@ mod journal;
 mod keys;
 mod list;
 mod metrics;
+mod recent;
+mod select;
+mod side;
 mod span;
 mod view;
 
@@ -25,10 +29,11 @@ use crate::{
     },
     ui::{
         keys::{find, hide, hints},
+        layout::Size,
         modal::{Guidance, faceplate::device_text},
     },
 };
-use filter::Filter;
+use filter::{Filter, Sort};
 pub use go::faceplate;
 use handover::Handover;
 pub use handover::suppressed_words;
@@ -36,6 +41,7 @@ use journal::Journal;
 pub use journal::{action_text, event_text};
 use keys::Action;
 use metrics::Metrics;
+use recent::Recent;
 
 /// A view of the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -79,9 +85,13 @@ pub struct Alarms {
     page: Page,
     /// The selected alarm; it stays selected when the list moves.
     selected: Selected<AlarmId>,
-    /// First-out groups whose consequences are shown, by their beginning; only those that are in the list.
-    unfolded: Vec<Timestamp>,
+    /// Alarms that were marked, for what is done with several; only those that are in the list.
+    marked: Vec<AlarmId>,
+    /// First-out groups that were folded or expanded, by their beginning; only those that are in the list.
+    folds: Vec<(Timestamp, bool)>,
     filter: Filter,
+    sort: Sort,
+    recent: Recent,
     journal: Journal,
     metrics: Metrics,
     handover: Handover,
@@ -103,7 +113,9 @@ impl TabView for Alarms {
             Action::Move(motion) => self.step(cx, motion),
             Action::View(by) => self.turn(by),
             Action::Bell => self.bell = !self.bell,
-            Action::Fold => self.fold(cx),
+            Action::Fold(folded) => self.fold(cx, folded),
+            Action::Mark => self.mark(cx),
+            Action::Sort => self.sort = self.sort.next(),
             Action::Priority => self.filter.next_priority(),
             Action::State => self.filter.next_state(),
             Action::Area => self.filter.next_area(cx.def()),
@@ -111,9 +123,10 @@ impl TabView for Alarms {
             Action::Shift(by) => self.shift(cx, by),
             Action::Now => self.shift(cx, 0),
             Action::Journal => self.turn_to_journal(cx),
+            Action::Note if !self.marked.is_empty() => return actions::note_all(cx, self.marked(cx).into_iter()),
             Action::Note => return alarm.map_or_else(Vec::new, |alarm| actions::note(cx, alarm)),
             Action::AcknowledgePage => return actions::acknowledge_all(cx, self.seen(cx).into_iter()),
-            Action::Shelve => return alarm.map_or_else(Vec::new, |alarm| actions::shelve(cx, alarm.id)),
+            Action::Shelve => return actions::shelve(cx, &self.meant(cx)),
             Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| actions::out_of_service(cx, alarm.id)),
             Action::PutBack => return self.suppressed(cx).map_or_else(Vec::new, |alarm| actions::put_back(cx, alarm)),
             Action::Reset => return alarm.map_or_else(Vec::new, |alarm| actions::reset(cx, alarm)),
@@ -138,7 +151,9 @@ impl TabView for Alarms {
         let is_kept = |alarm: &SuppressedAlarm| matches!(alarm.state, AlarmState::Shelved | AlarmState::OutOfService);
         let lacking = [
             (Action::Reset, !alarm.is_some_and(|alarm| alarm.state.is_latched())),
-            (Action::Fold, alarm.is_none_or(|alarm| alarm.first_out.is_none())),
+            (Action::Fold(false), !self.is_folded(cx, true)),
+            (Action::Fold(true), !self.is_folded(cx, false)),
+            (Action::Area, filter::areas(cx.def()).is_empty()),
             (Action::PutBack, !self.suppressed(cx).is_some_and(is_kept)),
         ];
         let mut keys = keys::table(self.page);
@@ -152,6 +167,10 @@ impl TabView for Alarms {
 
     fn back(&mut self, _cx: &ViewContext) -> bool {
         let list = matches!(self.page, Page::Active | Page::System);
+        if list && !self.marked.is_empty() {
+            self.marked.clear();
+            return true;
+        }
         if list && !self.filter.is_off() {
             self.filter = Filter::default();
             return true;
@@ -182,12 +201,10 @@ impl TabView for Alarms {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let there = |began: &Timestamp| {
-            cx.snapshot.alarms.iter().any(|alarm| alarm.first_out.is_some_and(|first_out| first_out.began == *began))
-        };
-        self.unfolded.retain(there);
+        self.forget_gone(cx);
         match self.page {
-            Page::Active | Page::Suppressed | Page::System => Vec::new(),
+            Page::Active | Page::System => self.recent.ask(cx, &mut self.asked),
+            Page::Suppressed => Vec::new(),
             Page::Journal => self.journal.ask(cx, &mut self.asked),
             Page::Metrics => self.metrics.ask(cx, &mut self.asked).into_iter().collect(),
             Page::Handover => self.handover.ask(cx, &mut self.asked).into_iter().collect(),
@@ -197,10 +214,11 @@ impl TabView for Alarms {
     fn awaits(&self, number: u32) -> bool {
         let Journal { alarms, actions, .. } = &self.journal;
         let queries = [&alarms.query, &actions.query, &self.metrics.figures.query, &self.handover.actions.query];
-        queries.iter().any(|query| query.awaits(number))
+        self.recent.awaits(number) || queries.iter().any(|query| query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        self.recent.on_answer(cx, number, &answer);
         self.journal.alarms.on_answer(cx, number, &answer);
         self.journal.actions.on_answer(cx, number, &answer);
         self.metrics.figures.on_answer(cx, number, &answer);
@@ -239,10 +257,12 @@ impl Alarms {
         self.page = Page::Active;
     }
 
-    /// The alarms that the filter lets through, in order of urgency; `None` on pages without a list of them.
+    /// The alarms that the filter lets through, in the order of the list; `None` on pages without a list of them.
     pub fn listed<'a>(&self, cx: &ViewContext<'a>) -> Option<Vec<&'a ActiveAlarm>> {
         let list = matches!(self.page, Page::Active | Page::System);
-        list.then(|| self.of_page(cx).filter(|alarm| self.filter.holds(cx, alarm)).collect())
+        let mut listed: Vec<_> = self.of_page(cx).filter(|alarm| self.filter.holds(cx, alarm)).collect();
+        self.sort.sort(cx.def(), &mut listed);
+        list.then_some(listed)
     }
 }
 
@@ -254,8 +274,15 @@ impl Alarms {
     }
 
     fn rows<'a>(&self, cx: &ViewContext<'a>) -> Vec<list::Row<'a>> {
-        let listed = self.listed(cx).unwrap_or_default();
-        list::rows(cx.def(), listed.into_iter(), &self.unfolded)
+        let listed = self.listed(cx).unwrap_or_default().into_iter();
+        match self.sort {
+            // A wide screen shows the tree of a first-out group until it is folded.
+            Sort::Urgency => {
+                let chosen = |began| self.folds.iter().find(|(of, _)| *of == began).map(|(_, folded)| *folded);
+                list::rows(cx.def(), listed, |began| chosen(began).unwrap_or(cx.size < Size::Wide))
+            }
+            Sort::Time | Sort::Name => listed.map(list::Row::plain).collect(),
+        }
     }
 
     fn place(&self, rows: &[list::Row]) -> usize {
@@ -265,17 +292,9 @@ impl Alarms {
     /// Rows of the list that the screen has room for.
     fn page_rows(&self, cx: &ViewContext) -> usize {
         match self.page {
-            Page::Active | Page::System | Page::Suppressed => view::room(cx, cx.area.width, cx.area.height),
+            Page::Active | Page::System | Page::Suppressed => view::room(self, cx, cx.area.width, cx.area.height),
             Page::Journal | Page::Metrics | Page::Handover => usize::from(cx.area.height.saturating_sub(3)).max(1),
         }
-    }
-
-    /// The alarms whose rows are on the screen.
-    fn seen<'a>(&self, cx: &ViewContext<'a>) -> Vec<&'a ActiveAlarm> {
-        let rows = self.rows(cx);
-        let room = self.page_rows(cx);
-        let first = first(self.place(&rows), rows.len(), room);
-        rows.into_iter().skip(first).take(room).map(|row| row.alarm).collect()
     }
 
     fn suppressed<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a SuppressedAlarm> {
@@ -289,36 +308,8 @@ impl Alarms {
         self.selected(cx).map(|alarm| alarm.id).or_else(|| self.suppressed(cx).map(|suppressed| suppressed.id))
     }
 
-    fn step(&mut self, cx: &ViewContext, motion: Motion) {
-        let room = self.page_rows(cx);
-        let ids: Vec<AlarmId> = match self.page {
-            Page::Active | Page::System => self.rows(cx).iter().map(|row| row.alarm.id).collect(),
-            Page::Suppressed => cx.snapshot.suppressed.iter().map(|alarm| alarm.id).collect(),
-            Page::Journal => return self.journal.step(cx, motion, room),
-            Page::Metrics => return self.metrics.step(cx, motion, room),
-            Page::Handover => return self.handover.step(cx, motion, room),
-        };
-        self.selected.on(motion, ids, room);
-    }
-
     fn turn(&mut self, by: isize) {
         self.page = Page::ALL[around(self.page as usize, by, Page::ALL.len())];
-    }
-
-    /// Shows what is folded under the selected alarm, or folds the first-out group that it belongs to.
-    fn fold(&mut self, cx: &ViewContext) {
-        let Some(first_out) = self.selected(cx).and_then(|alarm| alarm.first_out) else { return };
-        match self.unfolded.iter().position(|began| *began == first_out.began) {
-            Some(place) => drop(self.unfolded.remove(place)),
-            None => self.unfolded.push(first_out.began),
-        }
-        // Folded away with its first-out group, it is the first of it that is selected.
-        let rows = self.rows(cx);
-        if !rows.iter().any(|row| self.selected.0 == Some(row.alarm.id)) {
-            let leader =
-                rows.iter().find(|row| row.folded && row.alarm.first_out.map(|b| b.began) == Some(first_out.began));
-            self.selected.0 = leader.map(|row| row.alarm.id);
-        }
     }
 
     fn shift(&mut self, cx: &ViewContext, by: isize) {

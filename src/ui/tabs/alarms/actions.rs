@@ -44,6 +44,20 @@ pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     open(Modal::Reason(Box::new(reason)))
 }
 
+/// Acknowledges all of these with one note.
+pub fn note_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<UiAction> {
+    let waiting: Vec<_> = alarms.filter(|alarm| alarm.state.needs_acknowledgement()).collect();
+    if waiting.is_empty() {
+        return Vec::new();
+    }
+    let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).ack_comment);
+    let notes = names(cx, waiting.iter().map(|alarm| alarm.id));
+    let alarms = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
+    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms });
+    let reason = Reason::new(t!("acknowledge with a note"), t!("acknowledge"), notes, kind, needed);
+    open(Modal::Reason(Box::new(reason)))
+}
+
 /// Asks whether to acknowledge all of these, exactly as they are seen now; where one of them needs a note it is asked for.
 pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<UiAction> {
     let waiting: Vec<_> = alarms.filter(|alarm| alarm.state.needs_acknowledgement()).collect();
@@ -55,10 +69,7 @@ pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a Ac
         1 => t!("Acknowledge 1 alarm?").to_owned(),
         n => t!("Acknowledge {n} alarms?", n),
     };
-    let mut notes: Vec<String> = waiting.iter().take(NAMED).map(|alarm| marked(cx, alarm.id)).collect();
-    if NAMED < waiting.len() {
-        notes.push(t!("… and {count} more", count = waiting.len() - NAMED));
-    }
+    let mut notes = names(cx, waiting.iter().map(|alarm| alarm.id));
     let alarms = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
     let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms });
     let title = t!("acknowledge all");
@@ -70,8 +81,9 @@ pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a Ac
     open(Modal::Confirm(Confirm::command(title, asked, kind).with_notes(notes)))
 }
 
-/// Asks for how long an alarm is shelved, and why.
-pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
+/// Asks for how long these alarms are shelved, and why.
+pub fn shelve(cx: &ViewContext, alarms: &[AlarmId]) -> Vec<UiAction> {
+    let [alarm, ..] = *alarms else { return Vec::new() };
     let max = cx.def().alarm_rules.shelve_max;
     let fixed = SHELVE_MIN.map(|minutes| Duration::from_secs(minutes * 60));
     let mut times: Vec<_> = fixed.into_iter().filter(|span| *span <= max).map(|span| (spelled(span), span)).collect();
@@ -80,9 +92,10 @@ pub fn shelve(cx: &ViewContext, alarm: AlarmId) -> Vec<UiAction> {
     if let Some(rest) = rest.filter(|rest| !rest.is_zero() && *rest <= max) {
         times.push((t!("rest of the shift, {running}", running = running(rest)), rest));
     }
-    let notes = vec![name(cx, alarm), t!("Not annunciated for this time, then unshelved automatically:").to_owned()];
+    let mut notes = if alarms.len() == 1 { vec![name(cx, alarm)] } else { names(cx, alarms.iter().copied()) };
+    notes.push(t!("Not annunciated for this time, then unshelved automatically:").to_owned());
     let kind = CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: max });
-    let window = Modal::Reason(Box::new(Reason::shelve(notes, alarm, times, max)));
+    let window = Modal::Reason(Box::new(Reason::shelve(notes, alarms, times, max)));
     vec![Notice::or(cx, t!("shelve an alarm"), &kind, window)]
 }
 
@@ -146,6 +159,16 @@ pub fn take_over(cx: &ViewContext) -> Vec<UiAction> {
     let who = cx.session.who.as_ref().map_or("–", |who| &who.user);
     let words = t!("{who} has read this page and takes over the plant.", who);
     open(Modal::Confirm(Confirm::command(t!("take over"), words, CommandKind::TakeOver)))
+}
+
+/// The first few of these, and how many more.
+fn names(cx: &ViewContext, alarms: impl ExactSizeIterator<Item = AlarmId>) -> Vec<String> {
+    let more = alarms.len().saturating_sub(NAMED);
+    let mut names: Vec<String> = alarms.take(NAMED).map(|alarm| marked(cx, alarm)).collect();
+    if more > 0 {
+        names.push(t!("… and {count} more", count = more));
+    }
+    names
 }
 
 /// The same with the mark as wide as all others, for lists.

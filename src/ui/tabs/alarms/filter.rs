@@ -1,4 +1,4 @@
-//! Which alarms the list shows: by priority, state, area and words; pure.
+//! Which alarms the list shows, by priority, state, area and words, and in which order; pure.
 
 use crate::plant::{
     alarm::{AlarmState, manager::subject_name},
@@ -21,6 +21,47 @@ pub struct Filter {
     pub area: Option<String>,
     /// Words that must all be found.
     words: Words,
+}
+
+/// The order of the list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Sort {
+    /// By priority, unacknowledged first; first-out groups stand together.
+    #[default]
+    Urgency,
+    /// The latest first.
+    Time,
+    /// By the name of what they watch.
+    Name,
+}
+
+impl Sort {
+    /// The next order.
+    pub fn next(self) -> Sort {
+        match self {
+            Sort::Urgency => Sort::Time,
+            Sort::Time => Sort::Name,
+            Sort::Name => Sort::Urgency,
+        }
+    }
+
+    /// `latest first`.
+    pub fn label(self) -> &'static str {
+        match self {
+            Sort::Urgency => t!("most urgent first"),
+            Sort::Time => t!("latest first"),
+            Sort::Name => t!("by tag"),
+        }
+    }
+
+    /// Sorts alarms that come in order of urgency.
+    pub fn sort(self, def: &PlantDef, alarms: &mut [&ActiveAlarm]) {
+        match self {
+            Sort::Urgency => {}
+            Sort::Time => alarms.sort_by_key(|alarm| std::cmp::Reverse(alarm.raised_at)),
+            Sort::Name => alarms.sort_by_key(|alarm| subject_name(def, def.alarm(alarm.id).subject)),
+        }
+    }
 }
 
 /// The states that an alarm in the list can be in.
@@ -57,11 +98,7 @@ impl Filter {
     }
     /// The next area of the plant, and all of them after the last.
     pub fn next_area(&mut self, def: &PlantDef) {
-        let mut areas: Vec<String> = def.alarms.iter().map(|alarm| alarm.area.clone()).collect();
-        areas.retain(|area| !area.is_empty());
-        areas.sort();
-        areas.dedup();
-        self.area = after(&areas, self.area.as_ref());
+        self.area = after(&areas(def), self.area.as_ref());
     }
 
     /// Does it let this alarm through?
@@ -86,6 +123,15 @@ impl Filter {
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join("  ")
     }
+}
+
+/// The areas of the plant that have alarms.
+pub fn areas(def: &PlantDef) -> Vec<String> {
+    let mut areas: Vec<String> = def.alarms.iter().map(|alarm| alarm.area.clone()).collect();
+    areas.retain(|area| !area.is_empty());
+    areas.sort();
+    areas.dedup();
+    areas
 }
 
 /// All that is looked through for words: what the view shows, nothing that is hidden.

@@ -17,8 +17,8 @@ use crate::{
 };
 
 /// Columns of the names at the left, with a blank before and behind them.
-fn names() -> u16 {
-    let names = [t!("now"), t!("cause"), t!("effect"), t!("action"), t!("go to")];
+pub fn names() -> u16 {
+    let names = [t!("now"), t!("cause"), t!("effect"), t!("action"), t!("before"), t!("go to")];
     names.into_iter().map(|name| text::width(name) + 2).max().unwrap_or(0).max(9)
 }
 
@@ -152,17 +152,42 @@ pub fn now_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
     words
 }
 
+/// The time to respond to an active alarm, and how much of it is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Response {
+    allowed: Duration,
+    gone: Duration,
+}
+
+/// The time to respond to this alarm; nothing where the plant file gives none, or once the condition has cleared.
+pub fn response(def: &AlarmDef, alarm: &ActiveAlarm, now: Timestamp) -> Option<Response> {
+    let allowed = def.guidance.response_time.filter(|_| alarm.state.is_active())?;
+    Some(Response { allowed, gone: elapsed(alarm.raised_at, now) })
+}
+
+impl Response {
+    /// How much is left; `Err` by how much it is over.
+    fn left(self) -> Result<Duration, Duration> {
+        self.allowed.checked_sub(self.gone).ok_or(self.gone.saturating_sub(self.allowed))
+    }
+    /// The time that is gone as a bar: `██████────`.
+    pub fn bar(self, cx: &ViewContext, cells: u16) -> String {
+        draw::bar(cx, self.gone.as_secs_f64() / self.allowed.as_secs_f64().max(1.0), usize::from(cells))
+    }
+    /// `09:19`, `OVERDUE`.
+    pub fn short(self) -> String {
+        self.left().map_or(t!("OVERDUE").to_owned(), running)
+    }
+}
+
 /// `respond within 10 min, 09:19 left`, and whether that time is over; nothing where the plant file gives no time.
 pub fn respond_text(cx: &ViewContext, def: &AlarmDef, alarm: &ActiveAlarm) -> Option<(String, bool)> {
     let respond = def.guidance.response_time?;
     let within = t!("respond within {div_ceil} min", div_ceil = respond.as_secs().div_ceil(60));
-    let gone = elapsed(alarm.raised_at, cx.now);
-    if !alarm.state.is_active() {
-        return Some((within, false));
-    }
-    Some(match respond.checked_sub(gone) {
-        Some(left) => (t!("{within}, {running} left", within, running = running(left)), false),
-        None => (t!("{within}, OVERDUE by {running}", within, running = running(gone - respond)), true),
+    let Some(response) = response(def, alarm, cx.now) else { return Some((within, false)) };
+    Some(match response.left() {
+        Ok(left) => (t!("{within}, {running} left", within, running = running(left)), false),
+        Err(over) => (t!("{within}, OVERDUE by {running}", within, running = running(over)), true),
     })
 }
 

@@ -14,8 +14,12 @@ pub enum Action {
     Bell,
     /// Open the guidance of the alarm, whole.
     Open,
-    /// Fold or unfold the first-out group of the alarm.
-    Fold,
+    /// Fold the first-out group of the alarm, or show it.
+    Fold(bool),
+    /// Mark the alarm for what is done with several, or take the mark off.
+    Mark,
+    /// The next order of the list.
+    Sort,
     /// Acknowledge with a note.
     Note,
     /// Acknowledge all that is on this page of the list.
@@ -70,13 +74,16 @@ const RESET: [Row; 1] =
     [Key::new(char('r'), "reset", "reset a latched alarm whose condition has cleared (asks first)", Action::Reset)
         .needs(Role::Technician)];
 
-const ACTIONS: [Row; 8] = [
+const ACTIONS: [Row; 11] = [
     Key::new(char('n'), "note", "acknowledge with a note", Action::Note).needs(Role::Technician),
     Key::new(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve).needs(Role::Technician),
     Key::new(char('/'), "filter", "show only alarms with these words; Esc: show all", Action::Words),
     Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage)
         .needs(Role::Technician),
-    Key::new(char(' '), "expand", "show or hide the consequences of a first-out group", Action::Fold),
+    Key::new(char(' '), "mark", "mark several alarms: a, n and z act on all marked ones; Esc: no marks", Action::Mark),
+    Key::new(code(KeyCode::Right), "expand", "show the consequences of a first-out group", Action::Fold(false)),
+    Key::new(code(KeyCode::Left), "fold", "hide the consequences of a first-out group", Action::Fold(true)),
+    Key::new(char('s'), "sort", "sort: most urgent first, latest first, by tag", Action::Sort),
     Key::new(
         char('o'),
         "out of service",
@@ -88,7 +95,7 @@ const ACTIONS: [Row; 8] = [
     Key::new(char('d'), "", "filter: next state", Action::State),
 ];
 
-const AREA: [Row; 1] = [Key::new(char('g'), "", "filter: next area", Action::Area)];
+const AREA: [Row; 1] = [Key::new(char('g'), "area", "filter: next area", Action::Area)];
 
 const OPEN: [Row; 1] = [Key::new(
     code(KeyCode::Enter),
@@ -129,7 +136,7 @@ const HANDOVER: [Row; 2] = [
 /// The keys of a page, the most wanted ones first: these must not fall off a narrow footer.
 pub fn table(page: Page) -> Vec<Row> {
     let parts: &[&[Row]] = match page {
-        Page::Active | Page::System => &[&RESET, &VIEWS, &OPEN, &ACTIONS, &MOVE, &GO, &AREA],
+        Page::Active | Page::System => &[&RESET, &VIEWS, &OPEN, &ACTIONS, &AREA, &MOVE, &GO],
         Page::Suppressed => &[&BACK, &VIEWS, &OPEN, &MOVE, &GO],
         Page::Journal => &[&SEARCH, &VIEWS, &SHIFT, &MOVE],
         Page::Metrics => &[&VIEWS, &SHIFT, &MOVE],

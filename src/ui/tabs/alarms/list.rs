@@ -18,12 +18,21 @@ pub struct Row<'a> {
     pub first: bool,
     /// It stands under the one that its first-out group is folded under.
     pub under: bool,
+    /// It is the last of those.
+    pub last: bool,
     /// So many alarms of its first-out group are folded under it, or can be.
     pub more: usize,
     /// So many of those wait for an acknowledgement.
     pub more_waiting: usize,
     /// They are folded away.
     pub folded: bool,
+}
+
+impl<'a> Row<'a> {
+    /// A row of an alarm that stands for itself.
+    pub fn plain(alarm: &'a ActiveAlarm) -> Row<'a> {
+        Row { alarm, first: false, under: false, last: false, more: 0, more_waiting: 0, folded: false }
+    }
 }
 
 /// A first-out group, as far as it is in the list.
@@ -39,7 +48,11 @@ struct Group<'a> {
 
 /// The rows of these alarms, which come in order of urgency. The first of a first-out group stands where the most urgent of it
 /// would, the less urgent others below it, unless they are folded; alarms of high and critical priority are never folded.
-pub fn rows<'a>(def: &PlantDef, alarms: impl Iterator<Item = &'a ActiveAlarm>, unfolded: &[Timestamp]) -> Vec<Row<'a>> {
+pub fn rows<'a>(
+    def: &PlantDef,
+    alarms: impl Iterator<Item = &'a ActiveAlarm>,
+    is_folded: impl Fn(Timestamp) -> bool,
+) -> Vec<Row<'a>> {
     let alarms: Vec<&ActiveAlarm> = alarms.collect();
     let mut groups: HashMap<Timestamp, Group> = HashMap::new();
     for alarm in &alarms {
@@ -54,26 +67,27 @@ pub fn rows<'a>(def: &PlantDef, alarms: impl Iterator<Item = &'a ActiveAlarm>, u
             group.below.push(alarm);
         }
     }
-    let plain = |alarm| Row { alarm, first: false, under: false, more: 0, more_waiting: 0, folded: false };
     let mut rows = Vec::with_capacity(alarms.len());
     for alarm in &alarms {
         let group = alarm.first_out.and_then(|first_out| Some((first_out.began, groups.get_mut(&first_out.began)?)));
         let Some((began, group)) = group.filter(|(_, group)| 1 < group.count) else {
-            rows.push(plain(alarm));
+            rows.push(Row::plain(alarm));
             continue;
         };
         if !std::mem::replace(&mut group.listed, true) {
             let below: Vec<_> = group.below.iter().filter(|other| other.id != group.leader.id).copied().collect();
             let more_waiting = below.iter().filter(|other| other.state.needs_acknowledgement()).count();
-            let folded = !below.is_empty() && !unfolded.contains(&began);
+            let folded = !below.is_empty() && is_folded(began);
             let first = group.rank == 1;
-            rows.push(Row { first, more: below.len(), more_waiting, folded, ..plain(group.leader) });
+            rows.push(Row { first, more: below.len(), more_waiting, folded, ..Row::plain(group.leader) });
             if !folded {
-                rows.extend(below.into_iter().map(|alarm| Row { under: true, ..plain(alarm) }));
+                let last = below.len().saturating_sub(1);
+                let under = |(n, alarm)| Row { under: true, last: n == last, ..Row::plain(alarm) };
+                rows.extend(below.into_iter().enumerate().map(under));
             }
         }
         if alarm.id != group.leader.id && !may_fold(def, alarm) {
-            rows.push(plain(alarm));
+            rows.push(Row::plain(alarm));
         }
     }
     rows
@@ -123,17 +137,18 @@ mod tests {
     fn consequences_fold_under_the_first_alarm_urgent_ones_never() {
         use Priority::{High, Low, Medium};
         let (def, alarms) = book(&[(Low, 7, 1), (High, 7, 2), (Medium, 7, 3), (Low, 7, 4), (Medium, 0, 1)]);
-        let folded = rows(&def, alarms.iter(), &[]);
+        let folded = rows(&def, alarms.iter(), |_| true);
         assert_eq!(ids(&folded), [0, 1, 4], "the cause stands above the urgent one of its first-out group");
         assert!(folded[0].first && folded[0].folded && (folded[0].more, folded[0].more_waiting) == (2, 2));
         let began = alarms[0].first_out.expect("it is in a first-out group").began;
-        let open = rows(&def, alarms.iter(), &[began]);
+        let open = rows(&def, alarms.iter(), |of| of != began);
         assert_eq!(ids(&open), [0, 2, 3, 1, 4]);
         assert_eq!(open.iter().map(|row| row.under).collect::<Vec<_>>(), [false, true, true, false, false]);
+        assert!(!open[1].last && open[2].last, "the branch ends with the last of them");
         assert!(!open[0].folded && open[0].more == 2);
-        let alone = rows(&def, alarms.iter().filter(|alarm| alarm.id.0 == 0), &[]);
+        let alone = rows(&def, alarms.iter().filter(|alarm| alarm.id.0 == 0), |_| true);
         assert!(!alone[0].first, "the first of nothing");
-        let headless = rows(&def, alarms.iter().filter(|alarm| alarm.id.0 != 0), &[]);
+        let headless = rows(&def, alarms.iter().filter(|alarm| alarm.id.0 != 0), |_| true);
         assert!(!headless[0].first, "the second is not called the first once that has gone");
     }
 
@@ -149,8 +164,7 @@ mod tests {
                 (PRIORITIES[priority], first_out, ranks[first_out as usize])
             }).collect();
             let (def, alarms) = book(&seeds);
-            let unfolded: Vec<_> = alarms.iter().filter_map(|alarm| Some(alarm.first_out?.began)).filter(|_| open).collect();
-            let rows = rows(&def, alarms.iter(), &unfolded);
+            let rows = rows(&def, alarms.iter(), |_| !open);
             let hidden: usize = rows.iter().filter(|row| row.folded).map(|row| row.more).sum();
             prop_assert_eq!(rows.len() + hidden, alarms.len());
             let mut seen = ids(&rows);

@@ -16,7 +16,7 @@ use crate::{
         },
         command::CommandKind,
         def::{AlarmClass, AlarmDef, AlarmId, Priority},
-        record::{ActionRecord, FirstOut},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, FirstOut},
         role::Role,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
@@ -155,27 +155,32 @@ fn assert_pictures(name: &str, fixture: &Fixture, keys: &str) {
 #[test]
 fn a_storm_is_folded_and_counted() {
     assert_pictures("storm", &storm(), "");
-    assert_pictures("storm_unfolded", &storm(), " ");
+    assert_pictures("storm_unfolded", &storm(), "→");
     assert_pictures("system", &storm(), "vv");
-    assert_pictures("guidance_acknowledged", &storm(), " ↓↓↓↓↓↓↓↓↓↓");
+    assert_pictures("guidance_acknowledged", &storm(), "→↓↓↓↓↓↓↓↓↓↓");
 }
 
 #[test]
 fn list_and_guidance_mark_an_unrecorded_acknowledgement() {
     let mut fixture = storm();
     fixture.alarms.iter_mut().filter_map(|alarm| alarm.acknowledged.as_mut()).for_each(|note| note.recorded = false);
-    let mut model = shown(&fixture, Theme::FULL, " ");
+    let mut model = shown(&fixture, Theme::FULL, "→");
     let mut picture = |_| {
         type_keys(&mut model, "↓");
         [(80, 24), (160, 40)].map(|(width, height)| screen(&mut model, width, height))
     };
     let pictures: Vec<[String; 2]> = (0..14).map(&mut picture).collect();
     for size in 0..2 {
-        let rows = pictures.iter().flat_map(|picture| picture[size].lines()).filter(|row| row.contains("acked"));
+        let rows = pictures.iter().flat_map(|picture| picture[size].lines()).filter(|row| row.contains("□ "));
         let rows: Vec<&str> = rows.collect();
         assert!(!rows.is_empty() && rows.iter().all(|row| row.contains("NOT RECORDED")), "{rows:?}");
     }
-    let guidance = pictures.iter().filter(|picture| picture[1].contains("by anna (NOT RECORDED)"));
+    // Beside the list it goes on in the next row.
+    let beside = |picture: &str| {
+        let rows = picture.lines().map(|row| row.rsplit('┊').next().unwrap_or_default());
+        rows.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
+    };
+    let guidance = pictures.iter().filter(|picture| beside(&picture[1]).contains("by anna (NOT RECORDED)"));
     assert_eq!(guidance.count(), 1, "{}", pictures[13][1]);
 }
 
@@ -322,7 +327,7 @@ fn the_filter_in_force_is_written_and_hides_nothing_silently() {
 
 #[test]
 fn a_page_acknowledges_only_what_was_on_the_screen() {
-    let mut model = shown(&storm(), Theme::FULL, " ");
+    let mut model = shown(&storm(), Theme::FULL, "→");
     screen(&mut model, 80, 24);
     type_keys(&mut model, "p");
     let effects = type_keys(&mut model, "⏎");

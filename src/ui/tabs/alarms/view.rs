@@ -1,13 +1,13 @@
 //! How the alarms tab looks: the views and what is in them, the list, what is suppressed, and the guidance below.
 
-use super::{Alarms, Page, guidance, handover::suppressed_words, is_on, list::Row};
+use super::{Alarms, Page, columns::Columns, guidance, handover::suppressed_words, is_on, list::Row, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        def::{AlarmId, Subject},
+        def::AlarmId,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
-    ui::{chrome::history_text, modal::confirm::subject},
+    ui::{chrome::history_text, layout::Size},
 };
 
 /// Rows above the list: views, filter, headings.
@@ -44,14 +44,25 @@ fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<(String, Style
 }
 
 /// Rows of a list on a tab of this size.
-pub(super) fn room(cx: &ViewContext, width: u16, height: u16) -> usize {
+pub(super) fn room(tab: &Alarms, cx: &ViewContext, width: u16, height: u16) -> usize {
     let height = height.saturating_sub(to_u16(trouble_rows(cx, width, height).len()));
-    usize::from(height.saturating_sub(HEAD + guide(height))).max(1)
+    let below = if tab.page == Page::Suppressed { guide(height).min(6) } else { below(cx, height) };
+    usize::from(height.saturating_sub(HEAD + below)).max(1)
 }
 
 /// Rows of the guidance on a tab of this height.
 fn guide(height: u16) -> u16 {
     height.saturating_sub(HEAD + 2).min(if height < 28 { 7 } else { 10 })
+}
+
+/// Rows below the list of a tab of this height: the guidance where it does not stand beside the list.
+fn below(cx: &ViewContext, height: u16) -> u16 {
+    match cx.size {
+        Size::Tiny | Size::Compact => 0,
+        Size::Narrow | Size::Normal => guide(height),
+        // The legend.
+        Size::Wide | Size::Overview => 1,
+    }
 }
 
 /// The names of the views, each with how much is in it, and how much of that waits: nothing is hidden in another view.
@@ -84,7 +95,9 @@ fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let all = Some(names(t!(" unack"))).filter(fits).unwrap_or_else(|| names(""));
     let bar = if fits(&all) { " │ " } else { "│" };
     let mut x = 1;
-    for (page, name) in Page::ALL.into_iter().zip(all) {
+    // On the smallest screens the shown one alone has room.
+    let others = Size::Compact < cx.size;
+    for (page, name) in Page::ALL.into_iter().zip(all).filter(|(page, _)| others || *page == tab.page) {
         if x > 1 {
             x = canvas.text(x, 0, bar, cx.theme.dim());
         }
@@ -96,24 +109,34 @@ fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
 }
 
 fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
+    let (width, height) = (canvas.width(), canvas.height());
+    if cx.size < Size::Wide {
+        return list_alone(tab, cx, canvas);
+    }
+    let beside = side::columns(width);
+    list_alone(tab, cx, &mut canvas.part(0, 0, width - beside - 1, height));
+    side::view(tab, cx, &mut canvas.part(width - beside - 1, 0, beside + 1, height));
+}
+
+fn list_alone(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     let (width, height) = (canvas.width(), canvas.height());
     let rows = tab.rows(cx);
     let all = tab.of_page(cx).count();
     let place = tab.place(&rows);
-    let room = usize::from(height.saturating_sub(HEAD - 1 + guide(height + 1))).max(1);
+    let below = below(cx, height + 1);
+    let room = usize::from(height.saturating_sub(HEAD - 1 + below)).max(1);
     let first = first(place, rows.len(), room);
     filter_line(tab, cx, (&rows, all, first, room), canvas);
     let columns = Columns::new(&rows[first.min(rows.len())..], cx, room, width);
-    let names = ["", "", t!("time"), t!("tag"), t!("what"), t!("value"), t!("state"), t!("for"), t!("by")];
-    canvas.text(1, 1, &columns.row(names), theme.dim());
+    canvas.text(1, 1, &columns.headings(), theme.dim());
     if rows.is_empty() {
         let words = match all {
             0 if tab.page == Page::System => t!("No active system alarms. j: journal."),
             0 => t!("No active alarms. j: journal."),
             _ => t!("No alarm matches the filter. Esc: show all."),
         };
-        canvas.text(6, 3, words, theme.normal());
+        canvas.text(6.min(width / 10), 3, words, theme.normal());
         return;
     }
     for (y, n, row) in on_screen(&rows, first, room) {
@@ -121,23 +144,27 @@ fn list(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         let priority = cx.def().alarm(row.alarm.id).priority;
         let style = theme.alarm(priority, row.alarm.state, false);
         let style = if n == place { style.patch(theme.focus()).fg(style.fg.unwrap_or_default()) } else { style };
-        let cells = cells(cx, row, columns.what);
-        canvas.text(1, y, &columns.row(cells.each_ref().map(String::as_str)), style);
+        canvas.text(1, y, &columns.cells(tab, cx, row), style);
         if n != place {
             let mark = format!("{}{}", theme.priority_mark(priority), theme.state_mark(row.alarm.state));
             canvas.text(1, y, &mark, theme.alarm(priority, row.alarm.state, cx.flash()));
         }
+        if tab.marked.contains(&row.alarm.id) {
+            canvas.text(0, y, theme.pick("►", ">"), theme.strong());
+        }
     }
-    let used = 2 + to_u16(rows.len().min(room));
-    let selected = rows[place].alarm;
-    guidance_below(
-        cx,
-        canvas,
-        (used, guide(height + 1)),
-        selected.id,
-        Some(selected),
-        guidance::now_text(cx, selected),
-    );
+    if columns.has_ribbon() {
+        let words = theme.pick(
+            t!("last 60 minutes: ▄ acknowledged █ unacknowledged"),
+            t!("last 60 minutes: _ acknowledged # unacknowledged"),
+        );
+        canvas.text(1, height - 1, &fit_words(words, width - 2), theme.dim());
+    }
+    if below > 1 {
+        let (used, selected) = (2 + to_u16(rows.len().min(room)), rows[place].alarm);
+        let now = guidance::now_text(cx, selected);
+        guidance_below(cx, canvas, (used, below), selected.id, Some(selected), now);
+    }
 }
 
 /// The guidance below a list that uses so many rows: rows that it leaves empty are given to it, as far as it needs them.
@@ -179,17 +206,21 @@ fn filter_line(
         words.push(t!("FILTER {describe}: {shown} of {all} shown, Esc shows all", describe, shown, all));
     }
     if folded > 0 {
-        words.push(t!("{folded} grouped, space: expand", folded));
+        let arrow = theme.pick("→", "Right");
+        words.push(t!("{folded} grouped, {arrow}: expand", folded, arrow));
+    }
+    if let marked @ 1.. = tab.marked.len() {
+        words.insert(0, t!("{marked} marked, Esc: none", marked));
     }
     if tab.filter.is_off() && words.is_empty() && all > 0 {
         let sorted = match rows.iter().any(|row| row.first || row.under) {
             true => t!("grouped under the first-out alarm"),
-            false => t!("most urgent first"),
+            false => tab.sort.label(),
         };
         words.push(t!("{all} shown, {sorted}", all, sorted));
     }
     let room = end.saturating_sub(3 + width(&more));
-    let style = if tab.filter.is_off() { theme.dim() } else { theme.strong() };
+    let style = if tab.filter.is_off() && tab.marked.is_empty() { theme.dim() } else { theme.strong() };
     canvas.text(1, 0, &fit_words(&words.join("   "), room), style);
     canvas.text_right(end, 0, &more, theme.strong());
 }
@@ -220,73 +251,4 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     }
     let used = 1 + to_u16(all.len().min(room));
     guidance_below(cx, canvas, (used, guide), all[place].id, None, suppressed_words(cx, &all[place]));
-}
-
-/// Widths of the columns between time and state; wider screens give room to tag, words and who acknowledged.
-struct Columns {
-    tag: u16,
-    what: u16,
-    by: u16,
-}
-
-impl Columns {
-    /// For the rows that are seen.
-    fn new(rows: &[Row], cx: &ViewContext, room: usize, width: u16) -> Columns {
-        let by = if width >= 110 { 12 } else { 0 };
-        let free = width.saturating_sub(1 + 6 + 10 + 11 + 9 + 10 + if by > 0 { by + 1 } else { 0 });
-        let seen = rows.iter().take(room).map(|row| self::width(&subject(cx, row.alarm.id)));
-        let tag = seen.max().unwrap_or(8).min(free / 2);
-        Columns { tag, what: free.saturating_sub(tag + 1).min(48), by }
-    }
-    fn row(&self, [mark, state_mark, time, tag, what, value, state, since, by]: [&str; 9]) -> String {
-        let widths = [1, 9, self.tag.cast_signed(), self.what.cast_signed(), -10, 8, -8, self.by.cast_signed()];
-        let row = draw::columns(widths, [state_mark, time, tag, what, value, state, since, by]);
-        format!("{}{row}", pad(mark, 4))
-    }
-}
-
-fn cells(cx: &ViewContext, row: &Row, what: u16) -> [String; 9] {
-    let alarm: &ActiveAlarm = row.alarm;
-    let def = cx.def().alarm(alarm.id);
-    [
-        cx.theme.priority_mark(def.priority).to_owned(),
-        cx.theme.state_mark(alarm.state).to_owned(),
-        moment(alarm.raised_at, cx.now, &cx.def().time_zone),
-        subject(cx, alarm.id),
-        what_text(cx, row, what),
-        match def.subject {
-            Subject::Tag(tag) => value::show(cx, tag).within(10),
-            Subject::Device(_) | Subject::Line(_) | Subject::Station => "–".to_owned(),
-        },
-        translate(alarm.state.word()).to_owned(),
-        running(elapsed(alarm.raised_at, cx.now)),
-        alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default().to_owned(),
-    ]
-}
-
-/// `First-out temperature high > 72.0 +14 more, 3 unack`: how many are folded under it, and an acknowledgement that is not on
-/// disk, are never cut off.
-fn what_text(cx: &ViewContext, row: &Row, room: u16) -> String {
-    let mark = match (row.first, row.under) {
-        (true, _) => t!("First-out "),
-        (false, true) => cx.theme.pick("└ ", "` "),
-        (false, false) => "",
-    };
-    let (long, short) = match (row.folded, row.more, row.more_waiting) {
-        (false, ..) => (String::new(), String::new()),
-        (true, more, 0) => (t!(" +{more} more", more), format!(" +{more}")),
-        (true, more, waiting) => (t!(" +{more} more, {waiting} unack", more, waiting), format!(" +{more} ({waiting})")),
-    };
-    let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|note| !note.recorded);
-    let unrecorded = if unrecorded { t!(" NOT RECORDED") } else { "" };
-    let (long, short) = (long + unrecorded, short + unrecorded);
-    let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).message);
-    let text = format!("{name} {}", guidance::condition_text(cx, row.alarm.id));
-    let text = text.trim_end();
-    let choices = [(text, &long), (text, &short), (&name, &short)];
-    let whole = choices.iter().find(|(text, more)| width(text) + width(more) <= room);
-    match whole {
-        Some((text, more)) => format!("{text}{more}"),
-        None => format!("{}{short}", fit(text, room.saturating_sub(width(&short)))),
-    }
 }

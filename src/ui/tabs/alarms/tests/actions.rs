@@ -162,3 +162,83 @@ fn a_suppressed_alarm_is_put_back_only_as_it_was_drawn() {
         assert_acts_only_on_what_was_drawn(&mut model, change, "u");
     }
 }
+
+#[test]
+fn what_is_done_with_marked_alarms_is_done_with_all() {
+    let fixture = storm();
+    let mut model = shown(&fixture, Theme::FULL, "→  ");
+    let picture = screen(&mut model, 80, 24);
+    assert!(picture.contains("2 marked") && picture.lines().filter(|line| line.starts_with('►')).count() == 2);
+    // `a` asks, and names those that are marked.
+    assert_eq!(type_keys(&mut model, "a"), []);
+    let effects = type_keys(&mut model, "⏎");
+    let Some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms })) = sent_kind(&effects) else {
+        panic!("{effects:?}")
+    };
+    assert_eq!(alarms.len(), 2);
+    // Each is shelved by a command of its own, with the same reason.
+    let effects = type_keys(&mut model, "zpump is being repaired⏎");
+    let shelved: HashSet<AlarmId> = effects
+        .iter()
+        .filter_map(|effect| match effect {
+            Effect::Command(command, _) => match command.kind {
+                CommandKind::Alarm(AlarmCommand::Shelve { alarm, .. }) => {
+                    assert_eq!(command.note.as_deref(), Some("pump is being repaired"));
+                    Some(alarm)
+                }
+                _ => None,
+            },
+            _ => None,
+        })
+        .collect();
+    assert_eq!(shelved, alarms.iter().map(|(id, _)| *id).collect());
+    type_keys(&mut model, "⎋");
+    assert!(!screen(&mut model, 80, 24).contains("marked"), "Esc takes the marks off");
+    assert!(type_keys(&mut model, "a").iter().any(|effect| matches!(effect, Effect::Command(..))), "only the selected");
+}
+
+#[test]
+fn the_list_is_sorted_by_urgency_time_or_tag() {
+    let mut model = shown(&Fixture::alarm(), Theme::FULL, "");
+    let mut order = |keys: &str| {
+        type_keys(&mut model, keys);
+        let picture = screen(&mut model, 80, 24);
+        let rows = picture.lines().skip(7).take(3);
+        rows.filter_map(|row| row.split_whitespace().find(|word| word.contains('-')).map(str::to_owned))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(order(""), ["TIC-1.PV", "PLC-1", "PLC-1.LT-1"]);
+    assert_eq!(order("s"), ["TIC-1.PV", "PLC-1", "PLC-1.LT-1"]);
+    assert_eq!(order("s"), ["PLC-1", "PLC-1.LT-1", "TIC-1.PV"]);
+    assert_eq!(order("s"), ["TIC-1.PV", "PLC-1", "PLC-1.LT-1"]);
+}
+
+#[test]
+fn a_wide_screen_shows_guidance_beside_the_list() {
+    let event = |seconds, event| AlarmRecord::new(ago(seconds), "TIC-1.PV", "temperature high", Priority::High, event);
+    let note = AlarmRecord {
+        by: Some("anna".into()),
+        reason: Some("relay replaced".into()),
+        ..event(85_000, AlarmEvent::Acknowledged)
+    };
+    let before = vec![event(84_000, AlarmEvent::ReturnedToNormal), note, event(86_000, AlarmEvent::Raised)];
+    for (width, height) in [(110, 24), (120, 40), (160, 50), (200, 60)] {
+        let mut model = model(&Fixture::alarm(), Theme::FULL);
+        screen(&mut model, width, height);
+        for effect in type_keys(&mut model, "3") {
+            let answer = match &effect {
+                Effect::Query(_, Query::Journal { .. }) => Answer::Journal(before.clone()),
+                Effect::Query(_, Query::Actions { .. }) => Answer::Actions(Vec::new()),
+                _ => continue,
+            };
+            let Effect::Query(id, _) = effect else { continue };
+            update(&mut model, Msg::Answer(id, Ok(answer)));
+        }
+        let picture = screen(&mut model, width, height);
+        for words in ["10 min, 09:19 left", "temperature high", "once in 30 days", "anna: relay replaced", "go to"] {
+            assert!(picture.contains(words), "{words}:\n{picture}");
+        }
+        let row = picture.lines().find(|line| line.contains("(3) □")).unwrap_or_default();
+        assert!(row.contains('▄') && row.contains('·'), "the ribbon of an acknowledged alarm: {row}");
+    }
+}
