@@ -12,6 +12,7 @@ mod faceplate;
 mod program;
 mod sets;
 mod table;
+mod wall;
 
 #[cfg(test)]
 mod tests;
@@ -31,7 +32,10 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::parameter_set,
-    ui::keys::{find, hide, hints},
+    ui::{
+        keys::{find, hide, hints},
+        layout::Size,
+    },
 };
 
 /// The small trend is asked for again after this time.
@@ -71,6 +75,8 @@ pub struct Controllers {
     device: DeviceId,
     table: Table,
     cell: Cell,
+    /// The devices as faceplates or as a table; `None` as there is room.
+    wall: Option<bool>,
     /// The selected row of the sets.
     set: usize,
     asked_for: Asked,
@@ -100,6 +106,11 @@ impl TabView for Controllers {
             }
             Action::Device(by) => self.show(DeviceId(to_u16(around(device.id.index(), by, cx.def().devices.len())))),
             Action::Move(motion) => self.move_by(cx, device, motion),
+            Action::Wall => self.wall = Some(!self.is_wall(cx)),
+            Action::Column(by) if self.page == Page::List => {
+                let last = cx.def().devices.len().saturating_sub(1);
+                self.device = DeviceId(to_u16(device.id.index().saturating_add_signed(by).min(last)));
+            }
             Action::Column(by) => self.cell.column = self.cell.column.saturating_add_signed(by).min(2),
             Action::Open => return self.open_selected(cx, device),
             Action::Program if device.program.is_some() => self.page = Page::Program,
@@ -171,6 +182,7 @@ impl TabView for Controllers {
                 Page::Device
             }
             Page::Device if !alone => {
+                self.trend = Answered::default();
                 self.table = Table { defaults: self.table.defaults, ..Table::default() };
                 Page::List
             }
@@ -201,9 +213,16 @@ impl TabView for Controllers {
             self.page = Page::Device;
         }
         let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
-        let Some(faceplate) = faceplate.filter(|_| self.page == Page::Device) else { return Vec::new() };
+        let tags = match &self.page {
+            Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
+            Page::List if self.is_wall(cx) => wall::tags(cx),
+            Page::List | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => Vec::new(),
+        };
+        if tags.is_empty() {
+            return Vec::new();
+        }
         let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
-        let query = Query::Series { tags: vec![faceplate.pv], from, to: cx.now, buckets: TREND_BUCKETS };
+        let query = Query::Series { tags, from, to: cx.now, buckets: TREND_BUCKETS };
         let number = (Tab::Controllers, &mut self.asked);
         self.trend.ask(cx, number, TREND_EVERY, TIMEOUT, query).into_iter().collect()
     }
@@ -248,6 +267,9 @@ impl TabView for Controllers {
             return;
         };
         match (&self.page, &device.program) {
+            (Page::List, _) if self.is_wall(cx) => {
+                wall::view(cx, &mut canvas, self.device.index(), self.trend.value.as_deref().unwrap_or_default());
+            }
             (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
             (Page::Device | Page::Program, _) => {
@@ -272,13 +294,18 @@ impl TabView for Controllers {
 impl Controllers {
     fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
         let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
-        Controllers { page, device, table, cell, set: 0, asked_for, trend, asked: 0 }
+        Controllers { page, device, table, cell, wall: None, set: 0, asked_for, trend, asked: 0 }
+    }
+
+    /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.
+    fn is_wall(&self, cx: &ViewContext) -> bool {
+        self.wall.unwrap_or(Size::Wide <= cx.size)
     }
 
     /// Shows a device.
     pub fn show(&mut self, device: DeviceId) {
         let table = Table { defaults: self.table.defaults, ..Table::default() };
-        *self = Controllers { asked: self.asked, ..Controllers::on_page(Page::Device, device, table) };
+        *self = Controllers { asked: self.asked, wall: self.wall, ..Controllers::on_page(Page::Device, device, table) };
     }
 
     /// Shows the device of a tag with the tag selected.

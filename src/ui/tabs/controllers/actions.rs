@@ -42,6 +42,7 @@ impl Controllers {
             Action::Device(_)
             | Action::Move(_)
             | Action::Column(_)
+            | Action::Wall
             | Action::Open
             | Action::Program
             | Action::Sets

@@ -30,7 +30,7 @@ pub fn strip(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     let wide = canvas.width();
     let rows = 2 + u16::from(faceplate.mv.is_some());
     let bars = wide.saturating_sub(TREND + 2);
-    self::bars(cx, &mut canvas.part(0, 0, bars, rows), faceplate, false);
+    self::bars(cx, &mut canvas.part(0, 0, bars, rows), faceplate, Bars::Row);
     let at = Bounds { x: bars + 1, y: 0, width: TREND, height: rows };
     trend::view(cx, canvas, at, faceplate.pv, WINDOW, series, false);
     states(cx, &mut canvas.part(0, rows, wide, 1), device, faceplate);
@@ -44,7 +44,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     let Some(faceplate) = &device.faceplate else { return };
     let (wide, high) = (canvas.width(), canvas.height());
     let rows = 3 * (2 + u16::from(faceplate.mv.is_some()));
-    bars(cx, &mut canvas.part(0, 0, wide, rows), faceplate, true);
+    bars(cx, &mut canvas.part(0, 0, wide, rows), faceplate, Bars::Tall);
     states(cx, &mut canvas.part(0, rows, wide, 1), device, faceplate);
     let mut y = rows + 2;
     for alarm in list::alarms(cx, device.id).take(4) {
@@ -76,8 +76,20 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     }
 }
 
-/// A row a bar (`tall`: three, with value, bar and ends of the scale).
-fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool) {
+/// How the bars are laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bars {
+    /// Three rows each: value, bar, ends of the scale.
+    Tall,
+    /// A row each, with the ends of the scale behind it.
+    Row,
+    /// A row each, without the ends of the scale.
+    Bare,
+}
+
+/// The bars of PV, SV and MV.
+pub fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, layout: Bars) {
+    let tall = layout == Bars::Tall;
     let rows = [("PV", Some(faceplate.pv)), ("SV", Some(faceplate.sv_to_show())), ("MV", faceplate.mv)];
     let rows: Vec<(&str, TagId)> = rows.into_iter().filter_map(|(name, tag)| Some((name, tag?))).collect();
     // All bars start in one column, so that they can be compared.
@@ -103,8 +115,9 @@ fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tall: bool
             (0, y + 1, canvas.width())
         } else {
             let words = ends.map_or(t!("range unknown").to_owned(), |(low, high)| format!("{low} … {high}"));
-            let words = apart.unwrap_or(words);
-            let wide = canvas.width().saturating_sub(5 + values + 1 + 18);
+            let words = if layout == Bars::Row { apart.unwrap_or(words) } else { apart.unwrap_or_default() };
+            let behind = if layout == Bars::Row { 18 } else { width(&words) };
+            let wide = canvas.width().saturating_sub(5 + values + 1 + behind);
             canvas.text(5 + values + wide + 1, y, &words, cx.theme.dim());
             (5 + values, y, wide)
         };
@@ -168,7 +181,7 @@ fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = f64> {
 }
 
 /// `PID   AT off   RUN   ‹2›! temperature high UNACK`.
-fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, faceplate: &Faceplate) {
+pub fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, faceplate: &Faceplate) {
     let mut x = 1;
     for (name, tag) in [("", faceplate.mode), (t!("AT"), faceplate.tune), ("", faceplate.run)] {
         let Some(tag) = tag else { continue };

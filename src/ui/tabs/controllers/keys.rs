@@ -12,6 +12,8 @@ pub enum Action {
     Move(Motion),
     /// Select so many columns further on.
     Column(isize),
+    /// The devices as faceplates, or as a table.
+    Wall,
     /// Open, edit or write what is selected.
     Open,
     /// Say why the selected value is what it is.
@@ -95,11 +97,14 @@ const SETTINGS: Key<Action> = Key::new(
 
 const LIST: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "open", "faceplate and parameters of the device", Action::Open),
+    Key::new(char('v'), "view", "devices as faceplates or as a table", Action::Wall),
     REFRESH,
     GUIDE,
     WHY,
     SETTINGS,
     LINE,
+    Key::new(code(KeyCode::Left), "", "the faceplate to the left", Action::Column(-1)),
+    Key::new(code(KeyCode::Right), "", "the faceplate to the right", Action::Column(1)),
 ];
 const DEVICE_FIRST: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "previous device", Action::Device(-1)),

@@ -58,16 +58,22 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
         canvas.text_right(end, bottom.saturating_sub(1), &t!("{below} more ▼", below), theme.normal());
     }
     if let Some(device) = devices.get(selected) {
-        let x = canvas.text(1, bottom, &device.name, theme.strong());
-        let (words, style) = status_text(cx, device.id);
-        let title = if device.title.is_empty() { String::new() } else { format!("{}  ", device.title) };
-        let x = canvas.text(x + 2, bottom, &fit_words(&title, end.saturating_sub(x + 4)), theme.normal());
-        canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);
+        foot(cx, canvas, device);
     }
 }
 
+/// The selected device in the last row: what it is for, and how it stands.
+pub fn foot(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
+    let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
+    let x = canvas.text(1, bottom, &device.name, cx.theme.strong());
+    let (words, style) = status_text(cx, device.id);
+    let title = if device.title.is_empty() { String::new() } else { format!("{}  ", device.title) };
+    let x = canvas.text(x + 2, bottom, &fit_words(&title, end.saturating_sub(x + 4)), cx.theme.normal());
+    canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);
+}
+
 /// `31 devices   2 not responding   1 with alarms`.
-fn summary(cx: &ViewContext) -> String {
+pub fn summary(cx: &ViewContext) -> String {
     let devices = &cx.def().devices;
     let down = devices.iter().filter(|device| {
         let status = cx.snapshot.device(device.id);
@@ -157,15 +163,8 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
             cells.push((mode(cx, device), Columns::MODE, theme.normal()));
         }
         None => {
-            // What is never read by itself says nothing about the device.
-            let tags = cx.def().tags_of(device.id);
-            let tags = tags.filter(|tag| tag.access != Access::Write && tag.poll != Poll::Never);
-            let tags = tags.filter(|tag| tag.is_stored() || !cx.is_past());
-            let (good, all) = tags.fold((0, 0), |(good, all), tag| {
-                (good + usize::from(cx.snapshot.sample(tag.id).quality.is_good()), all + 1)
-            });
-            let style = if good == all { theme.dim() } else { theme.trouble() };
-            cells.push((t!("{good} of {all} values good", good, all), Columns::VALUE * 3 + 2, style));
+            let (words, style) = values_good(cx, device);
+            cells.push((words, Columns::VALUE * 3 + 2, style));
             cells.push((String::new(), Columns::MODE, style));
         }
     }
@@ -175,8 +174,19 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
     cells
 }
 
+/// `25 of 25 values good`. What is never read by itself says nothing about the device.
+pub fn values_good(cx: &ViewContext, device: &DeviceDef) -> (String, Style) {
+    let tags = cx.def().tags_of(device.id);
+    let tags = tags.filter(|tag| tag.access != Access::Write && tag.poll != Poll::Never);
+    let tags = tags.filter(|tag| tag.is_stored() || !cx.is_past());
+    let (good, all) = tags
+        .fold((0, 0), |(good, all), tag| (good + usize::from(cx.snapshot.sample(tag.id).quality.is_good()), all + 1));
+    let style = if good == all { cx.theme.dim() } else { cx.theme.trouble() };
+    (t!("{good} of {all} values good", good, all), style)
+}
+
 /// The most urgent alarm of a device, and how many there are.
-fn alarm(cx: &ViewContext, device: DeviceId) -> (String, Style) {
+pub fn alarm(cx: &ViewContext, device: DeviceId) -> (String, Style) {
     let all: Vec<&ActiveAlarm> = alarms(cx, device).collect();
     let Some(alarm) = all.iter().min_by_key(|alarm| cx.def().alarm(alarm.id).priority) else {
         return (String::new(), cx.theme.dim());
@@ -203,7 +213,7 @@ fn answers(cx: &ViewContext, device: DeviceId) -> bool {
 }
 
 /// The mark of NE 107 and its words; a device that is well has a tick.
-fn state(cx: &ViewContext, device: DeviceId) -> (String, String, Style) {
+pub fn state(cx: &ViewContext, device: DeviceId) -> (String, String, Style) {
     let status = cx.snapshot.device(device);
     match (status.diagnosis, status.state) {
         (Some(reason), _) => (signal_mark(reason.signal()), reason.to_string(), cx.theme.trouble()),

@@ -4,10 +4,18 @@ use super::*;
 
 impl Controllers {
     pub(super) fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion) {
-        let room = usize::from(cx.area.height.saturating_sub(4)).max(1);
+        let wall = (self.page == Page::List && self.is_wall(cx))
+            .then(|| wall::Grid::new(cx.size, cx.area, cx.def().devices.len()));
+        let room = wall.map_or(usize::from(cx.area.height.saturating_sub(4)).max(1), |grid| grid.rows * grid.columns);
         let to = |at: usize, count: usize| motion.to(at, count, room);
         match &mut self.page {
-            Page::List => self.device = DeviceId(to_u16(to(usize::from(self.device.0), cx.def().devices.len()))),
+            Page::List => {
+                let (at, count) = (usize::from(self.device.0), cx.def().devices.len());
+                self.device = DeviceId(to_u16(match (motion, wall) {
+                    (Motion::Rows(by), Some(grid)) => grid.step(at, by, count),
+                    (Motion::Rows(_) | Motion::Pages(_) | Motion::First | Motion::Last, _) => to(at, count),
+                }));
+            }
             Page::Device => self.table.selected = to(self.table.selected, self.table.rows(cx, device.id).len()),
             Page::Program => {
                 let steps = device.program.as_ref().map_or(0, |program| program.steps.len());

@@ -1,0 +1,62 @@
+//! The devices as small faceplates.
+
+use super::*;
+use crate::{
+    history::{Answer, Bucket, Query, Series},
+    ui::fixture::now,
+};
+
+#[test]
+fn a_wide_screen_shows_devices_as_faceplates_and_v_the_table() {
+    let mut model = model(&trouble(8), Theme::FULL);
+    screen(&mut model, 160, 50);
+    type_keys(&mut model, "4");
+    let wall = screen(&mut model, 160, 50);
+    let top = wall.lines().find(|line| line.starts_with("┌─ TIC-1  zone 1")).unwrap_or_default();
+    assert!(["TIC-2  zone 2", "TIC-3", "‹2›!", "✗F"].iter().all(|words| top.contains(words)), "{wall}");
+    assert!(wall.contains("PV-SV    +2.4 °C") && wall.contains("TIC-8"), "{wall}");
+    type_keys(&mut model, "v");
+    assert!(screen(&mut model, 160, 50).contains("device model"), "the table is one key away");
+    // A usual screen has the table, and the faceplates one key away.
+    let mut model = super::super::super::super::tests::model(&trouble(8), Theme::FULL);
+    type_keys(&mut model, "4");
+    assert!(screen(&mut model, 80, 24).contains("device model"));
+    type_keys(&mut model, "v");
+    assert!(screen(&mut model, 80, 24).contains("PV-SV"));
+}
+
+#[test]
+fn arrows_lead_from_faceplate_to_faceplate_and_enter_opens() {
+    let mut model = model(&many(8), Theme::FULL);
+    screen(&mut model, 160, 50);
+    type_keys(&mut model, "4→↓");
+    let foot = screen(&mut model, 160, 50).lines().rev().nth(2).map(str::to_owned).unwrap_or_default();
+    assert!(foot.contains("TIC-5"), "three stand in a row: {foot}");
+    type_keys(&mut model, "⏎");
+    assert!(screen(&mut model, 160, 50).contains("‹ TIC-5 ›"));
+    type_keys(&mut model, "⎋");
+    assert!(screen(&mut model, 160, 50).contains("PV-SV"), "back to the faceplates");
+}
+
+#[test]
+fn each_faceplate_has_the_curve_of_its_own_value() {
+    let mut model = model(&many(2), Theme::FULL);
+    screen(&mut model, 160, 50);
+    let effects = type_keys(&mut model, "4");
+    let Some(Effect::Query(id, Query::Series { tags, from, buckets, .. })) = effects.last() else {
+        panic!("{effects:?}")
+    };
+    assert_eq!(tags.len(), 2);
+    let step = Duration::try_from(now().duration_since(*from)).expect("a span") / *buckets as u32;
+    let series = |(n, tag): (usize, &crate::plant::def::TagId)| {
+        let bucket = |mean: f64| Some(Bucket { min: mean, max: mean, mean, last: mean });
+        let (low, high) = (n as f64 * 100.0, n as f64 * 100.0 + 9.0);
+        let buckets = (0..*buckets).map(|n| bucket(low + n as f64 % 9.0)).collect();
+        Series { tag: *tag, from: *from, step, buckets, summary: Some((low, low, high)), good: 1.0 }
+    };
+    let answer = Answer::Series(tags.iter().enumerate().map(series).collect());
+    update(&mut model, Msg::Answer(*id, Ok(answer)));
+    let shown = screen(&mut model, 160, 50);
+    let row = shown.lines().find(|line| line.contains("109.0")).unwrap_or_default();
+    assert!(row.contains("9.0 ││"), "each has its own scale: {shown}");
+}
