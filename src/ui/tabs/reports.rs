@@ -14,8 +14,10 @@ use self::batches::Batches;
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::def::CsvDialect,
+    history::Series,
+    plant::def::{CsvDialect, Pen},
     report::{self, Period, ShiftReport},
+    ui::{tabs::trends::span::View, widgets::chart},
 };
 
 /// What a key means here.
@@ -39,6 +41,8 @@ pub enum Action {
     Why,
     /// The list of batches.
     Batches,
+    /// The chart of the tag so many rows further on.
+    Tag(isize),
 }
 
 /// Keys of this tab.
@@ -49,6 +53,8 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
     Key::new(char('e'), "export", "write the report as CSV", Action::Export).needs(Role::Technician),
     Key::new(char(';'), "format", "CSV with , and . or with ; and ,", Action::Dialect),
+    Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
+    Key::new(char('T'), "", "chart of the previous tag", Action::Tag(-1)),
     Key::new(char('u'), "", "refresh the figures", Action::Refresh),
     Key::new(char('w'), "", "explain its current values", Action::Why),
 ];
@@ -75,6 +81,9 @@ pub struct Reports {
     follow: bool,
     /// The report of that very period.
     report: Answered<Box<ShiftReport>>,
+    /// The row whose tag has the chart, and its curve.
+    charted: usize,
+    curve: Answered<Vec<Series>>,
     batches: Batches,
     dialect: CsvDialect,
     export: Export,
@@ -103,6 +112,8 @@ impl TabView for Reports {
             period: period::at(&snapshot.def, snapshot.at),
             follow: true,
             report: Answered::default(),
+            charted: 0,
+            curve: Answered::default(),
             batches: Batches::default(),
             dialect: snapshot.def.report.csv,
             export: Export::Not,
@@ -124,11 +135,15 @@ impl TabView for Reports {
 
     fn awaits(&self, number: u32) -> bool {
         let overlay = self.batches.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number));
-        overlay || self.report.query.awaits(number) || self.batches.rows.query.awaits(number)
+        overlay
+            || self.curve.query.awaits(number)
+            || self.report.query.awaits(number)
+            || self.batches.rows.query.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.report.on_answer(cx, number, &answer);
+        self.curve.on_answer(cx, number, &answer);
         self.batches.rows.on_answer(cx, number, &answer);
         self.batches.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
         self.ask(cx)
@@ -219,6 +234,10 @@ impl Reports {
                 self.export = Export::Not;
             }
             Action::Refresh => self.report.query.want(),
+            Action::Tag(by) => {
+                let rows = self.report.value.as_ref().map_or(0, |report| report.tags.len());
+                (self.charted, self.curve) = (around(self.charted, by, rows), Answered::default());
+            }
             Action::Batches => {
                 (self.batches.shown, self.export) = (true, Export::Not);
                 self.batches.rows.query.want();
@@ -274,12 +293,22 @@ impl Reports {
     /// Shows another period; figures of the old one must not stand under its name.
     fn show(&mut self, period: Option<Period>) {
         (self.period, self.follow, self.scroll) = (period, false, Scroll::default());
-        (self.export, self.report) = (Export::Not, Answered::default());
+        (self.export, self.report, self.curve) = (Export::Not, Answered::default(), Answered::default());
+    }
+
+    /// The tag that has the chart, and the part of the period that is over, where there is room for it.
+    fn chart(&self, cx: &ViewContext) -> Option<(Pen, View)> {
+        let room = view::chart_columns(cx).filter(|_| !self.batches.shown)?;
+        let rows = &self.report.value.as_ref()?.tags;
+        let tag = cx.def().tag_named(&rows.get(self.charted)?.tag)?;
+        let period = self.period.as_ref()?;
+        let view = View::since(period.from, period.to.min(cx.now), chart::dots(cx.theme, room, 1));
+        Some((Pen { tag, scale: None }, view))
     }
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
-        let lines = self.report.value.as_ref().map_or(0, |report| view::lines(cx, report).len());
+        let lines = self.report.value.as_ref().map_or(0, |report| view::lines(cx, report, None).len());
         self.scroll.on(motion, lines, rows);
     }
 
@@ -297,7 +326,11 @@ impl Reports {
         let Some(period) = self.period.clone() else { return Vec::new() };
         let number = (Tab::Reports, &mut self.number);
         let query = self.report.ask(cx, number, every, real(cx, TIMEOUT_S), Query::Report { period });
-        query.into_iter().collect()
+        let curve = self.chart(cx).and_then(|(pen, view)| {
+            let query = Query::Series { tags: vec![pen.tag], from: view.from, to: view.to, buckets: view.columns };
+            self.curve.ask(cx, (Tab::Reports, &mut self.number), every, real(cx, TIMEOUT_S), query)
+        });
+        query.into_iter().chain(curve).collect()
     }
 
     /// Writes exactly the figures that are shown.

@@ -12,10 +12,16 @@ use crate::{
         record::{ActionRecord, AlarmEvent, AlarmRecord},
     },
     report::{Period, ShiftReport, SuppressedSummary, TagFigures, raised, text::mean_or_difference},
+    ui::layout::Size,
 };
 
 /// Alarm events and actions listed at most; the CSV has all of them.
 const LIST_MAX: usize = 500;
+
+/// Columns of the figures beside a chart.
+const FIGURES: u16 = 80;
+/// Rows of the chart at most.
+const CHART_ROWS: u16 = 24;
 
 /// Draws the tab.
 pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) {
@@ -24,17 +30,21 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
     let Some(period) = &reports.period else { return };
     draw_title(reports, cx, period, &mut canvas);
     let rows = height.saturating_sub(3);
+    let left = columns.saturating_sub(chart_columns(cx).map_or(0, |beside| beside + 1));
     match &reports.report.value {
         Some(report) => {
-            let lines = lines(cx, report);
+            draw_chart(reports, cx, &mut canvas.part(left, 1, columns - left, rows + 1));
+            let cx = &ViewContext { area: Rect { width: left, ..cx.area }, ..*cx };
+            let charted = (left < columns).then_some(reports.charted);
+            let lines = lines(cx, report, charted);
             let first = reports.scroll.first(lines.len(), usize::from(rows));
-            let mut part = canvas.part(0, 2, columns, rows);
+            let mut part = canvas.part(0, 2, left, rows);
             let area = part.area();
             for (y, _, line) in on_screen(&lines, first, usize::from(rows)) {
                 part.buffer().set_line(area.x, area.y + y, line, area.width);
             }
             let hidden = lines.len().saturating_sub(first + usize::from(rows));
-            canvas.text(0, 1, &heading(columns), cx.theme.dim());
+            canvas.text(0, 1, &heading(left), cx.theme.dim());
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         None => {
@@ -43,6 +53,28 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             let style = if reports.report.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
             canvas.text_centred(height / 2, words, style);
         }
+    }
+}
+
+/// Columns of the chart beside the figures, where there is room for both.
+pub fn chart_columns(cx: &ViewContext) -> Option<u16> {
+    let free = cx.area.width.saturating_sub(FIGURES);
+    (Size::Wide <= cx.size).then_some((free - free / 4).max(30))
+}
+
+/// The curve of the marked tag over the period; the rest of the column is free.
+fn draw_chart(reports: &Reports, cx: &ViewContext, canvas: &mut Canvas) {
+    let Some((pen, view)) = reports.chart(cx) else { return };
+    for y in 0..canvas.height() {
+        canvas.text(0, y, cx.theme.pick("┊", "|"), cx.theme.dim());
+    }
+    let (width, height) = (canvas.width().saturating_sub(1), canvas.height().min(CHART_ROWS));
+    let series = reports.curve.value.as_deref().unwrap_or_default();
+    let canvas = &mut canvas.part(1, 0, width, height);
+    draw::curves(cx, canvas, t!("t next tag"), view, &[pen], series);
+    if reports.curve.value.is_none() {
+        let words = reports.curve.trouble.as_deref().unwrap_or(t!("collecting data"));
+        canvas.text_centred(height / 2, words, cx.theme.dim());
     }
 }
 
@@ -126,14 +158,15 @@ fn heading(width: u16) -> String {
 }
 
 /// Everything below the heading: figures, counts, alarms, actions.
-pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
+/// The row whose tag has the chart is marked.
+pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>) -> Vec<Line<'static>> {
     let theme = cx.theme;
     let mut lines = Vec::new();
     if report.tags.iter().all(|tag| tag.good == 0.0) {
         let words = t!("  no data: no good value was recorded in this period");
         lines.push(Line::styled(words, theme.trouble()));
     }
-    lines.extend(report.tags.iter().map(|tag| figures(cx, tag)));
+    lines.extend(report.tags.iter().enumerate().map(|(n, tag)| figures(cx, tag, charted == Some(n))));
     lines.push(Line::default());
     lines.push(counts(cx, report));
     // The CSV has the whole hash.
@@ -162,7 +195,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport) -> Vec<Line<'static>> {
     lines
 }
 
-fn figures(cx: &ViewContext, tag: &TagFigures) -> Line<'static> {
+fn figures(cx: &ViewContext, tag: &TagFigures, charted: bool) -> Line<'static> {
     let (theme, (name, figure)) = (cx.theme, widths(cx.area.width));
     let value = |value: Option<f64>| match value {
         Some(value) => pad_left(&format!("{value:.*}", usize::from(tag.decimals)), figure),
@@ -173,7 +206,8 @@ fn figures(cx: &ViewContext, tag: &TagFigures) -> Line<'static> {
     let good =
         if tag.good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (tag.good * 1_000.0).floor() / 10.0) };
     Line::from(vec![
-        Span::styled(format!("  {}", pad(&tag.tag, name - 1)), theme.normal()),
+        Span::styled(if charted { theme.pick("▸ ", "> ") } else { "  " }, theme.strong()),
+        Span::styled(pad(&tag.tag, name - 1), if charted { theme.strong() } else { theme.normal() }),
         Span::styled(format!(" {}", pad(&tag.unit, 7)), theme.dim()),
         Span::styled(
             [value(tag.min), pad_left(&mean, figure), value(tag.max), value(tag.last)].concat(),
