@@ -12,6 +12,8 @@ pub enum Action {
     Open,
     /// Search words, a user, an action, a time.
     Search(SearchField),
+    /// Show every terminal that came and went, or fold them.
+    Fold,
     /// Search nothing.
     Everything,
     /// The list of users.
@@ -38,6 +40,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('b'), "by", "only actions of a user", Action::Search(SearchField::Who)),
     Key::new(char('w'), "what", "only an action: write, login …", Action::Search(SearchField::Action)),
     Key::new(char('t'), "time", "another day or period", Action::Search(SearchField::Time)),
+    Key::new(char('d'), "terminals", "show or fold attach and detach", Action::Fold),
     Key::new(char('c'), "all", "clear the search, show the last 7 days", Action::Everything),
     Key::new(char('j'), "users", "the list of users", Action::Back),
 ];
@@ -60,6 +63,8 @@ const TIMEOUT_S: f64 = 20.0;
 pub struct Audit {
     pub rows: Answered<Vec<ActionRecord>>,
     selected: usize,
+    /// Terminals that came and went are listed one by one.
+    unfolded: bool,
     /// What is searched; empty for anything.
     words: String,
     who: String,
@@ -74,19 +79,33 @@ impl Audit {
         self.rows.value.as_deref().unwrap_or_default()
     }
 
+    /// The rows of the list: each entry, or those in a row that say only that terminals came and went. A search for an
+    /// action folds nothing.
+    fn groups(&self) -> Vec<&[ActionRecord]> {
+        let folds = !self.unfolded && self.action.is_empty();
+        self.rows().chunk_by(|entry, next| folds && is_terminal(entry) && is_terminal(next)).collect()
+    }
+
     /// The list that keys act on.
     pub fn drawn_rows(&self) -> Rows {
-        Rows::of(self.rows().iter().map(|row| (row.at, &row.by, &row.action, &row.target)), self.selected)
+        let groups = self.groups();
+        let rows = groups.iter().flat_map(|group| group.first().map(|row| (row, group.len())));
+        Rows::of(rows.map(|(row, count)| (row.at, &row.by, &row.action, &row.target, count)), self.selected)
     }
 
     /// A key of [`KEYS`].
     pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
         match action {
             Action::Move(motion) => {
-                self.selected = motion.to(self.selected, self.rows().len(), rows_on(cx.area.height))
+                self.selected = motion.to(self.selected, self.groups().len(), rows_on(cx.area.height))
             }
             Action::Open => {
-                let entry = self.rows().get(self.selected).cloned();
+                let groups = self.groups();
+                if groups.get(self.selected).is_some_and(|group| 1 < group.len()) {
+                    self.unfold(true);
+                    return Vec::new();
+                }
+                let entry = groups.get(self.selected).and_then(|group| group.first()).cloned();
                 let window = entry.map(|entry| Modal::AuditEntry(Box::new(AuditEntryDialog(entry))));
                 return open(window);
             }
@@ -104,10 +123,24 @@ impl Audit {
                 };
                 return open(Modal::Prompt(Prompt::new(title, hint, text)));
             }
+            Action::Fold => self.unfold(!self.unfolded),
             Action::Everything => *self = Audit::default(),
             Action::Back => {}
         }
         Vec::new()
+    }
+
+    /// Lists terminals one by one, or folds them; the selected entry stays selected.
+    fn unfold(&mut self, unfolded: bool) {
+        let entry = self.groups().get(self.selected).and_then(|group| group.first()).cloned();
+        self.unfolded = unfolded;
+        self.select(entry.as_ref());
+    }
+
+    /// Selects an entry, or the first one where it is gone.
+    fn select(&mut self, entry: Option<&ActionRecord>) {
+        let place = entry.and_then(|entry| self.groups().iter().position(|group| group.contains(entry)));
+        self.selected = place.unwrap_or(0);
     }
 
     /// What was typed for the search.
@@ -142,9 +175,10 @@ impl Audit {
 
     /// The history answered query `number`; the selected entry stays selected, but at the top the newest one is.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        let selected = self.rows().get(self.selected).cloned().filter(|_| 0 < self.selected);
+        let groups = self.groups();
+        let selected = groups.get(self.selected).and_then(|group| group.first()).filter(|_| 0 < self.selected).cloned();
         self.rows.on_answer(cx, number, answer);
-        self.selected = selected.and_then(|entry| self.rows().iter().position(|row| *row == entry)).unwrap_or(0);
+        self.select(selected.as_ref());
     }
 
     /// Draws it.
@@ -166,10 +200,14 @@ impl Audit {
             canvas.text(2, 3, words, theme.dim());
             return;
         }
-        let rows = rows_on(canvas.height());
-        for (y, n, entry) in on_screen(self.rows(), first(self.selected, self.rows().len(), rows), rows) {
+        let (rows, groups) = (rows_on(canvas.height()), self.groups());
+        for (y, n, group) in on_screen(&groups, first(self.selected, groups.len(), rows), rows) {
             let style = if n == self.selected { theme.focus() } else { theme.normal() };
-            canvas.text(0, y + 2, &pad(&row(cx, entry, columns), columns), style);
+            let words = match group {
+                [entry] => row(cx, entry, columns),
+                group => folded(cx, group),
+            };
+            canvas.text(0, y + 2, &pad(&words, columns), style);
         }
     }
 
@@ -185,6 +223,23 @@ impl Audit {
         };
         [Some(time), Some(count)].into_iter().chain(parts).flatten().collect::<Vec<_>>().join("   ")
     }
+}
+
+/// Does an entry only say that a terminal came or went? One that was refused is never folded.
+fn is_terminal(entry: &ActionRecord) -> bool {
+    matches!(&*entry.action, "attach" | "detach") && &*entry.outcome == "done"
+}
+
+/// Entries in a row about terminals that came and went, as one.
+fn folded(cx: &ViewContext, group: &[ActionRecord]) -> String {
+    let zone = &cx.def().time_zone;
+    let at = |entry: Option<&ActionRecord>| entry.map_or(String::new(), |entry| moment(entry.at, cx.now, zone));
+    let (newest, oldest, count) = (at(group.first()), at(group.last()), group.len());
+    let attached = group.iter().filter(|entry| &*entry.action == "attach").count();
+    let number = cx.theme.pick("…", "..");
+    let words =
+        t!("{count} entries since {oldest}: terminals attached {attached} ×, d shows them", count, oldest, attached);
+    format!(" {} {words}", draw::columns([-5, 9], [number, &newest]))
 }
 
 /// Rows of the list on a tab of this height.

@@ -103,3 +103,31 @@ fn an_audit_entry_is_opened_only_as_it_was_drawn() {
     };
     assert_acts_only_on_what_was_drawn(&mut model, newer, "⏎");
 }
+
+#[test]
+fn terminals_that_come_and_go_are_one_row_of_the_audit_list() {
+    let mut model = with(&Fixture::normal(), supervisor());
+    let query = type_keys(&mut model, "7j").into_iter().find_map(|effect| match effect {
+        Effect::Query(id, Query::Audit { .. }) => Some(id),
+        _ => None,
+    });
+    let terminal = |number, what, outcome| action(number, "panel", what, "", ("", ""), outcome);
+    let rows = vec![
+        action(40, "anna", "write", "TIC-1.SV", ("70.0 °C", "65.0 °C"), "verified"),
+        terminal(39, "detach", "done"),
+        terminal(38, "attach", "done"),
+        terminal(37, "attach", "done"),
+        terminal(36, "attach", "refused: too many terminals"),
+    ];
+    update(&mut model, Msg::Answer(query.expect("a query"), Ok(Answer::Actions(rows))));
+    for (width, height) in [(80, 24), (120, 40)] {
+        let shown = screen(&mut model, width, height);
+        assert!(shown.contains("3 entries since") && shown.contains("attached 2 ×"), "{shown}");
+        assert!(shown.contains("refused: too many") && !shown.contains("detach "), "{shown}");
+    }
+    // Enter shows what is folded, d folds it again.
+    type_keys(&mut model, "↓⏎");
+    assert!(screen(&mut model, 80, 24).contains("detach ") && model.modal.is_none());
+    type_keys(&mut model, "d");
+    assert!(screen(&mut model, 80, 24).contains("3 entries since"));
+}
