@@ -12,8 +12,9 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let fits = |parts: &[(usize, String, Style)]| {
         parts.iter().map(|(_, text, _)| width(text) + 2).sum::<u16>() <= end.saturating_sub(start) + 2
     };
-    let full = header_parts(model, cx, true);
-    let mut parts = if fits(&full) { full } else { header_parts(model, cx, false) };
+    let shorter = [(true, Lines::Whole), (false, Lines::Whole), (false, Lines::Short), (false, Lines::Count)];
+    let mut parts = shorter.iter().map(|(role, lines)| header_parts(model, cx, *role, *lines));
+    let mut parts = parts.find(|parts| fits(parts)).unwrap_or_else(|| header_parts(model, cx, false, Lines::Count));
     while !fits(&parts) {
         let Some(least) = parts.iter().map(|(need, _, _)| *need).max() else { break };
         parts.retain(|(need, _, _)| *need != least);
@@ -24,9 +25,20 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     }
 }
 
+/// How much the header tells of lines that are well; what is wrong with one is always told in words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lines {
+    /// `L1 load 62 %`.
+    Whole,
+    /// `L1 62 %`.
+    Short,
+    /// `3 lines OK`, one part for all of them.
+    Count,
+}
+
 /// What the header tells, from the right, each with its need: the greatest number is the first to be left out.
 /// The role of the user is shown only where everything fits.
-pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(usize, String, Style)> {
+pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool, lines: Lines) -> Vec<(usize, String, Style)> {
     let theme = cx.theme;
     let time = if let Some(gone) = model.gone() {
         (0, t!("STATION LOST {gone} s: reconnecting", gone = gone.as_secs()), theme.trouble())
@@ -50,11 +62,21 @@ pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool) -> Vec<(
     } else if history.trouble.is_some() {
         parts.push((2, t!("history: see 3").to_owned(), theme.trouble()));
     }
-    for line in cx.def().lines.iter().rev() {
+    let (well, other): (Vec<&LineDef>, Vec<&LineDef>) = cx.def().lines.iter().rev().partition(|line| is_well(cx, line));
+    parts.extend(other.into_iter().map(|line| {
         let (text, style) = line_words(cx, line);
-        let status = cx.snapshot.line(line.id);
-        let well = status.state == LineState::Connected && !is_overloaded(status);
-        parts.push((if well { 10 + line.id.index() } else { 3 }, text, style));
+        (3, text, style)
+    }));
+    match (lines, well.as_slice()) {
+        (Lines::Count, [_, _, ..]) => parts.push((10, t!("{count} lines OK", count = well.len()), theme.normal())),
+        (Lines::Whole, _) => parts.extend(well.into_iter().map(|line| {
+            let (text, style) = line_words(cx, line);
+            (10, text, style)
+        })),
+        (Lines::Short | Lines::Count, _) => parts.extend(well.into_iter().map(|line| {
+            let busy = cx.snapshot.line(line.id).counters.utilisation * 100.0;
+            (10, t!("{name} {busy} %", name = line.name, busy = format!("{busy:.0}")), theme.normal())
+        })),
     }
     parts
 }
@@ -72,18 +94,28 @@ pub(super) fn who_text(model: &Model, cx: &ViewContext, role: bool) -> (usize, S
     }
 }
 
-/// A line in the header: `L1 load 62 %`, or why it is not connected and when it is tried again.
-pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
+/// Is a line connected, does it reply, and has it time for its polls?
+fn is_well(cx: &ViewContext, line: &LineDef) -> bool {
     let status = cx.snapshot.line(line.id);
+    status.state == LineState::Connected && !is_overloaded(status) && replies(cx, status)
+}
+
+/// Without a request no reply is missed.
+fn replies(cx: &ViewContext, status: &LineStatus) -> bool {
     let counters = &status.counters;
     let recent = |at: Option<jiff::Timestamp>| {
         at.is_some_and(|at| elapsed(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
     };
+    recent(counters.last_rx) || counters.last_tx <= counters.last_rx
+}
+
+/// A line in the header: `L1 load 62 %`, or why it is not connected and when it is tried again.
+pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
+    let status = cx.snapshot.line(line.id);
     match &status.state {
         LineState::Connected => {
-            // Without a request no reply is missed.
-            let replies = recent(counters.last_rx) || counters.last_tx <= counters.last_rx;
-            let busy = counters.utilisation * 100.0;
+            let replies = replies(cx, status);
+            let busy = status.counters.utilisation * 100.0;
             let overloaded = is_overloaded(status);
             let style = if replies && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
             let overload = if overloaded { t!(" OVERLOADED") } else { "" };
@@ -119,6 +151,36 @@ mod tests {
 
     use super::*;
     use crate::ui::fixture::{Fixture, with_cx};
+
+    #[test]
+    fn every_line_has_its_state_in_the_header() {
+        let mut fixture = Fixture::normal();
+        for n in 1..8u16 {
+            let name = format!("L{}", n + 1);
+            fixture.def.lines.push(LineDef { id: crate::plant::def::LineId(n), name, ..fixture.def.lines[0].clone() });
+        }
+        let check = |down: Option<usize>, width: u16, expect: &[&str]| {
+            let mut snapshot = (*fixture.snapshot()).clone();
+            snapshot.lines = vec![fixture.line.clone(); 8];
+            if let Some(line) = down {
+                snapshot.lines[line].state = LineState::Disconnected;
+            }
+            let mut model = Model::new(
+                std::sync::Arc::new(snapshot),
+                crate::ui::theme::Theme::FULL,
+                1,
+                crate::ui::fixture::session(),
+            );
+            let shown = crate::ui::tests::screen(&mut model, width, 24);
+            let header = shown.lines().next().unwrap_or_default();
+            assert!(expect.iter().all(|words| header.contains(words)), "{width}: {header}");
+        };
+        check(None, 200, &["L1 load 62 %", "L8 load 62 %"]);
+        check(None, 120, &["L1 62 %", "L8 62 %"]);
+        check(None, 80, &["8 lines OK"]);
+        check(None, 60, &["8 lines OK"]);
+        check(Some(2), 80, &["7 lines OK", "L3 DISCONNECTED"]);
+    }
 
     #[test]
     fn only_a_line_with_requests_misses_replies() {
