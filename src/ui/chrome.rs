@@ -10,7 +10,7 @@ use header::header;
 use ratatui::{Frame, style::Style};
 
 use banner::banner;
-pub use banner::{alarm_words, counts, history_text};
+pub use banner::{alarm_words, counts, history_text, since};
 
 use super::{
     LastCommand, Model, SILENCE, ViewContext,

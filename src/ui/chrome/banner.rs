@@ -172,7 +172,12 @@ fn what_text(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
 
 /// `UNACK 00:41`: the state and how long it lasts.
 fn state_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
-    let since = match alarm.state {
+    format!("{} {}", translate(alarm.state.word()), running(elapsed(since(alarm), cx.now)))
+}
+
+/// Since when an alarm has been as it is: raised, or returned to normal. The one time that is counted from on every page.
+pub fn since(alarm: &ActiveAlarm) -> jiff::Timestamp {
+    match alarm.state {
         AlarmState::ReturnedToNormal | AlarmState::LatchedUnacknowledged | AlarmState::LatchedAcknowledged => {
             alarm.returned_at.unwrap_or(alarm.raised_at)
         }
@@ -182,8 +187,7 @@ fn state_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
         | AlarmState::Shelved
         | AlarmState::SuppressedByDesign
         | AlarmState::OutOfService => alarm.raised_at,
-    };
-    format!("{} {}", translate(alarm.state.word()), running(elapsed(since, cx.now)))
+    }
 }
 
 /// How many of each priority: `[1]!1 (3)2`.

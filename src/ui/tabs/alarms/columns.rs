@@ -4,7 +4,7 @@ use super::{Alarms, guidance, list::Row};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{def::Subject, snapshot::ActiveAlarm},
-    ui::{layout::Size, modal::confirm::subject},
+    ui::{chrome, layout::Size, modal::confirm::subject},
 };
 
 /// Columns of priority and state, with the blanks around them.
@@ -104,7 +104,7 @@ impl Columns {
             tab.recent.ribbon(cx, alarm, self.ribbon),
             respond,
             translate(alarm.state.word()).to_owned(),
-            running(elapsed(alarm.raised_at, cx.now)),
+            running(elapsed(chrome::since(alarm), cx.now)),
             alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default().to_owned(),
         ];
         self.row(cx.theme.priority_mark(def.priority), cells.each_ref().map(String::as_str))

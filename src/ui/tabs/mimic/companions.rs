@@ -18,6 +18,7 @@ use crate::{
         snapshot::ActiveAlarm,
     },
     ui::{
+        chrome::since,
         layout::Size,
         modal::{
             confirm::subject,
@@ -205,7 +206,7 @@ fn view(cx: &ViewContext, trend: Rect) -> View {
 fn alarms(cx: &ViewContext) -> Vec<(String, Style)> {
     let row = |alarm: &ActiveAlarm| {
         let def = cx.def().alarm(alarm.id);
-        let (mark, since) = (cx.theme.priority_mark(def.priority), running(elapsed(alarm.raised_at, cx.now)));
+        let (mark, since) = (cx.theme.priority_mark(def.priority), running(elapsed(since(alarm), cx.now)));
         let text = format!("{mark} {since}  {} {}", subject(cx, alarm.id), def.message);
         (text, cx.theme.alarm(def.priority, alarm.state, cx.flash()))
     };
