@@ -203,7 +203,10 @@ impl TabView for Alarms {
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.forget_gone(cx);
         match self.page {
-            Page::Active | Page::System => self.recent.ask(cx, &mut self.asked),
+            Page::Active | Page::System => {
+                let subject = self.selected(cx).map(|alarm| cx.def().alarm(alarm.id).subject);
+                self.recent.ask(cx, subject, &mut self.asked)
+            }
             Page::Suppressed => Vec::new(),
             Page::Journal => self.journal.ask(cx, &mut self.asked),
             Page::Metrics => self.metrics.ask(cx, &mut self.asked).into_iter().collect(),

@@ -60,7 +60,7 @@ impl Columns {
         let hour = if self.ribbon < 16 { t!("last hour") } else { t!("last 60 minutes") };
         let names = ["", t!("time"), t!("tag"), t!("what"), t!("value"), hour, t!("respond"), t!("state"), t!("for")];
         let [mark, time, tag, what, value, hour, respond, state, since] = names;
-        self.row("", [mark, time, tag, what, value, hour, respond, state, since, t!("by")])
+        self.row("", [mark, time, tag, what, value, hour, respond, state, since, t!("by")]).concat()
     }
 
     /// Is the last hour of each alarm shown?
@@ -68,25 +68,20 @@ impl Columns {
         self.ribbon > 0
     }
 
-    fn row(&self, priority: &str, cells: [&str; 10]) -> String {
+    /// The columns before the bars, the bars, and those behind them.
+    fn row(&self, priority: &str, cells: [&str; 10]) -> [String; 3] {
         let left = |columns: u16| columns.cast_signed();
-        let widths = [
-            1,
-            left(self.time),
-            left(self.tag),
-            left(self.what),
-            -left(self.value),
-            left(self.ribbon),
-            left(self.respond),
-            left(self.state),
-            -left(self.since),
-            left(self.by),
-        ];
-        format!("{}{}", pad(priority, 4), draw::columns(widths, cells))
+        let [mark, time, tag, what, value, ribbon, respond, state, since, by] = cells;
+        let widths = [1, left(self.time), left(self.tag), left(self.what), -left(self.value)];
+        let before = draw::columns(widths, [mark, time, tag, what, value]);
+        let bars = draw::columns([left(self.ribbon), left(self.respond)], [ribbon, respond]);
+        let behind = draw::columns([left(self.state), -left(self.since), left(self.by)], [state, since, by]);
+        let gap = |text: String| if text.is_empty() { text } else { format!("{text} ") };
+        [format!("{}{before} ", pad(priority, 4)), gap(bars), behind]
     }
 
-    /// A row of the list.
-    pub fn cells(&self, tab: &Alarms, cx: &ViewContext, row: &Row) -> String {
+    /// A row of the list: what stands before the bars, the bars, and what stands behind them.
+    pub fn cells(&self, tab: &Alarms, cx: &ViewContext, row: &Row) -> [String; 3] {
         let alarm: &ActiveAlarm = row.alarm;
         let def = cx.def().alarm(alarm.id);
         let now = match def.subject {

@@ -1,15 +1,16 @@
 //! What the journal says of the listed alarms: how each came and went in the last hour, and what was done the last times.
 
-use super::span;
+use super::{side, span};
 use crate::ui::tabs::prelude::*;
 use crate::{
+    history::Series,
     plant::{
         alarm::{AlarmState, manager::subject_name},
-        def::AlarmDef,
+        def::{AlarmDef, Pen, Subject},
         record::{ActionRecord, AlarmEvent, AlarmRecord, NOT_PROCESS_ACTIONS},
         snapshot::ActiveAlarm,
     },
-    ui::layout::Size,
+    ui::{layout::Size, tabs::trends::span::View, widgets::chart},
 };
 
 /// The ribbons reach back so far.
@@ -18,6 +19,7 @@ const RIBBON_EVERY_S: f64 = 5.0;
 /// "The last times" reach back so far.
 pub const DAYS: i64 = 30;
 const DAYS_EVERY_S: f64 = 60.0;
+const CURVE_EVERY_S: f64 = 10.0;
 /// Events and actions that are looked through at most.
 const EVENTS_MAX: usize = 2_000;
 const ACTIONS_MAX: usize = 500;
@@ -28,6 +30,9 @@ pub struct Recent {
     hour: Answered<Vec<AlarmRecord>>,
     alarms: Answered<Vec<AlarmRecord>>,
     actions: Answered<Vec<ActionRecord>>,
+    /// The tag that the selected alarm watches, and its curve.
+    tag: Option<TagId>,
+    curve: Answered<Vec<Series>>,
 }
 
 /// How an alarm stood in a cell of its ribbon, the most urgent last.
@@ -50,8 +55,8 @@ pub struct Occurrence {
 }
 
 impl Recent {
-    /// Asks for what is due.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+    /// Asks for what is due; `selected` is what the selected alarm watches.
+    pub fn ask(&mut self, cx: &ViewContext, selected: Option<Subject>, number: &mut u32) -> Vec<UiAction> {
         if cx.size < Size::Wide {
             return Vec::new();
         }
@@ -66,17 +71,39 @@ impl Recent {
         let alarms = span::ask(cx, &mut self.alarms, number, DAYS_EVERY_S, None, query);
         let query = Query::Actions { from, to, limit: ACTIONS_MAX };
         let actions = span::ask(cx, &mut self.actions, number, DAYS_EVERY_S, None, query);
-        hour.into_iter().chain(alarms).chain(actions).collect()
+        let tag = match selected {
+            Some(Subject::Tag(tag)) => Some(tag),
+            Some(Subject::Device(_) | Subject::Line(_) | Subject::Station) | None => None,
+        };
+        if tag != self.tag {
+            (self.tag, self.curve) = (tag, Answered::default());
+        }
+        let curve = tag.and_then(|tag| {
+            let view = view(cx);
+            let query = Query::Series { tags: vec![tag], from: view.from, to: view.to, buckets: view.columns };
+            span::ask(cx, &mut self.curve, number, CURVE_EVERY_S, None, query)
+        });
+        hour.into_iter().chain(alarms).chain(actions).chain(curve).collect()
+    }
+
+    /// Draws the last hour of what the selected alarm watches; nothing where that is no tag.
+    pub fn draw_curve(&self, cx: &ViewContext, canvas: &mut Canvas) {
+        let Some(tag) = self.tag else { return };
+        let series = self.curve.value.as_deref().unwrap_or_default();
+        draw::curves(cx, canvas, t!("last hour"), view(cx), &[Pen { tag, scale: None }], series);
     }
 
     pub fn awaits(&self, number: u32) -> bool {
-        [&self.hour.query, &self.alarms.query, &self.actions.query].iter().any(|query| query.awaits(number))
+        [&self.hour.query, &self.alarms.query, &self.actions.query, &self.curve.query]
+            .iter()
+            .any(|query| query.awaits(number))
     }
 
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         self.hour.on_answer(cx, number, answer);
         self.alarms.on_answer(cx, number, answer);
         self.actions.on_answer(cx, number, answer);
+        self.curve.on_answer(cx, number, answer);
     }
 
     /// The last hour of an alarm in so many cells: `··▄▄██`. What the snapshot says of it is never late.
@@ -115,6 +142,11 @@ impl Recent {
         let of_device: Vec<&ActionRecord> = actions.iter().filter(is_process).collect();
         Some(occurrences(&of_alarm.collect::<Vec<_>>(), &of_device, just_before(now)))
     }
+}
+
+/// The last hour, in columns of the panel beside the list.
+fn view(cx: &ViewContext) -> View {
+    View::live(cx.now, RIBBON.as_secs(), chart::dots(cx.theme, side::columns(cx.area.width), 1))
 }
 
 /// The journal holds microseconds, a snapshot more digits: what was at this time is not before it.

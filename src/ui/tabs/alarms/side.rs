@@ -12,6 +12,8 @@ const WIDTH: (u16, u16) = (40, 64);
 const LIST_MIN: u16 = 78;
 /// Cells of the bar of the time to respond.
 const BAR: u16 = 16;
+/// Rows of the curve of what the alarm watches, at least and at most.
+const CURVE: (u16, u16) = (7, 14);
 /// Earlier times that are listed.
 const TIMES_MAX: usize = 6;
 
@@ -78,6 +80,10 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
             }
             y += 1;
         }
+    }
+    let free = last.saturating_sub(y + 2);
+    if CURVE.0 <= free {
+        tab.recent.draw_curve(cx, &mut canvas.part(0, y + 1, width, free.min(CURVE.1)));
     }
     canvas.text(0, last, t!("go to"), theme.dim());
     for (n, line) in go.iter().enumerate() {

@@ -1,5 +1,7 @@
 //! How the alarms tab looks: the views and what is in them, the list, what is suppressed, and the guidance below.
 
+use ratatui::style::Modifier;
+
 use super::{Alarms, Page, columns::Columns, guidance, handover::suppressed_words, is_on, list::Row, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -144,7 +146,11 @@ fn list_alone(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         let priority = cx.def().alarm(row.alarm.id).priority;
         let style = theme.alarm(priority, row.alarm.state, false);
         let style = if n == place { style.patch(theme.focus()).fg(style.fg.unwrap_or_default()) } else { style };
-        canvas.text(1, y, &columns.cells(tab, cx, row), style);
+        // A reversed full block is an empty one.
+        let [before, bars, behind] = columns.cells(tab, cx, row);
+        let x = canvas.text(1, y, &before, style);
+        let x = canvas.text(x, y, &bars, style.remove_modifier(Modifier::REVERSED));
+        canvas.text(x, y, &behind, style);
         if n != place {
             let mark = format!("{}{}", theme.priority_mark(priority), theme.state_mark(row.alarm.state));
             canvas.text(1, y, &mark, theme.alarm(priority, row.alarm.state, cx.flash()));

@@ -229,6 +229,10 @@ fn a_wide_screen_shows_guidance_beside_the_list() {
             let answer = match &effect {
                 Effect::Query(_, Query::Journal { .. }) => Answer::Journal(before.clone()),
                 Effect::Query(_, Query::Actions { .. }) => Answer::Actions(Vec::new()),
+                Effect::Query(_, Query::Series { tags, .. }) => {
+                    assert_eq!(tags, &[Fixture::alarm().tag("TIC-1.PV")]);
+                    continue;
+                }
                 _ => continue,
             };
             let Effect::Query(id, _) = effect else { continue };
@@ -238,6 +242,7 @@ fn a_wide_screen_shows_guidance_beside_the_list() {
         for words in ["10 min, 09:19 left", "temperature high", "once in 30 days", "anna: relay replaced", "go to"] {
             assert!(picture.contains(words), "{words}:\n{picture}");
         }
+        assert_eq!(picture.contains("● TIC-1.PV"), 30 <= height, "the curve where there is room:\n{picture}");
         let row = picture.lines().find(|line| line.contains("(3) □")).unwrap_or_default();
         assert!(row.contains('▄') && row.contains('·'), "the ribbon of an acknowledged alarm: {row}");
     }
