@@ -184,6 +184,6 @@ pub(super) fn close_unseen(model: &mut Model) {
     let small = model.small();
     let closes = |modal: &Modal| !modal.is_quit() && (small || !modal.only_shows());
     if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
-        model.note = Some(effects::needs_room());
+        model.note = Some(effects::needs_room().into());
     }
 }

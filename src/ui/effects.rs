@@ -65,7 +65,7 @@ pub(super) fn needs_room() -> &'static str {
 pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     let fits = tab.is_compact() || tab == Tab::Login || !model.tabs.shown.is_compact();
     if Size::of(model.screen) == Size::Compact && !fits {
-        model.note = Some(needs_room());
+        model.note = Some(needs_room().into());
         return Vec::new();
     }
     if !tab.has_past() {

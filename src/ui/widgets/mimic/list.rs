@@ -79,7 +79,12 @@ fn rows(cx: &ViewContext, items: &[MimicItem]) -> Vec<Vec<usize>> {
 }
 
 /// The item that an arrow key leads to; the first one when none is selected; the same when there is none further on.
-pub fn neighbour(cx: &ViewContext, items: &[MimicItem], selected: Option<usize>, (dx, dy): (i32, i32)) -> Option<usize> {
+pub fn neighbour(
+    cx: &ViewContext,
+    items: &[MimicItem],
+    selected: Option<usize>,
+    (dx, dy): (i32, i32),
+) -> Option<usize> {
     let rows = rows(cx, items);
     let at = |n: usize| rows.iter().enumerate().find_map(|(y, row)| Some((row.iter().position(|of| *of == n)?, y)));
     let Some((x, y)) = selected.and_then(at) else { return rows.first().map(|row| row[0]) };
