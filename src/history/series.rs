@@ -25,12 +25,13 @@ pub struct Span {
 }
 
 /// The grid of a curve of at most `buckets` columns, and the widest aggregates that it may be made of, `finest` at least:
-/// where these are minutes or hours, columns begin and end with them, and the span is a little longer than asked.
+/// where these are minutes or hours, columns begin and end with them, and the span is a little longer than asked. A single
+/// column begins and ends as asked: its ends come from samples, for as long as these are kept.
 pub fn grid(span: Span, buckets: usize, finest: Tier) -> (Span, usize, Tier) {
     let (from, to) = (span.from.as_microsecond(), span.to.as_microsecond());
     let count = i64::try_from(buckets.max(1)).unwrap_or(i64::MAX);
     let tier = Tier::within((to - from) / count).max(finest);
-    let Some(step) = tier.step() else { return (span, buckets, tier) };
+    let Some(step) = (if count == 1 { finest } else { tier }).step() else { return (span, buckets, tier) };
     let from = floor(from, step);
     let column = ceil_div(ceil_div(to - from, count), step) * step;
     let count = ceil_div(to - from, column);
@@ -164,6 +165,18 @@ mod tests {
             value.map_or(Sample::bad(Cause::DeviceDown, sec(at)), |value| Sample::good(value, sec(at)))
         };
         rows.iter().map(row).collect()
+    }
+
+    #[test]
+    fn one_column_begins_and_ends_as_it_is_asked() {
+        let asked = span(7, 100_003);
+        let check = |buckets, finest, expect: (i64, i64)| {
+            let (got, count, tier) = grid(asked, buckets, finest);
+            assert_eq!((got.from, got.to, count, tier), (sec(expect.0), sec(expect.1), buckets, Tier::Hour));
+        };
+        check(1, Tier::Raw, (7, 100_003));
+        check(2, Tier::Raw, (0, 100_800));
+        check(1, Tier::Minute, (0, 100_020));
     }
 
     fn span(from: i64, to: i64) -> Span {

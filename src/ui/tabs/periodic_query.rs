@@ -10,7 +10,7 @@ use crate::{
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
     },
-    report::{ShiftReport, batch::BatchReport},
+    report::{ShiftReport, batch::BatchReport, step_series::HeldValue},
     t,
     ui::{UiAction, ViewContext},
 };
@@ -210,6 +210,7 @@ from_answer! {
     Report: Box<ShiftReport>;
     AlarmMetrics: Box<PeriodMetrics>;
     Batches: Vec<BatchReport>;
+    Values: Vec<Vec<Option<HeldValue>>>;
 }
 
 /// Seconds of the operator as plant time, which runs faster in demonstrations.

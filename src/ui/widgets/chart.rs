@@ -42,8 +42,8 @@ pub struct Chart<'a> {
     pub now: Timestamp,
     /// The pens, most important first: the first wins where curves cross.
     pub curves: Vec<Curve<'a>>,
-    /// A vertical line at an instant, and what to write above it.
-    pub cursor: Option<(Timestamp, Line<'a>)>,
+    /// Vertical lines at instants, and what to write above each, in order of time.
+    pub cursors: Vec<(Timestamp, Line<'a>)>,
     /// Events on the time axis.
     pub marks: Vec<(Timestamp, Style)>,
 }
@@ -228,7 +228,7 @@ impl Widget for &Chart<'_> {
         self.draw_marks(&plan, buf);
         self.draw_gaps(&plan, buf);
         self.draw_axes(&plan, area, buf);
-        self.draw_cursor(&plan, area, buf);
+        self.draw_cursors(&plan, area, buf);
     }
 }
 

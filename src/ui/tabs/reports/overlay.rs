@@ -120,7 +120,7 @@ impl Overlay {
             to: end,
             now: end,
             curves: curves.collect(),
-            cursor: None,
+            cursors: Vec::new(),
             marks: Vec::new(),
         };
         let plot = canvas.part(0, 1, width, height.saturating_sub(legend + 1)).area();

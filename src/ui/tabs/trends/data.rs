@@ -62,6 +62,9 @@ impl Trends {
             let every = often.max(real(cx, 10.0));
             acts.extend(self.raised.ask(cx, (Tab::Trends, &mut self.asked), every, timeout, raised));
         }
+        if self.values.is_none() {
+            acts.extend(self.ask_between(cx));
+        }
         let tags = match self.values {
             Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
             None => group,

@@ -23,6 +23,8 @@ pub enum Action {
     Rate,
     /// Cursor on or off.
     Cursor,
+    /// Cursor B on, then which of both is moved.
+    CursorB,
     /// The picture stands still, or is live again.
     Hold,
     /// Back to the present.
@@ -50,6 +52,12 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('='), "", "shorter window", Action::Zoom(-1)),
     Key::new(char('-'), "", "longer window", Action::Zoom(1)),
     Key::new(char('c'), "cursor", "cursor on or off: reads every pen at one time", Action::Cursor),
+    Key::new(
+        char('b'),
+        "cursor B",
+        "cursor B: measures from A to B; again: which one the arrows move",
+        Action::CursorB,
+    ),
     Key::new(char('g'), "group", "next group of pens", Action::Group),
     Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
     Key::new(char('v'), "values", "all values with their last hour, or the curves", Action::Values),

@@ -176,30 +176,35 @@ impl Chart<'_> {
         }
     }
 
-    /// A line through the empty cells of its column, and the words above it, on whichever side there is room.
-    pub(super) fn draw_cursor(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
+    /// A line through the empty cells of the column of each cursor, and the words above it, on whichever side there is
+    /// room; those of the next cursor begin behind them.
+    pub(super) fn draw_cursors(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
         let plot = plan.plot;
-        let Some((at, words)) = &self.cursor else { return };
-        let Some(x) = self.cell(*at, plot.width).map(|x| plot.x + x) else { return };
         let (line, foot) = match self.theme.glyphs {
             Glyphs::Braille => ("┊", "┷"),
             Glyphs::Block => ("│", "┴"),
             Glyphs::Ascii => (":", "^"),
         };
-        for y in plot.y..plot.bottom() {
-            let cell = &mut buf[(x, y)];
-            if matches!(cell.symbol(), " " | "·") {
-                cell.set_symbol(line).set_style(self.theme.normal());
-            } else {
-                cell.set_style(self.theme.focus());
+        let mut free = plot.x;
+        for (n, (at, words)) in self.cursors.iter().enumerate() {
+            let Some(x) = self.cell(*at, plot.width).map(|x| plot.x + x) else { continue };
+            for y in plot.y..plot.bottom() {
+                let cell = &mut buf[(x, y)];
+                if matches!(cell.symbol(), " " | "·") {
+                    cell.set_symbol(line).set_style(self.theme.normal());
+                } else {
+                    cell.set_style(self.theme.focus());
+                }
             }
-        }
-        if plot.y > area.y {
-            buf[(x, plot.bottom())].set_symbol(foot).set_style(self.theme.normal());
-            let width = to_u16(words.width()).min(plot.width);
-            let end = plot.right().saturating_sub(2).max(plot.x + width);
-            let start = x.saturating_sub(width / 2).clamp(plot.x, end - width);
-            buf.set_line(start, area.y, words, width);
+            if plot.y > area.y {
+                buf[(x, plot.bottom())].set_symbol(foot).set_style(self.theme.normal());
+                let later: usize = self.cursors[n + 1..].iter().map(|(_, words)| words.width() + 2).sum();
+                let end = plot.right().saturating_sub(2 + to_u16(later));
+                let width = to_u16(words.width()).min(end.saturating_sub(free));
+                let start = x.saturating_sub(width / 2).min(end.saturating_sub(width)).max(free);
+                buf.set_line(start, area.y, words, width);
+                free = start + width + 2;
+            }
         }
     }
 }

@@ -31,7 +31,7 @@ fn curve<'a>(trace: &'a Trace, pen: usize, unit: &'a str) -> Curve<'a> {
 
 fn chart<'a>(theme: &'a Theme, curves: Vec<Curve<'a>>) -> Chart<'a> {
     let (from, to, now) = (at(0), at(120), at(120));
-    Chart { theme, zone: Some(&ZONE), from, to, now, curves, cursor: None, marks: Vec::new() }
+    Chart { theme, zone: Some(&ZONE), from, to, now, curves, cursors: Vec::new(), marks: Vec::new() }
 }
 
 fn picture(chart: &Chart, width: u16, height: u16) -> String {
@@ -79,7 +79,7 @@ fn a_spike_of_one_second_is_seen_in_an_hour() {
 fn the_cursor_shows_its_words_and_alarms_their_mark() {
     let pv = trace((0..120).map(wave));
     let mut chart = chart(&Theme::FULL, vec![curve(&pv, 0, "°C")]);
-    chart.cursor = Some((at(110), Line::from("13:01:50  PV 71.2")));
+    chart.cursors = vec![(at(110), Line::from("13:01:50  PV 71.2"))];
     chart.marks = vec![(at(45), Style::new())];
     insta::assert_snapshot!(picture(&chart, 60, 10));
 }
@@ -115,7 +115,7 @@ proptest! {
         let (a, b) = (trace(values.iter().copied()), trace(values.iter().map(|v| -v)));
         for theme in [Theme::FULL, Theme::PLAIN] {
             let curves = vec![curve(&a, 0, "°C"), curve(&b, 1, "%"), curve(&b, 2, "")];
-            let chart = Chart { to: at(span), cursor: Some((at(5), Line::from("13:01"))), ..chart(&theme, curves) };
+            let chart = Chart { to: at(span), cursors: vec![(at(5), Line::from("13:01"))], ..chart(&theme, curves) };
             let mut buf = Buffer::empty(Rect::new(0, 0, 100, 40));
             chart.render(Rect::new(x, y, width, height), &mut buf);
         }

@@ -22,9 +22,10 @@ use crate::{
         number::to_u16,
         sample::{Cause, Sample},
         tag::{ByteOrder, DataType, Table, TagDef},
+        time::instant_of_grid,
     },
     report::{
-        step_series::HOLD_MAX,
+        step_series::{HOLD_MAX, HeldValue, ValuesAt},
         value_log::reader::{LoggedValue, ValueLog},
     },
     ui::{Effect, keys::find},
@@ -96,10 +97,21 @@ impl Graph {
 
 /// What the history would say.
 fn answer(items: &[Watched], query: Query, now: Timestamp) -> Result<Answer, HistoryError> {
+    let of = |tag: TagId| items.get(tag.index()).map(|item| &item.samples);
+    if let Query::Values { tags, from, every, count } = query {
+        let instants: Arc<[Timestamp]> = (1..=count).map_while(|n| instant_of_grid(from, every, n)).collect();
+        return Ok(Answer::Values(tags.into_iter().map(|tag| held(of(tag), instants.clone())).collect()));
+    }
     let Query::Series { tags, from, to, buckets } = query else { return Ok(Answer::Journal(Vec::new())) };
-    let known = tags.into_iter().filter_map(|tag| Some((tag, items.get(tag.index())?)));
+    let known = tags.into_iter().filter_map(|tag| Some((tag, of(tag)?)));
     let span = Span { from, to, until: now };
-    Ok(Answer::Series(known.map(|(tag, item)| series(&item.samples, tag, span, buckets)).collect()))
+    Ok(Answer::Series(known.map(|(tag, samples)| series(samples, tag, span, buckets)).collect()))
+}
+
+fn held(samples: Option<&VecDeque<Sample>>, instants: Arc<[Timestamp]>) -> Vec<Option<HeldValue>> {
+    let mut values = ValuesAt::new(instants);
+    samples.into_iter().flatten().for_each(|sample| values.next(*sample));
+    values.end().into_iter().map(|sample| sample.map(HeldValue::from)).collect()
 }
 
 fn series(samples: &VecDeque<Sample>, tag: TagId, span: Span, buckets: usize) -> Series {

@@ -1,0 +1,49 @@
+//! The cursors A and B, and what is measured between them.
+
+use super::{super::cursors::Measured, *};
+use crate::plant::sample::{Cause, Quality};
+
+#[test]
+fn two_cursors_measure_every_pen_between_them() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("c←←←←←←←←←←b→→→→");
+    stand.answer();
+    insta::assert_snapshot!(stand.screen());
+    let (a, b) = stand.model.tabs.trends.both().expect("both cursors");
+    assert!(a < b);
+    stand.press("b←");
+    assert_eq!(stand.model.tabs.trends.both().map(|(_, b)| b), Some(b), "the arrows move A again");
+    stand.press("c");
+    assert_eq!((stand.model.tabs.trends.both(), stand.model.tabs.trends.cursor), (None, None));
+}
+
+#[test]
+fn figures_of_another_interval_are_not_shown() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    stand.press("b←←");
+    stand.answer();
+    assert!(stand.screen().contains("58.2"));
+    stand.press("←");
+    assert!(!stand.screen().contains("58.2"), "until the history has answered");
+    stand.press("→→→→←←");
+    assert!(stand.asked.len() <= 6, "fast keys do not pile up queries");
+    stand.answer();
+    assert!(stand.screen().contains("58.2"));
+}
+
+#[test]
+fn only_good_values_make_a_difference() {
+    let good = |value| Some(Sample::good(value, now()).into());
+    let doubted = Some(Sample::good(5.0, now()).uncertain(Cause::Stale).into());
+    let check = |ends, expect| assert_eq!(Measured { ends, figures: None }.difference(), expect);
+    check([good(2.0), good(5.0)], Some(3.0));
+    check([good(2.0), doubted], None);
+    check([None, good(2.0)], None);
+    assert!(doubted.is_some_and(|held: crate::report::step_series::HeldValue| held.quality != Quality::Good));
+    let measured = Measured { ends: [good(2.0), good(5.0)], figures: None };
+    assert_eq!(measured.slope(SignedDuration::from_secs(30)), Some(6.0));
+    assert_eq!(measured.slope(SignedDuration::from_secs(-30)), Some(-6.0), "the other way round");
+    assert_eq!(measured.slope(SignedDuration::ZERO), None);
+}

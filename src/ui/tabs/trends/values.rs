@@ -1,0 +1,66 @@
+//! The list of all values with their last hour.
+
+use super::{
+    view::{hour, resolution, trouble},
+    *,
+};
+use crate::ui::widgets::spark::spark;
+
+impl Trends {
+    pub(super) fn select_value(&mut self, cx: &ViewContext, first: usize, row: usize, motion: Motion) {
+        let rows = usize::from(cx.area.height.saturating_sub(2)).max(1);
+        let row = motion.to(row, stored(cx).len(), rows);
+        let first_now = first.clamp((row + 1).saturating_sub(rows), row);
+        if first_now != first {
+            self.hours.query.want();
+        }
+        self.values = Some((first_now, row));
+    }
+}
+
+/// All stored tags, in the order of the plant.
+pub(super) fn stored(cx: &ViewContext) -> Vec<TagId> {
+    cx.def().tags.iter().filter(|tag| tag.is_stored()).map(|tag| tag.id).collect()
+}
+
+/// Every stored value with its last hour.
+pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: usize, selected: usize) {
+    let (theme, all) = (cx.theme, stored(cx));
+    let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
+    let last = (first + rows).min(all.len());
+    let x = canvas.text(1, 0, t!("All values"), theme.strong());
+    let range = t!("{min}–{last} of {count}", min = (first + 1).min(last), last, count = all.len());
+    canvas.text(x + 3, 0, &range, theme.dim());
+    let wide = canvas.width().saturating_sub(80);
+    let name = 15 + wide / 5;
+    let label = name + 18 + wide / 4;
+    let (value, low, high) = (label + 15, label + 23, label + 31);
+    canvas.text(2, 1, t!("tag"), theme.dim());
+    let now = if cx.is_past() { t!("then") } else { t!("now") };
+    for (end, text) in [(value, now), (low, t!("1 h min")), (high, t!("1 h max"))] {
+        canvas.text_right(end, 1, text, theme.dim());
+    }
+    canvas.text(high + 2, 1, t!("last hour"), theme.dim());
+    let (words, style) = match trouble(trends, cx) {
+        Some(trouble) => (trouble, theme.trouble()),
+        None => (t!("{pick} curve   v back", pick = theme.pick("⏎", t!("Enter"))), theme.dim()),
+    };
+    canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&words, canvas.width().saturating_sub(30)), style);
+    for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
+        let (y, def, shown) = (to_u16(y) + 2, cx.def().tag(*tag), value::show(cx, *tag));
+        let style = if n == selected { theme.strong() } else { theme.normal() };
+        if n == selected {
+            canvas.text(0, y, theme.pick("▸", ">"), theme.strong());
+        }
+        canvas.text(2, y, &pad(&def.name, name.saturating_sub(1)), style);
+        canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());
+        canvas.text_right(value, y, &shown.within(value - label), shown.style);
+        let Some(series) = hour(trends, *tag) else { continue };
+        if let Some((min, _, max)) = series.summary.filter(|_| def.enum_labels.is_empty()) {
+            canvas.text_right(low, y, &cx.snapshot.format(*tag, min), theme.dim());
+            canvas.text_right(high, y, &cx.snapshot.format(*tag, max), theme.dim());
+        }
+        let cells = usize::from(canvas.width().saturating_sub(high + 3)).min(series.buckets.len());
+        canvas.text(high + 2, y, &spark(series, cells, resolution(cx, *tag), theme.glyphs), style);
+    }
+}
