@@ -20,8 +20,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub use self::keys::{Action, KEYS};
 use self::{
     cursors::Between,
+    pens::PenScale,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
-    values::stored,
 };
 use crate::ui::tabs::{prelude::*, reports::period};
 use crate::{
@@ -50,9 +50,13 @@ const MARKS_MAX: usize = 200;
 /// State of this tab.
 #[derive(Debug, Default)]
 pub struct Trends {
-    /// Groups of the plant, and behind them the tag that was picked in the list of values.
+    /// Groups of the plant, and behind them the tags that were picked in the list of values.
     group: usize,
-    picked: Option<TagId>,
+    picked: Vec<TagId>,
+    /// Scales that were typed, instead of those of the plant file.
+    scales: BTreeMap<TagId, PenScale>,
+    /// What the text of the open window is for.
+    asking: Asking,
     off: Vec<TagId>,
     selected: usize,
     /// Place in [`WINDOWS`].
@@ -73,6 +77,8 @@ pub struct Trends {
     replayed: Option<Timestamp>,
     /// The list of values instead of the curves: first row shown, row selected.
     values: Option<(usize, usize)>,
+    /// Those that are listed.
+    filter: Words,
     /// When the tab last got a snapshot.
     seen: Option<Timestamp>,
     traces: BTreeMap<TagId, Trace>,
@@ -89,6 +95,18 @@ pub struct Trends {
     apart: bool,
     /// Nothing comes any more: what is shown is a log.
     ended: bool,
+}
+
+/// What a typed text is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Asking {
+    /// A time to go to.
+    #[default]
+    Time,
+    /// The values that are listed.
+    Filter,
+    /// The scale of a pen.
+    Scale(TagId),
 }
 
 type Figures = (Option<(f64, f64, f64)>, f64);
@@ -139,7 +157,7 @@ impl TabView for Trends {
 
     fn back(&mut self, cx: &ViewContext) -> bool {
         let cancelled = [&mut self.curves, &mut self.hours.query].map(|query| query.cancel(cx));
-        cancelled.contains(&true)
+        cancelled.contains(&true) || self.values.is_some() && self.leave_values()
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
@@ -151,13 +169,10 @@ impl TabView for Trends {
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        let asked = period::typed(cx.def(), text, cx.present())?;
-        if asked.to < cx.present() {
-            self.window = nearest(asked.to.duration_since(asked.from));
-            (self.accumulate, self.since, self.end) = (false, None, Some(asked.to));
-            self.moved();
-        } else {
-            self.go_to_moment(cx, asked.from);
+        match self.asking {
+            Asking::Time => self.go_to(cx, text)?,
+            Asking::Filter => self.filter_values(text),
+            Asking::Scale(tag) => self.set_scale(tag, text)?,
         }
         Ok(self.ask(cx))
     }
@@ -179,11 +194,17 @@ impl Trends {
         match (self.values, action) {
             (Some((first, row)), Action::Move(motion)) => self.select_value(cx, first, row, motion),
             (Some((_, row)), Action::Open) => {
-                if let Some(tag) = stored(cx).get(row) {
-                    self.open_tag(cx, *tag);
+                if let Some(tag) = self.listed(cx).get(row) {
+                    self.open_value(cx, *tag);
                 }
             }
-            (Some((_, row)), Action::Why) => return Why::open(Why::new(stored(cx), row)),
+            (Some((_, row)), Action::Toggle) => self.pick(cx, row),
+            (Some(_), Action::Find) => {
+                self.asking = Asking::Filter;
+                let words = t!("words of name, label or unit; none lists all");
+                return open(Modal::Prompt(Prompt::new(t!("Find values"), words, &self.filter.to_string())));
+            }
+            (Some((_, row)), Action::Why) => return Why::open(Why::new(self.listed(cx), row)),
             (None, Action::Why) => {
                 let pens = self.pens(cx).into_iter().map(|pen| pen.tag).collect();
                 return Why::open(Why::new(pens, self.selected));
@@ -191,6 +212,9 @@ impl Trends {
             (_, Action::Values) => {
                 self.values = if self.values.is_some() { None } else { Some((0, 0)) };
                 self.hours.query.want();
+            }
+            (None, Action::Find) => {
+                return self.act(cx, Action::Values).into_iter().chain(self.act(cx, action)).collect();
             }
             (Some(_), _) => {}
             (None, Action::Side(by)) if cx.is_past() => return self.replay_by(self.cell(cx), by),
@@ -224,9 +248,9 @@ impl Trends {
                 self.between.clear();
             }
             (None, Action::CursorB) => self.toggle_cursor_b(cx),
-            // A log has no history behind it.
-            (None, Action::GoTo) if self.apart => {}
+            (None, Action::Scale) => return self.ask_scale(cx),
             (None, Action::GoTo) => {
+                self.asking = Asking::Time;
                 let prompt = Prompt::new(t!("Go to a time"), t!("03:12   2026-11-20   2026-11-20 22:00-06:00"), "");
                 return vec![UiAction::Open(Modal::Prompt(prompt))];
             }

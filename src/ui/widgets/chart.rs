@@ -44,6 +44,8 @@ pub struct Chart<'a> {
     pub curves: Vec<Curve<'a>>,
     /// Vertical lines at instants, and what to write above each, in order of time.
     pub cursors: Vec<(Timestamp, Line<'a>)>,
+    /// The curve whose axis is at the right where there are more than two.
+    pub right: Option<usize>,
     /// Events on the time axis.
     pub marks: Vec<(Timestamp, Style)>,
 }
@@ -57,12 +59,34 @@ pub struct Curve<'a> {
     pub pen: usize,
     /// Curves of one unit share an axis.
     pub unit: &'a str,
+    /// It has an axis of its own.
+    pub own: bool,
     /// Fixed scale; `None` fits the data.
     pub fixed: Option<(f64, f64)>,
+    /// The fixed scale is kept where data lie outside: arrows at its end say so.
+    pub clipped: bool,
     /// The value of the last digit shown.
     pub resolution: f64,
     /// A broken line: a written value, not a measured one.
     pub dashed: bool,
+}
+
+impl<'a> Curve<'a> {
+    /// A plain pen with so many decimals, on a scale that fits it.
+    pub fn new(trace: &'a Trace, pen: usize, unit: &'a str, decimals: u8) -> Curve<'a> {
+        let resolution = 10f64.powi(-i32::from(decimals));
+        Curve { trace, pen, unit, own: false, fixed: None, clipped: false, resolution, dashed: false }
+    }
+
+    /// Curves with equal ones share an axis.
+    fn axis(&self) -> (&str, Option<usize>) {
+        (self.unit, self.own.then_some(self.pen))
+    }
+
+    /// What is written over its axis.
+    fn heading(&self, theme: &Theme) -> String {
+        if self.own { format!("{} {}", mark(theme, self.pen), self.unit) } else { self.unit.to_owned() }
+    }
 }
 
 /// The axis that a curve is read on.
@@ -108,6 +132,17 @@ fn raster(theme: &Theme) -> Raster {
         Glyphs::Braille => Raster::Braille,
         Glyphs::Block => Raster::Half,
         Glyphs::Ascii => Raster::Ascii,
+    }
+}
+
+impl<'a> Chart<'a> {
+    /// Curves from the first instant to the second, up to now, on an axis of elapsed time.
+    pub fn new(
+        theme: &'a Theme,
+        (from, to, now): (Timestamp, Timestamp, Timestamp),
+        curves: Vec<Curve<'a>>,
+    ) -> Chart<'a> {
+        Chart { theme, zone: None, from, to, now, curves, cursors: Vec::new(), right: None, marks: Vec::new() }
     }
 }
 
@@ -175,28 +210,36 @@ impl Chart<'_> {
     /// Axis and scale of each curve: curves of one unit share a scale.
     fn scales(&self, columns: &[Vec<Option<Span>>], intervals: usize) -> Vec<(Axis, Scale)> {
         let scale = |curve: &Curve| {
-            let same = || self.curves.iter().zip(columns).filter(|(other, _)| other.unit == curve.unit);
+            let same = || self.curves.iter().zip(columns).filter(|(other, _)| other.axis() == curve.axis());
+            let clipped = || same().filter(|(curve, _)| curve.clipped).filter_map(|(curve, _)| curve.fixed);
             let spans = same().flat_map(|(_, columns)| columns.iter().flatten()).map(|span| (span.min, span.max));
             let fixed = same().filter_map(|(curve, _)| curve.fixed);
             let resolution = same().map(|(curve, _)| curve.resolution).fold(f64::INFINITY, f64::min);
-            Scale::fit(spans.reduce(widen), fixed.reduce(widen), resolution, intervals.clamp(1, 6))
+            let (data, fixed) = match clipped().reduce(widen) {
+                Some(range) => (None, Some(range)),
+                None => (spans.reduce(widen), fixed.reduce(widen)),
+            };
+            Scale::fit(data, fixed, resolution, intervals.clamp(1, 6))
         };
         self.axes().into_iter().zip(self.curves.iter().map(scale)).collect()
     }
 
     /// The axis of each curve. Units get the two axes in the order of the pens; what has no unit only if one is left.
     fn axes(&self) -> Vec<Axis> {
-        let mut units: Vec<&str> = Vec::new();
-        let (with, without): (Vec<_>, Vec<_>) = self.curves.iter().map(|curve| curve.unit).partition(|u| !u.is_empty());
-        for unit in with.into_iter().chain(without) {
-            if !units.contains(&unit) {
-                units.push(unit);
+        let mut axes: Vec<(&str, Option<usize>)> = Vec::new();
+        let (with, without): (Vec<_>, Vec<_>) =
+            self.curves.iter().map(Curve::axis).partition(|axis| !axis.0.is_empty());
+        for axis in with.into_iter().chain(without) {
+            if !axes.contains(&axis) {
+                axes.push(axis);
             }
         }
-        let axis = |curve: &Curve| match units.iter().position(|unit| *unit == curve.unit) {
+        let place = |curve: &Curve| axes.iter().position(|axis| *axis == curve.axis());
+        let right = self.right.and_then(|n| place(self.curves.get(n)?)).filter(|place| *place > 0).unwrap_or(1);
+        let axis = |curve: &Curve| match place(curve) {
             Some(0) => Axis::Left,
-            Some(1) => Axis::Right,
-            _ => Axis::Own,
+            Some(place) if place == right => Axis::Right,
+            Some(_) | None => Axis::Own,
         };
         self.curves.iter().map(axis).collect()
     }

@@ -104,25 +104,11 @@ impl Overlay {
         };
         let legend = to_u16(self.batches.len()) + 1;
         let traces: Vec<Trace> = self.batches.iter().map(|(batch, curve)| from_begin(batch, curve)).collect();
-        let curves = traces.iter().enumerate().map(|(pen, trace)| Curve {
-            trace,
-            pen,
-            unit: cx.snapshot.unit(tag),
-            fixed: None,
-            resolution: 10f64.powi(-i32::from(cx.snapshot.decimals[tag.index()])),
-            dashed: false,
-        });
+        let decimals = cx.snapshot.decimals[tag.index()];
+        let curve = |(pen, trace)| Curve::new(trace, pen, cx.snapshot.unit(tag), decimals);
+        let curves = traces.iter().enumerate().map(curve).collect();
         let end = BEGIN.checked_add(self.span(cx.now)).unwrap_or(BEGIN);
-        let chart = Chart {
-            theme,
-            zone: None,
-            from: BEGIN,
-            to: end,
-            now: end,
-            curves: curves.collect(),
-            cursors: Vec::new(),
-            marks: Vec::new(),
-        };
+        let chart = Chart::new(theme, (BEGIN, end, end), curves);
         let plot = canvas.part(0, 1, width, height.saturating_sub(legend + 1)).area();
         chart.render(plot, canvas.buffer());
         let y = height.saturating_sub(legend);

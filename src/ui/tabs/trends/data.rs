@@ -66,7 +66,7 @@ impl Trends {
             acts.extend(self.ask_between(cx));
         }
         let tags = match self.values {
-            Some((first, _)) => stored(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
+            Some((first, _)) => self.listed(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
             None => group,
         };
         let hour = View::ending(cx.now, 3_600, HOUR_COLUMNS);

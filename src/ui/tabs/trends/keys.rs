@@ -11,6 +11,10 @@ pub enum Action {
     Move(Motion),
     /// Switch the selected pen on or off.
     Toggle,
+    /// Find values by their words.
+    Find,
+    /// Ask for the scale of the selected pen.
+    Scale,
     /// Show the curve of the selected value.
     Open,
     /// A window so many steps longer.
@@ -37,6 +41,13 @@ pub enum Action {
     Why,
 }
 
+impl Action {
+    /// Does it need a plant: its station, or the window of a tab?
+    pub fn is_of_plant(self) -> bool {
+        matches!(self, Action::Why | Action::GoTo | Action::Find | Action::Scale)
+    }
+}
+
 /// Keys of this tab.
 pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", Action::Side(-1)),
@@ -59,10 +70,12 @@ pub const KEYS: &[Key<Action>] = &[
         Action::CursorB,
     ),
     Key::new(char('g'), "group", "next group of pens", Action::Group),
-    Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
+    Key::new(char(' '), "pen", "switch the selected pen on or off; in the list of values: mark as pen", Action::Toggle),
+    Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),
+    Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Action::Find),
     Key::new(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
     Key::new(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
     Key::new(char('u'), "rate", "refresh interval of the curves: 0.5, 1, 2, 5, 10 s", Action::Rate),
-    Key::new(code(KeyCode::Enter), "", "in the list of values: show its curve", Action::Open),
+    Key::new(code(KeyCode::Enter), "", "in the list of values: show its curve, or the marked ones", Action::Open),
 ];

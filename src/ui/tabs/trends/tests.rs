@@ -1,6 +1,7 @@
 //! The trends tab in the whole terminal, with a made-up history behind it.
 
 mod cursors;
+mod pens;
 mod queries;
 
 use queries::kinds;

@@ -4,12 +4,40 @@ use super::{
     view::{hour, resolution, trouble},
     *,
 };
-use crate::ui::widgets::spark::spark;
+use crate::{
+    plant::tag::TagDef,
+    ui::widgets::{chart::mark, spark::spark},
+};
 
 impl Trends {
+    /// The stored tags that fit the filter, in the order of the plant.
+    pub(super) fn listed(&self, cx: &ViewContext) -> Vec<TagId> {
+        let fits = |tag: &TagDef| {
+            self.filter.is_empty()
+                || self.filter.fit(&format!("{} {} {}", tag.name, tag.label, cx.snapshot.unit(tag.id)))
+        };
+        cx.def().tags.iter().filter(|tag| tag.is_stored() && fits(tag)).map(|tag| tag.id).collect()
+    }
+
+    /// Lists the values that fit these words.
+    pub(super) fn filter_values(&mut self, text: &str) {
+        (self.filter, self.values) = (Words::parse(text), Some((0, 0)));
+        self.hours.query.want();
+    }
+
+    /// Out of the list: first the filter goes.
+    pub(super) fn leave_values(&mut self) -> bool {
+        if self.filter.is_empty() {
+            self.values = None;
+        } else {
+            self.filter_values("");
+        }
+        true
+    }
+
     pub(super) fn select_value(&mut self, cx: &ViewContext, first: usize, row: usize, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(2)).max(1);
-        let row = motion.to(row, stored(cx).len(), rows);
+        let row = motion.to(row, self.listed(cx).len(), rows);
         let first_now = first.clamp((row + 1).saturating_sub(rows), row);
         if first_now != first {
             self.hours.query.want();
@@ -18,19 +46,17 @@ impl Trends {
     }
 }
 
-/// All stored tags, in the order of the plant.
-pub(super) fn stored(cx: &ViewContext) -> Vec<TagId> {
-    cx.def().tags.iter().filter(|tag| tag.is_stored()).map(|tag| tag.id).collect()
-}
-
 /// Every stored value with its last hour.
 pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: usize, selected: usize) {
-    let (theme, all) = (cx.theme, stored(cx));
+    let (theme, all) = (cx.theme, trends.listed(cx));
     let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
     let last = (first + rows).min(all.len());
     let x = canvas.text(1, 0, t!("All values"), theme.strong());
     let range = t!("{min}–{last} of {count}", min = (first + 1).min(last), last, count = all.len());
-    canvas.text(x + 3, 0, &range, theme.dim());
+    let x = canvas.text(x + 3, 0, &range, theme.dim());
+    if !trends.filter.is_empty() {
+        canvas.text(x + 2, 0, &format!("/{}", trends.filter), theme.strong());
+    }
     let wide = canvas.width().saturating_sub(80);
     let name = 15 + wide / 5;
     let label = name + 18 + wide / 4;
@@ -43,7 +69,7 @@ pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
     canvas.text(high + 2, 1, t!("last hour"), theme.dim());
     let (words, style) = match trouble(trends, cx) {
         Some(trouble) => (trouble, theme.trouble()),
-        None => (t!("{pick} curve   v back", pick = theme.pick("⏎", t!("Enter"))), theme.dim()),
+        None => (t!("space mark   / find   {pick} curve   v back", pick = theme.pick("⏎", t!("Enter"))), theme.dim()),
     };
     canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&words, canvas.width().saturating_sub(30)), style);
     for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
@@ -51,6 +77,9 @@ pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
         let style = if n == selected { theme.strong() } else { theme.normal() };
         if n == selected {
             canvas.text(0, y, theme.pick("▸", ">"), theme.strong());
+        }
+        if let Some(pen) = trends.picked.iter().position(|picked| picked == tag) {
+            canvas.text(1, y, mark(theme, pen), theme.pen(pen));
         }
         canvas.text(2, y, &pad(&def.name, name.saturating_sub(1)), style);
         canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());

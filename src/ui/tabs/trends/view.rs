@@ -60,15 +60,15 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
 fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let (def, theme, view) = (cx.def(), cx.theme, trends.span(cx));
     let zone = &def.time_zone;
-    let name = match (def.trends.get(trends.group), trends.picked) {
+    let name = match (def.trends.get(trends.group), trends.picked.as_slice()) {
         (Some(group), _) => group.name.clone(),
-        (None, Some(tag)) => def.tag(tag).name.clone(),
-        (None, None) => String::new(),
+        (None, [tag]) => def.tag(*tag).name.clone(),
+        (None, _) => t!("marked").to_owned(),
     };
     let trouble = trouble(trends, cx);
     let brief = trouble.is_some() && canvas.width() < 120;
     let mut x = canvas.text(1, 0, &name, theme.strong());
-    let groups = def.trends.len() + usize::from(trends.picked.is_some());
+    let groups = def.trends.len() + usize::from(!trends.picked.is_empty());
     if groups > 1 && !brief {
         x = canvas.text(x + 1, 0, &t!("group {group}/{groups}", group = trends.group + 1, groups), theme.dim());
     }
@@ -118,26 +118,26 @@ pub(super) fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
 
 fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
     let view = trends.span(cx);
-    let curve = |(n, pen): (usize, Pen)| Curve {
-        trace: trends.traces.get(&pen.tag).unwrap_or(&NO_TRACE),
-        pen: n,
-        unit: axis(trends, cx, pen.tag),
-        fixed: pen.scale,
-        resolution: resolution(cx, pen.tag),
-        dashed: is_set_value(cx, pen.tag),
+    let curve = |(n, pen): (usize, Pen)| {
+        let trace = trends.traces.get(&pen.tag).unwrap_or(&NO_TRACE);
+        let scale = trends.scales.get(&pen.tag);
+        Curve {
+            own: scale.is_some_and(|scale| scale.own),
+            fixed: scale.map_or(pen.scale, |scale| scale.range),
+            clipped: scale.is_some_and(|scale| scale.range.is_some()),
+            dashed: is_set_value(cx, pen.tag),
+            ..Curve::new(trace, n, axis(trends, cx, pen.tag), cx.snapshot.decimals[pen.tag.index()])
+        }
     };
     let names: Vec<&str> = trends.drawn(cx).iter().map(|(_, pen)| cx.def().tag(pen.tag).name.as_str()).collect();
     let raised = trends.raised.value.iter().flatten().filter(|record| record.event == AlarmEvent::Raised);
     let marks = raised.filter(|record| names.contains(&&*record.subject));
+    let curves = trends.drawn(cx).into_iter().map(curve).collect();
     Chart {
-        theme: cx.theme,
         zone: Some(&cx.def().time_zone),
-        from: view.from,
-        to: view.to,
-        now: cx.present(),
-        curves: trends.drawn(cx).into_iter().map(curve).collect(),
-        cursors: Vec::new(),
+        right: trends.drawn(cx).iter().position(|(n, _)| *n == trends.selected),
         marks: marks.map(|record| (record.at, cx.theme.severity(record.priority))).collect(),
+        ..Chart::new(cx.theme, (view.from, view.to, cx.present()), curves)
     }
 }
 

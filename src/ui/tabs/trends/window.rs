@@ -3,6 +3,19 @@
 use super::*;
 
 impl Trends {
+    /// Shows a typed time or period.
+    pub(super) fn go_to(&mut self, cx: &ViewContext, text: &str) -> Result<(), String> {
+        let asked = period::typed(cx.def(), text, cx.present())?;
+        if asked.to < cx.present() {
+            self.window = nearest(asked.to.duration_since(asked.from));
+            (self.accumulate, self.since, self.end) = (false, None, Some(asked.to));
+            self.moved();
+        } else {
+            self.go_to_moment(cx, asked.from);
+        }
+        Ok(())
+    }
+
     /// Shows the curve of a tag over a stretch of time, with a little before and after it; at a moment, with the cursor.
     pub fn show(&mut self, cx: &ViewContext, tag: TagId, (from, to): (Timestamp, Timestamp)) {
         self.open_tag(cx, tag);

@@ -24,6 +24,8 @@ impl Chart<'_> {
         let plot = plan.plot;
         let mut canvas = Canvas::new(raster(self.theme), plot.width.into(), plot.height.into());
         let (_, height) = canvas.size();
+        let across = raster(self.theme).dots().0;
+        let mut outside: Vec<(usize, bool, usize)> = Vec::new();
         for (n, curve) in self.curves.iter().enumerate().rev() {
             let scale = plan.scales[n].1;
             let row = |value: f64| dot_of(scale, value, height);
@@ -32,7 +34,9 @@ impl Chart<'_> {
                 if let Some(span) = span {
                     let from = before.map_or(span.last, |before| before.last);
                     let (low, high) = (span.min.min(from), span.max.max(from));
-                    if !curve.dashed || row(low) != row(high) || x % 4 < 2 {
+                    if high < scale.low || scale.high < low {
+                        outside.push((x / across, scale.high < low, n));
+                    } else if !curve.dashed || row(low) != row(high) || x % 4 < 2 {
                         canvas.bar(x, row(high), row(low), n);
                     }
                 }
@@ -42,6 +46,12 @@ impl Chart<'_> {
         for (x, y, glyph, owner) in canvas.glyphs() {
             let cell = &mut buf[(plot.x + to_u16(x), plot.y + to_u16(y))];
             cell.set_char(glyph).set_style(self.theme.pen(self.curves[owner].pen));
+        }
+        // What lies outside of a typed scale is no flat line at its end.
+        for (x, above, n) in outside {
+            let (y, arrow) = if above { (plot.y, ("↑", "^")) } else { (plot.bottom() - 1, ("↓", "v")) };
+            let cell = &mut buf[(plot.x + to_u16(x), y)];
+            cell.set_symbol(self.theme.pick(arrow.0, arrow.1)).set_style(self.theme.pen(self.curves[n].pen));
         }
     }
 
@@ -122,7 +132,7 @@ impl Chart<'_> {
         }
         if let Some((curve, (_, scale))) = own(Axis::Left).filter(|_| plot.x > area.x) {
             let width = usize::from(plot.x - area.x - 1);
-            buf.set_stringn(area.x, area.y, format!("{:>width$}", curve.unit), plot.width.into(), style);
+            buf.set_stringn(area.x, area.y, format!("{:>width$}", curve.heading(self.theme)), plot.width.into(), style);
             for tick in scale.ticks() {
                 let y = plot.y + self.row(*scale, tick, plot.height);
                 buf.set_string(area.x, y, format!("{:>width$}{}", scale.label(tick), line("┤", "+")), style);
@@ -132,7 +142,7 @@ impl Chart<'_> {
             for y in plot.y..below {
                 buf[(right, y)].set_symbol(line("│", "|")).set_style(style);
             }
-            buf.set_stringn(right + 1, area.y, curve.unit, usize::from(area.right() - right - 1), style);
+            buf.set_stringn(right + 1, area.y, curve.heading(self.theme), usize::from(area.right() - right - 1), style);
             buf[(right, below)].set_symbol(line("┘", "+")).set_style(style);
             for tick in scale.ticks() {
                 let y = plot.y + self.row(*scale, tick, plot.height);

@@ -26,12 +26,11 @@ fn trace(values: impl IntoIterator<Item = f64>) -> Trace {
 }
 
 fn curve<'a>(trace: &'a Trace, pen: usize, unit: &'a str) -> Curve<'a> {
-    Curve { trace, pen, unit, fixed: None, resolution: 0.1, dashed: false }
+    Curve::new(trace, pen, unit, 1)
 }
 
 fn chart<'a>(theme: &'a Theme, curves: Vec<Curve<'a>>) -> Chart<'a> {
-    let (from, to, now) = (at(0), at(120), at(120));
-    Chart { theme, zone: Some(&ZONE), from, to, now, curves, cursors: Vec::new(), marks: Vec::new() }
+    Chart { zone: Some(&ZONE), ..Chart::new(theme, (at(0), at(120), at(120)), curves) }
 }
 
 fn picture(chart: &Chart, width: u16, height: u16) -> String {

@@ -237,7 +237,7 @@ impl Registers {
 
 /// The keys of the trends, but for those that ask the plant.
 pub fn keys() -> Vec<Key<trends::Action>> {
-    trends::KEYS.iter().copied().filter(|key| key.action != trends::Action::Why).collect()
+    trends::KEYS.iter().copied().filter(|key| !key.action.is_of_plant()).collect()
 }
 
 /// Draws it; where it has room, what is wrong with reading, or the log.

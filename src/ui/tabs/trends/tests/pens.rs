@@ -1,0 +1,55 @@
+//! Pens from any tag, and their scales.
+
+use super::*;
+
+#[test]
+fn marked_values_are_drawn_together() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    stand.press("/");
+    stand.press("p-1⏎");
+    stand.answer();
+    let listed = |stand: &Stand| stand.model.tabs.trends.listed(&stand.model.cx()).len();
+    assert!(stand.screen().contains("/p-1"), "the filter is shown");
+    let found = listed(&stand);
+    stand.press("/");
+    stand.press("xyz⏎");
+    assert_eq!(listed(&stand), 0);
+    stand.press("⏎w ");
+    assert!(stand.model.tabs.trends.picked.is_empty(), "nothing to mark");
+    stand.send(Msg::Key(KeyEvent::new(KeyCode::Esc, KeyModifiers::NONE)));
+    assert!(listed(&stand) > found, "Esc takes the filter away");
+    stand.press(" ↓↓↓ ⏎");
+    stand.answer();
+    let screen = stand.screen();
+    assert!(screen.contains("marked group 3/3"), "{screen}");
+    assert_eq!(stand.model.tabs.trends.pens(&stand.model.cx()).len(), 2);
+    stand.press("v↓↓ ");
+    stand.press("⏎");
+    assert_eq!(stand.model.tabs.trends.pens(&stand.model.cx()).len(), 3, "a third pen joins them");
+}
+
+#[test]
+fn a_typed_scale_says_where_the_curve_lies() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    let scale = |stand: &mut Stand, text: &str| {
+        stand.press("s");
+        for _ in 0..20 {
+            stand.send(Msg::Key(KeyEvent::new(KeyCode::Backspace, KeyModifiers::NONE)));
+        }
+        stand.press(text);
+        stand.press("⏎");
+    };
+    scale(&mut stand, "80 90");
+    let screen = stand.screen();
+    assert!(screen.contains("↓") && screen.contains("90┤") && !screen.contains("75┤"), "{screen}");
+    scale(&mut stand, "90 80");
+    assert!(stand.screen().contains("the lower first"));
+    stand.send(Msg::Key(KeyEvent::new(KeyCode::Esc, KeyModifiers::NONE)));
+    scale(&mut stand, "own");
+    let screen = stand.screen();
+    assert!(screen.contains("● °C") && screen.contains("scale 0 … 100"), "{screen}");
+    scale(&mut stand, "plant");
+    assert!(stand.screen().contains("100┤"));
+}
