@@ -36,6 +36,7 @@ use crate::{
 use filter::{Filter, Sort};
 pub use go::faceplate;
 use handover::Handover;
+pub(in crate::ui) use handover::NO_CHANGE;
 pub use handover::suppressed_words;
 use journal::Journal;
 pub use journal::{action_text, event_text};

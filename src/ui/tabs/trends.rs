@@ -3,7 +3,9 @@
 
 mod cursors;
 mod data;
+mod events;
 mod keys;
+mod lanes;
 mod legend;
 mod pens;
 mod replay;
@@ -20,6 +22,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub use self::keys::{Action, KEYS};
 use self::{
     cursors::Between,
+    events::Events,
     pens::PenScale,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
 };
@@ -44,8 +47,6 @@ const UNSEEN_S: f64 = 3.0;
 const COMMIT_LAG_S: f64 = 3.0;
 /// Columns of the last hour, a minute each.
 const HOUR_COLUMNS: usize = 60;
-/// Alarms marked on the time axis at most.
-const MARKS_MAX: usize = 200;
 
 /// State of this tab.
 #[derive(Debug, Default)]
@@ -88,7 +89,7 @@ pub struct Trends {
     curves: PeriodicQuery,
     trouble: Option<String>,
     hours: Answered<Vec<Series>>,
-    raised: Answered<Vec<AlarmRecord>>,
+    events: Events,
     /// Queries asked so far.
     asked: u32,
     /// Values without a unit have a scale each: nothing says that they are alike.
@@ -133,13 +134,13 @@ impl TabView for Trends {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        let queries = [&self.curves, &self.hours.query, &self.raised.query];
-        queries.into_iter().chain(self.between.queries()).any(|query| query.awaits(number))
+        let queries = [&self.curves, &self.hours.query].into_iter().chain(self.events.queries());
+        queries.chain(self.between.queries()).any(|query| query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.hours.on_answer(cx, number, &answer);
-        self.raised.on_answer(cx, number, &answer);
+        self.events.on_answer(cx, number, &answer);
         self.between.on_answer(cx, number, &answer);
         if let Some(asked) = self.curves.answered(number, cx.steady()) {
             self.trouble = answer.as_ref().err().map(HistoryError::to_string);
@@ -178,7 +179,16 @@ impl TabView for Trends {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let of_present = [Action::Live, Action::Mode, Action::Hold, Action::Cursor, Action::Rate, Action::GoTo];
+        let of_present = [
+            Action::Live,
+            Action::Mode,
+            Action::Hold,
+            Action::Cursor,
+            Action::Rate,
+            Action::GoTo,
+            Action::Event(1),
+            Action::Event(-1),
+        ];
         let keys = KEYS.iter().filter(|key| !cx.is_past() || !of_present.contains(&key.action));
         hints(&keys.copied().collect::<Vec<_>>())
     }
@@ -223,7 +233,8 @@ impl Trends {
             }
             (None, Action::Live) if cx.is_past() => self.go_to_moment(cx, cx.now),
             // The instant of the replay is in the view with the cursor on it, and nothing moves.
-            (None, Action::Mode | Action::Hold | Action::Cursor | Action::Rate | Action::GoTo) if cx.is_past() => {}
+            (None, Action::Mode | Action::Hold | Action::Cursor | Action::Rate | Action::GoTo | Action::Event(_))
+                if cx.is_past() => {}
             (None, Action::Side(by)) => self.step(cx, by),
             (None, Action::Move(Motion::Pages(by))) => self.pan(cx, 4 * by),
             (None, Action::Move(motion)) => self.selected = motion.to(self.selected, self.pens(cx).len(), 1),
@@ -247,6 +258,7 @@ impl Trends {
                 self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) };
                 self.between.clear();
             }
+            (None, Action::Event(by)) => self.to_event(cx, by),
             (None, Action::CursorB) => self.toggle_cursor_b(cx),
             (None, Action::Scale) => return self.ask_scale(cx),
             (None, Action::GoTo) => {

@@ -46,8 +46,25 @@ pub struct Chart<'a> {
     pub cursors: Vec<(Timestamp, Line<'a>)>,
     /// The curve whose axis is at the right where there are more than two.
     pub right: Option<usize>,
+    /// Alarm limits: lines behind the curves, and the range between them on the axis.
+    pub limits: Vec<Limit>,
+    /// Least width of the margin at the left: rows under the chart have their names there.
+    pub margin: u16,
     /// Events on the time axis.
     pub marks: Vec<(Timestamp, Style)>,
+}
+
+/// A limit on the scale of a curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limit {
+    /// Place of the curve.
+    pub curve: usize,
+    /// In its unit.
+    pub value: f64,
+    /// Values above it are abnormal; else those below.
+    pub high: bool,
+    /// `H 75.0`.
+    pub text: String,
 }
 
 /// One pen.
@@ -142,7 +159,19 @@ impl<'a> Chart<'a> {
         (from, to, now): (Timestamp, Timestamp, Timestamp),
         curves: Vec<Curve<'a>>,
     ) -> Chart<'a> {
-        Chart { theme, zone: None, from, to, now, curves, cursors: Vec::new(), right: None, marks: Vec::new() }
+        Chart {
+            theme,
+            zone: None,
+            from,
+            to,
+            now,
+            curves,
+            cursors: Vec::new(),
+            right: None,
+            limits: Vec::new(),
+            margin: 0,
+            marks: Vec::new(),
+        }
     }
 }
 
@@ -158,7 +187,7 @@ impl Chart<'_> {
             let labels = scales.flat_map(|scale| scale.ticks().into_iter().map(move |tick| scale.label(tick).len()));
             labels.max().map_or(0, |width| to_u16((width + 1).max(GUTTER)))
         };
-        let (mut left, mut right) = (gutter(Axis::Left).max(1), gutter(Axis::Right));
+        let (mut left, mut right) = (gutter(Axis::Left).max(1).max(self.margin), gutter(Axis::Right));
         if area.height < 6 || area.width < left + right + 10 {
             (left, right) = (0, 0);
         }
@@ -251,7 +280,7 @@ impl Chart<'_> {
     }
 
     /// The cell column of an instant, counted from the left of the plot.
-    fn cell(&self, at: Timestamp, width: u16) -> Option<u16> {
+    pub fn cell(&self, at: Timestamp, width: u16) -> Option<u16> {
         let (from, to) = (self.from.as_microsecond(), self.to.as_microsecond());
         let inside = (from..to).contains(&at.as_microsecond());
         let share = (at.as_microsecond() - from) as f64 / (to - from).max(1) as f64;
@@ -270,7 +299,9 @@ impl Widget for &Chart<'_> {
         self.draw_curves(&plan, buf);
         self.draw_marks(&plan, buf);
         self.draw_gaps(&plan, buf);
+        self.draw_limits(&plan, buf);
         self.draw_axes(&plan, area, buf);
+        self.draw_normal(&plan, area, buf);
         self.draw_cursors(&plan, area, buf);
     }
 }

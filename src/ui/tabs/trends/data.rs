@@ -52,15 +52,12 @@ impl Trends {
             true => rate.max((view.step() / 2).min(real(cx, 30.0))),
             false => real(cx, 60.0),
         };
-        let to = view.to.min(now);
         let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
         if self.values.is_none() && !group.is_empty() {
             let curves = series(&group, view.from, view.to, view.columns);
             acts.extend(self.curves.ask(cx, (Tab::Trends, &mut self.asked), often, timeout, curves));
-            let raised = Query::Journal { from: view.from, to, limit: MARKS_MAX };
-            let every = often.max(real(cx, 10.0));
-            acts.extend(self.raised.ask(cx, (Tab::Trends, &mut self.asked), every, timeout, raised));
+            acts.extend(self.ask_events(cx, view, often));
         }
         if self.values.is_none() {
             acts.extend(self.ask_between(cx));

@@ -29,6 +29,8 @@ pub enum Action {
     Cursor,
     /// Cursor B on, then which of both is moved.
     CursorB,
+    /// The cursor to the next event, or to the one before.
+    Event(isize),
     /// The picture stands still, or is live again.
     Hold,
     /// Back to the present.
@@ -44,7 +46,7 @@ pub enum Action {
 impl Action {
     /// Does it need a plant: its station, or the window of a tab?
     pub fn is_of_plant(self) -> bool {
-        matches!(self, Action::Why | Action::GoTo | Action::Find | Action::Scale)
+        matches!(self, Action::Why | Action::GoTo | Action::Find | Action::Scale | Action::Event(_))
     }
 }
 
@@ -69,6 +71,8 @@ pub const KEYS: &[Key<Action>] = &[
         "cursor B: measures from A to B; again: which one the arrows move",
         Action::CursorB,
     ),
+    Key::new(char('n'), "event", "cursor to the next event: alarm, command, note, batch", Action::Event(1)),
+    Key::new(char('N'), "", "cursor to the event before", Action::Event(-1)),
     Key::new(char('g'), "group", "next group of pens", Action::Group),
     Key::new(char(' '), "pen", "switch the selected pen on or off; in the list of values: mark as pen", Action::Toggle),
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),

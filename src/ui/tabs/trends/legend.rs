@@ -58,7 +58,7 @@ pub(super) fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
         canvas.text_right(end, 0, text, dim);
     }
     canvas.text(columns.hour, 0, t!("last hour"), dim);
-    let drawn = trends.drawn(cx);
+    let drawn = trends.curved(cx);
     each_row(trends, cx, canvas, |row, (n, pen)| {
         let place = drawn.iter().position(|(of, _)| *of == n);
         let scale = plan.zip(place).and_then(|(plan, place)| plan.scales.get(place));

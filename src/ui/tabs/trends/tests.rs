@@ -1,6 +1,7 @@
 //! The trends tab in the whole terminal, with a made-up history behind it.
 
 mod cursors;
+mod events;
 mod pens;
 mod queries;
 
@@ -12,7 +13,7 @@ use jiff::SignedDuration;
 use ratatui::{Terminal, backend::TestBackend};
 
 use super::*;
-use crate::plant::record::AlarmEvent;
+use crate::plant::record::{ActionRecord, AlarmEvent};
 use crate::{
     history::Bucket,
     plant::{def::Priority, sample::Sample},
@@ -51,6 +52,21 @@ fn past(tag: TagId, at: Timestamp) -> f64 {
             }
         }
         n => 42.0 + f64::from(n) + seconds / 40.0 % 30.0,
+    }
+}
+
+fn action(at: Timestamp, action: &str, note: Option<&str>) -> ActionRecord {
+    ActionRecord {
+        at,
+        by: "anna".into(),
+        from: "".into(),
+        action: action.into(),
+        target: "TIC-1.SV".into(),
+        old: Some("60.0 °C".into()),
+        new: Some("70.0 °C".into()),
+        outcome: "verified".into(),
+        note: note.map(Into::into),
+        chain_hash: None,
     }
 }
 
@@ -115,6 +131,12 @@ impl Stand {
                 until: None,
                 first_out: None,
             }]),
+            Query::Actions { .. } => Answer::Actions(vec![
+                action(ago(200), "write", Some("too slow")),
+                action(ago(210), "login", None),
+                action(ago(420), "write", None),
+            ]),
+            Query::Batches { .. } => Answer::Batches(Vec::new()),
             Query::Values { tags, from, every, .. } => Answer::Values(
                 tags.iter().map(|tag| vec![Some(Sample::good(past(*tag, *from + *every), *from).into())]).collect(),
             ),
@@ -127,6 +149,8 @@ impl Stand {
         let known = |at: Timestamp| at + step > self.begin && at <= now() && !(self.gap.0..self.gap.1).contains(&at);
         let bucket = |n: usize| {
             let at = from + step * n as u32;
+            let is_state = lanes::is_state(self.model.snapshot.def.tag(tag));
+            let past = |tag, at| if is_state { (past(tag, at) / 12.0).floor() % 2.0 } else { past(tag, at) };
             let (first, last) = (past(tag, at), past(tag, at + step));
             let bucket = Bucket { min: first.min(last), max: first.max(last), mean: (first + last) / 2.0, last };
             known(at).then_some(bucket)
@@ -330,7 +354,7 @@ fn a_snapshot_a_little_behind_the_clock_changes_nothing() {
     stand.answer();
     stand.press("+++");
     stand.send(Msg::Tick { silent: std::time::Duration::from_millis(900) });
-    assert_eq!(kinds(&std::mem::take(&mut stand.asked)), "curves alarms");
+    assert_eq!(kinds(&std::mem::take(&mut stand.asked)), "curves alarms actions batches");
     stand.send(Msg::Snapshot(stand.model.snapshot.clone()));
     assert_eq!(kinds(&stand.asked), "");
     assert!(!stand.model.tabs.trends.traces[&TagId(0)].past().is_none_or(|past| past.buckets.is_empty()));

@@ -8,6 +8,8 @@ use ratatui::{
 
 use super::{
     Trends,
+    events::{draw_event_words, draw_events},
+    lanes::draw_lane,
     legend::draw_legend,
     span::{RATES, WINDOWS, midnight, rate_text, window_text},
     values::draw_values,
@@ -15,10 +17,13 @@ use super::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::{def::Pen, record::AlarmEvent},
+    plant::{
+        def::{Condition, Level, Pen, Subject},
+        record::AlarmEvent,
+    },
     ui::{
         theme::Glyphs,
-        widgets::chart::{Chart, Curve, mark, trace::Trace},
+        widgets::chart::{Chart, Curve, Limit, Plan, mark, trace::Trace},
     },
 };
 
@@ -41,8 +46,13 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let pens = trends.pens(cx);
     let legend = (to_u16(pens.len()) + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
     draw_title(trends, cx, canvas);
-    let mut chart = chart(trends, cx);
-    let area = canvas.part(0, 1, width, height.saturating_sub(1 + legend)).area();
+    let spare = height.saturating_sub(1 + legend + CHART_ROWS_MIN);
+    let rows = Rows::new(trends, cx, spare);
+    let mut chart = chart(trends, cx, rows.events == 0);
+    let room = height.saturating_sub(1 + legend + rows.count());
+    // Without a curve it is only the time axis of the lanes.
+    let room = if chart.curves.is_empty() && rows.lanes > 0 { room.min(CHART_ROWS_MIN) } else { room };
+    let area = canvas.part(0, 1, width, room).area();
     let plan = (!area.is_empty()).then(|| chart.plan(area));
     if let Some(plan) = &plan {
         chart.cursors = cursors(trends, cx, plan.plot.width);
@@ -51,9 +61,48 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
             let words = t!("no pen is switched on: select one below, space switches it on");
             canvas.text_centred(1 + area.height / 2, words, cx.theme.dim());
         }
+        let below = plan.plot.bottom().saturating_sub(canvas.area().y) + 2;
+        draw_below(trends, cx, &mut canvas.part(0, below, width, rows.count()), &rows, (&chart, plan));
     }
     let mut part = canvas.part(0, height - legend.min(height), width, legend);
     draw_legend(trends, cx, &mut part, plan.as_ref());
+}
+
+/// Rows under the chart: lanes of states, events, and the words of the event at the cursor.
+struct Rows {
+    lanes: u16,
+    events: u16,
+    words: u16,
+}
+
+impl Rows {
+    /// As many as there is room for: the events first, then the lanes, then the words.
+    fn new(trends: &Trends, cx: &ViewContext, spare: u16) -> Rows {
+        let events = u16::from(!trends.apart).min(spare);
+        let lanes = to_u16(trends.lanes(cx).len()).min(spare - events);
+        let words = u16::from(trends.cursor(cx).is_some()).min(events).min(spare - events - lanes);
+        Rows { lanes, events, words }
+    }
+
+    fn count(&self) -> u16 {
+        self.lanes + self.events + self.words
+    }
+}
+
+/// Draws the rows under the chart, on its time axis.
+fn draw_below(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, rows: &Rows, (chart, plan): (&Chart, &Plan)) {
+    let (left, inner) = (plan.plot.x.saturating_sub(canvas.area().x), plan.plot.width);
+    for (y, lane) in trends.lanes(cx).into_iter().take(usize::from(rows.lanes)).enumerate() {
+        draw_lane(trends, cx, &mut canvas.part(0, to_u16(y), left + inner, 1), lane, left);
+    }
+    if rows.events > 0 {
+        canvas.text(0, rows.lanes, &fit(t!("events"), left), cx.theme.dim());
+        let mut row = canvas.part(left, rows.lanes, inner, 1);
+        draw_events(&trends.marks(cx), cx, &mut row, |at| chart.cell(at, inner));
+    }
+    if let Some(at) = trends.moving(cx).filter(|_| rows.words > 0) {
+        draw_event_words(trends, cx, &mut canvas.part(left, rows.lanes + rows.events, inner, 1), at);
+    }
 }
 
 /// Group, window, live or past, rate; on the right what is wrong with the history.
@@ -112,11 +161,12 @@ pub(super) fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
     let long = |query: &&PeriodicQuery| query.waiting(cx.steady()).is_some_and(|time| time >= real(cx, 2.0));
     let mut waiting =
         [&trends.curves, &trends.hours.query].into_iter().filter(long).filter_map(|query| query.shown_waiting(cx));
-    let failed = [&trends.trouble, &trends.hours.trouble, &trends.raised.trouble].into_iter().flatten().next();
+    let failed = [&trends.trouble, &trends.hours.trouble, &trends.events.alarms.trouble].into_iter().flatten().next();
     failed.cloned().or_else(|| waiting.next())
 }
 
-fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
+/// The chart, with the alarms of its pens on the axis where there is no row of events.
+fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>, with_marks: bool) -> Chart<'a> {
     let view = trends.span(cx);
     let curve = |(n, pen): (usize, Pen)| {
         let trace = trends.traces.get(&pen.tag).unwrap_or(&NO_TRACE);
@@ -130,15 +180,43 @@ fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Chart<'a> {
         }
     };
     let names: Vec<&str> = trends.drawn(cx).iter().map(|(_, pen)| cx.def().tag(pen.tag).name.as_str()).collect();
-    let raised = trends.raised.value.iter().flatten().filter(|record| record.event == AlarmEvent::Raised);
-    let marks = raised.filter(|record| names.contains(&&*record.subject));
-    let curves = trends.drawn(cx).into_iter().map(curve).collect();
+    let raised = trends.events.alarms.value.iter().flatten().filter(|record| record.event == AlarmEvent::Raised);
+    let marks = raised.filter(|record| with_marks && names.contains(&&*record.subject));
+    let curves = trends.curved(cx).into_iter().map(curve).collect();
     Chart {
         zone: Some(&cx.def().time_zone),
-        right: trends.drawn(cx).iter().position(|(n, _)| *n == trends.selected),
+        right: trends.curved(cx).iter().position(|(n, _)| *n == trends.selected),
         marks: marks.map(|record| (record.at, cx.theme.severity(record.priority))).collect(),
+        limits: limits(trends, cx),
+        margin: margin(trends, cx),
         ..Chart::new(cx.theme, (view.from, view.to, cx.present()), curves)
     }
+}
+
+/// Room for the names of the rows under the chart.
+fn margin(trends: &Trends, cx: &ViewContext) -> u16 {
+    let names = trends.lanes(cx).into_iter().map(|(_, pen)| width(&cx.def().tag(pen.tag).short) + 3);
+    let events = if trends.apart { 0 } else { width(t!("events")) + 1 };
+    names.chain([events]).max().unwrap_or(0).min(cx.area.width / 6)
+}
+
+/// The alarm limits of the selected pen.
+fn limits(trends: &Trends, cx: &ViewContext) -> Vec<Limit> {
+    let curved = trends.curved(cx);
+    let Some(curve) = curved.iter().position(|(n, _)| *n == trends.selected) else { return Vec::new() };
+    let tag = curved[curve].1.tag;
+    let of_tag = cx.def().alarms.iter().filter(|alarm| alarm.subject == Subject::Tag(tag));
+    let limit = |condition: Condition| {
+        let Condition::Limit { level, limit: value, .. } = condition else { return None };
+        let text = cx.snapshot.format(tag, value);
+        Some(match level {
+            Level::HighHigh => Limit { curve, value, high: true, text: format!("HH {text}") },
+            Level::High => Limit { curve, value, high: true, text: format!("H {text}") },
+            Level::Low => Limit { curve, value, high: false, text: format!("L {text}") },
+            Level::LowLow => Limit { curve, value, high: false, text: format!("LL {text}") },
+        })
+    };
+    of_tag.filter_map(|alarm| limit(alarm.condition)).collect()
 }
 
 /// Where the cursors stand, and what is written above them.

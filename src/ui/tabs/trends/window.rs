@@ -100,6 +100,6 @@ impl Trends {
     pub(super) fn moved(&mut self) {
         self.figures.clear();
         self.curves.want();
-        self.raised.query.want();
+        self.events.want();
     }
 }

@@ -217,4 +217,63 @@ impl Chart<'_> {
             }
         }
     }
+
+    /// Lines of the limits through the empty cells of their rows, with their names at the right; what lies outside of the
+    /// scale has none.
+    pub(super) fn draw_limits(&self, plan: &Plan, buf: &mut Buffer) {
+        let (plot, style) = (plan.plot, self.theme.dim());
+        let line = match self.theme.glyphs {
+            Glyphs::Braille => "┈",
+            Glyphs::Block => "-",
+            Glyphs::Ascii => "~",
+        };
+        for limit in &self.limits {
+            let Some((_, scale)) = plan.scales.get(limit.curve) else { continue };
+            if limit.value < scale.low || scale.high < limit.value {
+                continue;
+            }
+            let y = plot.y + self.row(*scale, limit.value, plot.height);
+            let is_blank = |buf: &Buffer, x: u16| matches!(buf[(x, y)].symbol(), " " | "·");
+            let taken = (plot.x..plot.right()).filter(|x| !is_blank(buf, *x)).count();
+            if taken > usize::from(plot.width / 2) {
+                // A curve runs along it.
+                continue;
+            }
+            let width = to_u16(limit.text.width()) + 2;
+            // The name stands where nothing is drawn, as far to the right as it can.
+            let places = (plot.x..plot.right().saturating_sub(width)).rev();
+            let name = places.step_by(2).find(|x| (*x..x + width).all(|x| is_blank(buf, x)));
+            for x in plot.x..plot.right() {
+                if is_blank(buf, x) {
+                    buf[(x, y)].set_symbol(line).set_style(style);
+                }
+            }
+            if let Some(x) = name {
+                buf.set_string(x, y, format!(" {} ", limit.text), style);
+            }
+        }
+    }
+
+    /// The range between the limits, as a broad stroke on the axis of their curve.
+    pub(super) fn draw_normal(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
+        let (plot, Some(limit)) = (plan.plot, self.limits.first()) else { return };
+        let Some((axis, scale)) = plan.scales.get(limit.curve) else { return };
+        let x = match axis {
+            Axis::Left if plot.x > area.x => plot.x - 1,
+            Axis::Right if area.right() > plot.right() => plot.right(),
+            Axis::Left | Axis::Right | Axis::Own => return,
+        };
+        let values = |high: bool| self.limits.iter().filter(move |limit| limit.high == high).map(|limit| limit.value);
+        let low = values(false).fold(f64::NEG_INFINITY, f64::max).max(scale.low);
+        let high = values(true).fold(f64::INFINITY, f64::min).min(scale.high);
+        if high < low {
+            return;
+        }
+        for y in self.row(*scale, high, plot.height)..=self.row(*scale, low, plot.height) {
+            let cell = &mut buf[(x, plot.y + y)];
+            if matches!(cell.symbol(), "│" | "|") {
+                cell.set_symbol(self.theme.pick(if *axis == Axis::Left { "▐" } else { "▌" }, "#"));
+            }
+        }
+    }
 }

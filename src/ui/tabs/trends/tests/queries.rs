@@ -8,13 +8,13 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
         Query::Series { buckets: HOUR_COLUMNS, .. } => "hour",
         Query::Series { .. } => "curves",
         Query::Journal { .. } => "alarms",
-        Query::Actions { .. }
-        | Query::Audit { .. }
+        Query::Actions { .. } => "actions",
+        Query::Batches { .. } => "batches",
+        Query::Audit { .. }
         | Query::LineMinutes { .. }
         | Query::Report { .. }
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
-        | Query::Batches { .. }
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview
@@ -26,13 +26,13 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
 #[test]
 fn nothing_is_asked_while_the_tab_is_not_shown() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
-    assert_eq!(kinds(&stand.asked), "curves alarms hour");
+    assert_eq!(kinds(&stand.asked), "curves alarms actions batches hour");
     stand.answer();
     stand.press("1");
     stand.live(120, |_| Some(60.0));
     assert_eq!(kinds(&stand.asked), "");
     stand.press("2");
-    assert_eq!(kinds(&stand.asked), "curves alarms hour");
+    assert_eq!(kinds(&stand.asked), "curves alarms actions batches hour");
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn an_answer_to_an_older_question_is_ignored() {
     let old = std::mem::take(&mut stand.asked);
     stand.press("+");
     stand.live(20, |_| Some(60.0));
-    assert_eq!(kinds(&stand.asked), "curves alarms", "the answers are overdue, and to another view");
+    assert_eq!(kinds(&stand.asked), "curves alarms actions batches", "the answers are overdue, and to another view");
     let before = stand.screen();
     for (id, query) in old.into_iter().take(2) {
         let answer = stand.history(&query);
@@ -71,7 +71,7 @@ fn fast_keys_do_not_pile_up_questions() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.answer();
     stand.press("--++--←←←←");
-    assert_eq!(kinds(&stand.asked), "curves alarms");
+    assert_eq!(kinds(&stand.asked), "curves alarms actions batches");
     stand.answer();
     let view = stand.model.tabs.trends.span(&stand.model.cx());
     let shown = stand.model.tabs.trends.traces[&TagId(0)].past().map(|series| series.from);

@@ -1,0 +1,201 @@
+//! Events on the time axis: alarms raised, operator actions and their notes, batches; and the one at the cursor in words.
+
+use super::*;
+use crate::{
+    plant::record::{ActionRecord, AlarmEvent},
+    report::batch::BatchReport,
+    ui::tabs::alarms::{NO_CHANGE, action_text, event_text},
+};
+
+/// Events of each kind that are read; where there are more, the oldest are missing, and the row says so.
+const EVENTS_MAX: usize = 200;
+/// Batches are shown in windows up to this: each costs a small report.
+const BATCHES_SPAN: SignedDuration = SignedDuration::from_hours(24 * 31);
+
+/// The events of the view.
+#[derive(Debug, Default)]
+pub(super) struct Events {
+    pub alarms: Answered<Vec<AlarmRecord>>,
+    pub actions: Answered<Vec<ActionRecord>>,
+    pub batches: Answered<Vec<BatchReport>>,
+}
+
+/// What an event is; the first is shown where several happened in one column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum EventKind {
+    /// An alarm was raised.
+    Alarm,
+    /// An operator left a note with an action.
+    Note,
+    /// An operator changed something.
+    Command,
+    /// A batch began or ended.
+    Batch,
+    /// Older ones were not read.
+    More,
+}
+
+impl EventKind {
+    /// Its mark in the row of events.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            EventKind::Alarm => "!",
+            EventKind::Note => "n",
+            EventKind::Command => "c",
+            EventKind::Batch => "b",
+            EventKind::More => "<",
+        }
+    }
+}
+
+/// A mark on the time axis.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mark {
+    pub at: Timestamp,
+    pub kind: EventKind,
+    pub style: Style,
+    pub text: String,
+}
+
+impl Events {
+    pub(super) fn queries(&self) -> [&PeriodicQuery; 3] {
+        [&self.alarms.query, &self.actions.query, &self.batches.query]
+    }
+
+    pub(super) fn want(&mut self) {
+        [&mut self.alarms.query, &mut self.actions.query, &mut self.batches.query]
+            .into_iter()
+            .for_each(PeriodicQuery::want);
+    }
+
+    pub(super) fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        self.alarms.on_answer(cx, number, answer);
+        self.actions.on_answer(cx, number, answer);
+        self.batches.on_answer(cx, number, answer);
+    }
+}
+
+impl Trends {
+    /// Asks for the events of the view; registers without a plant file have none.
+    pub(super) fn ask_events(&mut self, cx: &ViewContext, view: View, every: SignedDuration) -> Vec<UiAction> {
+        if self.apart {
+            return Vec::new();
+        }
+        let (from, to, limit) = (view.from, view.to.min(cx.present()), EVENTS_MAX);
+        let (every, timeout) = (every.max(real(cx, 10.0)), real(cx, TIMEOUT_S));
+        let Trends { events, asked, .. } = self;
+        let alarms = events.alarms.ask(cx, (Tab::Trends, asked), every, timeout, Query::Journal { from, to, limit });
+        let query = Query::Actions { from, to, limit };
+        let actions = events.actions.ask(cx, (Tab::Trends, asked), every, timeout, query);
+        let has_batches = !cx.def().batches.is_empty() && view.width() <= BATCHES_SPAN;
+        let query = Query::Batches { from, to, limit };
+        let ask = || events.batches.ask(cx, (Tab::Trends, asked), every * 6, timeout, query);
+        let batches = if has_batches { ask() } else { None };
+        [alarms, actions, batches].into_iter().flatten().collect()
+    }
+
+    /// The events in the view, in order of time.
+    pub(super) fn marks(&self, cx: &ViewContext) -> Vec<Mark> {
+        let (view, theme) = (self.span(cx), cx.theme);
+        let alarms = self.events.alarms.value.as_deref().unwrap_or_default();
+        let actions = self.events.actions.value.as_deref().unwrap_or_default();
+        let oldest = |len: usize, at: Option<Timestamp>| at.filter(|_| len >= EVENTS_MAX);
+        let more = [
+            oldest(alarms.len(), alarms.last().map(|record| record.at)),
+            oldest(actions.len(), actions.last().map(|record| record.at)),
+        ];
+        let more = more.into_iter().flatten().map(|at| Mark {
+            at,
+            kind: EventKind::More,
+            style: theme.trouble(),
+            text: t!("older events are too many to show: choose a shorter window").to_owned(),
+        });
+        let raised = alarms.iter().filter(|record| record.event == AlarmEvent::Raised).map(|record| Mark {
+            at: record.at,
+            kind: EventKind::Alarm,
+            style: theme.severity(record.priority),
+            text: event_text(cx, record),
+        });
+        let done = actions.iter().filter(|action| !NO_CHANGE.contains(&&*action.action) || action.note.is_some());
+        let done = done.map(|action| Mark {
+            at: action.at,
+            kind: if action.note.is_some() { EventKind::Note } else { EventKind::Command },
+            style: theme.normal(),
+            text: action_text(cx, action).split_whitespace().collect::<Vec<_>>().join(" "),
+        });
+        let batches = self.events.batches.value.iter().flatten().flat_map(|report| {
+            let (label, batch) = (report.batch.label(), &report.batch);
+            let mark = |at, text| Mark { at, kind: EventKind::Batch, style: theme.normal(), text };
+            let begin = mark(batch.from, t!("batch {label} begins", label));
+            [Some(begin), batch.to.map(|to| mark(to, t!("batch {label} ends", label)))]
+        });
+        let all = raised.chain(done).chain(batches.flatten()).chain(more);
+        let mut all: Vec<Mark> = all.filter(|mark| view.holds(mark.at)).collect();
+        all.sort_by_key(|mark| mark.at);
+        all
+    }
+
+    /// The events within half a cell of an instant, the most important first.
+    pub(super) fn marks_at(&self, cx: &ViewContext, at: Timestamp) -> Vec<Mark> {
+        let near = self.cell(cx) / 2;
+        let mut marks = self.marks(cx);
+        marks.retain(|mark| mark.at.duration_since(at).abs() <= near);
+        marks.sort_by_key(|mark| mark.kind);
+        marks
+    }
+
+    /// Moves the cursor to the next event, or to the one before.
+    pub(super) fn to_event(&mut self, cx: &ViewContext, by: isize) {
+        let marks = self.marks(cx);
+        let view = self.span(cx);
+        // Behind what stands in the same column: a step always moves.
+        let near = self.cell(cx) / 2;
+        let found = if by > 0 {
+            let after = self.moving(cx).map_or(view.from, |at| at + near);
+            marks.iter().find(|mark| mark.at > after)
+        } else {
+            let before = self.moving(cx).map_or(view.to, |at| at - near);
+            marks.iter().rev().find(|mark| mark.at < before)
+        };
+        if let Some(at) = found.map(|mark| mark.at) {
+            self.move_cursor(cx, at);
+        }
+    }
+}
+
+/// Draws the row of events: the most important of each column.
+pub(super) fn draw_events(
+    marks: &[Mark],
+    cx: &ViewContext,
+    canvas: &mut Canvas,
+    cell: impl Fn(Timestamp) -> Option<u16>,
+) {
+    let mut last: Option<(u16, EventKind)> = None;
+    for mark in marks {
+        let Some(x) = cell(mark.at) else { continue };
+        if last.is_none_or(|(column, kind)| column != x || mark.kind < kind) {
+            canvas.text(x, 0, mark.kind.symbol(), mark.style);
+            last = Some((x, mark.kind));
+        }
+    }
+    if marks.is_empty() {
+        canvas.text(0, 0, t!("no events"), cx.theme.dim());
+    }
+}
+
+/// The event at the cursor in words, or what the marks mean.
+pub(super) fn draw_event_words(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, at: Timestamp) {
+    let marks = trends.marks_at(cx, at);
+    let Some(mark) = marks.first() else {
+        let words = t!("! alarm   c command   n note   b batch      n N next, previous event");
+        canvas.text(0, 0, &fit_words(words, canvas.width()), cx.theme.dim());
+        return;
+    };
+    let time = clock(mark.at, &cx.def().time_zone);
+    let more = marks.len() - 1;
+    let more = if more > 0 { t!("   and {more} more", more) } else { String::new() };
+    let room = canvas.width().saturating_sub(width(&more) + 10);
+    let x = canvas.text(0, 0, &time, cx.theme.strong());
+    let x = canvas.text(x + 2, 0, &fit(&mark.text, room), mark.style);
+    canvas.text(x, 0, &more, cx.theme.dim());
+}
