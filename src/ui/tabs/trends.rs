@@ -25,6 +25,7 @@ use self::{
     events::Events,
     pens::PenScale,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
+    window::Visited,
 };
 use crate::ui::tabs::{prelude::*, reports::period};
 use crate::{
@@ -70,6 +71,8 @@ pub struct Trends {
     since: Option<Timestamp>,
     /// Right edge of a view of the past; `None` is the present.
     end: Option<Timestamp>,
+    /// Earlier and later windows, to go back to.
+    visited: Visited,
     /// Cursor A.
     cursor: Option<Timestamp>,
     /// Cursor B, and what lies between both.
@@ -179,17 +182,7 @@ impl TabView for Trends {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let of_present = [
-            Action::Live,
-            Action::Mode,
-            Action::Hold,
-            Action::Cursor,
-            Action::Rate,
-            Action::GoTo,
-            Action::Event(1),
-            Action::Event(-1),
-        ];
-        let keys = KEYS.iter().filter(|key| !cx.is_past() || !of_present.contains(&key.action));
+        let keys = KEYS.iter().filter(|key| !cx.is_past() || !key.action.is_of_present());
         hints(&keys.copied().collect::<Vec<_>>())
     }
 
@@ -233,16 +226,16 @@ impl Trends {
             }
             (None, Action::Live) if cx.is_past() => self.go_to_moment(cx, cx.now),
             // The instant of the replay is in the view with the cursor on it, and nothing moves.
-            (None, Action::Mode | Action::Hold | Action::Cursor | Action::Rate | Action::GoTo | Action::Event(_))
-                if cx.is_past() => {}
+            (None, action) if cx.is_past() && action.is_of_present() => {}
             (None, Action::Side(by)) => self.step(cx, by),
             (None, Action::Move(Motion::Pages(by))) => self.pan(cx, 4 * by),
             (None, Action::Move(motion)) => self.selected = motion.to(self.selected, self.pens(cx).len(), 1),
             (None, Action::Toggle) => self.toggle(cx),
-            (None, Action::Open) => {}
+            (None, Action::Open) => self.zoom_to_cursors(cx),
             (None, Action::Zoom(by)) => self.zoom(cx, by),
             (None, Action::Group) => self.next_group(cx),
             (None, Action::Mode) => {
+                self.visit();
                 (self.accumulate, self.since, self.end) = (!self.accumulate, None, None);
                 self.moved();
             }
@@ -253,6 +246,7 @@ impl Trends {
                 }
                 self.moved();
             }
+            (None, Action::Revisit(direction)) => self.revisit(direction),
             (None, Action::Rate) => self.rate = (self.rate + 1) % RATES.len(),
             (None, Action::Cursor) => {
                 self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) };

@@ -1,5 +1,6 @@
 //! What the keys of the trends tab are and mean.
 
+use super::window::Direction;
 use crate::ui::tabs::prelude::*;
 
 /// What a key means here.
@@ -19,6 +20,8 @@ pub enum Action {
     Open,
     /// A window so many steps longer.
     Zoom(isize),
+    /// The window before, or the one that was left by that.
+    Revisit(Direction),
     /// Next group of pens.
     Group,
     /// Moving window, or everything since the start of the day.
@@ -44,6 +47,21 @@ pub enum Action {
 }
 
 impl Action {
+    /// Does it mean nothing in a replay, whose instant stays in the view with the cursor on it?
+    pub fn is_of_present(self) -> bool {
+        matches!(
+            self,
+            Action::Live
+                | Action::Mode
+                | Action::Hold
+                | Action::Cursor
+                | Action::Rate
+                | Action::GoTo
+                | Action::Event(_)
+                | Action::Revisit(_)
+        )
+    }
+
     /// Does it need a plant: its station, or the window of a tab?
     pub fn is_of_plant(self) -> bool {
         matches!(self, Action::Why | Action::GoTo | Action::Find | Action::Scale | Action::Event(_))
@@ -64,6 +82,8 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('+'), "zoom", "shorter window", Action::Zoom(-1)),
     Key::new(char('='), "", "shorter window", Action::Zoom(-1)),
     Key::new(char('-'), "", "longer window", Action::Zoom(1)),
+    Key::new(char('z'), "", "back to the window before the last zoom, step or jump", Action::Revisit(Direction::Back)),
+    Key::new(char('Z'), "", "forward to the later window again", Action::Revisit(Direction::Forward)),
     Key::new(char('c'), "cursor", "cursor on or off: reads every pen at one time", Action::Cursor),
     Key::new(
         char('b'),
@@ -81,5 +101,10 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
     Key::new(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
     Key::new(char('u'), "rate", "refresh interval of the curves: 0.5, 1, 2, 5, 10 s", Action::Rate),
-    Key::new(code(KeyCode::Enter), "", "in the list of values: show its curve, or the marked ones", Action::Open),
+    Key::new(
+        code(KeyCode::Enter),
+        "",
+        "zoom to the time between the cursors; in the list of values: show the curve, or the marked ones",
+        Action::Open,
+    ),
 ];

@@ -4,6 +4,7 @@ mod cursors;
 mod events;
 mod pens;
 mod queries;
+mod window;
 
 use queries::kinds;
 use std::sync::Arc;

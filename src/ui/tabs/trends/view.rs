@@ -30,7 +30,7 @@ use crate::{
 /// Rows that the chart keeps, whatever the legend wants.
 const CHART_ROWS_MIN: u16 = 7;
 
-static NO_TRACE: Trace = Trace::EMPTY;
+pub(super) static NO_TRACE: Trace = Trace::EMPTY;
 
 /// Draws the tab.
 pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {

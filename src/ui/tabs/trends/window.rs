@@ -2,10 +2,84 @@
 
 use super::*;
 
+/// Windows that can be gone back to at most; the oldest is forgotten.
+const VISITED_MAX: usize = 32;
+
+/// A way through the windows that were shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// To the one before.
+    Back,
+    /// To the one that was left by that.
+    Forward,
+}
+
+/// A window that was shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Window {
+    window: usize,
+    end: Option<Timestamp>,
+    accumulate: bool,
+}
+
+/// The windows before and after the one that is shown.
+#[derive(Debug, Default)]
+pub(super) struct Visited {
+    back: Vec<Window>,
+    forward: Vec<Window>,
+    /// The last one was left by a step to the side: more steps are one move.
+    stepped: bool,
+}
+
 impl Trends {
+    fn shown(&self) -> Window {
+        Window { window: self.window, end: self.end, accumulate: self.accumulate }
+    }
+
+    fn show_window(&mut self, window: Window) {
+        (self.window, self.end, self.accumulate, self.since) = (window.window, window.end, window.accumulate, None);
+        self.moved();
+    }
+
+    /// Remembers the window before another is shown.
+    pub(super) fn visit(&mut self) {
+        let shown = self.shown();
+        let Visited { back, forward, stepped } = &mut self.visited;
+        *stepped = false;
+        if back.last() != Some(&shown) {
+            back.push(shown);
+            back.drain(..back.len().saturating_sub(VISITED_MAX));
+        }
+        forward.clear();
+    }
+
+    /// To the window before, or to the one that was left by that.
+    pub(super) fn revisit(&mut self, direction: Direction) {
+        let shown = self.shown();
+        let Visited { back, forward, stepped } = &mut self.visited;
+        *stepped = false;
+        let (from, to) = match direction {
+            Direction::Back => (back, forward),
+            Direction::Forward => (forward, back),
+        };
+        if let Some(window) = from.pop() {
+            to.push(shown);
+            self.show_window(window);
+        }
+    }
+
+    /// Shows the time between both cursors.
+    pub(super) fn zoom_to_cursors(&mut self, cx: &ViewContext) {
+        let Some((a, b)) = self.both().filter(|(a, b)| a != b) else { return };
+        self.visit();
+        let (window, end) = around((a.min(b), a.max(b)));
+        self.show_window(Window { window, end: Some(end).filter(|end| *end < cx.present()), accumulate: false });
+    }
+
     /// Shows a typed time or period.
     pub(super) fn go_to(&mut self, cx: &ViewContext, text: &str) -> Result<(), String> {
         let asked = period::typed(cx.def(), text, cx.present())?;
+        self.visit();
         if asked.to < cx.present() {
             self.window = nearest(asked.to.duration_since(asked.from));
             (self.accumulate, self.since, self.end) = (false, None, Some(asked.to));
@@ -76,6 +150,10 @@ impl Trends {
 
     /// Moves the view by quarters; a view of the whole day becomes a window.
     pub(super) fn pan(&mut self, cx: &ViewContext, quarters: isize) {
+        if !self.visited.stepped {
+            self.visit();
+            self.visited.stepped = true;
+        }
         let end = self.end.unwrap_or(cx.present());
         if self.accumulate {
             self.window = nearest(self.span(cx).width());
@@ -87,6 +165,7 @@ impl Trends {
     }
 
     pub(super) fn zoom(&mut self, cx: &ViewContext, by: isize) {
+        self.visit();
         if self.accumulate {
             self.window = nearest(self.span(cx).width());
             self.accumulate = false;
