@@ -8,6 +8,7 @@ mod keys;
 mod lanes;
 mod legend;
 mod pens;
+mod plots;
 mod replay;
 pub(super) mod span;
 mod values;
@@ -24,6 +25,7 @@ use self::{
     cursors::Between,
     events::Events,
     pens::PenScale,
+    plots::Plot,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
     window::Visited,
 };
@@ -36,7 +38,7 @@ use crate::{
     },
     ui::{
         keys::{find, hints},
-        widgets::chart::{self, trace::Trace},
+        widgets::chart::{self, stroke::Stroke, trace::Trace},
     },
 };
 
@@ -57,6 +59,9 @@ pub struct Trends {
     picked: Vec<TagId>,
     /// Scales that were typed, instead of those of the plant file.
     scales: BTreeMap<TagId, PenScale>,
+    /// How pens are drawn that were given another look.
+    strokes: BTreeMap<TagId, Stroke>,
+    plot: Plot,
     /// What the text of the open window is for.
     asking: Asking,
     off: Vec<TagId>,
@@ -254,6 +259,8 @@ impl Trends {
             }
             (None, Action::Event(by)) => self.to_event(cx, by),
             (None, Action::CursorB) => self.toggle_cursor_b(cx),
+            (None, Action::Plot) => self.plot = self.plot.next(),
+            (None, Action::Stroke) => self.next_stroke(cx),
             (None, Action::Scale) => return self.ask_scale(cx),
             (None, Action::GoTo) => {
                 self.asking = Asking::Time;

@@ -2,6 +2,7 @@
 //! without colour.
 
 mod draw;
+pub(crate) mod stroke;
 pub(crate) mod axis;
 pub(crate) mod raster;
 pub(crate) mod trace;
@@ -16,6 +17,7 @@ use unicode_width::UnicodeWidthStr;
 use self::{
     axis::{Scale, elapsed_ticks, time_ticks},
     raster::{Canvas, Raster},
+    stroke::Stroke,
     trace::{Span, Trace},
 };
 use crate::{
@@ -84,6 +86,8 @@ pub struct Curve<'a> {
     pub clipped: bool,
     /// The value of the last digit shown.
     pub resolution: f64,
+    /// How it is drawn.
+    pub stroke: Stroke,
     /// A broken line: a written value, not a measured one.
     pub dashed: bool,
 }
@@ -92,7 +96,17 @@ impl<'a> Curve<'a> {
     /// A plain pen with so many decimals, on a scale that fits it.
     pub fn new(trace: &'a Trace, pen: usize, unit: &'a str, decimals: u8) -> Curve<'a> {
         let resolution = 10f64.powi(-i32::from(decimals));
-        Curve { trace, pen, unit, own: false, fixed: None, clipped: false, resolution, dashed: false }
+        Curve {
+            trace,
+            pen,
+            unit,
+            own: false,
+            fixed: None,
+            clipped: false,
+            resolution,
+            stroke: Stroke::Step,
+            dashed: false,
+        }
     }
 
     /// Curves with equal ones share an axis.
@@ -144,7 +158,7 @@ pub fn dots(theme: &Theme, width: u16, axes: usize) -> usize {
     cells.max(10) * raster(theme).dots().0
 }
 
-fn raster(theme: &Theme) -> Raster {
+pub(crate) fn raster(theme: &Theme) -> Raster {
     match theme.glyphs {
         Glyphs::Braille => Raster::Braille,
         Glyphs::Block => Raster::Half,

@@ -14,6 +14,10 @@ pub enum Action {
     Toggle,
     /// Find values by their words.
     Find,
+    /// Curves over time, or another plot.
+    Plot,
+    /// The next look of the selected pen.
+    Stroke,
     /// Ask for the scale of the selected pen.
     Scale,
     /// Show the curve of the selected value.
@@ -96,6 +100,8 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('g'), "group", "next group of pens", Action::Group),
     Key::new(char(' '), "pen", "switch the selected pen on or off; in the list of values: mark as pen", Action::Toggle),
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),
+    Key::new(char('x'), "plot", "curves, x-y plot, histogram, or step response", Action::Plot),
+    Key::new(char('y'), "", "look of the selected pen: steps, lines, dots, bars", Action::Stroke),
     Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Action::Find),
     Key::new(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),

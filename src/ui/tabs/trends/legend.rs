@@ -153,7 +153,7 @@ fn held(cx: &ViewContext, tag: TagId, held: Option<HeldValue>) -> (String, Style
 }
 
 /// `+1:50`, `-0:07.5`, `1d 02:00:00`: tenths of seconds below ten minutes.
-fn signed_time(span: SignedDuration) -> String {
+pub(super) fn signed_time(span: SignedDuration) -> String {
     let sign = if span.is_negative() { "-" } else { "" };
     let tenths = span.unsigned_abs().as_millis() / 100;
     match tenths {

@@ -115,6 +115,14 @@ impl Trends {
         self.moved();
     }
 
+    /// The next look of the selected pen.
+    pub(super) fn next_stroke(&mut self, cx: &ViewContext) {
+        if let Some(pen) = self.pens(cx).get(self.selected) {
+            let stroke = self.strokes.entry(pen.tag).or_default();
+            *stroke = stroke.next();
+        }
+    }
+
     /// Asks for the scale of the selected pen.
     pub(super) fn ask_scale(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(pen) = self.pens(cx).get(self.selected).copied() else { return Vec::new() };

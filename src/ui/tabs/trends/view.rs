@@ -11,6 +11,7 @@ use super::{
     events::{draw_event_words, draw_events},
     lanes::draw_lane,
     legend::draw_legend,
+    plots::{Plot, draw_histogram, draw_xy},
     span::{RATES, WINDOWS, midnight, rate_text, window_text},
     values::draw_values,
 };
@@ -46,6 +47,17 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let pens = trends.pens(cx);
     let legend = (to_u16(pens.len()) + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
     draw_title(trends, cx, canvas);
+    let mut plot = canvas.part(0, 1, width, height.saturating_sub(1 + legend));
+    match trends.plot {
+        Plot::Time => {}
+        Plot::Xy | Plot::Histogram => {
+            let draw = if trends.plot == Plot::Xy { draw_xy } else { draw_histogram };
+            draw(trends, cx, &mut plot);
+            let mut part = canvas.part(0, height - legend.min(height), width, legend);
+            return draw_legend(trends, cx, &mut part, None);
+        }
+        Plot::Response => {}
+    }
     let spare = height.saturating_sub(1 + legend + CHART_ROWS_MIN);
     let rows = Rows::new(trends, cx, spare);
     let mut chart = chart(trends, cx, rows.events == 0);
@@ -175,6 +187,7 @@ fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>, with_marks: bool) -> Char
             own: scale.is_some_and(|scale| scale.own),
             fixed: scale.map_or(pen.scale, |scale| scale.range),
             clipped: scale.is_some_and(|scale| scale.range.is_some()),
+            stroke: trends.strokes.get(&pen.tag).copied().unwrap_or_default(),
             dashed: is_set_value(cx, pen.tag),
             ..Curve::new(trace, n, axis(trends, cx, pen.tag), cx.snapshot.decimals[pen.tag.index()])
         }

@@ -1,6 +1,6 @@
 //! Drawing of a chart: grid, curves, marks, gaps, axes and cursor.
 
-use super::*;
+use super::{stroke::straight, *};
 use crate::plant::time::elapsed;
 use crate::t;
 
@@ -29,10 +29,17 @@ impl Chart<'_> {
         for (n, curve) in self.curves.iter().enumerate().rev() {
             let scale = plan.scales[n].1;
             let row = |value: f64| dot_of(scale, value, height);
+            let lines = (curve.stroke == Stroke::Line).then(|| straight(&plan.columns[n]));
+            let columns = lines.as_ref().unwrap_or(&plan.columns[n]);
+            let base = 0.0f64.clamp(scale.low, scale.high);
             let mut before: Option<Span> = None;
-            for (x, span) in plan.columns[n].iter().enumerate() {
+            for (x, span) in columns.iter().enumerate() {
                 if let Some(span) = span {
-                    let from = before.map_or(span.last, |before| before.last);
+                    let from = match curve.stroke {
+                        Stroke::Step | Stroke::Line => before.map_or(span.last, |before| before.last),
+                        Stroke::Dots => span.last,
+                        Stroke::Bars => base,
+                    };
                     let (low, high) = (span.min.min(from), span.max.max(from));
                     if high < scale.low || scale.high < low {
                         outside.push((x / across, scale.high < low, n));
