@@ -9,6 +9,7 @@ pub(crate) mod alarm_metrics;
 mod csv;
 pub(crate) mod shift_csv;
 mod record_csv;
+pub(crate) mod drawing;
 pub(crate) mod export;
 pub(crate) mod value_log;
 pub(crate) mod text;

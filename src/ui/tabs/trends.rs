@@ -4,10 +4,12 @@
 mod cursors;
 mod data;
 mod events;
+mod export;
 mod keys;
 mod lanes;
 mod legend;
 mod pens;
+mod picture;
 mod plots;
 mod replay;
 pub(super) mod span;
@@ -18,12 +20,16 @@ mod window;
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+};
 
 pub use self::keys::{Action, KEYS};
 use self::{
     cursors::Between,
     events::Events,
+    export::Export,
     pens::PenScale,
     plots::Plot,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
@@ -62,6 +68,7 @@ pub struct Trends {
     /// How pens are drawn that were given another look.
     strokes: BTreeMap<TagId, Stroke>,
     plot: Plot,
+    export: Export,
     /// What the text of the open window is for.
     asking: Asking,
     off: Vec<TagId>,
@@ -143,6 +150,7 @@ impl TabView for Trends {
 
     fn awaits(&self, number: u32) -> bool {
         let queries = [&self.curves, &self.hours.query].into_iter().chain(self.events.queries());
+        let queries = queries.chain([self.export.query()]);
         queries.chain(self.between.queries()).any(|query| query.awaits(number))
     }
 
@@ -150,6 +158,7 @@ impl TabView for Trends {
         self.hours.on_answer(cx, number, &answer);
         self.events.on_answer(cx, number, &answer);
         self.between.on_answer(cx, number, &answer);
+        let exported = self.accept_export(cx, number, &answer);
         if let Some(asked) = self.curves.answered(number, cx.steady()) {
             self.trouble = answer.as_ref().err().map(HistoryError::to_string);
             if let Ok(Answer::Series(series)) = answer {
@@ -157,7 +166,7 @@ impl TabView for Trends {
                 self.accept_curves(cx, series, asked.checked_add(cx.snapshot.stepped).unwrap_or(asked));
             }
         }
-        self.ask(cx)
+        exported.into_iter().chain(self.ask(cx)).collect()
     }
 
     fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
@@ -174,7 +183,16 @@ impl TabView for Trends {
     }
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
+        self.export.said = None;
         find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
+    }
+
+    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
+        self.recorded(answer)
+    }
+
+    fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        self.written(result)
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
@@ -259,6 +277,8 @@ impl Trends {
             }
             (None, Action::Event(by)) => self.to_event(cx, by),
             (None, Action::CursorB) => self.toggle_cursor_b(cx),
+            (None, Action::Csv) => self.export_csv(cx),
+            (None, Action::Picture) => return self.export_picture(cx),
             (None, Action::Plot) => self.plot = self.plot.next(),
             (None, Action::Stroke) => self.next_stroke(cx),
             (None, Action::Scale) => return self.ask_scale(cx),

@@ -61,6 +61,7 @@ impl Trends {
         }
         if self.values.is_none() {
             acts.extend(self.ask_between(cx));
+            acts.extend(self.ask_export(cx));
         }
         let tags = match self.values {
             Some((first, _)) => self.listed(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),

@@ -14,6 +14,10 @@ pub enum Action {
     Toggle,
     /// Find values by their words.
     Find,
+    /// Export the values of the view.
+    Csv,
+    /// Export the chart.
+    Picture,
     /// Curves over time, or another plot.
     Plot,
     /// The next look of the selected pen.
@@ -68,7 +72,16 @@ impl Action {
 
     /// Does it need a plant: its station, or the window of a tab?
     pub fn is_of_plant(self) -> bool {
-        matches!(self, Action::Why | Action::GoTo | Action::Find | Action::Scale | Action::Event(_))
+        matches!(
+            self,
+            Action::Why
+                | Action::GoTo
+                | Action::Find
+                | Action::Scale
+                | Action::Event(_)
+                | Action::Csv
+                | Action::Picture
+        )
     }
 }
 
@@ -102,6 +115,8 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),
     Key::new(char('x'), "plot", "curves, x-y plot, histogram, or step response", Action::Plot),
     Key::new(char('y'), "", "look of the selected pen: steps, lines, dots, bars", Action::Stroke),
+    Key::new(char('e'), "export", "write the values of the view as CSV", Action::Csv).needs(Role::Technician),
+    Key::new(char('E'), "", "write the chart as SVG and PNG", Action::Picture).needs(Role::Technician),
     Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Action::Find),
     Key::new(char('v'), "values", "all values with their last hour, or the curves", Action::Values),
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),

@@ -49,6 +49,15 @@ impl Trends {
         group.map_or_else(picked, |group| group.pens.iter().take(PENS_MAX).copied().collect())
     }
 
+    /// The name of the shown group.
+    pub(super) fn name(&self, cx: &ViewContext) -> String {
+        match (cx.def().trends.get(self.group), self.picked.as_slice()) {
+            (Some(group), _) => group.name.clone(),
+            (None, [tag]) => cx.def().tag(*tag).name.clone(),
+            (None, _) => t!("marked").to_owned(),
+        }
+    }
+
     /// The pens that are switched on, with their place in the group.
     pub(super) fn drawn(&self, cx: &ViewContext) -> Vec<(usize, Pen)> {
         self.pens(cx).into_iter().enumerate().filter(|(_, pen)| !self.off.contains(&pen.tag)).collect()

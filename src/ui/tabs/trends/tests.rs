@@ -2,6 +2,7 @@
 
 mod cursors;
 mod events;
+mod export;
 mod pens;
 mod queries;
 mod window;

@@ -121,11 +121,7 @@ fn draw_below(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, rows: &Row
 fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let (def, theme, view) = (cx.def(), cx.theme, trends.span(cx));
     let zone = &def.time_zone;
-    let name = match (def.trends.get(trends.group), trends.picked.as_slice()) {
-        (Some(group), _) => group.name.clone(),
-        (None, [tag]) => def.tag(*tag).name.clone(),
-        (None, _) => t!("marked").to_owned(),
-    };
+    let name = trends.name(cx);
     let trouble = trouble(trends, cx);
     let brief = trouble.is_some() && canvas.width() < 120;
     let mut x = canvas.text(1, 0, &name, theme.strong());
@@ -161,7 +157,15 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         let rate = t!("update {rate_text}", rate_text = rate_text(RATES[trends.rate]));
         x = canvas.text(x + 3, 0, &rate, theme.normal());
     }
-    if let Some(trouble) = trouble {
+    let said = trends.export.said.as_ref().map(|said| match said {
+        Ok(file) => (t!("{file} written", file), theme.done()),
+        Err(why) => (t!("not exported: {why}", why), theme.trouble()),
+    });
+    let exporting = || trends.export.is_busy().then(|| (t!("exporting").to_owned(), theme.normal()));
+    if let Some((words, style)) = said.or_else(exporting) {
+        let room = canvas.width().saturating_sub(x + 3);
+        canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&words, room), style);
+    } else if let Some(trouble) = trouble {
         let room = canvas.width().saturating_sub(x + 3);
         canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&trouble, room), theme.trouble());
     }
@@ -178,7 +182,7 @@ pub(super) fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
 }
 
 /// The chart, with the alarms of its pens on the axis where there is no row of events.
-fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>, with_marks: bool) -> Chart<'a> {
+pub(super) fn chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>, with_marks: bool) -> Chart<'a> {
     let view = trends.span(cx);
     let curve = |(n, pen): (usize, Pen)| {
         let trace = trends.traces.get(&pen.tag).unwrap_or(&NO_TRACE);

@@ -1,0 +1,143 @@
+//! Export of what is seen: values with quality as CSV, the chart as SVG and PNG. Every file is on record before it is
+//! written.
+
+use std::{collections::VecDeque, path::PathBuf};
+
+use super::{picture::picture, *};
+use crate::{
+    report::{
+        export::{Column, export_csv},
+        step_series::HeldValue,
+    },
+    ui::tabs::Outgoing,
+};
+
+/// Rows of a CSV lie on multiples of this.
+const STEP_MS: i128 = 100;
+
+/// Files on their way.
+#[derive(Debug, Default)]
+pub(super) struct Export {
+    /// The values of a CSV that are waited for: from, every, count, pens.
+    wanted: Option<(Timestamp, Duration, usize, Vec<TagId>)>,
+    values: Answered<Vec<Vec<Option<HeldValue>>>>,
+    /// Those that wait for their turn; the first is before the station or on its way to the disk.
+    files: VecDeque<Outgoing>,
+    /// What became of the last one.
+    pub said: Option<Result<String, String>>,
+}
+
+impl Export {
+    pub(super) fn query(&self) -> &PeriodicQuery {
+        &self.values.query
+    }
+
+    /// Is something on its way?
+    pub(super) fn is_busy(&self) -> bool {
+        self.wanted.is_some() || !self.files.is_empty()
+    }
+
+    /// Asks the station to record the first file.
+    fn next(&self) -> Vec<UiAction> {
+        self.files.front().map(Outgoing::export_request).into_iter().collect()
+    }
+}
+
+impl Trends {
+    /// Begins a CSV of the values in the view.
+    pub(super) fn export_csv(&mut self, cx: &ViewContext) {
+        let view = self.span(cx);
+        let tags: Vec<TagId> = self.drawn(cx).iter().map(|(_, pen)| pen.tag).collect();
+        if tags.is_empty() || self.export.is_busy() {
+            return;
+        }
+        let step = (view.step().as_millis() + STEP_MS - 1) / STEP_MS * STEP_MS;
+        let every = Duration::from_millis(u64::try_from(step.max(STEP_MS)).unwrap_or(u64::MAX));
+        let past = view.to.min(cx.present()).duration_since(view.from).as_millis();
+        let count = usize::try_from(past / step.max(STEP_MS)).unwrap_or(0);
+        (self.export.said, self.export.values) = (None, Answered::default());
+        self.export.wanted = (count > 0).then_some((view.from, every, count, tags));
+    }
+
+    /// Asks for the values of a CSV.
+    pub(super) fn ask_export(&mut self, cx: &ViewContext) -> Option<UiAction> {
+        let (from, every, count, tags) = self.export.wanted.clone()?;
+        let query = Query::Values { tags, from, every, count };
+        let number = (Tab::Trends, &mut self.asked);
+        self.export.values.ask(cx, number, SignedDuration::MAX, real(cx, 60.0), query)
+    }
+
+    /// Takes the values of a CSV, and asks the station to record the file.
+    pub(super) fn accept_export(
+        &mut self,
+        cx: &ViewContext,
+        number: u32,
+        answer: &Result<Answer, HistoryError>,
+    ) -> Vec<UiAction> {
+        if !self.export.values.query.awaits(number) {
+            return Vec::new();
+        }
+        self.export.values.on_answer(cx, number, answer);
+        let Some((from, every, _, tags)) = self.export.wanted.take() else { return Vec::new() };
+        let Some(values) = self.export.values.value.take() else {
+            self.export.said = self.export.values.trouble.take().map(Err);
+            return Vec::new();
+        };
+        let column = |(tag, values): (&TagId, Vec<Option<HeldValue>>)| Column {
+            tag: cx.def().tag(*tag).name.clone(),
+            unit: cx.snapshot.unit(*tag).to_owned(),
+            decimals: cx.snapshot.decimals[tag.index()],
+            values,
+        };
+        let columns: Vec<Column> = tags.iter().zip(values).map(column).collect();
+        let bytes = export_csv(cx.def(), from, every, &columns, cx.def().report.csv);
+        self.send(vec![(self.file(cx, "csv"), bytes)])
+    }
+
+    /// Exports the chart as it is drawn, as SVG and PNG.
+    pub(super) fn export_picture(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if self.export.is_busy() {
+            return Vec::new();
+        }
+        let page = picture(self, cx);
+        let png = page.png().map(|png| (self.file(cx, "png"), png));
+        self.send([(self.file(cx, "svg"), page.svg())].into_iter().chain(png).collect())
+    }
+
+    fn send(&mut self, files: Vec<(PathBuf, Vec<u8>)>) -> Vec<UiAction> {
+        let outgoing = |(path, bytes)| Outgoing { tab: Tab::Trends, path, bytes };
+        self.export.files = files.into_iter().map(outgoing).collect();
+        self.export.said = None;
+        self.export.next()
+    }
+
+    /// The station has put the first file on record, or why not.
+    pub(super) fn recorded(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
+        match answer {
+            Ok(()) => self.export.files.front().cloned().map(Outgoing::write).into_iter().collect(),
+            Err(why) => {
+                self.export.files.clear();
+                self.export.said = Some(Err(why));
+                Vec::new()
+            }
+        }
+    }
+
+    /// The first file was written, or why not; then the next one.
+    pub(super) fn written(&mut self, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        self.export.files.pop_front();
+        if result.is_err() {
+            self.export.files.clear();
+        }
+        self.export.said = Some(result.map(|path| path.display().to_string()));
+        self.export.next()
+    }
+
+    /// `2026-11-25T093600-TIC-1.csv`: begin of the view and name of the group.
+    fn file(&self, cx: &ViewContext, extension: &str) -> PathBuf {
+        let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '-' };
+        let name: String = self.name(cx).chars().map(plain).collect();
+        let begin = draw::local(cx, self.span(cx).from, "%Y-%m-%dT%H%M%S");
+        cx.def().report.folder.join(format!("{begin}-{name}.{extension}"))
+    }
+}

@@ -1,0 +1,198 @@
+//! The chart as a page to print: what is on the screen, at the resolution of the page.
+
+use ratatui::layout::Rect;
+
+use super::{
+    events::EventKind,
+    lanes::runs,
+    view::{self, NO_TRACE, axis, share},
+    *,
+};
+use crate::{
+    report::drawing::{Anchor, Drawing, Ink, TEXT},
+    ui::widgets::chart::{
+        Axis, Chart,
+        axis::{Scale, time_ticks},
+        trace::Span,
+    },
+};
+
+/// Size of the page.
+const PAGE: (u16, u16) = (1_280, 800);
+/// The plot on it: left, top and right.
+const PLOT: (f32, f32, f32) = (80.0, 64.0, 1_200.0);
+
+/// Places on the page.
+struct Frame {
+    from: Timestamp,
+    to: Timestamp,
+    bottom: f32,
+}
+
+impl Frame {
+    fn x(&self, at: Timestamp) -> f32 {
+        let share = at.duration_since(self.from).as_secs_f64() / self.to.duration_since(self.from).as_secs_f64();
+        PLOT.0 + (PLOT.2 - PLOT.0) * share.clamp(0.0, 1.0) as f32
+    }
+
+    fn y(&self, scale: Scale, value: f64) -> f32 {
+        self.bottom - (self.bottom - PLOT.1) * scale.share(value) as f32
+    }
+}
+
+/// Draws the curves, lanes, events, cursors and figures of the view.
+pub(super) fn picture(trends: &Trends, cx: &ViewContext) -> Drawing {
+    let mut page = Drawing::new(PAGE.0, PAGE.1);
+    let (view, chart) = (trends.span(cx), view::chart(trends, cx, false));
+    let (lanes, pens) = (trends.lanes(cx), trends.drawn(cx));
+    let rows = (lanes.len() + pens.len() + 4) as f32;
+    let frame = Frame { from: view.from, to: view.to, bottom: f32::from(PAGE.1) - rows * (TEXT.0 + 2.0) };
+    let head = format!(
+        "{}   {}   {} – {}",
+        cx.def().name,
+        trends.name(cx),
+        draw::local(cx, view.from, "%Y-%m-%d %H:%M:%S"),
+        draw::local(cx, view.to, "%Y-%m-%d %H:%M:%S %:z")
+    );
+    page.text((PLOT.0, 20.0), Anchor::Start, head, Ink::Text);
+    let scales = chart.plan(Rect::new(0, 0, 120, 40)).scales;
+    axes(&mut page, cx, &chart, &scales, &frame);
+    // As many as on the screen: finer ones would only smear those of the history.
+    let count = view.columns;
+    for (curve, (_, scale)) in chart.curves.iter().zip(&scales) {
+        let columns = curve.trace.columns(view.from, view.to, cx.present(), count);
+        for points in paths(&columns, |value| frame.y(*scale, value)) {
+            page.line(points, Ink::Pen(curve.pen), 1.5, curve.dashed);
+        }
+    }
+    for (at, words) in &chart_cursors(trends, cx) {
+        page.line(vec![(frame.x(*at), PLOT.1), (frame.x(*at), frame.bottom)], Ink::Text, 1.0, true);
+        page.text((frame.x(*at), PLOT.1 - 8.0), Anchor::Middle, words.as_str(), Ink::Text);
+    }
+    let mut y = frame.bottom + 2.2 * TEXT.0;
+    for (n, pen) in lanes {
+        lane(&mut page, trends, cx, (n, pen), y, &frame);
+        y += TEXT.0 + 2.0;
+    }
+    for mark in trends.marks(cx) {
+        let ink = if mark.kind == EventKind::Alarm { Ink::Pen(1) } else { Ink::Text };
+        page.text((frame.x(mark.at), y), Anchor::Middle, mark.kind.symbol(), ink);
+    }
+    y += TEXT.0 + 8.0;
+    for pen in pens {
+        legend(&mut page, trends, cx, pen, y);
+        y += TEXT.0 + 2.0;
+    }
+    page
+}
+
+/// The cursors with their times.
+fn chart_cursors(trends: &Trends, cx: &ViewContext) -> Vec<(Timestamp, String)> {
+    let word = |letter: &str, at| (at, format!("{letter} {}", clock(at, &cx.def().time_zone)));
+    match trends.both() {
+        Some((a, b)) => vec![word("A", a), word("B", b)],
+        None => trends.cursor(cx).map(|at| word("A", at)).into_iter().collect(),
+    }
+}
+
+/// Frame, grid, ticks and units.
+fn axes(page: &mut Drawing, cx: &ViewContext, chart: &Chart, scales: &[(Axis, Scale)], frame: &Frame) {
+    let corners = [(PLOT.0, PLOT.1), (PLOT.0, frame.bottom), (PLOT.2, frame.bottom), (PLOT.2, PLOT.1)];
+    for (at, label) in time_ticks(frame.from, frame.to, &cx.def().time_zone, 140, 12) {
+        page.line(vec![(frame.x(at), PLOT.1), (frame.x(at), frame.bottom + 4.0)], Ink::Grid, 1.0, false);
+        page.text((frame.x(at), frame.bottom + TEXT.0), Anchor::Middle, label, Ink::Text);
+    }
+    let sides = [(Axis::Left, PLOT.0 - 6.0, Anchor::End), (Axis::Right, PLOT.2 + 6.0, Anchor::Start)];
+    for (side, x, anchor) in sides {
+        let first = chart.curves.iter().zip(scales).find(|(_, (axis, _))| *axis == side);
+        let Some((curve, (_, scale))) = first else { continue };
+        page.text((x, PLOT.1 - 18.0), anchor, curve.unit, Ink::Text);
+        for tick in scale.ticks() {
+            let y = frame.y(*scale, tick);
+            if side == Axis::Left {
+                page.line(vec![(PLOT.0, y), (PLOT.2, y)], Ink::Grid, 1.0, false);
+            }
+            page.text((x, y), anchor, scale.label(tick), Ink::Text);
+        }
+    }
+    page.line(corners.to_vec(), Ink::Text, 1.0, false);
+    for limit in &chart.limits {
+        let Some((_, scale)) = scales.get(limit.curve) else { continue };
+        if (scale.low..=scale.high).contains(&limit.value) {
+            let y = frame.y(*scale, limit.value);
+            page.line(vec![(PLOT.0, y), (PLOT.2, y)], Ink::Text, 0.7, true);
+            page.text((PLOT.2 - 4.0, y - 8.0), Anchor::End, limit.text.as_str(), Ink::Text);
+        }
+    }
+}
+
+/// The lines of a curve, a column of pixels each: from the value that held to the least, the greatest and the last. A gap
+/// ends a line.
+fn paths(columns: &[Option<Span>], y: impl Fn(f64) -> f32) -> Vec<Vec<(f32, f32)>> {
+    let width = (PLOT.2 - PLOT.0) / columns.len().max(1) as f32;
+    let mut paths: Vec<Vec<(f32, f32)>> = vec![Vec::new()];
+    for (n, span) in columns.iter().enumerate() {
+        let (x, path) = (PLOT.0 + width * n as f32, paths.last_mut());
+        match (span, path) {
+            (Some(span), Some(path)) => {
+                let spike = if span.min == span.max { vec![span.last] } else { vec![span.min, span.max, span.last] };
+                path.extend(path.last().map(|(_, held)| (x, *held)));
+                path.extend(spike.into_iter().map(|value| (x, y(value))));
+                path.push((x + width, y(span.last)));
+            }
+            (None, Some(path)) if path.is_empty() => {}
+            (None, _) | (Some(_), None) => paths.push(Vec::new()),
+        }
+    }
+    paths
+}
+
+/// A lane of states: a line where it is not 0, and its names.
+fn lane(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usize, Pen), y: f32, frame: &Frame) {
+    let count = usize::from(PAGE.0);
+    let width = (PLOT.2 - PLOT.0) / count as f32;
+    page.text((PLOT.0 - 6.0, y), Anchor::End, cx.def().tag(pen.tag).short.as_str(), Ink::Pen(n));
+    let trace = trends.traces.get(&pen.tag).unwrap_or(&NO_TRACE);
+    for run in runs(&trace.columns(frame.from, frame.to, cx.present(), count)) {
+        let (from, to) = (PLOT.0 + width * run.first as f32, PLOT.0 + width * (run.first + run.cells) as f32);
+        let Some(state) = run.state else {
+            page.line(vec![(from, y - 6.0), (from, y + 6.0)], Ink::Pen(n), 1.0, false);
+            continue;
+        };
+        let (ink, thick) = if state == 0.0 { (Ink::Grid, 1.0) } else { (Ink::Pen(n), 3.0) };
+        page.line(vec![(from, y + 6.0), (to, y + 6.0)], ink, thick, false);
+        let label = cx.snapshot.format(pen.tag, state);
+        if (label.chars().count() as f32 + 1.0) * TEXT.1 < to - from {
+            page.text((from + 3.0, y - 2.0), Anchor::Start, label, Ink::Text);
+        }
+    }
+}
+
+/// Name, label, unit and figures of a pen.
+fn legend(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usize, Pen), y: f32) {
+    let def = cx.def().tag(pen.tag);
+    page.line(vec![(PLOT.0, y), (PLOT.0 + 24.0, y)], Ink::Pen(n), 3.0, false);
+    let figures = trends.figures.get(&pen.tag).filter(|_| !lanes::is_state(def)).map(|(summary, good)| {
+        let value = |value: f64| cx.snapshot.format(pen.tag, value);
+        let values = summary.map(|(min, mean, max)| {
+            t!("min {min}  mean {mean}  max {max}", min = value(min), mean = value(mean), max = value(max))
+        });
+        format!("{}  {}", values.unwrap_or_default(), t!("good {share}", share = share(*good)))
+    });
+    let text =
+        format!("{:<18} {:<10} {}   {}", def.name, axis(trends, cx, pen.tag), def.label, figures.unwrap_or_default());
+    page.text((PLOT.0 + 32.0, y), Anchor::Start, text, Ink::Text);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_ends_at_a_gap() {
+        let at = |value: f64| Some(Span { min: value, max: value, last: value });
+        let paths = paths(&[at(1.0), at(2.0), None, None, at(3.0)], |value| value as f32);
+        let ends: Vec<usize> = paths.iter().map(Vec::len).filter(|len| *len > 0).collect();
+        assert_eq!(ends, [5, 2]);
+    }
+}
