@@ -44,6 +44,7 @@ pub mod record;
 pub(crate) mod interlock;
 pub mod alarm;
 pub(crate) mod ne107;
+pub(crate) mod step_response;
 pub(crate) mod tuning;
 pub mod restore;
 pub mod station;

@@ -12,6 +12,7 @@ mod pens;
 mod picture;
 mod plots;
 mod replay;
+mod response;
 pub(super) mod span;
 mod values;
 mod view;
@@ -32,6 +33,7 @@ use self::{
     export::Export,
     pens::PenScale,
     plots::Plot,
+    response::Response,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
     window::Visited,
 };
@@ -68,6 +70,7 @@ pub struct Trends {
     /// How pens are drawn that were given another look.
     strokes: BTreeMap<TagId, Stroke>,
     plot: Plot,
+    response: Response,
     export: Export,
     /// What the text of the open window is for.
     asking: Asking,
@@ -150,7 +153,7 @@ impl TabView for Trends {
 
     fn awaits(&self, number: u32) -> bool {
         let queries = [&self.curves, &self.hours.query].into_iter().chain(self.events.queries());
-        let queries = queries.chain([self.export.query()]);
+        let queries = queries.chain([self.export.query(), self.response.query()]);
         queries.chain(self.between.queries()).any(|query| query.awaits(number))
     }
 
@@ -158,6 +161,7 @@ impl TabView for Trends {
         self.hours.on_answer(cx, number, &answer);
         self.events.on_answer(cx, number, &answer);
         self.between.on_answer(cx, number, &answer);
+        self.response.on_answer(cx, number, &answer);
         let exported = self.accept_export(cx, number, &answer);
         if let Some(asked) = self.curves.answered(number, cx.steady()) {
             self.trouble = answer.as_ref().err().map(HistoryError::to_string);

@@ -62,6 +62,7 @@ impl Trends {
         if self.values.is_none() {
             acts.extend(self.ask_between(cx));
             acts.extend(self.ask_export(cx));
+            acts.extend(self.ask_response(cx, often.max(real(cx, 2.0))));
         }
         let tags = match self.values {
             Some((first, _)) => self.listed(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),

@@ -12,6 +12,7 @@ use super::{
     lanes::draw_lane,
     legend::draw_legend,
     plots::{Plot, draw_histogram, draw_xy},
+    response::draw_response,
     span::{RATES, WINDOWS, midnight, rate_text, window_text},
     values::draw_values,
 };
@@ -48,15 +49,16 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let legend = (to_u16(pens.len()) + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
     draw_title(trends, cx, canvas);
     let mut plot = canvas.part(0, 1, width, height.saturating_sub(1 + legend));
-    match trends.plot {
-        Plot::Time => {}
-        Plot::Xy | Plot::Histogram => {
-            let draw = if trends.plot == Plot::Xy { draw_xy } else { draw_histogram };
-            draw(trends, cx, &mut plot);
-            let mut part = canvas.part(0, height - legend.min(height), width, legend);
-            return draw_legend(trends, cx, &mut part, None);
-        }
-        Plot::Response => {}
+    let draw: Option<fn(&Trends, &ViewContext, &mut Canvas)> = match trends.plot {
+        Plot::Time => None,
+        Plot::Xy => Some(draw_xy),
+        Plot::Histogram => Some(draw_histogram),
+        Plot::Response => Some(draw_response),
+    };
+    if let Some(draw) = draw {
+        draw(trends, cx, &mut plot);
+        let mut part = canvas.part(0, height - legend.min(height), width, legend);
+        return draw_legend(trends, cx, &mut part, None);
     }
     let spare = height.saturating_sub(1 + legend + CHART_ROWS_MIN);
     let rows = Rows::new(trends, cx, spare);

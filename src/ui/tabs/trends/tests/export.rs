@@ -43,7 +43,7 @@ fn values_of_the_view_are_written_once_on_record() {
     stand.answer();
     let (id, file) = requested(&effects(&mut stand, key('e'))).expect("the station is asked first");
     assert!(file.ends_with("TIC-1.csv"), "{file}");
-    let (path, bytes) = saved(&effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Synced)))).expect("written");
+    let (path, bytes) = saved(&effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Recorded)))).expect("written");
     let csv = String::from_utf8(bytes).expect("CSV is text");
     assert!(csv.starts_with("time,TIC-1.PV") && csv.contains(",good"), "{csv}");
     effects(&mut stand, Msg::Saved(Tab::Trends, Ok(path)));
@@ -59,7 +59,7 @@ fn the_chart_is_written_as_svg_and_then_as_png() {
     let (id, file) = requested(&effects(&mut stand, key('E'))).expect("the SVG is recorded");
     assert!(file.ends_with(".svg"), "{file}");
     assert_eq!(effects(&mut stand, key('E')), [], "one export at a time");
-    let (path, bytes) = saved(&effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Synced)))).expect("written");
+    let (path, bytes) = saved(&effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Recorded)))).expect("written");
     let svg = String::from_utf8(bytes).expect("SVG is text");
     assert!(svg.contains("TIC-1.PV") && svg.contains("HH 90.0") && svg.contains("<polyline"));
     let (id, file) = requested(&effects(&mut stand, Msg::Saved(Tab::Trends, Ok(path)))).expect("then the PNG");
