@@ -7,7 +7,7 @@ use tiny_skia::{
     Color, LineCap, Paint, PathBuilder, Pixmap, PremultipliedColorU8, Rect, Stroke, StrokeDash, Transform,
 };
 
-use crate::plant::number::{to_u8, to_u32};
+use crate::plant::number::{to_u8, to_u32, to_usize};
 
 /// Height of a line of text, and width of a letter, in pixels.
 pub const TEXT: (f32, f32) = (16.0, 8.0);
@@ -177,6 +177,11 @@ fn stroke(page: &mut Pixmap, points: &[(f32, f32)], ink: Ink, width: f32, dashed
     }
 }
 
+/// A place in whole pixels; what lies before the edge is at it.
+fn whole(place: f32) -> u32 {
+    to_u32(to_usize(f64::from(place).round()))
+}
+
 /// Sets a text; a letter that the font lacks is a question mark.
 fn letters(page: &mut Pixmap, (x, y): (f32, f32), anchor: Anchor, text: &str, ink: Ink) {
     let count = text.chars().count() as f32;
@@ -185,8 +190,7 @@ fn letters(page: &mut Pixmap, (x, y): (f32, f32), anchor: Anchor, text: &str, in
         Anchor::Middle => x - count * TEXT.1 / 2.0,
         Anchor::End => x - count * TEXT.1,
     };
-    let (mut left, top) =
-        (to_u32(left.max(0.0).round() as usize), to_u32((y - TEXT.0 / 2.0).max(0.0).round() as usize));
+    let (mut left, top) = (whole(left), whole(y - TEXT.0 / 2.0));
     let (width, height, Rgb(r, g, b)) = (page.width(), page.height(), ink.rgb());
     for letter in text.chars() {
         let letter = match letter {

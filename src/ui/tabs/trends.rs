@@ -229,11 +229,7 @@ impl Trends {
                 }
             }
             (Some((_, row)), Action::Toggle) => self.pick(cx, row),
-            (Some(_), Action::Find) => {
-                self.asking = Asking::Filter;
-                let words = t!("words of name, label or unit; none lists all");
-                return open(Modal::Prompt(Prompt::new(t!("Find values"), words, &self.filter.to_string())));
-            }
+            (_, Action::Find) => return self.ask_filter(),
             (Some((_, row)), Action::Why) => return Why::open(Why::new(self.listed(cx), row)),
             (None, Action::Why) => {
                 let pens = self.pens(cx).into_iter().map(|pen| pen.tag).collect();
@@ -242,9 +238,6 @@ impl Trends {
             (_, Action::Values) => {
                 self.values = if self.values.is_some() { None } else { Some((0, 0)) };
                 self.hours.query.want();
-            }
-            (None, Action::Find) => {
-                return self.act(cx, Action::Values).into_iter().chain(self.act(cx, action)).collect();
             }
             (Some(_), _) => {}
             (None, Action::Side(by)) if cx.is_past() => return self.replay_by(self.cell(cx), by),
@@ -261,25 +254,15 @@ impl Trends {
             (None, Action::Open) => self.zoom_to_cursors(cx),
             (None, Action::Zoom(by)) => self.zoom(cx, by),
             (None, Action::Group) => self.next_group(cx),
-            (None, Action::Mode) => {
-                self.visit();
-                (self.accumulate, self.since, self.end) = (!self.accumulate, None, None);
-                self.moved();
-            }
-            (None, Action::Hold) => {
-                self.end = if self.end.is_some() { None } else { Some(cx.now) };
-                if std::mem::take(&mut self.accumulate) {
-                    self.window = nearest(self.span(cx).width());
-                }
-                self.moved();
-            }
+            (None, Action::Mode) => self.toggle_mode(),
+            (None, Action::Hold) => self.hold(cx),
             (None, Action::Revisit(direction)) => self.revisit(direction),
             (None, Action::Rate) => self.rate = (self.rate + 1) % RATES.len(),
             (None, Action::Cursor) => {
                 self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) };
                 self.between.clear();
             }
-            (None, Action::Event(by)) => self.to_event(cx, by),
+            (None, Action::Event(by)) => self.go_to_event(cx, by),
             (None, Action::CursorB) => self.toggle_cursor_b(cx),
             (None, Action::Csv) => self.export_csv(cx),
             (None, Action::Picture) => return self.export_picture(cx),
@@ -291,11 +274,7 @@ impl Trends {
                 let prompt = Prompt::new(t!("Go to a time"), t!("03:12   2026-11-20   2026-11-20 22:00-06:00"), "");
                 return vec![UiAction::Open(Modal::Prompt(prompt))];
             }
-            (None, Action::Live) => {
-                (self.end, self.cursor) = (None, None);
-                self.between.clear();
-                self.moved();
-            }
+            (None, Action::Live) => self.go_live(),
         }
         self.ask(cx)
     }

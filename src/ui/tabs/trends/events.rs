@@ -145,7 +145,7 @@ impl Trends {
     }
 
     /// Moves the cursor to the next event, or to the one before.
-    pub(super) fn to_event(&mut self, cx: &ViewContext, by: isize) {
+    pub(super) fn go_to_event(&mut self, cx: &ViewContext, by: isize) {
         let marks = self.marks(cx);
         let view = self.span(cx);
         // Behind what stands in the same column: a step always moves.

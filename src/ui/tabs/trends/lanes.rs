@@ -3,7 +3,10 @@
 use super::*;
 use crate::{
     plant::tag::{DataType, TagDef},
-    ui::widgets::chart::{mark, trace::Span},
+    ui::{
+        theme::Glyphs,
+        widgets::chart::{mark, trace::Span},
+    },
 };
 
 /// Is it drawn as a lane? Between two states lies nothing, so that a curve would mean nothing.
@@ -53,6 +56,8 @@ pub(super) fn draw_lane(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, 
     let Some(trace) = trends.traces.get(&pen.tag) else { return };
     let count = usize::from(canvas.width().saturating_sub(left));
     let columns = trace.columns(view.from, view.to, cx.present(), count);
+    // Console fonts lack these lines.
+    let line = |full, plain| if theme.glyphs == Glyphs::Braille { full } else { plain };
     let end = |run: &Run| run.first + run.cells;
     let runs = runs(&columns);
     for (place, run) in runs.iter().enumerate() {
@@ -62,8 +67,8 @@ pub(super) fn draw_lane(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, 
             continue;
         };
         let (line, style) = match state == 0.0 {
-            true => (theme.pick("┈", "."), theme.dim()),
-            false => (theme.pick("━", "="), theme.pen(n)),
+            true => (line("┈", "."), theme.dim()),
+            false => (line("━", "="), theme.pen(n)),
         };
         let begins = place > 0 && end(&runs[place - 1]) == run.first && runs[place - 1].state.is_some();
         let stroke = if begins { theme.pick("│", "|") } else { line };

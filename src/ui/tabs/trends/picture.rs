@@ -9,6 +9,7 @@ use super::{
     *,
 };
 use crate::{
+    plant::number::to_f32,
     report::drawing::{Anchor, Drawing, Ink, TEXT},
     ui::widgets::chart::{
         Axis, Chart,
@@ -32,11 +33,11 @@ struct Frame {
 impl Frame {
     fn x(&self, at: Timestamp) -> f32 {
         let share = at.duration_since(self.from).as_secs_f64() / self.to.duration_since(self.from).as_secs_f64();
-        PLOT.0 + (PLOT.2 - PLOT.0) * share.clamp(0.0, 1.0) as f32
+        PLOT.0 + (PLOT.2 - PLOT.0) * to_f32(share.clamp(0.0, 1.0))
     }
 
     fn y(&self, scale: Scale, value: f64) -> f32 {
-        self.bottom - (self.bottom - PLOT.1) * scale.share(value) as f32
+        self.bottom - (self.bottom - PLOT.1) * to_f32(scale.share(value))
     }
 }
 
@@ -191,7 +192,7 @@ mod tests {
     #[test]
     fn a_line_ends_at_a_gap() {
         let at = |value: f64| Some(Span { min: value, max: value, last: value });
-        let paths = paths(&[at(1.0), at(2.0), None, None, at(3.0)], |value| value as f32);
+        let paths = paths(&[at(1.0), at(2.0), None, None, at(3.0)], to_f32);
         let ends: Vec<usize> = paths.iter().map(Vec::len).filter(|len| *len > 0).collect();
         assert_eq!(ends, [5, 2]);
     }

@@ -49,7 +49,7 @@ impl Trends {
     /// The controller of the selected pen: that of its device.
     fn controller<'a>(&self, cx: &ViewContext<'a>) -> Option<(&'a DeviceDef, &'a Faceplate)> {
         let pen = self.pens(cx).get(self.selected).copied()?;
-        let device = cx.def().device(cx.def().tag(pen.tag).device);
+        let device = cx.def().devices.get(cx.def().tag(pen.tag).device.index())?;
         Some((device, device.faceplate.as_ref()?))
     }
 

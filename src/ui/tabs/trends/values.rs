@@ -19,6 +19,15 @@ impl Trends {
         cx.def().tags.iter().filter(|tag| tag.is_stored() && fits(tag)).map(|tag| tag.id).collect()
     }
 
+    /// Asks for the words of the filter, and shows the list.
+    pub(super) fn ask_filter(&mut self) -> Vec<UiAction> {
+        self.asking = Asking::Filter;
+        self.values.get_or_insert((0, 0));
+        self.hours.query.want();
+        let words = t!("words of name, label or unit; none lists all");
+        open(Modal::Prompt(Prompt::new(t!("Find values"), words, &self.filter.to_string())))
+    }
+
     /// Lists the values that fit these words.
     pub(super) fn filter_values(&mut self, text: &str) {
         (self.filter, self.values) = (Words::parse(text), Some((0, 0)));

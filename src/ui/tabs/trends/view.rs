@@ -229,10 +229,10 @@ fn limits(trends: &Trends, cx: &ViewContext) -> Vec<Limit> {
         let Condition::Limit { level, limit: value, .. } = condition else { return None };
         let text = cx.snapshot.format(tag, value);
         Some(match level {
-            Level::HighHigh => Limit { curve, value, high: true, text: format!("HH {text}") },
-            Level::High => Limit { curve, value, high: true, text: format!("H {text}") },
-            Level::Low => Limit { curve, value, high: false, text: format!("L {text}") },
-            Level::LowLow => Limit { curve, value, high: false, text: format!("LL {text}") },
+            Level::HighHigh => Limit { curve, value, high: true, text: t!("HH {text}", text) },
+            Level::High => Limit { curve, value, high: true, text: t!("H {text}", text) },
+            Level::Low => Limit { curve, value, high: false, text: t!("L {text}", text) },
+            Level::LowLow => Limit { curve, value, high: false, text: t!("LL {text}", text) },
         })
     };
     of_tag.filter_map(|alarm| limit(alarm.condition)).collect()

@@ -137,6 +137,29 @@ impl Trends {
         at.min(last).max(view.from)
     }
 
+    /// A moving window, or everything since the start of the day.
+    pub(super) fn toggle_mode(&mut self) {
+        self.visit();
+        (self.accumulate, self.since, self.end) = (!self.accumulate, None, None);
+        self.moved();
+    }
+
+    /// The picture stands still, or is live again.
+    pub(super) fn hold(&mut self, cx: &ViewContext) {
+        self.end = if self.end.is_some() { None } else { Some(cx.now) };
+        if std::mem::take(&mut self.accumulate) {
+            self.window = nearest(self.span(cx).width());
+        }
+        self.moved();
+    }
+
+    /// Back to the present, without cursors.
+    pub(super) fn go_live(&mut self) {
+        (self.end, self.cursor) = (None, None);
+        self.between.clear();
+        self.moved();
+    }
+
     /// A step to the side: of the moved cursor by one cell, or of the view by a quarter.
     pub(super) fn step(&mut self, cx: &ViewContext, by: isize) {
         let Some(at) = self.moving(cx) else { return self.pan(cx, by) };

@@ -279,7 +279,8 @@ impl Chart<'_> {
         for y in self.row(*scale, high, plot.height)..=self.row(*scale, low, plot.height) {
             let cell = &mut buf[(x, plot.y + y)];
             if matches!(cell.symbol(), "│" | "|") {
-                cell.set_symbol(self.theme.pick(if *axis == Axis::Left { "▐" } else { "▌" }, "#"));
+                let stroke = if *axis == Axis::Left { "▐" } else { "▌" };
+                cell.set_symbol(if self.theme.glyphs == Glyphs::Braille { stroke } else { "#" });
             }
         }
     }

@@ -46,7 +46,7 @@ fn values_of_the_view_are_written_once_on_record() {
     let (path, bytes) = saved(&effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Recorded)))).expect("written");
     let csv = String::from_utf8(bytes).expect("CSV is text");
     assert!(csv.starts_with("time,TIC-1.PV") && csv.contains(",good"), "{csv}");
-    effects(&mut stand, Msg::Saved(Tab::Trends, Ok(path)));
+    effects(&mut stand, Msg::Saved(Some(Tab::Trends), Ok(path)));
     assert!(stand.screen().contains("TIC-1.csv written"));
     stand.press("↓");
     assert!(!stand.screen().contains("written"));
@@ -62,7 +62,7 @@ fn the_chart_is_written_as_svg_and_then_as_png() {
     let (path, bytes) = saved(&effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Recorded)))).expect("written");
     let svg = String::from_utf8(bytes).expect("SVG is text");
     assert!(svg.contains("TIC-1.PV") && svg.contains("HH 90.0") && svg.contains("<polyline"));
-    let (id, file) = requested(&effects(&mut stand, Msg::Saved(Tab::Trends, Ok(path)))).expect("then the PNG");
+    let (id, file) = requested(&effects(&mut stand, Msg::Saved(Some(Tab::Trends), Ok(path)))).expect("then the PNG");
     assert!(file.ends_with(".png"), "{file}");
     effects(&mut stand, Msg::RequestDone(id, Err("audit log full".to_owned())));
     assert!(stand.screen().contains("not exported: audit log full"));
