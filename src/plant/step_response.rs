@@ -38,11 +38,11 @@ pub struct StepResponse {
     pub at: Timestamp,
     /// Setpoint before and after.
     pub sv: (f64, f64),
-    /// PV at the step: what the step is measured from.
+    /// PV at the step: what the rise is measured from.
     pub pv: f64,
     /// When PV was furthest beyond the new setpoint, and its value there; `None` if it never passed it.
     pub peak: Option<(Timestamp, f64)>,
-    /// The peak beyond the setpoint, in percent of the step; 0 without one.
+    /// The peak beyond the setpoint, in percent of the step of the setpoint; 0 without one.
     pub overshoot: f64,
     /// From 10 % to 90 % of the step: begin and end; `None` if it was never there.
     pub rise: Option<(Timestamp, Timestamp)>,
@@ -69,14 +69,12 @@ pub fn step_response(of: Loop) -> Option<StepResponse> {
     let first = (1..=last).rev().take_while(changed).last()?;
     let sv = (of.sv[first - 1]?, of.sv[last]?);
     let pv = of.pv[..=first].iter().rev().take(2).find_map(|pv| *pv)?;
-    let step = sv.1 - pv;
-    if step == 0.0 {
-        return None;
-    }
     let end = count - of.pv[..count].iter().rev().take_while(|pv| pv.is_none()).count();
-    let share = |value: f64| (value - pv) / step;
+    // PV may have been anywhere: only its way up is measured from there.
+    let share = |value: f64| (value - sv.0) / (sv.1 - sv.0);
+    let way = |value: f64| (value - pv) / (sv.1 - pv);
     let known = || (first..end).filter_map(|n| Some((n, share(of.pv[n]?))));
-    let passed = |least: f64| known().find(|(_, share)| *share >= least).and_then(|(n, _)| time(n));
+    let passed = |least: f64| (first..end).find(|n| of.pv[*n].is_some_and(|pv| way(pv) >= least)).and_then(time);
     let peak = known().filter(|(_, share)| *share > 1.0).max_by(|a, b| a.1.total_cmp(&b.1));
     let outside = |n: &usize| of.pv[*n].is_none_or(|value| (share(value) - 1.0).abs() > SETTLED);
     let settled = (last..end).rev().find(outside).map_or(last, |n| n + 1);

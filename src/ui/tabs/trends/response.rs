@@ -98,7 +98,7 @@ pub(super) fn draw_response(trends: &Trends, cx: &ViewContext, canvas: &mut Canv
     let curve = |n: usize, pen| Curve::new(&traces[n], pen, unit, cx.snapshot.decimals[tags[1].index()]);
     let before = found.until.duration_since(found.at) / 10;
     let span = (found.at - before, found.until + before / 2, found.until);
-    let band = (found.sv.1 - found.pv).abs() * SETTLED;
+    let band = (found.sv.1 - found.sv.0).abs() * SETTLED;
     let limit = |value, high, text: &str| Limit { curve: 0, value, high, text: text.to_owned() };
     let number = |value: f64| cx.snapshot.format(tags[1], value);
     let word = |at, text: String| (at, Line::styled(text, theme.normal()));
