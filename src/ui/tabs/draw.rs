@@ -76,23 +76,12 @@ pub fn curves(cx: &ViewContext, canvas: &mut Canvas, title: &str, view: View, pe
     };
     let traces: Vec<Trace> = pens.iter().map(trace).collect();
     let curve = |(n, (pen, trace)): (usize, (&Pen, _))| Curve {
-        trace,
-        pen: n,
-        unit: cx.snapshot.unit(pen.tag),
         fixed: pen.scale,
-        resolution: 10f64.powi(-i32::from(cx.snapshot.decimals[pen.tag.index()])),
-        dashed: false,
+        ..Curve::new(trace, n, cx.snapshot.unit(pen.tag), cx.snapshot.decimals[pen.tag.index()])
     };
-    let chart = Chart {
-        theme,
-        zone: Some(&cx.def().time_zone),
-        from: view.from,
-        to: view.to,
-        now: cx.now,
-        curves: pens.iter().zip(&traces).enumerate().map(curve).collect(),
-        cursor: None,
-        marks: Vec::new(),
-    };
+    let curves = pens.iter().zip(&traces).enumerate().map(curve).collect();
+    let zone = Some(&cx.def().time_zone);
+    let chart = Chart { zone, ..Chart::new(theme, (view.from, view.to, cx.now), curves) };
     let area = canvas.part(0, 1, canvas.width(), canvas.height().saturating_sub(1)).area();
     chart.render(area, canvas.buffer());
 }
