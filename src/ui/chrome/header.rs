@@ -26,7 +26,7 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     }
 }
 
-/// How much the header tells of lines that are well; what is wrong with one is always told in words.
+/// How much the header says of lines that are well; what is wrong with one is always said in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Lines {
     /// `L1 load 62 %`.

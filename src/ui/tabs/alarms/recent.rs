@@ -204,10 +204,10 @@ fn ribbon(steps: &[(Timestamp, AlarmEvent)], state: AlarmState, now: Timestamp, 
 /// How it stood before it ended at this time: acknowledged if it was in this activation.
 fn before_end(steps: &[(Timestamp, AlarmEvent)], at: Timestamp) -> Stood {
     let earlier = steps.iter().rev().filter(|(other, _)| *other < at);
-    let told = earlier
+    let last = earlier
         .map(|(_, event)| *event)
         .find(|event| matches!(event, AlarmEvent::Raised | AlarmEvent::Acknowledged | AlarmEvent::ReAlarmed));
-    if told == Some(AlarmEvent::Acknowledged) { Stood::Acknowledged } else { Stood::Unacknowledged }
+    if last == Some(AlarmEvent::Acknowledged) { Stood::Acknowledged } else { Stood::Unacknowledged }
 }
 
 /// How often it was raised before `now`, and each of these times; events and actions are newest first.
