@@ -263,6 +263,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
 pub fn view(model: &Model, frame: &mut Frame) {
     model.language.within(|| chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
+    model.theme.paint_ground(frame.buffer_mut());
 }
 
 fn on_paste(model: &mut Model, text: &str) {

@@ -1,22 +1,52 @@
 //! How things look, by role: colours, attributes and glyph sets; no widget names a colour.
 
-use ratatui::style::{Color, Modifier, Style};
+mod palette;
+
+use ratatui::{
+    buffer::Buffer,
+    style::{Color, Modifier, Style},
+};
 
 use crate::plant::{
     alarm::AlarmState,
     def::Priority,
     sample::{Cause, Quality},
 };
+use palette::Role;
 
 /// Looks of a terminal. Every role keeps a cue besides colour: a word, a shape, reverse or bold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Theme {
+    /// Which colours.
+    pub name: ThemeName,
     /// How many colours.
     pub colours: Colours,
     /// Which characters.
     pub glyphs: Glyphs,
     /// Agitators turn and flow arrows travel.
     pub motion: bool,
+}
+
+/// A set of colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ThemeName {
+    /// Greys on dark grey, colour for what is abnormal only (ISA-101).
+    #[default]
+    Grey,
+    /// Blues on near black.
+    Dark,
+    /// Dark words on a light ground, for bright rooms.
+    Light,
+    /// At least 7:1 on black.
+    HighContrast,
+    /// Without hue.
+    Mono,
+}
+
+impl ThemeName {
+    /// All of them, as they are chosen.
+    pub const ALL: [ThemeName; 5] =
+        [ThemeName::Grey, ThemeName::Dark, ThemeName::Light, ThemeName::HighContrast, ThemeName::Mono];
 }
 
 /// How many colours the terminal has.
@@ -45,9 +75,10 @@ pub enum Glyphs {
 
 impl Theme {
     /// Full looks, for tests and modern terminals.
-    pub const FULL: Theme = Theme { colours: Colours::True, glyphs: Glyphs::Braille, motion: true };
+    pub const FULL: Theme =
+        Theme { name: ThemeName::Grey, colours: Colours::True, glyphs: Glyphs::Braille, motion: true };
     /// Attributes and seven bits only.
-    pub const PLAIN: Theme = Theme { colours: Colours::None, glyphs: Glyphs::Ascii, motion: true };
+    pub const PLAIN: Theme = Theme { colours: Colours::None, glyphs: Glyphs::Ascii, ..Theme::FULL };
 
     /// Chooses by the environment: `NO_COLOR`, `TERM`, `COLORTERM` and the locale.
     pub fn detect(env: impl Fn(&str) -> Option<String>) -> Theme {
@@ -73,24 +104,20 @@ impl Theme {
             (true, true) => Glyphs::Block,
             (true, false) => Glyphs::Braille,
         };
-        Theme { colours, glyphs, motion: true }
+        Theme { colours, glyphs, ..Theme::FULL }
     }
 
     /// Ordinary words and values.
     pub fn normal(&self) -> Style {
-        self.fg((200, 200, 196), 251, Color::Reset)
+        self.fg(Role::Normal)
     }
     /// Labels, units, frames: there when looked for.
     pub fn dim(&self) -> Style {
-        self.fg((140, 142, 144), 245, Color::Reset).add_modifier(if self.colours == Colours::Sixteen {
-            Modifier::DIM
-        } else {
-            Modifier::empty()
-        })
+        self.fg(Role::Dim)
     }
     /// Headings and the keys of the footer.
     pub fn strong(&self) -> Style {
-        self.fg((232, 232, 228), 254, Color::Reset).add_modifier(Modifier::BOLD)
+        self.fg(Role::Strong).add_modifier(Modifier::BOLD)
     }
     /// What the arrow keys have selected.
     pub fn focus(&self) -> Style {
@@ -102,13 +129,17 @@ impl Theme {
     }
     /// The liquid in a vessel: calm, never an alarm colour.
     pub fn liquid(&self) -> Style {
-        self.fg((96, 128, 152), 67, Color::Blue)
+        self.fg(Role::Liquid)
     }
-    /// Under words that stand in liquid: its colour becomes the background.
-    pub fn under_liquid(&self) -> Style {
-        match self.liquid().fg {
-            Some(colour) => Style::new().bg(colour),
-            None => Style::new(),
+    /// What is drawn in liquid: calm words stand on its colour, alarms and doubts keep the ground that they are legible on.
+    pub fn in_liquid(&self, style: Style) -> Style {
+        let is = |role| style.fg == self.colour(role);
+        match self.colour(Role::Liquid) {
+            Some(liquid) if is(Role::Liquid) => style.bg(liquid),
+            Some(liquid) if [Role::Normal, Role::Dim, Role::Strong].into_iter().any(is) => {
+                style.patch(self.fg(Role::LiquidText)).bg(liquid)
+            }
+            Some(_) | None => style,
         }
     }
     /// Equipment that runs: brighter than one that rests, no colour of its own.
@@ -117,11 +148,11 @@ impl Theme {
     }
     /// A setpoint, marked on bars and curves.
     pub fn set_value(&self) -> Style {
-        self.fg((150, 170, 190), 110, Color::Cyan)
+        self.fg(Role::SetValue)
     }
     /// Trouble of the program itself: lost records, a silent station.
     pub fn trouble(&self) -> Style {
-        self.fg((230, 160, 80), 214, Color::Yellow).add_modifier(Modifier::BOLD)
+        self.fg(Role::Trouble).add_modifier(Modifier::BOLD)
     }
     /// An action that succeeded.
     pub fn done(&self) -> Style {
@@ -129,13 +160,13 @@ impl Theme {
     }
     /// A priority in full strength, for alarms that are active.
     pub fn severity(&self, priority: Priority) -> Style {
-        let style = match priority {
-            Priority::Critical => self.fg((255, 96, 96), 203, Color::LightRed),
-            Priority::High => self.fg((255, 170, 70), 215, Color::LightYellow),
-            Priority::Medium => self.fg((226, 214, 110), 185, Color::Yellow),
-            Priority::Low => self.fg((196, 150, 210), 176, Color::LightMagenta),
+        let role = match priority {
+            Priority::Critical => Role::Critical,
+            Priority::High => Role::High,
+            Priority::Medium => Role::Medium,
+            Priority::Low => Role::Low,
         };
-        style.add_modifier(Modifier::BOLD)
+        self.fg(role).add_modifier(Modifier::BOLD)
     }
     /// An alarm by priority and state: unacknowledged flashes (reverse in one phase), returned is dim.
     pub fn alarm(&self, priority: Priority, state: AlarmState, flash: bool) -> Style {
@@ -154,25 +185,14 @@ impl Theme {
     pub fn quality(&self, quality: Quality) -> Style {
         match quality {
             Quality::Good => self.normal(),
-            Quality::Uncertain(_) => self.fg((190, 150, 120), 180, Color::Yellow).add_modifier(Modifier::ITALIC),
+            Quality::Uncertain(_) => self.fg(Role::Uncertain).add_modifier(Modifier::ITALIC),
             Quality::Bad(Cause::NotRead) => self.dim(),
             Quality::Bad(_) => self.trouble(),
         }
     }
     /// The n-th pen of a chart.
     pub fn pen(&self, index: usize) -> Style {
-        const PENS: [(u8, u8, u8, u8, Color); 8] = [
-            (126, 184, 218, 110, Color::LightCyan),
-            (206, 206, 200, 252, Color::White),
-            (150, 196, 150, 114, Color::Green),
-            (196, 168, 218, 182, Color::Magenta),
-            (120, 200, 190, 79, Color::Cyan),
-            (214, 186, 160, 180, Color::Gray),
-            (160, 170, 230, 147, Color::LightBlue),
-            (180, 200, 130, 150, Color::LightGreen),
-        ];
-        let (r, g, b, indexed, sixteen) = PENS[index % PENS.len()];
-        self.fg((r, g, b), indexed, sixteen)
+        self.fg(Role::Pen(index))
     }
 
     /// The mark of a priority: shape, number and, for the two urgent ones, an exclamation mark.
@@ -219,56 +239,28 @@ impl Theme {
         self.pick("…", "..")
     }
 
-    fn fg(&self, (r, g, b): (u8, u8, u8), indexed: u8, sixteen: Color) -> Style {
-        match self.colours {
-            Colours::True => Style::new().fg(Color::Rgb(r, g, b)),
-            Colours::Indexed => Style::new().fg(Color::Indexed(indexed)),
-            Colours::Sixteen => Style::new().fg(sixteen),
-            Colours::None => Style::new(),
+    /// Gives the cells of a drawn frame that have no colour of their own those of the theme, so that it does not depend on
+    /// the ground of the terminal.
+    pub fn paint_ground(&self, buffer: &mut Buffer) {
+        let (Some(ground), Some(normal)) = (self.colour(Role::Ground), self.colour(Role::Normal)) else { return };
+        for cell in &mut buffer.content {
+            if cell.bg == Color::Reset {
+                cell.bg = ground;
+            }
+            if cell.fg == Color::Reset {
+                cell.fg = normal;
+            }
         }
+    }
+
+    fn colour(&self, role: Role) -> Option<Color> {
+        palette::colour(self.name, self.colours, role)
+    }
+
+    fn fg(&self, role: Role) -> Style {
+        Style { fg: self.colour(role), ..Style::new() }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn check(env: &[(&str, &str)], colours: Colours, glyphs: Glyphs) {
-        let theme = Theme::detect(|name| env.iter().find(|(key, _)| *key == name).map(|(_, value)| value.to_string()));
-        assert_eq!((theme.colours, theme.glyphs), (colours, glyphs), "{env:?}");
-    }
-
-    #[test]
-    fn a_terminal_gets_what_it_can_show() {
-        let utf8 = ("LANG", "en_US.UTF-8");
-        check(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor"), utf8], Colours::True, Glyphs::Braille);
-        check(&[("TERM", "tmux-256color"), utf8], Colours::Indexed, Glyphs::Braille);
-        check(&[("TERM", "xterm"), utf8], Colours::Sixteen, Glyphs::Braille);
-        for term in ["linux", "linux-16color"] {
-            check(&[("TERM", term), utf8], Colours::Sixteen, Glyphs::Block);
-        }
-        check(&[("TERM", "linux")], Colours::Sixteen, Glyphs::Ascii);
-        check(&[("TERM", "xterm"), ("LC_ALL", "C"), utf8], Colours::Sixteen, Glyphs::Ascii);
-        check(&[("TERM", "vt220")], Colours::None, Glyphs::Ascii);
-        check(&[("TERM", "xterm-256color"), ("NO_COLOR", "1"), utf8], Colours::None, Glyphs::Braille);
-        check(&[("TERM", "xterm-256color"), ("NO_COLOR", ""), utf8], Colours::Indexed, Glyphs::Braille);
-    }
-
-    #[test]
-    fn without_colour_no_role_asks_for_one() {
-        let theme = Theme::PLAIN;
-        let pens = (0..8).map(|n| theme.pen(n));
-        let roles = [
-            theme.normal(),
-            theme.dim(),
-            theme.strong(),
-            theme.focus(),
-            theme.liquid(),
-            theme.trouble(),
-            theme.severity(Priority::High),
-        ];
-        for style in pens.chain(roles) {
-            assert_eq!((style.fg, style.bg), (None, None));
-        }
-    }
-}
+mod tests;

@@ -112,7 +112,7 @@ fn the_mimic_with_commands() {
         type_keys(&mut model, "C↓");
         insta::assert_snapshot!(format!("window_commands_{name}"), screen(&mut model, width, height));
     }
-    let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
+    let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, ..Theme::FULL };
     let mut model = Model::new(Arc::new(commanded()), console, 1, fixture::session());
     assert!(screen(&mut model, 80, 24).contains("! not OFF"));
 }
@@ -127,7 +127,7 @@ fn the_mimic_in_seven_bits() {
 
 #[test]
 fn the_linux_console_gets_characters_of_its_font() {
-    let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, motion: true };
+    let console = Theme { colours: Colours::Sixteen, glyphs: Glyphs::Block, ..Theme::FULL };
     let font = "─│┌┐└┘├┤┬┴┼═║╔╗╚╝╢╫►◄▲▼█▄▀▒░°·×←↑→↓≈•○■√┘";
     for tab in Tab::ALL {
         let mut model = model(&Fixture::alarm(), console);

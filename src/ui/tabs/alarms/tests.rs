@@ -26,7 +26,7 @@ use crate::{
         modal::Modal,
         tabs::Tab,
         tests::{assert_acts_only_on_what_was_drawn, model, screen, sent_kind, type_keys},
-        theme::{Colours, Glyphs, Theme},
+        theme::{Glyphs, Theme},
         update,
     },
 };

@@ -6,7 +6,7 @@ use super::*;
 fn without_colour_a_little_liquid_is_seen() {
     for (glyphs, shallow, body) in [(Glyphs::Braille, '░', '▒'), (Glyphs::Block, '░', '▒'), (Glyphs::Ascii, ':', '#')]
     {
-        let theme = Theme { colours: Colours::None, glyphs, motion: false };
+        let theme = Theme { glyphs, motion: false, ..Theme::PLAIN };
         let liquid = |level: f64| {
             let mut fixture = Fixture::normal();
             for tank in ["PLC-1.LT-1", "PLC-1.TK-2", "PLC-1.TK-3"] {
@@ -25,7 +25,7 @@ fn without_colour_a_little_liquid_is_seen() {
 
 #[test]
 fn without_colour_every_state_and_quality_looks_different() {
-    let theme = Theme { colours: Colours::None, glyphs: Glyphs::Ascii, motion: false };
+    let theme = Theme { motion: false, ..Theme::PLAIN };
     let mut looks = HashSet::new();
     let mut states = 0;
     for priority in [Priority::Critical, Priority::High, Priority::Medium, Priority::Low] {

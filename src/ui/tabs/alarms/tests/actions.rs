@@ -68,7 +68,7 @@ fn an_alarm_leads_to_mimic_trend_and_controller() {
 #[test]
 fn every_priority_in_every_state_looks_different_without_colour() {
     for glyphs in [Glyphs::Ascii, Glyphs::Block, Glyphs::Braille] {
-        let theme = Theme { colours: Colours::None, glyphs, motion: false };
+        let theme = Theme { glyphs, motion: false, ..Theme::PLAIN };
         let mut looks = HashSet::new();
         for (priority, state) in PRIORITIES.into_iter().flat_map(|p| AlarmState::ALL.map(|state| (p, state))) {
             if state == AlarmState::Normal {
