@@ -24,6 +24,33 @@ pub enum Language {
 type Catalogue = HashMap<String, String>;
 
 impl Language {
+    /// The language of the code.
+    pub const ENGLISH: Language = Language::English;
+
+    /// Every language that can be chosen.
+    pub fn all() -> impl Iterator<Item = Language> {
+        std::iter::once(Language::ENGLISH)
+    }
+    /// The language of this code.
+    pub fn from_code(code: &str) -> Option<Language> {
+        Language::all().find(|language| language.code() == code)
+    }
+    /// ISO 639: in files.
+    pub fn code(self) -> &'static str {
+        match self {
+            Language::English => "en",
+            #[cfg(test)]
+            Language::Pseudo => "pseudo",
+        }
+    }
+    /// What its speakers call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Language::English => "English",
+            #[cfg(test)]
+            Language::Pseudo => "pseudo",
+        }
+    }
     /// Runs `body` with all texts of this thread in this language.
     pub fn within<R>(self, body: impl FnOnce() -> R) -> R {
         let before = LANGUAGE.replace(self);

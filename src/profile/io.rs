@@ -22,6 +22,15 @@ static SHIPPED: Dir = include_dir!("$CARGO_MANIFEST_DIR/profiles");
 /// A profile is some kilobytes; whatever is larger than this is something else.
 const BYTES_MAX: u64 = 4 << 20;
 
+/// The user's configuration folder: `$XDG_CONFIG_HOME/sightglass`, else `~/.config/sightglass`.
+pub fn config_folder() -> Option<PathBuf> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    // The XDG rules say that a relative path is to be ignored.
+    let config = set("XDG_CONFIG_HOME").filter(|path| path.is_absolute());
+    let config = config.or_else(|| set("HOME").map(|home| home.join(".config")));
+    config.map(|config| config.join("sightglass"))
+}
+
 /// Configuration folders that are looked into before the shipped profiles, the first one first.
 ///
 /// In each, a device profile is `devices/NAME.toml` or `NAME.toml`, a plant is `plants/NAME.toml`.
@@ -31,14 +40,9 @@ pub struct Search {
 }
 
 impl Search {
-    /// The user's folder (`$XDG_CONFIG_HOME/sightglass`, else `~/.config/sightglass`), then `/etc/sightglass`.
+    /// The user's [`config_folder`], then `/etc/sightglass`.
     pub fn usual() -> Search {
-        let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-        // The XDG rules say that a relative path is to be ignored.
-        let config = set("XDG_CONFIG_HOME").filter(|path| path.is_absolute());
-        let user = config.or_else(|| set("HOME").map(|home| home.join(".config")));
-        let user = user.map(|config| config.join("sightglass"));
-        Search { folders: user.into_iter().chain([PathBuf::from("/etc/sightglass")]).collect() }
+        Search { folders: config_folder().into_iter().chain([PathBuf::from("/etc/sightglass")]).collect() }
     }
     /// Only what comes with the program and lies beside the plant file.
     pub fn shipped() -> Search {

@@ -9,6 +9,7 @@ use super::{
     Clock, Model, UiAction,
     extension::Extension,
     layout::{Size, layout},
+    preferences::Preferences,
     replay::Replay,
     tabs::Tabs,
     theme::Theme,
@@ -25,6 +26,8 @@ pub struct ViewContext<'a> {
     pub snapshot: &'a Snapshot,
     /// The looks.
     pub theme: &'a Theme,
+    /// What the user has chosen.
+    pub preferences: &'a Preferences,
     /// Plant time now: the snapshot's, carried on while none comes; the instant of a past that is shown.
     pub now: Timestamp,
     /// What time it really is while a past is shown.
@@ -87,8 +90,8 @@ pub(super) fn context(model: &Model, screen: Rect) -> ViewContext<'_> {
 
 /// What the parts may read that always show the present.
 pub(super) fn present_context(model: &Model, screen: Rect) -> ViewContext<'_> {
-    let Model { snapshot, theme, clock, extension, session, .. } = model;
-    view_context(snapshot, theme, *clock, screen, extension, session)
+    let Model { snapshot, theme, preferences, clock, extension, session, .. } = model;
+    view_context(snapshot, (theme, preferences), *clock, screen, extension, session)
 }
 
 /// A past instead of the present, if one is shown.
@@ -108,7 +111,7 @@ pub(super) fn past_context<'a>(present: ViewContext<'a>, replay: &'a Replay) -> 
 /// The same of parts of a model, while others of it change.
 pub(super) fn view_context<'a>(
     snapshot: &'a Snapshot,
-    theme: &'a Theme,
+    (theme, preferences): (&'a Theme, &'a Preferences),
     clock: Clock,
     screen: Rect,
     extension: &'a Option<Arc<dyn Extension>>,
@@ -118,7 +121,7 @@ pub(super) fn view_context<'a>(
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
     let (area, size) = (layout(screen).body, Size::of(screen));
     let extension = extension.as_deref();
-    ViewContext { snapshot, theme, now, present: None, phase: clock.phase, area, size, extension, session }
+    ViewContext { snapshot, theme, preferences, now, present: None, phase: clock.phase, area, size, extension, session }
 }
 
 /// Lets the tabs change while they read the rest of the model.
@@ -126,7 +129,7 @@ pub(super) fn with_tabs(
     model: &mut Model,
     change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>,
 ) -> Vec<UiAction> {
-    let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
-    let present = view_context(snapshot, theme, *clock, *screen, extension, session);
+    let Model { snapshot, theme, preferences, clock, extension, session, screen, tabs, replay, .. } = model;
+    let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, session);
     change(tabs, &past_context(present, replay))
 }

@@ -1,7 +1,7 @@
 //! What a key does: of a window, of the replay, of every tab, or of the shown tab.
 
 use super::*;
-use modal::Next;
+use modal::{Next, TerminalSettings};
 
 /// Choices of the palette that are remembered.
 const RECENT_MAX: usize = 8;
@@ -33,8 +33,9 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return on_global(model, Global::Dump);
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
-        let Model { snapshot, theme, clock, extension, session, screen, tabs, replay, .. } = model;
-        let cx = past_context(view_context(snapshot, theme, *clock, *screen, extension, session), replay);
+        let Model { snapshot, theme, preferences, clock, extension, session, screen, tabs, replay, .. } = model;
+        let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, session);
+        let cx = past_context(present, replay);
         let before = cx.is_past().then(|| modal.clone());
         let (rest, actions) = match modal.on_key(&cx, tabs, event) {
             Next::Stay(modal) => (Some(modal), Vec::new()),
@@ -150,6 +151,10 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Silence => Vec::new(),
         Global::Dump if session_lock::is_closed(&model.session) => Vec::new(),
         Global::Dump => screen_dump::begin(model),
+        Global::Settings => {
+            let window = TerminalSettings::new(model);
+            vec![UiAction::Open(Modal::TerminalSettings(window))]
+        }
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.

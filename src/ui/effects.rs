@@ -49,6 +49,12 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 }
                 effects.push(Effect::SessionRequest(QueryId { tab: Some(tab), number }, request));
             }
+            UiAction::KeepPreferences(chosen) => {
+                model.modal.take_if(|modal| matches!(modal, Modal::TerminalSettings(_)));
+                let user = model.user().map(str::to_owned);
+                model.preferences_file.set(user.as_deref(), chosen);
+                effects.push(Effect::KeepPreferences(user, chosen));
+            }
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
         }
@@ -90,6 +96,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
         | UiAction::ReplayStep(_)
         | UiAction::Command(_)
         | UiAction::SendCommand(..)
+        | UiAction::KeepPreferences(_)
         | UiAction::SessionRequest(..) => None,
     });
     effects.collect()

@@ -10,7 +10,7 @@ use jiff::{SignedDuration, Timestamp};
 
 pub use traffic::more_frames;
 
-use super::{ViewContext, theme::Theme};
+use super::{ViewContext, preferences::Preferences, theme::Theme};
 use crate::plant::{
     alarm::{AlarmMetrics, AlarmState},
     def::*,
@@ -201,6 +201,7 @@ pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&ViewContext) -> T) -> 
     call(&ViewContext {
         snapshot,
         theme: &Theme::FULL,
+        preferences: &Preferences::default(),
         now: snapshot.at,
         present: None,
         phase: 0,

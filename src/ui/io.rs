@@ -1,6 +1,7 @@
 //! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become commands, queries and frames.
 
 mod append;
+mod preferences;
 mod screen;
 #[cfg(test)]
 mod tests;
@@ -24,6 +25,7 @@ use tokio::{
 use super::{
     Effect, Leaving, Model, Msg, QueryId,
     extension::{Extension, ExtensionMessage},
+    preferences::{Preferences, PreferencesFile},
     tabs::{Tab, registers::Start},
     theme::Theme,
     update, view,
@@ -51,8 +53,10 @@ const INBOX: usize = 32;
 
 /// What can be chosen about a terminal.
 pub struct Options {
-    /// How things look.
+    /// What the terminal can show.
     pub theme: Theme,
+    /// What its users have chosen.
+    pub preferences: PreferencesFile,
     /// What ends with it.
     pub leaving: Leaving,
     /// It begins with the tour of a demonstration.
@@ -74,17 +78,12 @@ pub struct ExtensionPort {
 }
 
 impl Options {
-    /// Looks chosen by the environment.
+    /// Looks chosen by the environment and by the users of this account.
     pub fn new(leaving: Leaving) -> Options {
         let theme = Theme::detect(|name| std::env::var(name).ok());
-        Options {
-            theme,
-            leaving,
-            tour: false,
-            extension: None,
-            start: Start::default(),
-            profiles: OwnProfiles::default(),
-        }
+        let preferences = preferences::load();
+        let (extension, start, profiles) = Default::default();
+        Options { theme, preferences, leaving, tour: false, extension, start, profiles }
     }
 }
 
@@ -118,6 +117,8 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
     model.leaving = options.leaving;
     model.tour = options.tour.then(super::Tour::default);
+    model.note = options.preferences.problem.clone().map(Into::into);
+    model.preferences_file = options.preferences;
     model.tabs.registers.profiles = options.profiles;
     let mut extension = options.extension;
     if let Some(port) = &mut extension {
@@ -202,7 +203,7 @@ impl Loop {
                 state = next_state(&mut self.extension) => self.handle(Msg::Extension(state), FRAME)?,
                 Some((plants, msg)) = inbox.recv() => {
                     // Ids of one plant mean something else in another.
-                    let fits = plants == self.model.plants || matches!(msg, Msg::RequestDone(..));
+                    let fits = plants == self.model.plants || matches!(msg, Msg::RequestDone(..) | Msg::Preferences(_));
                     if fits { self.handle(msg, FRAME)? } else { false }
                 }
                 _ = ticks.tick() => {
@@ -249,6 +250,7 @@ impl Loop {
                 Effect::SaveReport { tab, path, bytes, new } => self.save(tab, path, bytes, new),
                 Effect::Load { tab, path } => self.load(tab, path),
                 Effect::Append { tab, path, bytes, new } => self.appender.append(tab, path, bytes, new),
+                Effect::KeepPreferences(user, chosen) => self.keep_preferences(user, chosen),
                 Effect::Bell => self.screen.ring()?,
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),
@@ -308,6 +310,15 @@ impl Loop {
         tokio::task::spawn_blocking(move || {
             let loaded = load(&path).map_err(|error| format!("{}: {error}", path.display()));
             let _ = outbox.blocking_send((plants, Msg::Loaded(tab, loaded)));
+        });
+    }
+
+    fn keep_preferences(&self, user: Option<String>, chosen: Preferences) {
+        let outbox = self.outbox.clone();
+        let plants = self.model.plants;
+        tokio::task::spawn_blocking(move || {
+            let kept = preferences::keep(user.as_deref(), chosen);
+            let _ = outbox.blocking_send((plants, Msg::Preferences(kept)));
         });
     }
 

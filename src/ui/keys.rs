@@ -178,6 +178,8 @@ pub enum Global {
     Silence,
     /// Save the screen as text and as a picture.
     Dump,
+    /// Choose theme, characters, motion, bell, mouse and language.
+    Settings,
     /// Redraw the screen.
     Redraw,
     /// Take the outcome of the last command off the screen.
@@ -217,6 +219,7 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
     Key::new(char('P'), "", "save this screen as text and SVG in the folder of the reports", Global::Dump),
+    Key::new(code(KeyCode::F(2)), "", "settings: theme, characters, motion, bell, mouse, language", Global::Settings),
     Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
     Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),
     Key::new(char('q'), "quit", "quit (asks first, and lists what stops)", Global::Quit),

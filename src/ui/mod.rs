@@ -14,6 +14,7 @@ pub(crate) mod keys;
 pub(crate) mod layout;
 pub(crate) mod modal;
 pub(crate) mod msg;
+pub(crate) mod preferences;
 pub(crate) mod session_lock;
 pub(crate) mod replay;
 pub(crate) mod screen_dump;
@@ -53,6 +54,7 @@ use last_frame::LastFrame;
 use layout::Size;
 use modal::{Confirm, Modal, Palette, Target, palette};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
+use preferences::{Bell, Preferences, PreferencesFile};
 use replay::Replay;
 use screen_dump::ScreenDump;
 use session_lock::SessionLock;
@@ -77,10 +79,18 @@ pub struct Model {
     pub replay: Replay,
     /// The window on top, which gets every key.
     pub modal: Option<Modal>,
-    /// How things look.
+    /// How things look: as preferred, within the limits.
     pub theme: Theme,
-    /// The language of its texts.
+    /// What the terminal can show.
+    pub limits: Theme,
+    /// The language of its texts, where its user has chosen none.
     pub language: Language,
+    /// What the user has chosen, or tries.
+    pub preferences: Preferences,
+    /// What all users have chosen.
+    pub preferences_file: PreferencesFile,
+    /// The tick at which the bell rang last.
+    pub rang_at: u32,
     /// The whole screen.
     pub screen: Rect,
     /// What time it is and how the animation stands.
@@ -107,7 +117,7 @@ pub struct Model {
     pub extension: Option<Arc<dyn Extension>>,
     /// What the last frame showed; `None` before the first one.
     pub last_frame: Option<LastFrame>,
-    /// Why the last key did nothing; until the next one.
+    /// What the last key did, or why it did nothing; until the next one.
     pub note: Option<Cow<'static, str>>,
     /// Files of the screen that are being saved.
     pub screen_dump: ScreenDump,
@@ -136,7 +146,11 @@ impl Model {
             replay: Replay::default(),
             modal: None,
             theme,
-            language: Language::default(),
+            limits: theme,
+            language: Language::ENGLISH,
+            preferences: Preferences::default(),
+            preferences_file: PreferencesFile::default(),
+            rang_at: 0,
             screen: Rect::default(),
             clock: Clock::default(),
             last_command: None,
@@ -188,7 +202,7 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
-    model.language.within(|| on_msg(model, msg))
+    model.language().within(|| on_msg(model, msg))
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
@@ -241,6 +255,13 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             Vec::new()
         }
         Msg::Tick { silent } => on_tick(model, silent),
+        Msg::Preferences(kept) => {
+            match kept {
+                Ok(file) => model.preferences_file = file,
+                Err(why) => model.note = Some(t!("Not kept: {why}", why).into()),
+            }
+            Vec::new()
+        }
         Msg::Drawn => {
             model.note_drawn();
             Vec::new()
@@ -253,6 +274,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     effects.extend(perform(model, actions));
     dispatch::close_unseen(model);
     model.close_confirmation();
+    model.apply_preferences();
     if keyed {
         model.note_keyed();
     }
@@ -261,7 +283,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    model.language.within(|| chrome::view(model, frame));
+    model.language().within(|| chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
     model.theme.paint_ground(frame.buffer_mut());
 }
@@ -284,15 +306,20 @@ fn on_snapshot(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<UiAction> {
         let actions = session_lock::on_other_plant(model, snapshot);
         return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
     }
-    let rings = model.tabs.alarms.bell && bell::rings(&model.snapshot, &snapshot);
+    let rings = model.preferences.bell != Bell::Off && bell::rings(&model.snapshot, &snapshot);
     model.snapshot = snapshot;
     model.follow();
     if model.session.gone.is_some() {
         // What still came through is as old as all the rest.
         model.doubt();
     }
-    let bell = rings.then_some(UiAction::Do(Effect::Bell));
+    let bell = rings.then(|| ring(model));
     bell.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
+}
+
+fn ring(model: &mut Model) -> UiAction {
+    model.rang_at = model.clock.phase;
+    UiAction::Do(Effect::Bell)
 }
 
 fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
@@ -303,9 +330,12 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     if silent >= SILENCE {
         model.doubt();
     }
+    let rings = model.preferences.bell == Bell::Repeated
+        && bell::rings_again(&model.snapshot, phase.wrapping_sub(model.rang_at));
+    let bell = rings.then(|| ring(model));
     let present = model.present_cx().now;
     let played = model.replay.on_tick(present).into_iter().map(UiAction::Do);
-    played.chain(with_tabs(model, |tabs, cx| tabs.on_tick(cx))).collect()
+    bell.into_iter().chain(played).chain(with_tabs(model, |tabs, cx| tabs.on_tick(cx))).collect()
 }
 
 /// The history has answered the replay. A tab that has no past gives way to the one that the terminal begins with.
@@ -314,8 +344,8 @@ fn on_replayed(model: &mut Model, number: u32, answer: Result<Answer, HistoryErr
         // What is being filled in is of the present.
         model.replay.cancel();
     }
-    let Model { snapshot, theme, clock, extension, session, screen, replay, tabs, visited, .. } = model;
-    let present = view_context(snapshot, theme, *clock, *screen, extension, session);
+    let Model { snapshot, theme, preferences, clock, extension, session, screen, replay, tabs, visited, .. } = model;
+    let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, session);
     let asked = replay.on_answer(number, answer, &present);
     if replay.shown().is_some() && !tabs.shown.has_past() {
         let home = Tab::home(&snapshot.def);

@@ -8,6 +8,7 @@ use jiff::{SignedDuration, Timestamp};
 use super::{
     extension::{Extension, ExtensionMessage},
     modal::Modal,
+    preferences::{Preferences, PreferencesFile},
     tabs::{Tab, registers::Start},
 };
 use crate::{
@@ -49,6 +50,8 @@ pub enum Msg {
     Loaded(Tab, Result<String, String>),
     /// The station did not take this command: its queue is full, or it has gone.
     Undelivered(CommandId, &'static str),
+    /// The preferences were kept, and what the file holds now; or why not.
+    Preferences(Result<PreferencesFile, String>),
     /// A frame was drawn: what it showed may be meant by the next key.
     Drawn,
     /// Half a second passed; so long ago (real time) came the last snapshot.
@@ -99,6 +102,8 @@ pub enum Effect {
         /// The file begins with them: it must not be there yet.
         new: bool,
     },
+    /// Keep what this user has chosen; answered by [`Msg::Preferences`].
+    KeepPreferences(Option<String>, Preferences),
     /// Ring the bell of the terminal once.
     Bell,
     /// Forget what the terminal shows and draw everything.
@@ -141,6 +146,8 @@ pub enum UiAction {
     SendCommand(Command, Option<Credentials>),
     /// Send the station a request; the answer goes to the window that waits for one, else to this tab.
     SessionRequest(Tab, SessionRequest),
+    /// Keep what the user has chosen about the terminal.
+    KeepPreferences(Preferences),
     /// Ask whether to leave.
     Leave,
     /// Pass on an effect as it is.

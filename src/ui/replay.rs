@@ -357,6 +357,7 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         | UiAction::Replay(_)
         | UiAction::ReplayStep(_)
         | UiAction::SessionRequest(..)
+        | UiAction::KeepPreferences(_)
         | UiAction::Leave
         | UiAction::Do(_) => false,
     };

@@ -170,6 +170,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             UiAction::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
             UiAction::Command(_)
             | UiAction::SendCommand(..)
+            | UiAction::KeepPreferences(_)
             | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
             | UiAction::Do(
                 Effect::SaveReport { .. }
@@ -280,7 +281,7 @@ pub(super) fn is_past_unlock(model: &Model, event: KeyEvent) -> bool {
 impl Modal {
     /// Does it at most choose what is seen, so that a locked terminal may open it?
     pub fn only_looks(&self) -> bool {
-        self.only_shows() || matches!(self, Modal::Prompt(_) | Modal::Palette(_))
+        self.only_shows() || matches!(self, Modal::Prompt(_) | Modal::Palette(_) | Modal::TerminalSettings(_))
     }
 
     /// Does it ask for the password of a locked terminal?

@@ -10,6 +10,7 @@ use ratatui::{
 use crate::plant::{
     alarm::AlarmState,
     def::Priority,
+    keyword::keyword_enum,
     sample::{Cause, Quality},
 };
 use palette::Role;
@@ -27,26 +28,22 @@ pub struct Theme {
     pub motion: bool,
 }
 
-/// A set of colours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ThemeName {
-    /// Greys on dark grey, colour for what is abnormal only (ISA-101).
-    #[default]
-    Grey,
-    /// Blues on near black.
-    Dark,
-    /// Dark words on a light ground, for bright rooms.
-    Light,
-    /// At least 7:1 on black.
-    HighContrast,
-    /// Without hue.
-    Mono,
-}
-
-impl ThemeName {
-    /// All of them, as they are chosen.
-    pub const ALL: [ThemeName; 5] =
-        [ThemeName::Grey, ThemeName::Dark, ThemeName::Light, ThemeName::HighContrast, ThemeName::Mono];
+keyword_enum! {
+    /// A set of colours.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub enum ThemeName: "theme" {
+        /// Greys on dark grey, colour for what is abnormal only (ISA-101).
+        #[default]
+        Grey => "grey",
+        /// More colour on near black.
+        Dark => "dark",
+        /// Dark words on a light ground.
+        Light => "light",
+        /// At least 7:1 on black.
+        HighContrast => "high contrast",
+        /// Without hue.
+        Mono => "mono",
+    }
 }
 
 /// How many colours the terminal has.

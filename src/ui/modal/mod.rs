@@ -16,6 +16,7 @@ pub(crate) mod prompt;
 pub(crate) mod reason;
 pub(crate) mod confirmed_value;
 pub(crate) mod settings;
+pub(crate) mod terminal_settings;
 mod sheet;
 pub(crate) mod user_form;
 pub(crate) mod why;
@@ -35,6 +36,7 @@ pub use palette::{Palette, Target};
 pub use prompt::Prompt;
 pub use reason::Reason;
 pub use settings::Settings;
+pub use terminal_settings::TerminalSettings;
 pub use user_form::UserForm;
 pub use why::Why;
 
@@ -82,6 +84,8 @@ pub enum Modal {
     UserForm(Box<UserForm>),
     /// One audit entry.
     AuditEntry(Box<AuditEntryDialog>),
+    /// Theme, characters, motion, bell, mouse and language.
+    TerminalSettings(TerminalSettings),
 }
 
 /// What a key did to a window.
@@ -130,6 +134,7 @@ impl Modal {
                 | Modal::Settings(_)
                 | Modal::Bus(_)
                 | Modal::Palette(_)
+                | Modal::TerminalSettings(_)
                 | Modal::AuditEntry(_) => None,
             };
             return back.map_or(Next::Close, Next::Stay);
@@ -153,6 +158,7 @@ impl Modal {
             Modal::Bus(window) => window.on_key(cx, tabs, event),
             Modal::UserForm(form) => form.on_key(cx, event),
             Modal::AuditEntry(dialog) => dialog.on_key(event),
+            Modal::TerminalSettings(window) => window.on_key(event),
         }
     }
 
@@ -165,7 +171,7 @@ impl Modal {
     pub fn takes_text(&self) -> bool {
         match self {
             Modal::Confirm(confirm) => confirm.takes_text(),
-            Modal::Choice(_) => false,
+            Modal::Choice(_) | Modal::TerminalSettings(_) => false,
             Modal::Palette(_)
             | Modal::Entry(_)
             | Modal::Prompt(_)
@@ -199,6 +205,7 @@ impl Modal {
             | Modal::Prompt(_)
             | Modal::Reason(_)
             | Modal::Settings(_)
+            | Modal::TerminalSettings(_)
             | Modal::UserForm(_) => false,
         }
     }
@@ -219,6 +226,7 @@ impl Modal {
             | Modal::Notice(_)
             | Modal::Guidance(_)
             | Modal::AuditEntry(_)
+            | Modal::TerminalSettings(_)
             | Modal::Why(_) => {}
             Modal::Bus(window) => window.on_paste(text),
         }
@@ -262,6 +270,7 @@ impl Modal {
             Modal::UserForm(form) => {
                 form.hints().into_iter().chain([Hint::in_window(t!("Esc"), t!("cancel"))]).collect()
             }
+            Modal::TerminalSettings(window) => window.hints(),
             Modal::AuditEntry(_) => vec![Hint::in_window(t!("Esc"), t!("close"))],
         };
         // A digit is typed here: the tabs are one key further away.
@@ -289,6 +298,7 @@ impl Modal {
             Modal::Bus(window) => window.view(cx, frame, body),
             Modal::UserForm(form) => form.view(cx, frame, body),
             Modal::AuditEntry(dialog) => dialog.view(cx, frame, body),
+            Modal::TerminalSettings(window) => window.view(cx, frame, body),
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::{
     text::translate,
     ui::{
         UiAction, ViewContext,
-        keys::{self, Chord},
+        keys::{self, Chord, Global},
         modal::confirm::subject,
         replay,
         tabs::{Tab, TabView, alarms},
@@ -211,7 +211,9 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let active = cx.snapshot.alarms.iter().map(|active| alarm(active.id, translate(active.state.word())));
     let is_active = |id: AlarmId| cx.snapshot.alarms.iter().any(|active| active.id == id);
     let others = def.alarms.iter().filter(|def| !is_active(def.id)).map(|def| alarm(def.id, ""));
-    let keys = tab.hints(cx).into_iter().filter_map(|hint| {
+    let global = keys::global().into_iter().filter(|key| !matches!(key.action, Global::Show(_) | Global::Palette));
+    let global = keys::hints(&global.collect::<Vec<_>>());
+    let keys = tab.hints(cx).into_iter().chain(global).filter_map(|hint| {
         let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
         Some(Row::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))
     });

@@ -98,8 +98,6 @@ pub struct Alarms {
     handover: Handover,
     /// Queries asked so far.
     asked: u32,
-    /// The bell of the terminal rings for new alarms.
-    pub bell: bool,
 }
 
 impl TabView for Alarms {
@@ -113,7 +111,7 @@ impl TabView for Alarms {
         match action {
             Action::Move(motion) => self.step(cx, motion),
             Action::View(by) => self.turn(by),
-            Action::Bell => self.bell = !self.bell,
+            Action::Bell => return actions::toggle_bell(cx),
             Action::Fold(folded) => self.fold(cx, folded),
             Action::Mark => self.mark(cx),
             Action::Sort => self.sort = self.sort.next(),

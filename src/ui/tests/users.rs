@@ -95,7 +95,7 @@ fn the_login_page_in_every_mood() {
         }
     }
     let mut model = with(&Fixture::alarm(), closed());
-    model.theme = Theme::PLAIN;
+    model.limits = Theme::PLAIN;
     type_keys(&mut model, "anna⏎abc");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.is_ascii(), "{shown}");

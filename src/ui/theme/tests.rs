@@ -1,6 +1,7 @@
 //! Contrast of every theme, what a terminal gets, and what is left without colour.
 
 use super::*;
+use crate::ui::preferences::Preferences;
 
 fn check(env: &[(&str, &str)], colours: Colours, glyphs: Glyphs) {
     let theme = Theme::detect(|name| env.iter().find(|(key, _)| *key == name).map(|(_, value)| value.to_string()));
@@ -205,7 +206,6 @@ fn priorities_differ_for_colour_blind_eyes_too() {
             for (n, one) in seen.iter().enumerate() {
                 for (m, other) in seen.iter().enumerate().skip(n + 1) {
                     let distance = distance(*one, *other);
-                    println!("{name:?} {blindness} {} {} {distance:.3}", n + 1, m + 1);
                     assert!(0.04 <= distance, "{name:?}, {blindness}: {} and {}: {distance:.3}", n + 1, m + 1);
                 }
             }
@@ -218,7 +218,9 @@ fn every_cell_of_a_screen_gets_the_ground_of_the_theme() {
     for name in ThemeName::ALL {
         let theme = Theme { name, ..Theme::FULL };
         let ground = theme.colour(Role::Ground).expect("there are colours");
-        let mut model = crate::ui::tests::model(&crate::ui::fixture::Fixture::alarm(), theme);
+        let mut model = crate::ui::tests::model(&crate::ui::fixture::Fixture::alarm(), Theme::FULL);
+        model.preferences_file.set(Some("tech1"), Preferences { theme: name, ..Preferences::default() });
+        crate::ui::update(&mut model, crate::ui::Msg::Tick { silent: std::time::Duration::ZERO });
         let buffer = crate::ui::tests::draw(&mut model, 80, 24);
         assert!(buffer.content.iter().all(|cell| cell.bg != Color::Reset && cell.fg != Color::Reset), "{name:?}");
         assert!(buffer.content.iter().filter(|cell| cell.bg == ground).count() > 1000, "{name:?}");

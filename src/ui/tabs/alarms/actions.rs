@@ -7,7 +7,10 @@ use crate::{
         def::AlarmId,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
-    ui::modal::{Reason, confirm::subject, reason::spelled},
+    ui::{
+        modal::{Reason, confirm::subject, reason::spelled},
+        preferences::{Bell, Preferences},
+    },
 };
 
 /// Times that are offered for the shelf, minutes.
@@ -181,4 +184,13 @@ fn marked(cx: &ViewContext, alarm: AlarmId) -> String {
 fn name(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
     format!("{} {} {}", cx.theme.priority_tag(def.priority), subject(cx, alarm), def.message)
+}
+
+/// Switches the bell off, or on for new alarms.
+pub fn toggle_bell(cx: &ViewContext) -> Vec<UiAction> {
+    let bell = match cx.preferences.bell {
+        Bell::Off => Bell::Once,
+        Bell::Once | Bell::Repeated => Bell::Off,
+    };
+    vec![UiAction::KeepPreferences(Preferences { bell, ..*cx.preferences })]
 }

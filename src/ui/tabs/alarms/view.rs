@@ -9,7 +9,7 @@ use crate::{
         def::AlarmId,
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
-    ui::{chrome::history_text, layout::Size},
+    ui::{chrome::history_text, layout::Size, preferences::Bell},
 };
 
 /// Rows above the list: views, filter, headings.
@@ -90,7 +90,10 @@ fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
         };
         Page::ALL.into_iter().zip(counts).map(name).collect()
     };
-    let bell = if tab.bell { t!("bell") } else { "" };
+    let bell = match cx.preferences.bell {
+        Bell::Off => "",
+        Bell::Once | Bell::Repeated => t!("bell"),
+    };
     let room = canvas.width().saturating_sub(2 + width(bell));
     let fits = |names: &Vec<String>| names.iter().map(|name| width(name) + 3).sum::<u16>() <= room + 3;
     // Where there is no room for the word the brackets alone show how many wait.

@@ -1,0 +1,227 @@
+//! What each user has chosen about looks and sounds of a terminal: one file an account, a section a logged-in user.
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use super::{
+    Model,
+    modal::Modal,
+    theme::{Glyphs, Theme, ThemeName},
+};
+use crate::{
+    plant::keyword::keyword_enum,
+    profile::{
+        Errors,
+        diagnostic::{Problems, Span},
+        reader::{self, At, Node, OptionalKey, Raw, Value, toml_tables},
+    },
+    text::Language,
+};
+
+keyword_enum! {
+    /// Which characters are drawn, as far as the terminal has them.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub enum Characters: "set of characters" {
+        /// All that the terminal has.
+        #[default]
+        Automatic => "automatic",
+        /// No braille dots.
+        Blocks => "blocks",
+        /// Seven bits.
+        Ascii => "ASCII",
+    }
+}
+
+keyword_enum! {
+    /// When the bell of the terminal rings.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub enum Bell: "bell" {
+        /// Never.
+        #[default]
+        Off => "off",
+        /// Once for each new alarm.
+        Once => "once an alarm",
+        /// The same, and again while an alarm is unacknowledged.
+        Repeated => "until acknowledged",
+    }
+}
+
+/// What a user has chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Preferences {
+    /// Colours.
+    pub theme: ThemeName,
+    /// Characters.
+    pub characters: Characters,
+    /// Agitators turn and flow arrows travel.
+    pub motion: bool,
+    /// The bell.
+    pub bell: Bell,
+    /// The mouse acts; else it selects text, as the terminal has it.
+    pub mouse: bool,
+    /// The language; `None` is that of the environment.
+    pub language: Option<Language>,
+}
+
+impl Default for Preferences {
+    fn default() -> Preferences {
+        Preferences {
+            theme: ThemeName::default(),
+            characters: Characters::default(),
+            motion: true,
+            bell: Bell::default(),
+            mouse: false,
+            language: None,
+        }
+    }
+}
+
+impl Preferences {
+    /// The looks on a terminal that can show so much.
+    pub fn theme(&self, limits: &Theme) -> Theme {
+        let glyphs = match (self.characters, limits.glyphs) {
+            (Characters::Ascii, _) | (_, Glyphs::Ascii) => Glyphs::Ascii,
+            (Characters::Blocks, _) | (_, Glyphs::Block) => Glyphs::Block,
+            (Characters::Automatic, Glyphs::Braille) => Glyphs::Braille,
+        };
+        Theme { name: self.theme, colours: limits.colours, glyphs, motion: self.motion && limits.motion }
+    }
+}
+
+/// The preferences of all users of an account.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PreferencesFile {
+    /// Where it is, for people.
+    pub path: String,
+    /// Why it is not used: file, line, found, expected. Then it is not written either.
+    pub problem: Option<String>,
+    /// While nobody is logged in, and for users without a section.
+    default: Preferences,
+    users: BTreeMap<String, Preferences>,
+}
+
+toml_tables! {
+    /// The file.
+    FileTable, "the preferences" {
+        opt "default" default: SectionTable,
+        opt "users" users: Raw,
+    }
+    /// What one user has chosen.
+    SectionTable, "the preferences of a user" {
+        opt "theme" theme: ThemeName,
+        opt "characters" characters: Characters,
+        opt "motion" motion: bool,
+        opt "bell" bell: Bell,
+        opt "mouse" mouse: bool,
+        opt "language" language: Language,
+    }
+}
+
+impl Value for Language {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Language> {
+        let code = String::read(value, at, problems)?;
+        let language = Language::from_code(&code);
+        if language.is_none() {
+            let known: Vec<&str> = Language::all().map(Language::code).collect();
+            problems
+                .add(at, format!("unknown language `{code}`"))
+                .label(format!("expected one of {}", known.join(", ")));
+        }
+        language
+    }
+}
+
+impl PreferencesFile {
+    /// Nothing chosen, because there is no file at this path yet, or because of a problem with it.
+    pub fn new(path: &str, problem: Option<String>) -> PreferencesFile {
+        PreferencesFile { path: path.to_owned(), problem, ..PreferencesFile::default() }
+    }
+
+    /// What this user has chosen.
+    pub fn of(&self, user: Option<&str>) -> Preferences {
+        user.and_then(|user| self.users.get(user)).copied().unwrap_or(self.default)
+    }
+
+    /// Takes in what this user has chosen.
+    pub fn set(&mut self, user: Option<&str>, chosen: Preferences) {
+        match user {
+            Some(user) => drop(self.users.insert(user.to_owned(), chosen)),
+            None => self.default = chosen,
+        }
+    }
+
+    /// Reads its text; an empty one holds no choice.
+    pub fn read(path: &str, bytes: &[u8]) -> Result<PreferencesFile, Errors> {
+        let mut file = PreferencesFile::new(path, None);
+        if bytes.trim_ascii().is_empty() {
+            return Ok(file);
+        }
+        let mut problems = Problems::default();
+        if let Some(raw) = reader::parse(path, bytes, &mut problems) {
+            let table = FileTable::of(&[raw], &mut problems);
+            file.default = table.default.map_or_else(Preferences::default, |section| of_section(&section.value));
+            let users = table.users.map(|users| users.value.table).unwrap_or_default();
+            for (user, (_, At { value, at })) in users {
+                let section = SectionTable::read(&value, at, &mut problems);
+                file.users.extend(section.map(|section| (user, of_section(&section))));
+            }
+        }
+        problems.finish(file)
+    }
+
+    /// Its text.
+    pub fn text(&self) -> String {
+        let users: toml::Table = self.users.iter().map(|(user, chosen)| (user.clone(), section(chosen))).collect();
+        let tables = [("default".to_owned(), section(&self.default)), ("users".to_owned(), users.into())];
+        let body: toml::Table = tables.into_iter().collect();
+        format!("# What users have chosen about the terminals of sightglass; written by its settings (F2).\n\n{body}")
+    }
+}
+
+fn of_section(section: &SectionTable) -> Preferences {
+    let usual = Preferences::default();
+    Preferences {
+        theme: section.theme.value_or(usual.theme),
+        characters: section.characters.value_or(usual.characters),
+        motion: section.motion.value_or(usual.motion),
+        bell: section.bell.value_or(usual.bell),
+        mouse: section.mouse.value_or(usual.mouse),
+        language: section.language.map(|written| written.value),
+    }
+}
+
+fn section(chosen: &Preferences) -> toml::Value {
+    let keys = [
+        ("theme", Some(chosen.theme.word().into())),
+        ("characters", Some(chosen.characters.word().into())),
+        ("motion", Some(chosen.motion.into())),
+        ("bell", Some(chosen.bell.word().into())),
+        ("mouse", Some(chosen.mouse.into())),
+        ("language", chosen.language.map(|language| language.code().into())),
+    ];
+    let written = keys.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
+    toml::Value::Table(written.collect())
+}
+
+impl Model {
+    /// The name of who is logged in.
+    pub(super) fn user(&self) -> Option<&str> {
+        self.session.who.as_ref().map(|who| who.user.as_ref())
+    }
+
+    /// The language of the texts.
+    pub(super) fn language(&self) -> Language {
+        self.preferences.language.unwrap_or(self.language)
+    }
+
+    /// Follows what the user has chosen, or tries in the window of the settings: whatever closes it ends the trial.
+    pub(super) fn apply_preferences(&mut self) {
+        self.preferences = match &self.modal {
+            Some(Modal::TerminalSettings(window)) => window.chosen,
+            Some(_) | None => self.preferences_file.of(self.user()),
+        };
+        self.theme = self.preferences.theme(&self.limits);
+    }
+}
