@@ -2,22 +2,27 @@
 
 mod header;
 mod banner;
+mod footer;
 mod past;
 
 use crate::t;
 use crate::text::translate;
 use header::header;
-use ratatui::{Frame, style::Style};
+use ratatui::{
+    Frame,
+    layout::Position,
+    style::Style,
+};
 
 use banner::banner;
 pub use banner::{alarm_words, counts, history_text, since};
+use footer::Footer;
 
 use super::{
     LastCommand, Model, SILENCE, ViewContext,
-    keys::{self, Hint},
+    keys::{Chord, Hint},
     layout::{Size, layout},
     modal::Modal,
-    replay, rights,
     tabs::Tab,
     widgets::text::{Canvas, clock, fit, fit_words, running, width},
 };
@@ -27,7 +32,6 @@ use crate::plant::{
     def::LineDef,
     event::LineState,
     number::to_u16,
-    role::Role,
     snapshot::LineStatus,
 };
 
@@ -50,18 +54,7 @@ pub fn view(model: &Model, frame: &mut Frame) {
         let row = if cx.is_past() { parts.status } else { parts.rule };
         tour.view(cx, &mut Canvas::new(frame.buffer_mut(), row));
     }
-    let hints = match &model.modal {
-        Some(modal) => modal.hints(cx),
-        None if cx.is_past() => [keys::hints(replay::KEYS), past::own_keys(model, cx)].concat(),
-        None if cx.size <= Size::Compact => compact_hints(model, cx),
-        None => model.tabs.shown().hints(cx),
-    };
-    let typing = model.tabs.shown == Tab::Login && model.tabs.login.is_typing();
-    let global = model.modal.is_none() && !typing;
-    let lacks = |hint: &Hint| hint.needs.filter(|role| rights::lacks(cx, *role).is_some());
-    let (refused, may): (Vec<Hint>, Vec<Hint>) = hints.into_iter().partition(|hint| lacks(hint).is_some());
-    let role = refused.first().and_then(lacks).map(|role| (role, refused));
-    footer(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer), &may, role, global);
+    Footer::new(model, cx, parts.footer.width).view(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer));
     if let Some(modal) = &model.modal {
         // On the smallest screen a window has all rows below the banner but that of the keys.
         let room = if cx.size <= Size::Compact { parts.body.union(parts.status) } else { parts.body };
@@ -101,7 +94,32 @@ fn too_small(model: &Model, cx: &ViewContext, (width, height): (u16, u16), frame
     }
 }
 
+/// The key of the footer at this place.
+pub fn chord_at(model: &Model, at: Position) -> Option<Chord> {
+    let parts = layout(model.screen);
+    let footer = parts.footer.contains(at).then(|| Footer::new(model, &model.cx(), parts.footer.width));
+    footer.and_then(|footer| footer.chord_at(at.x - parts.footer.x))
+}
+
+/// The tab whose heading is at this place.
+pub fn tab_at(model: &Model, at: Position) -> Option<Tab> {
+    let bar = layout(model.screen).tabs;
+    let headings = if bar.contains(at) { headings(model, &model.cx(), bar.width) } else { Vec::new() };
+    let at_place = headings.into_iter().find(|(x, _, name)| (*x..*x + width(name)).contains(&(at.x - bar.x)));
+    at_place.map(|(_, tab, _)| tab)
+}
+
 fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
+    for (x, tab, name) in headings(model, cx, canvas.width()) {
+        if x > 0 {
+            canvas.text(x - 1, 0, "│", cx.theme.dim());
+        }
+        canvas.text(x, 0, &name, cx.theme.tab(tab == model.tabs.shown));
+    }
+}
+
+/// The headings of the tabs with their columns.
+fn headings(model: &Model, cx: &ViewContext, columns: u16) -> Vec<(u16, Tab, String)> {
     let name = |tab: Tab| {
         let count = if tab == Tab::Alarms { cx.snapshot.alarms.len() } else { 0 };
         let count = if count > 0 { format!(" {count}") } else { String::new() };
@@ -110,7 +128,7 @@ fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let names: Vec<(Tab, String)> = Tab::offered(cx).into_iter().map(|tab| (tab, name(tab))).collect();
     // Where there is no room for blanks around the names they stand closer; then all but the shown one are cut alike.
     let needs = |blanks: u16| names.iter().map(|(_, name)| width(name) + blanks).sum::<u16>() + to_u16(names.len());
-    let blank = if needs(2) <= canvas.width() + 1 { " " } else { "" };
+    let blank = if needs(2) <= columns + 1 { " " } else { "" };
     let longest = names.iter().map(|(_, name)| width(name)).max().unwrap_or(0);
     let cut = |most: u16| {
         let cut = |(tab, name): &(Tab, String)| match *tab == model.tabs.shown || *tab == Tab::Alarms {
@@ -119,16 +137,14 @@ fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
         };
         names.iter().map(cut).collect::<Vec<_>>()
     };
-    let fits =
-        |names: &Vec<(Tab, String)>| names.iter().map(|(_, name)| width(name) + 1).sum::<u16>() <= canvas.width() + 1;
+    let fits = |names: &Vec<(Tab, String)>| names.iter().map(|(_, name)| width(name) + 1).sum::<u16>() <= columns + 1;
     let names = (5..=longest).rev().map(cut).find(fits).unwrap_or_else(|| cut(5));
-    let mut x = 0;
-    for (n, (tab, name)) in names.iter().enumerate() {
-        if n > 0 {
-            x = canvas.text(x, 0, "│", cx.theme.dim());
-        }
-        x = canvas.text(x, 0, &format!("{blank}{name}{blank}"), cx.theme.tab(*tab == model.tabs.shown));
-    }
+    let heading = |x: &mut u16, (tab, name): (Tab, String)| {
+        let (at, name) = (*x, format!("{blank}{name}{blank}"));
+        *x += width(&name) + 1;
+        Some((at, tab, name))
+    };
+    names.into_iter().scan(0, heading).collect()
 }
 
 fn status(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
@@ -257,56 +273,4 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> 
         CommandKind::HandOver => t!("hand over").to_owned(),
         CommandKind::TakeOver => t!("take over").to_owned(),
     }
-}
-
-/// As many keys as fit; those of every tab stand at the right end.
-/// Keys that the user may not press stand dimmed behind the role that they need.
-fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option<(Role, Vec<Hint>)>, global: bool) {
-    let tail: Vec<Hint> = if global {
-        keys::hints(&keys::global()).into_iter().filter(|hint| !hint.label.is_empty()).collect()
-    } else {
-        Vec::new()
-    };
-    // In seven bits the sign of Enter would be a slash, which is another key.
-    let shown = |hint: &Hint| Hint { key: cx.theme.enter(&hint.key), ..hint.clone() };
-    let (hints, mut tail): (Vec<Hint>, Vec<Hint>) =
-        (hints.iter().map(shown).collect(), tail.iter().map(shown).collect());
-    let room = |hint: &Hint| width(&hint.key) + 1 + width(&hint.label) + 2;
-    // A quarter of the row is for the keys of every tab, the last ones first.
-    while 2 < tail.len() && canvas.width() / 4 < tail.iter().map(room).sum() {
-        tail.remove(0);
-    }
-    let mut end = canvas.width().saturating_sub(1 + tail.iter().map(room).sum::<u16>());
-    let mut x = 1;
-    for (n, hint) in hints.iter().enumerate().filter(|(_, hint)| !hint.label.is_empty()) {
-        let hint = n.checked_sub(1).and_then(|before| pair(&hints[before], hint)).unwrap_or_else(|| hint.clone());
-        if x + room(&hint) > end {
-            break;
-        }
-        x = key(cx, canvas, x, &hint);
-    }
-    if let Some((role, refused)) = refused {
-        let named = |hint: &&Hint| !hint.label.is_empty();
-        let keys: Vec<&str> = refused.iter().filter(named).map(|hint| hint.key.as_str()).collect();
-        let keys = cx.theme.enter(&format!("{}: {}", rights::title(role), keys.join(" ")));
-        let words = [t!("needs {keys}", keys), keys];
-        if let Some(words) = words.iter().find(|words| x + width(words) < end) {
-            canvas.text(x, 0, words, cx.theme.dim());
-        }
-    }
-    for hint in &tail {
-        end = key(cx, canvas, end, hint);
-    }
-}
-
-/// Two keys that belong together as one: `↑↓ select`.
-fn pair(before: &Hint, hint: &Hint) -> Option<Hint> {
-    const PAIRS: &str = "←→←↑↓↑[]<>,.";
-    let together = before.label.is_empty() && PAIRS.contains(&format!("{}{}", before.key, hint.key));
-    together.then(|| Hint { key: format!("{}{}", before.key, hint.key), ..hint.clone() })
-}
-
-fn key(cx: &ViewContext, canvas: &mut Canvas, x: u16, hint: &Hint) -> u16 {
-    let x = canvas.text(x, 0, &hint.key, cx.theme.strong());
-    canvas.text(x + 1, 0, &hint.label, cx.theme.dim()) + 2
 }

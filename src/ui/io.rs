@@ -13,8 +13,9 @@ use std::{
     time::Duration,
 };
 
-use crossterm::event::{Event, EventStream};
+use crossterm::event::{Event, EventStream, MouseButton, MouseEvent, MouseEventKind};
 use futures_util::{StreamExt, stream::BoxStream};
+use ratatui::layout::Position;
 use tokio::{
     signal::unix::{SignalKind, signal},
     sync::{mpsc, oneshot},
@@ -25,6 +26,7 @@ use tokio::{
 use super::{
     Effect, Leaving, Model, Msg, QueryId,
     extension::{Extension, ExtensionMessage},
+    mouse::Pointer,
     preferences::{Preferences, PreferencesFile},
     tabs::{Tab, registers::Start},
     theme::Theme,
@@ -117,7 +119,8 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
     model.leaving = options.leaving;
     model.tour = options.tour.then(super::Tour::default);
-    model.note = options.preferences.problem.clone().map(Into::into);
+    let why = options.preferences.problem.as_ref();
+    model.note = why.map(|why| t!("Preferences are not used, F2 says why: {why}", why).into());
     model.preferences_file = options.preferences;
     model.tabs.registers.profiles = options.profiles;
     let mut extension = options.extension;
@@ -226,7 +229,11 @@ impl Loop {
                 let (width, height) = self.screen.size();
                 self.handle(Msg::Resize(width, height), ECHO)
             }
-            Event::Mouse(_) | Event::FocusGained | Event::FocusLost => Ok(false),
+            Event::Mouse(event) => match pointer(event) {
+                Some(pointer) => self.handle(Msg::Pointer(pointer), ECHO),
+                None => Ok(false),
+            },
+            Event::FocusGained | Event::FocusLost => Ok(false),
         }
     }
 
@@ -236,6 +243,7 @@ impl Loop {
         let due = self.drawn_at.map_or_else(Instant::now, |at| at + pause);
         self.redraw_at = Some(self.redraw_at.map_or(due, |planned| planned.min(due)));
         self.cancel();
+        self.screen.set_mouse(self.model.preferences.mouse)?;
         for effect in effects {
             match effect {
                 Effect::Command(command, credentials) => {
@@ -251,6 +259,7 @@ impl Loop {
                 Effect::Load { tab, path } => self.load(tab, path),
                 Effect::Append { tab, path, bytes, new } => self.appender.append(tab, path, bytes, new),
                 Effect::KeepPreferences(user, chosen) => self.keep_preferences(user, chosen),
+                Effect::Copy(text) => self.screen.copy(&text)?,
                 Effect::Bell => self.screen.ring()?,
                 Effect::Redraw => self.screen.renew()?,
                 Effect::Quit => return Ok(true),
@@ -328,6 +337,18 @@ impl Loop {
         own(|| update(&mut self.model, Msg::Drawn));
         self.drawn_at = Some(Instant::now());
         Ok(())
+    }
+}
+
+/// What the mouse did; `None` for what means nothing here.
+fn pointer(event: MouseEvent) -> Option<Pointer> {
+    let at = Position::new(event.column, event.row);
+    match event.kind {
+        MouseEventKind::Down(MouseButton::Left) => Some(Pointer::Press(at)),
+        MouseEventKind::Drag(MouseButton::Left) => Some(Pointer::Drag(at)),
+        MouseEventKind::ScrollUp => Some(Pointer::Wheel { down: false }),
+        MouseEventKind::ScrollDown => Some(Pointer::Wheel { down: true }),
+        _ => None,
     }
 }
 

@@ -3,7 +3,7 @@
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::tabs::Tab;
-use crate::{plant::role::Role, text::translate};
+use crate::{plant::role::Role, t, text::translate};
 
 /// One row of a key table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +64,12 @@ impl Hint {
     pub fn new(key: impl Into<String>, label: impl Into<String>, help: impl Into<String>) -> Hint {
         let key = key.into();
         let mut letters = key.chars();
-        let chord = letters.next().filter(|_| letters.next().is_none()).map(char);
+        let chord = match key.as_str() {
+            "⏎" => Some(code(KeyCode::Enter)),
+            "Tab" => Some(code(KeyCode::Tab)),
+            escape if escape == t!("Esc") => Some(code(KeyCode::Esc)),
+            _ => letters.next().filter(|_| letters.next().is_none()).map(char),
+        };
         Hint { key, label: label.into(), help: help.into(), needs: None, chord }
     }
     /// A hint of a window, which the help does not list.
@@ -180,6 +185,8 @@ pub enum Global {
     Dump,
     /// Choose theme, characters, motion, bell, mouse and language.
     Settings,
+    /// Copy what is selected.
+    Copy,
     /// Redraw the screen.
     Redraw,
     /// Take the outcome of the last command off the screen.
@@ -220,6 +227,7 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
     Key::new(char('P'), "", "save this screen as text and SVG in the folder of the reports", Global::Dump),
     Key::new(code(KeyCode::F(2)), "", "settings: theme, characters, motion, bell, mouse, language", Global::Settings),
+    Key::new(char('y'), "", "copy what is selected, with its unit, quality and time", Global::Copy),
     Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
     Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),
     Key::new(char('q'), "quit", "quit (asks first, and lists what stops)", Global::Quit),

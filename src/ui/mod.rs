@@ -13,6 +13,7 @@ pub(crate) mod interlock;
 pub(crate) mod keys;
 pub(crate) mod layout;
 pub(crate) mod modal;
+pub(crate) mod mouse;
 pub(crate) mod msg;
 pub(crate) mod preferences;
 pub(crate) mod session_lock;
@@ -207,7 +208,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let event = TourEvent::of(&msg);
-    let keyed = matches!(msg, Msg::Key(_)) && model.is_as_drawn();
+    let keyed = matches!(msg, Msg::Key(_) | Msg::Pointer(_)) && model.is_as_drawn();
     if matches!(msg, Msg::Snapshot(_) | Msg::SessionStatus(_) | Msg::Answer(..) | Msg::Extension(_) | Msg::Tick { .. })
     {
         model.note_news();
@@ -217,6 +218,11 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Key(event) => {
             let active = session_lock::active(model);
             let actions = on_key(model, event);
+            active.map(UiAction::Do).into_iter().chain(actions).collect()
+        }
+        Msg::Pointer(pointer) => {
+            let active = session_lock::active(model);
+            let actions = mouse::on_pointer(model, pointer);
             active.map(UiAction::Do).into_iter().chain(actions).collect()
         }
         Msg::Paste(text) => {

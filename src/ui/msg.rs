@@ -8,6 +8,7 @@ use jiff::{SignedDuration, Timestamp};
 use super::{
     extension::{Extension, ExtensionMessage},
     modal::Modal,
+    mouse::Pointer,
     preferences::{Preferences, PreferencesFile},
     tabs::{Tab, registers::Start},
 };
@@ -28,6 +29,8 @@ pub enum Msg {
     Begin(Start),
     /// A key.
     Key(KeyEvent),
+    /// The mouse.
+    Pointer(Pointer),
     /// Pasted text: never acts as keys.
     Paste(String),
     /// The screen has a new size.
@@ -104,6 +107,8 @@ pub enum Effect {
     },
     /// Keep what this user has chosen; answered by [`Msg::Preferences`].
     KeepPreferences(Option<String>, Preferences),
+    /// Put a text into the clipboard of the terminal.
+    Copy(String),
     /// Ring the bell of the terminal once.
     Bell,
     /// Forget what the terminal shows and draw everything.

@@ -75,6 +75,7 @@ pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
         | Effect::Append { .. }
         | Effect::Bell
         | Effect::Redraw
+        | Effect::Copy(_)
         | Effect::KeepPreferences(..)
         | Effect::Quit => None,
     })

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::plant::time::elapsed;
-use crate::t;
+use crate::{t, ui::rights};
 
 pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;

@@ -9,7 +9,7 @@ use std::{
     },
 };
 
-use crossterm::{cursor, event, terminal};
+use crossterm::{clipboard::CopyToClipboard, cursor, event, terminal};
 use ratatui::{
     Frame, Terminal,
     backend::{Backend, ClearType, CrosstermBackend, WindowSize},
@@ -33,6 +33,8 @@ const TEAR_BYTES: usize = 96;
 /// A raised terminal. Dropping it restores what was there before.
 pub struct Screen {
     terminal: Terminal<Wire>,
+    /// The terminal reports the mouse.
+    mouse: bool,
 }
 
 impl Screen {
@@ -57,7 +59,7 @@ impl Screen {
             cursor::Hide,
             event::EnableBracketedPaste
         );
-        let screen = raised.and_then(|()| Ok(Screen { terminal: Terminal::new(Wire::new()?)? }));
+        let screen = raised.and_then(|()| Ok(Screen { terminal: Terminal::new(Wire::new()?)?, mouse: false }));
         if screen.is_err() {
             restore();
         }
@@ -81,6 +83,25 @@ impl Screen {
     pub fn ring(&mut self) -> io::Result<()> {
         let wire = self.terminal.backend_mut();
         wire.bytes.push(0x07);
+        wire.send()
+    }
+
+    /// Has the terminal report the mouse, or select text by itself.
+    pub fn set_mouse(&mut self, on: bool) -> io::Result<()> {
+        if self.mouse == on {
+            return Ok(());
+        }
+        self.mouse = on;
+        let wire = self.terminal.backend_mut();
+        // Clicks, drags and the wheel; not every movement, as crossterm asks for.
+        wire.bytes.extend(if on { b"\x1b[?1000h\x1b[?1002h\x1b[?1006h" } else { b"\x1b[?1006l\x1b[?1002l\x1b[?1000l" });
+        wire.send()
+    }
+
+    /// Puts a text into the clipboard of the terminal, also over SSH (OSC 52). A terminal that cannot ignores it.
+    pub fn copy(&mut self, text: &str) -> io::Result<()> {
+        let wire = self.terminal.backend_mut();
+        crossterm::execute!(wire.bytes, CopyToClipboard::to_clipboard_from(text))?;
         wire.send()
     }
 
@@ -115,6 +136,7 @@ fn restore() {
     if RAISED.swap(false, Ordering::SeqCst) {
         let _ = crossterm::execute!(
             io::stdout(),
+            event::DisableMouseCapture,
             event::DisableBracketedPaste,
             terminal::LeaveAlternateScreen,
             cursor::Show

@@ -160,6 +160,10 @@ impl TabView for Alarms {
         [keys::everywhere(self.page), hints(&keys)].concat()
     }
 
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        self.selected(cx).map(|alarm| actions::line(cx, alarm)).into_iter().collect()
+    }
+
     fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
         self.selected(cx).map(|alarm| alarm.raised_at)
     }

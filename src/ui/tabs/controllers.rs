@@ -86,6 +86,17 @@ pub struct Controllers {
 }
 
 impl TabView for Controllers {
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        let device = cx.def().devices.get(self.device.index());
+        let tag = device.and_then(|device| match self.page {
+            Page::Device => self.table.tag(cx, device.id).map(|tag| tag.id),
+            Page::List => device.faceplate.as_ref().map(|faceplate| faceplate.pv),
+            Page::Program => device.program.as_ref().and_then(|program| self.cell.tag(program)),
+            Page::Sets | Page::Compare(..) | Page::Guide(..) => None,
+        });
+        tag.into_iter().map(|tag| value::line(cx, tag)).collect()
+    }
+
     fn new(snapshot: &Snapshot) -> Controllers {
         let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
         Controllers::on_page(page, DeviceId(0), Table::default())

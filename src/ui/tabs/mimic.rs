@@ -1,6 +1,7 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
 mod companions;
+mod point;
 mod preview;
 
 use companions::{Companions, Parts, parts};
@@ -85,6 +86,20 @@ impl TabView for Mimic {
         commands.chain([Hint::new("←↑↓→", t!("select"), t!("select an item"))]).chain(keys::hints(&table)).collect()
     }
 
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        let item = self.selected.and_then(|n| self.shown(cx, cx.area).0.items.get(n));
+        item.into_iter().flat_map(|item| tags(cx, item)).map(|tag| value::line(cx, tag)).collect()
+    }
+
+    fn on_point(&mut self, cx: &ViewContext, at: Position) -> bool {
+        let (picture, parts) = self.shown(cx, cx.area);
+        if list::is_shown(cx, picture, parts.picture) || !parts.picture.contains(at) {
+            return false;
+        }
+        self.selected = point::item_at(picture, parts.picture, at).or(self.selected);
+        true
+    }
+
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let (picture, parts) = self.shown(cx, cx.area);
         self.follow(picture);
@@ -122,10 +137,8 @@ impl TabView for Mimic {
         if list::is_shown(cx, picture, area) {
             return list::view(cx, &mut canvas, items, self.selected);
         }
-        let scale = scale(picture, area);
-        // A picture that is not stretched stands in the middle.
-        let spare = area.width.saturating_sub(scale.column(picture.size.0));
-        let mut canvas = canvas.part(spare / 2, 0, area.width - spare / 2, area.height);
+        let (scale, left) = placed(picture, area);
+        let mut canvas = canvas.part(left, 0, area.width - left, area.height);
         for (n, item) in items.iter().enumerate() {
             self.item(cx, &mut canvas, item, n, scale);
         }
@@ -291,6 +304,13 @@ impl Mimic {
 
 fn scale(picture: &Picture, area: Rect) -> CanvasScale {
     CanvasScale::new(picture.size, (area.width, area.height))
+}
+
+/// The scale of a picture, and its first column: one that is not stretched stands in the middle.
+fn placed(picture: &Picture, area: Rect) -> (CanvasScale, u16) {
+    let scale = scale(picture, area);
+    let spare = area.width.saturating_sub(scale.column(picture.size.0));
+    (scale, spare / 2)
 }
 
 /// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.

@@ -18,7 +18,10 @@ use std::path::PathBuf;
 
 use crossterm::event::KeyEvent;
 use jiff::Timestamp;
-use ratatui::{Frame, layout::Rect};
+use ratatui::{
+    Frame,
+    layout::{Position, Rect},
+};
 
 use super::{
     Effect, UiAction, ViewContext,
@@ -83,9 +86,19 @@ pub trait TabView {
         Rows::default()
     }
 
+    /// What is selected, a line each, to be copied; its parts are separated by tabs, as for a spreadsheet.
+    fn copied(&self, _cx: &ViewContext) -> Vec<String> {
+        Vec::new()
+    }
+
     /// The past moment that is selected, for a replay to begin at.
     fn moment(&self, _cx: &ViewContext) -> Option<Timestamp> {
         None
+    }
+
+    /// The mouse is pressed at this place of the screen: selects what stands there; `false` where arrow keys do that.
+    fn on_point(&mut self, _cx: &ViewContext, _at: Position) -> bool {
+        false
     }
 
     /// Esc: a step back, `false` where there is none.

@@ -4,7 +4,11 @@ pub(super) use std::time::Duration;
 
 pub(super) use crossterm::event::{KeyCode, KeyEvent};
 pub(super) use jiff::{SignedDuration, Timestamp};
-pub(super) use ratatui::{Frame, layout::Rect, style::Style};
+pub(super) use ratatui::{
+    Frame,
+    layout::{Position, Rect},
+    style::Style,
+};
 
 pub(super) use super::{
     Tab, TabView,

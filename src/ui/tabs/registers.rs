@@ -167,6 +167,10 @@ impl TabView for Registers {
         cx.def().is_bench()
     }
 
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        view::copied(self, cx)
+    }
+
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         if self.watch.has_graph() {
             return match find(&keys::log(cx), event) {

@@ -11,6 +11,7 @@ mod legend;
 mod pens;
 mod picture;
 mod plots;
+mod pointer;
 mod replay;
 mod response;
 pub(super) mod span;
@@ -171,6 +172,16 @@ impl TabView for Trends {
             }
         }
         exported.into_iter().chain(self.ask(cx)).collect()
+    }
+
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        pointer::copied(self, cx)
+    }
+
+    fn on_point(&mut self, cx: &ViewContext, at: Position) -> bool {
+        let moment = pointer::moment_at(self, cx, at);
+        self.cursor = moment.or(self.cursor);
+        moment.is_some()
     }
 
     fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {

@@ -271,6 +271,11 @@ pub fn clock(at: Timestamp, zone: &TimeZone) -> String {
     at.to_zoned(zone.clone()).strftime("%H:%M:%S").to_string()
 }
 
+/// Local time with its offset, for what leaves the program: `2026-11-21T14:02:31+07:00`.
+pub fn stamp(at: Timestamp, zone: &TimeZone) -> String {
+    at.to_zoned(zone.clone()).strftime("%Y-%m-%dT%H:%M:%S%:z").to_string()
+}
+
 /// Local time in at most nine columns: `14:02:31` today, `Fri 14:02` in the last six days, else `11-02 14h`.
 pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     let (days, at) = (elapsed(at, now).as_secs() / 86_400, at.to_zoned(zone.clone()));

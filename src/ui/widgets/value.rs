@@ -55,6 +55,17 @@ pub fn show(cx: &ViewContext, tag: TagId) -> Shown {
     }
 }
 
+/// Name, value, unit, quality and time of a tag, separated by tabs.
+pub fn line(cx: &ViewContext, tag: TagId) -> String {
+    let (def, sample, shown) = (cx.def().tag(tag), cx.snapshot.sample(tag), show(cx, tag));
+    let quality = match sample.quality {
+        Quality::Good => t!("good").to_owned(),
+        Quality::Uncertain(cause) => t!("uncertain: {cause}", cause = translate(cause.word())),
+        Quality::Bad(cause) => t!("bad: {cause}", cause = translate(cause.word())),
+    };
+    [def.name.clone(), shown.text, shown.unit, quality, text::stamp(sample.at, &cx.def().time_zone)].join("\t")
+}
+
 /// The value in words; a status word as the names of its set bits.
 fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let def = cx.def().tag(tag);

@@ -4,7 +4,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         alarm::{AlarmCommand, AlarmState},
-        def::AlarmId,
+        def::{AlarmId, Subject},
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
@@ -184,6 +184,18 @@ fn marked(cx: &ViewContext, alarm: AlarmId) -> String {
 fn name(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
     format!("{} {} {}", cx.theme.priority_tag(def.priority), subject(cx, alarm), def.message)
+}
+
+/// Priority, subject, message, state, value and time of an alarm, separated by tabs.
+pub fn line(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
+    let def = cx.def().alarm(alarm.id);
+    let value = match (def.subject, alarm.value) {
+        (Subject::Tag(tag), Some(value)) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
+        (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => String::new(),
+    };
+    let words = [translate(def.priority.word()), &subject(cx, alarm.id), &def.message, translate(alarm.state.word())];
+    let at = text::stamp(alarm.raised_at, &cx.def().time_zone);
+    [words.join("\t"), value.trim_end().to_owned(), at].join("\t")
 }
 
 /// Switches the bell off, or on for new alarms.

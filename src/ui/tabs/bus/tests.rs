@@ -111,6 +111,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
             | Effect::Append { .. }
             | Effect::Bell
             | Effect::Redraw
+            | Effect::Copy(_)
             | Effect::KeepPreferences(..)
             | Effect::Quit => None,
         })

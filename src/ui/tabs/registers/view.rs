@@ -188,6 +188,17 @@ fn address_text(tab: &Registers, address: u16) -> String {
     format!("{shown:>6} / {address:04X}")
 }
 
+/// Address, hexadecimal and decimal value and time of the selected register.
+pub fn copied(tab: &Registers, cx: &ViewContext) -> Vec<String> {
+    let cell = tab.cells.get(tab.table, tab.selected);
+    let read = cell.and_then(|cell| Some((cell.word?, cell.at)));
+    let zone = &cx.def().time_zone;
+    let line = |(word, at)| {
+        format!("{}\t{word:04X}\t{word}\t{}", address_text(tab, tab.selected).trim(), text::stamp(at, zone))
+    };
+    read.map(line).into_iter().collect()
+}
+
 fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: u16) {
     let (theme, at) = (cx.theme, layout(canvas.width()));
     let selected = address == tab.selected;

@@ -63,6 +63,7 @@ impl Stand {
                 | Effect::Append { .. }
                 | Effect::Bell
                 | Effect::Redraw
+                | Effect::Copy(_)
                 | Effect::KeepPreferences(..)
                 | Effect::Quit => {}
             }

@@ -43,10 +43,14 @@ pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     }
 }
 
+/// Rows of the legend on a tab of this height.
+fn legend_rows(trends: &Trends, cx: &ViewContext, height: u16) -> u16 {
+    (to_u16(trends.pens(cx).len()) + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN))
+}
+
 fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let (width, height) = (canvas.width(), canvas.height());
-    let pens = trends.pens(cx);
-    let legend = (to_u16(pens.len()) + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN));
+    let legend = legend_rows(trends, cx, height);
     draw_title(trends, cx, canvas);
     let mut plot = canvas.part(0, 1, width, height.saturating_sub(1 + legend));
     let draw: Option<fn(&Trends, &ViewContext, &mut Canvas)> = match trends.plot {
@@ -60,12 +64,7 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         let mut part = canvas.part(0, height - legend.min(height), width, legend);
         return draw_legend(trends, cx, &mut part, None);
     }
-    let spare = height.saturating_sub(1 + legend + CHART_ROWS_MIN);
-    let rows = Rows::new(trends, cx, spare);
-    let mut chart = chart(trends, cx, rows.events == 0);
-    let room = height.saturating_sub(1 + legend + rows.count());
-    // Without a curve it is only the time axis of the lanes.
-    let room = if chart.curves.is_empty() && rows.lanes > 0 { room.min(CHART_ROWS_MIN) } else { room };
+    let (mut chart, rows, room) = time_chart(trends, cx, height, legend);
     let area = canvas.part(0, 1, width, room).area();
     let plan = (!area.is_empty()).then(|| chart.plan(area));
     if let Some(plan) = &plan {
@@ -80,6 +79,24 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     }
     let mut part = canvas.part(0, height - legend.min(height), width, legend);
     draw_legend(trends, cx, &mut part, plan.as_ref());
+}
+
+/// The chart over time, the rows below it and the rows that it takes, on a tab of this height.
+fn time_chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>, height: u16, legend: u16) -> (Chart<'a>, Rows, u16) {
+    let rows = Rows::new(trends, cx, height.saturating_sub(1 + legend + CHART_ROWS_MIN));
+    let chart = chart(trends, cx, rows.events == 0);
+    let room = height.saturating_sub(1 + legend + rows.count());
+    // Without a curve it is only the time axis of the lanes.
+    let room = if chart.curves.is_empty() && rows.lanes > 0 { room.min(CHART_ROWS_MIN) } else { room };
+    (chart, rows, room)
+}
+
+/// The chart over time and its place on the screen; `None` while something else is shown.
+pub(super) fn placed_chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Option<(Chart<'a>, Rect)> {
+    let legend = legend_rows(trends, cx, cx.area.height);
+    let (chart, _, height) = time_chart(trends, cx, cx.area.height, legend);
+    let area = Rect { y: cx.area.y + 1, height, ..cx.area };
+    (trends.values.is_none() && matches!(trends.plot, Plot::Time)).then_some((chart, area))
 }
 
 /// Rows under the chart: lanes of states, events, and the words of the event at the cursor.

@@ -1,0 +1,29 @@
+//! Which item of a picture stands where.
+
+use super::placed;
+use crate::{
+    plant::def::Picture,
+    ui::{
+        tabs::prelude::*,
+        widgets::mimic::{Bounds, place},
+    },
+};
+use ratatui::layout::Position;
+
+/// Columns and rows beside an item that count as it: a label reaches so far.
+const NEAR: (u16, u16) = (3, 1);
+
+/// The item of a picture at this place of the screen, or the nearest beside it; of two the smaller one, which stands in the
+/// other.
+pub(super) fn item_at(picture: &Picture, area: Rect, at: Position) -> Option<usize> {
+    let (scale, left) = placed(picture, area);
+    let (x, y) = (at.x.checked_sub(area.x + left)?, at.y - area.y);
+    let outside = |at: u16, from: u16, length: u16| {
+        from.saturating_sub(at) + at.saturating_sub(from.saturating_add(length.saturating_sub(1)))
+    };
+    let distance = |at: Bounds| (outside(x, at.x, at.width), outside(y, at.y, at.height), at.width * at.height);
+    let items = picture.items.iter().enumerate();
+    let near = items.filter_map(|(n, item)| Some((distance(scale.place(place(item)?)), n)));
+    let near = near.filter(|((x, y, _), _)| *x <= NEAR.0 && *y <= NEAR.1);
+    near.min_by_key(|((x, y, size), _)| (x + 2 * y, *size)).map(|(_, n)| n)
+}
