@@ -128,17 +128,6 @@ impl Theme {
     pub fn liquid(&self) -> Style {
         self.fg(Role::Liquid)
     }
-    /// What is drawn in liquid: calm words stand on its colour, alarms and doubts keep the ground that they are legible on.
-    pub fn in_liquid(&self, style: Style) -> Style {
-        let is = |role| style.fg == self.colour(role);
-        match self.colour(Role::Liquid) {
-            Some(liquid) if is(Role::Liquid) => style.bg(liquid),
-            Some(liquid) if [Role::Normal, Role::Dim, Role::Strong].into_iter().any(is) => {
-                style.patch(self.fg(Role::LiquidText)).bg(liquid)
-            }
-            Some(_) | None => style,
-        }
-    }
     /// Equipment that runs: brighter than one that rests, no colour of its own.
     pub fn running(&self) -> Style {
         self.strong()

@@ -17,8 +17,6 @@ pub(super) enum Role {
     Strong,
     /// Liquid in a vessel.
     Liquid,
-    /// Words that stand in liquid.
-    LiquidText,
     /// Setpoints.
     SetValue,
     /// Trouble of the program itself.
@@ -44,13 +42,12 @@ pub(super) const PENS: usize = 8;
 type Shade = (u32, u8);
 
 /// Grey, dark, light, high contrast, mono.
-const SHADES: [[Shade; 5]; 13 + PENS] = [
+const SHADES: [[Shade; 5]; 12 + PENS] = [
     [(0x262626, 235), (0x0c1014, 233), (0xf2f2ee, 255), (0x000000, 16), (0x101010, 233)], // ground
     [(0xc8c8c4, 251), (0xd4dae0, 253), (0x2a2c2e, 236), (0xffffff, 231), (0xd0d0d0, 252)], // normal
     [(0x9c9ea0, 247), (0x96a0aa, 247), (0x5a5e62, 59), (0xd4d4d4, 188), (0xa4a4a4, 248)], // dim
     [(0xeaeae6, 255), (0xf4f8fc, 231), (0x000000, 16), (0xffffff, 231), (0xffffff, 231)], // strong
-    [(0x3f4f5e, 239), (0x1f4468, 238), (0xb4cade, 251), (0x003c78, 24), (0x3c3c3c, 237)], // liquid
-    [(0xd4d4d0, 252), (0xd4dae0, 253), (0x2a2c2e, 236), (0xffffff, 231), (0xd0d0d0, 252)], // words in liquid
+    [(0x5f7890, 66), (0x2f6a9c, 61), (0x5f88ac, 67), (0x1f62ac, 25), (0x686868, 242)],    // liquid
     [(0x9ab0c4, 110), (0x6cb6f0, 75), (0x1c5488, 24), (0x90d4ff, 117), (0xd0d0d0, 252)],  // set value
     [(0xe6a050, 214), (0xff9f40, 214), (0x8c4a00, 94), (0xffc060, 222), (0xffffff, 231)], // trouble
     [(0xc69c7c, 180), (0xd8a878, 180), (0x7c4a26, 94), (0xffdca8, 223), (0xbcbcbc, 250)], // uncertain
@@ -69,13 +66,12 @@ const SHADES: [[Shade; 5]; 13 + PENS] = [
 ];
 
 /// The same of sixteen: on black, on white, on black without hue. No grey but the light one is legible on all of them.
-const SIXTEEN: [[Color; 3]; 13 + PENS] = [
+const SIXTEEN: [[Color; 3]; 12 + PENS] = [
     [Color::Black, Color::White, Color::Black],         // ground
     [Color::White, Color::Black, Color::White],         // normal
     [Color::Gray, Color::Black, Color::Gray],           // dim
     [Color::White, Color::Black, Color::White],         // strong
-    [Color::Blue, Color::Cyan, Color::Gray],            // liquid
-    [Color::White, Color::Black, Color::Black],         // words in liquid
+    [Color::LightBlue, Color::LightBlue, Color::Gray],  // liquid
     [Color::Cyan, Color::Blue, Color::White],           // set value
     [Color::LightYellow, Color::Magenta, Color::White], // trouble
     [Color::LightYellow, Color::Magenta, Color::White], // uncertain
@@ -118,14 +114,13 @@ fn row(role: Role) -> usize {
         Role::Dim => 2,
         Role::Strong => 3,
         Role::Liquid => 4,
-        Role::LiquidText => 5,
-        Role::SetValue => 6,
-        Role::Trouble => 7,
-        Role::Uncertain => 8,
-        Role::Critical => 9,
-        Role::High => 10,
-        Role::Medium => 11,
-        Role::Low => 12,
-        Role::Pen(pen) => 13 + pen % PENS,
+        Role::SetValue => 5,
+        Role::Trouble => 6,
+        Role::Uncertain => 7,
+        Role::Critical => 8,
+        Role::High => 9,
+        Role::Medium => 10,
+        Role::Low => 11,
+        Role::Pen(pen) => 12 + pen % PENS,
     }
 }

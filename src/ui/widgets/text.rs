@@ -103,20 +103,6 @@ impl<'a> Canvas<'a> {
         let area = self.part(x, y, width, height).area;
         self.buffer.set_style(area, style);
     }
-    /// Changes the style of every cell of a rectangle.
-    pub(crate) fn restyle(
-        &mut self,
-        x: impl Number,
-        y: impl Number,
-        width: impl Number,
-        height: impl Number,
-        change: impl Fn(Style) -> Style,
-    ) {
-        for at in self.part(x, y, width, height).area.positions() {
-            let cell = &mut self.buffer[at];
-            cell.set_style(change(cell.style()));
-        }
-    }
     /// Blanks everything.
     pub fn clear(&mut self) {
         for y in 0..self.height() {
