@@ -8,11 +8,7 @@ mod past;
 use crate::t;
 use crate::text::translate;
 use header::header;
-use ratatui::{
-    Frame,
-    layout::Position,
-    style::Style,
-};
+use ratatui::{Frame, layout::Position, style::Style};
 
 use banner::banner;
 pub use banner::{alarm_words, counts, history_text, since};

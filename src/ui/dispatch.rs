@@ -151,23 +151,8 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Silence => Vec::new(),
         Global::Dump if session_lock::is_closed(&model.session) => Vec::new(),
         Global::Dump => screen_dump::begin(model),
-        Global::Copy => {
-            let lines = model.tabs.shown().copied(&model.cx());
-            let Some(first) = lines.first() else {
-                model.note = Some(t!("Nothing is selected that can be copied").into());
-                return Vec::new();
-            };
-            let what = first.replace('\t', "  ");
-            model.note = Some(match lines.len() - 1 {
-                0 => t!("Copied: {what}", what).into(),
-                more => t!("Copied with {more} more: {what}", more, what).into(),
-            });
-            vec![UiAction::Do(Effect::Copy(lines.join("\n")))]
-        }
-        Global::Settings => {
-            let window = TerminalSettings::new(model);
-            vec![UiAction::Open(Modal::TerminalSettings(window))]
-        }
+        Global::Copy => copy(model),
+        Global::Settings => vec![UiAction::Open(Modal::TerminalSettings(TerminalSettings::new(model)))],
         Global::Redraw => vec![UiAction::Do(Effect::Redraw)],
         Global::Dismiss => {
             // A failure that is being read is dismissed first; everything else does not hold up the way back.
@@ -204,4 +189,19 @@ pub(super) fn close_unseen(model: &mut Model) {
     if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
         model.note = Some(effects::needs_room().into());
     }
+}
+
+/// Copies what is selected, and says so.
+fn copy(model: &mut Model) -> Vec<UiAction> {
+    let lines = model.tabs.shown().copied(&model.cx());
+    let Some(first) = lines.first() else {
+        model.note = Some(t!("Nothing is selected that can be copied").into());
+        return Vec::new();
+    };
+    let what = first.replace('\t', "  ");
+    model.note = Some(match lines.len() - 1 {
+        0 => t!("Copied: {what}", what).into(),
+        more => t!("Copied with {more} more: {what}", more, what).into(),
+    });
+    vec![UiAction::Do(Effect::Copy(lines.join("\n")))]
 }

@@ -215,16 +215,8 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     }
     let actions = match msg {
         Msg::Key(event) if event.kind == KeyEventKind::Release => Vec::new(),
-        Msg::Key(event) => {
-            let active = session_lock::active(model);
-            let actions = on_key(model, event);
-            active.map(UiAction::Do).into_iter().chain(actions).collect()
-        }
-        Msg::Pointer(pointer) => {
-            let active = session_lock::active(model);
-            let actions = mouse::on_pointer(model, pointer);
-            active.map(UiAction::Do).into_iter().chain(actions).collect()
-        }
+        Msg::Key(event) => on_input(model, |model| on_key(model, event)),
+        Msg::Pointer(pointer) => on_input(model, |model| mouse::on_pointer(model, pointer)),
         Msg::Paste(text) => {
             on_paste(model, &text);
             Vec::new()
@@ -262,10 +254,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Tick { silent } => on_tick(model, silent),
         Msg::Preferences(kept) => {
-            match kept {
-                Ok(file) => model.preferences_file = file,
-                Err(why) => model.note = Some(t!("Not kept: {why}", why).into()),
-            }
+            model.on_kept(kept);
             Vec::new()
         }
         Msg::Drawn => {
@@ -285,6 +274,12 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         model.note_keyed();
     }
     effects
+}
+
+/// A key or the mouse; now and then it is reported to the station that the terminal is in use.
+fn on_input(model: &mut Model, act: impl FnOnce(&mut Model) -> Vec<UiAction>) -> Vec<UiAction> {
+    let active = session_lock::active(model);
+    active.map(UiAction::Do).into_iter().chain(act(model)).collect()
 }
 
 /// Draws the terminal as it stands.

@@ -6,7 +6,9 @@ mod tests;
 use crossterm::event::KeyCode;
 use ratatui::{Terminal, backend::TestBackend, layout::Position, style::Modifier};
 
-use super::{Model, UiAction, chrome, context::with_tabs, dispatch::on_global, dispatch::on_key, keys, keys::Global, layout};
+use super::{
+    Model, UiAction, chrome, context::with_tabs, dispatch::on_global, dispatch::on_key, keys, keys::Global, layout,
+};
 
 /// What the mouse did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

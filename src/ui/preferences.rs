@@ -17,6 +17,7 @@ use crate::{
         diagnostic::{Problems, Span},
         reader::{self, At, Node, OptionalKey, Raw, Value, toml_tables},
     },
+    t,
     text::Language,
 };
 
@@ -97,7 +98,7 @@ pub struct PreferencesFile {
     pub path: String,
     /// Why it is not used: file, line, found, expected. Then it is not written either.
     pub problem: Option<String>,
-    /// While nobody is logged in, and for users without a section.
+    /// For a terminal without a login, and for users without a section.
     default: Preferences,
     users: BTreeMap<String, Preferences>,
 }
@@ -214,6 +215,14 @@ impl Model {
     /// The language of the texts.
     pub(super) fn language(&self) -> Language {
         self.preferences.language.unwrap_or(self.language)
+    }
+
+    /// The preferences were kept, or not: that is said.
+    pub(super) fn on_kept(&mut self, kept: Result<PreferencesFile, String>) {
+        match kept {
+            Ok(file) => self.preferences_file = file,
+            Err(why) => self.note = Some(t!("Not kept: {why}", why).into()),
+        }
     }
 
     /// Follows what the user has chosen, or tries in the window of the settings: whatever closes it ends the trial.
