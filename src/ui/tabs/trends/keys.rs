@@ -114,7 +114,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char(' '), "pen", "switch the selected pen on or off; in the list of values: mark as pen", Action::Toggle),
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),
     Key::new(char('x'), "plot", "curves, x-y plot, histogram, or step response", Action::Plot),
-    Key::new(char('y'), "", "look of the selected pen: steps, lines, dots, bars", Action::Stroke),
+    Key::new(char('k'), "", "look of the selected pen: steps, lines, dots, bars", Action::Stroke),
     Key::new(char('e'), "export", "write the values of the view as CSV", Action::Csv).needs(Role::Technician),
     Key::new(char('E'), "", "write the chart as SVG and PNG", Action::Picture).needs(Role::Technician),
     Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Action::Find),
