@@ -42,11 +42,15 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{Parser, Subcommand};
+use clap::{
+    Parser, Subcommand,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 
 use self::times::{span, speed};
 use crate::{
-    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile, ui,
+    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile,
+    text::Language, ui,
 };
 
 const EXIT_CODES: &str = "\
@@ -69,6 +73,8 @@ struct Args {
     /// that runs. Without it: a terminal at the station that runs here
     #[arg(value_name = "PLANT")]
     plant: Option<String>,
+    #[command(flatten)]
+    terminal: TerminalArgs,
     #[command(flatten)]
     station: StationArgs,
 }
@@ -147,6 +153,28 @@ struct StationArgs {
     /// File of the log [default: the user's state folder, a file a day, seven days]
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
+}
+
+/// What every command that starts a terminal takes.
+#[derive(Debug, Clone, Default, clap::Args)]
+struct TerminalArgs {
+    /// Language of the screens [default: that of LC_ALL, LC_MESSAGES or LANG, else English]; L changes it
+    #[arg(long, value_name = "LANGUAGE", value_parser = language())]
+    language: Option<Language>,
+}
+
+impl TerminalArgs {
+    /// What can be chosen about a terminal.
+    fn options(&self, leaving: ui::Leaving) -> ui::io::Options {
+        let detected = ui::io::Options::new(leaving);
+        ui::io::Options { language: self.language.unwrap_or(detected.language), ..detected }
+    }
+}
+
+/// Reads the code of a language.
+fn language() -> impl TypedValueParser<Value = Language> {
+    PossibleValuesParser::new(Language::all().map(Language::code))
+        .map(|code| Language::from_code(&code).expect("it is one of them"))
 }
 
 /// Why a command failed.
@@ -240,8 +268,10 @@ fn parse(words: Vec<std::ffi::OsString>) -> Args {
 fn run_command(args: Args) -> Result<(), CliError> {
     match args.command {
         None => match args.plant {
-            Some(plant) => run::with_terminal(&plant, &args.station).map_err(|error| mistyped(&plant, error)),
-            None => match attach::main(attach::Args { plant: None }) {
+            Some(plant) => {
+                run::with_terminal(&plant, &args.station, &args.terminal).map_err(|error| mistyped(&plant, error))
+            }
+            None => match attach::main(attach::Args { plant: None, terminal: args.terminal }) {
                 Err(error @ CliError::NotRunning(_)) => match menu::without_station()? {
                     Some(words) => run_command(parse(
                         std::iter::once("sightglass".into()).chain(words.into_iter().map(Into::into)).collect(),

@@ -12,6 +12,9 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     if keys::find(&keys::global(), event) == Some(Global::Lock) {
         return session_lock::lock(model);
     }
+    if keys::ctrl('t').is(event) {
+        return on_global(model, Global::Language);
+    }
     if model.tour.is_some() && tour::SKIP.is(event) {
         return Vec::new();
     }
@@ -66,7 +69,9 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
     }
     match keys::find(&keys::global(), event) {
-        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
+        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw | Global::Language)) => {
+            on_global(model, global)
+        }
         // No command goes to what is not visible.
         Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
@@ -134,6 +139,7 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             let tab = model.visited.step(shown, &offered, global == Global::Forward);
             tab.map(UiAction::Show).into_iter().collect()
         }
+        Global::Language => vec![UiAction::SetLocale(model.locale.language.next().locale())],
         Global::Help => vec![UiAction::Open(Modal::Help(0))],
         Global::Quit => vec![UiAction::Leave],
         Global::Acknowledge => last_frame::acknowledge(model),

@@ -49,6 +49,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 }
                 effects.push(Effect::SessionRequest(QueryId { tab: Some(tab), number }, request));
             }
+            UiAction::SetLocale(locale) => model.set_locale(locale),
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
         }
@@ -71,6 +72,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
             None
         }
         UiAction::Leave
+        | UiAction::SetLocale(_)
         | UiAction::Show(_)
         | UiAction::ShowDevice(_)
         | UiAction::ShowParameter(_)

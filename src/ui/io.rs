@@ -37,6 +37,7 @@ use crate::{
     },
     station::{Request, Session},
     t,
+    text::Language,
 };
 use screen::{Screen, own};
 
@@ -53,6 +54,8 @@ const INBOX: usize = 32;
 pub struct Options {
     /// How things look.
     pub theme: Theme,
+    /// The language that it begins with, if the terminal has its letters.
+    pub language: Language,
     /// What ends with it.
     pub leaving: Leaving,
     /// It begins with the tour of a demonstration.
@@ -76,9 +79,11 @@ pub struct ExtensionPort {
 impl Options {
     /// Looks chosen by the environment.
     pub fn new(leaving: Leaving) -> Options {
-        let theme = Theme::detect(|name| std::env::var(name).ok());
+        let env = |name: &str| std::env::var(name).ok();
+        let (theme, language) = (Theme::detect(env), Language::detect(env));
         Options {
             theme,
+            language,
             leaving,
             tour: false,
             extension: None,
@@ -116,6 +121,7 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let snapshot = session.snapshots.borrow_and_update().clone();
     let status = session.status.borrow_and_update().clone();
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
+    model.set_locale(options.language.locale());
     model.leaving = options.leaving;
     model.tour = options.tour.then(super::Tour::default);
     model.tabs.registers.profiles = options.profiles;
@@ -293,9 +299,10 @@ impl Loop {
 
     fn save(&self, tab: Option<Tab>, path: PathBuf, bytes: Vec<u8>, new: bool) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
+        let exists = self.model.locale.within(|| t!("a file of this name is there already"));
         tokio::task::spawn_blocking(move || {
             let why = |error: io::Error| match error.kind() {
-                io::ErrorKind::AlreadyExists => t!("a file of this name is there already").to_owned(),
+                io::ErrorKind::AlreadyExists => exists.to_owned(),
                 _ => error.to_string(),
             };
             let saved = save(&path, &bytes, new).map_err(|error| format!("{}: {}", path.display(), why(error)));

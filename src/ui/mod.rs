@@ -43,7 +43,7 @@ use crate::{
     history::{Answer, HistoryError},
     plant::{alarm::AlarmCommand, command::CommandKind, sample::Cause, snapshot::Snapshot},
     t,
-    text::Language,
+    text::{Language, Locale},
 };
 use extension::Extension;
 use keys::Global;
@@ -56,7 +56,7 @@ use screen_dump::ScreenDump;
 use session_lock::SessionLock;
 pub(crate) use tabs::mimic::preview;
 use tabs::{Tab, Tabs, alarms::actions};
-use theme::Theme;
+use theme::{Glyphs, Theme};
 pub(crate) use tour::Tour;
 use tour::TourEvent;
 use visited::Visited;
@@ -77,8 +77,8 @@ pub struct Model {
     pub modal: Option<Modal>,
     /// How things look.
     pub theme: Theme,
-    /// The language of its texts.
-    pub language: Language,
+    /// The language of its texts, and how it writes dates.
+    pub locale: Locale,
     /// The whole screen.
     pub screen: Rect,
     /// What time it is and how the animation stands.
@@ -134,7 +134,7 @@ impl Model {
             replay: Replay::default(),
             modal: None,
             theme,
-            language: Language::default(),
+            locale: Locale::ENGLISH,
             screen: Rect::default(),
             clock: Clock::default(),
             last_command: None,
@@ -162,6 +162,15 @@ impl Model {
         chrome::layout(self.screen).small
     }
 
+    /// Shows all texts in this language, if the terminal has its letters: fonts of a console have those of English only.
+    pub fn set_locale(&mut self, locale: Locale) {
+        if locale.language == Language::ENGLISH || self.theme.glyphs == Glyphs::Braille {
+            self.locale = locale;
+        } else {
+            self.note = Some(t!("This terminal does not have the letters of that language"));
+        }
+    }
+
     /// Doubts every value: nothing has been heard of them for too long.
     fn doubt(&mut self) {
         if self.snapshot.samples.iter().any(|sample| sample.quality.is_good()) {
@@ -175,7 +184,7 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
-    model.language.within(|| on_msg(model, msg))
+    model.locale.within(|| on_msg(model, msg))
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
@@ -250,7 +259,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    model.language.within(|| chrome::view(model, frame));
+    model.locale.within(|| chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
 }
 

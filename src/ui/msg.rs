@@ -18,6 +18,7 @@ use crate::{
         def::{DeviceId, TagId},
         snapshot::Snapshot,
     },
+    text::Locale,
 };
 
 /// What happens to a terminal.
@@ -141,6 +142,8 @@ pub enum UiAction {
     SendCommand(Command, Option<Credentials>),
     /// Send the station a request; the answer goes to the window that waits for one, else to this tab.
     SessionRequest(Tab, SessionRequest),
+    /// Show all texts in this language.
+    SetLocale(Locale),
     /// Ask whether to leave.
     Leave,
     /// Pass on an effect as it is.

@@ -358,6 +358,7 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         | UiAction::ReplayStep(_)
         | UiAction::SessionRequest(..)
         | UiAction::Leave
+        | UiAction::SetLocale(_)
         | UiAction::Do(_) => false,
     };
     let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();

@@ -179,6 +179,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             ) => held = held.or(Some(None)),
             UiAction::Open(_)
             | UiAction::Leave
+            | UiAction::SetLocale(_)
             | UiAction::Show(_)
             | UiAction::ShowDevice(_)
             | UiAction::ShowParameter(_)

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::{model, replay::replayed, screen, type_keys};
+use super::{LANGUAGES, model, replay::replayed, screen, type_keys};
 use crate::{
     text::{Language, translate},
-    ui::{fixture::Fixture, tabs::Tab, theme::Theme, widgets::text::take_overwritten},
+    ui::{fixture::Fixture, glyph_filter::cells, tabs::Tab, theme::Theme, widgets::text::take_overwritten},
 };
 
 /// Words that no language changes: letters of controllers, names of protocols, standards and keys.
@@ -73,8 +73,8 @@ fn missed_words(line: &str, given: &BTreeSet<String>) -> Vec<String> {
     runs(line).filter(missed).map(|(word, ..)| word.to_owned()).collect()
 }
 
-/// Draws every page and window with the texts of the test's language, in every size.
-fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
+/// Draws every page and window with the texts of a language, in every size.
+fn draw_all(language: Language, mut check: impl FnMut(&Fixture, &str, &str)) {
     let tabs: [(Tab, &[&str]); 8] = [
         (Tab::Mimic, &["", "?", "q", "⏎", "s", "C", "w", ":", ":pv", "@", "@x⏎", "Z"]),
         (Tab::Trends, &["", "?", "p", "⏎"]),
@@ -89,7 +89,7 @@ fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
         for (tab, typed) in tabs {
             for (keys, (width, height)) in typed.iter().flat_map(|keys| SIZES.map(|size| (keys, size))) {
                 let mut model = model(&fixture, Theme::FULL);
-                model.language = Language::Pseudo;
+                model.locale = language.locale();
                 model.tabs.shown = tab;
                 type_keys(&mut model, keys);
                 let shown = screen(&mut model, width, height);
@@ -97,7 +97,7 @@ fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
             }
             for (keys, (width, height)) in ["", "?"].iter().flat_map(|keys| SIZES.map(|size| (keys, size))) {
                 let mut model = replayed(&fixture, tab);
-                model.language = Language::Pseudo;
+                model.locale = language.locale();
                 type_keys(&mut model, keys);
                 let shown = screen(&mut model, width, height);
                 check(&fixture, &format!("{tab:?} {keys:?} {width}x{height} in the past"), &shown);
@@ -109,7 +109,7 @@ fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
 #[test]
 fn every_text_of_a_screen_is_in_the_catalogue() {
     let mut missed = BTreeSet::new();
-    draw_all(|fixture, place, shown| {
+    draw_all(Language::PSEUDO, |fixture, place, shown| {
         let given = given_words(fixture);
         for line in shown.lines() {
             let words = missed_words(line, &given);
@@ -120,20 +120,25 @@ fn every_text_of_a_screen_is_in_the_catalogue() {
 }
 
 #[test]
-fn longer_words_overwrite_nothing() {
+fn no_text_overwrites_another_in_any_language() {
     let mut overwritten = BTreeSet::new();
     take_overwritten();
-    draw_all(|_, place, _| {
-        overwritten.extend(take_overwritten().into_iter().map(|texts| format!("{place}: {texts}")));
-    });
+    for language in LANGUAGES {
+        draw_all(language, |_, place, _| {
+            let found = take_overwritten().into_iter();
+            overwritten.extend(found.map(|texts| format!("{} {place}: {texts}", language.code())));
+        });
+    }
     assert!(overwritten.is_empty(), "{}", overwritten.into_iter().collect::<Vec<_>>().join("\n"));
 }
 
 #[test]
-fn longer_words_leave_room_for_the_way_out() {
-    let ways = Language::Pseudo.within(|| [translate("help"), translate("Esc"), "Esc"]);
-    draw_all(|_, place, shown| {
-        let footer = shown.lines().last().unwrap_or_default();
-        assert!(ways.iter().any(|way| footer.contains(way)), "{place}: {footer}");
-    });
+fn every_language_has_room_for_the_way_out() {
+    for language in LANGUAGES {
+        let ways = language.locale().within(|| [translate("help"), translate("Esc"), "Esc"]).map(cells);
+        draw_all(language, |_, place, shown| {
+            let footer = shown.lines().last().unwrap_or_default();
+            assert!(ways.iter().any(|way| footer.contains(&**way)), "{} {place}: {footer}", language.code());
+        });
+    }
 }

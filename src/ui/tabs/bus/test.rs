@@ -166,7 +166,7 @@ pub fn closed(at: &LineView) -> Option<String> {
         LineState::Connected | LineState::Testing => None,
         LineState::Connecting => Some(t!("line {name} is connecting: nothing can be sent yet", name)),
         LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why)),
-        LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (tab 4, L)", name)),
+        LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (tab 4, D)", name)),
     }
 }
 
