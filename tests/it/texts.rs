@@ -14,6 +14,9 @@ use syn::{
 
 type Texts = BTreeMap<String, BTreeSet<String>>;
 
+/// Functions and fields whose texts are translated where they are drawn.
+const LABELS: [&str; 7] = ["label", "word", "words", "message", "advice", "mode", "effect"];
+
 /// Texts of one file: of `t!`, of functions that label a state, and of rows of tables.
 #[derive(Default)]
 struct Found {
@@ -38,7 +41,7 @@ impl Found {
     /// A label of a state is a `&'static str` that is translated where it is drawn.
     fn within(&mut self, signature: &syn::Signature, visit: impl FnOnce(&mut Self)) {
         let is_label =
-            ["label", "word", "words", "message", "advice", "mode"].iter().any(|name| signature.ident == name);
+            LABELS.iter().any(|name| signature.ident == name);
         let is_text = matches!(&signature.output, syn::ReturnType::Type(_, of)
             if matches!(&**of, syn::Type::Reference(text) if text.lifetime.as_ref().is_some_and(|of| of.ident == "static")));
         let before = std::mem::replace(&mut self.in_label, is_label && is_text);
@@ -84,7 +87,7 @@ impl<'a> Visit<'a> for Found {
         let of_keys = row.path.segments.last().is_some_and(|name| name.ident == "Key");
         for field in row.fields.iter().filter(|_| of_keys) {
             if let (syn::Member::Named(name), syn::Expr::Lit(literal)) = (&field.member, &field.expr)
-                && (["label", "word", "words", "message", "advice", "mode"].iter().any(|label| name == label))
+                && LABELS.iter().any(|label| name == label)
                 && let syn::Lit::Str(text) = &literal.lit
             {
                 self.add(text.value());
@@ -93,12 +96,12 @@ impl<'a> Visit<'a> for Found {
         visit::visit_expr_struct(self, row);
     }
     fn visit_expr_call(&mut self, call: &'a syn::ExprCall) {
-        // Rows of the tables of keys and of alarm metrics.
+        // Rows of the tables of keys and of alarm metrics, headings of columns.
         let name = match &*call.func {
             syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
             _ => Vec::new(),
         };
-        if [vec!["row"], vec!["goal"], vec!["Key", "new"]].iter().any(|row| *row == name) {
+        if [vec!["row"], vec!["goal"], vec!["Key", "new"], vec!["rows", "words"], vec!["rows", "number"]].iter().any(|row| *row == name) {
             for argument in &call.args {
                 if let syn::Expr::Lit(literal) = argument
                     && let syn::Lit::Str(text) = &literal.lit
@@ -197,6 +200,10 @@ fn texts() -> Texts {
         let in_profile = path.starts_with(root.join("profile"));
         let mut found = Found { in_profile, ..Found::default() };
         found.visit_file(&syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap());
+        if path.ends_with("controllers/guide.rs") {
+            let guide = fs::read_to_string(path.with_extension("txt")).unwrap();
+            guide.lines().for_each(|line| found.add(line.trim_start_matches("# ").to_owned()));
+        }
         let new: BTreeSet<String> = found.texts.into_iter().filter(|text| known.insert(text.clone())).collect();
         let name = path.strip_prefix(&root).unwrap().with_extension("").display().to_string();
         if !new.is_empty() {
