@@ -112,7 +112,7 @@ impl Language {
 }
 
 impl Locale {
-    /// As the code has it: for what is written into files and records, whatever a terminal shows.
+    /// As the code has it.
     pub const ENGLISH: Locale = Locale { language: Language::ENGLISH, calendar: Calendar::Gregorian };
 
     /// That of this thread.
@@ -136,6 +136,11 @@ pub fn translate(english: &'static str) -> &'static str {
 /// The text in the language of this thread, unless that is English.
 pub fn translation(english: &str) -> Option<&'static str> {
     CATALOGUES[LOCALE.get().language.0].get(english).map(String::as_str)
+}
+
+/// Makes a file, which is the same whatever language its terminal shows.
+pub fn file<R>(make: impl FnOnce() -> R) -> R {
+    Locale::ENGLISH.within(make)
 }
 
 /// A text as it is searched: without break points, and SARA AM always as one character.

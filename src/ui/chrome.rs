@@ -323,8 +323,13 @@ fn footer(cx: &ViewContext, canvas: &mut Canvas, hints: &[Hint], refused: Option
     let mut x = 1;
     for (n, hint) in hints.iter().enumerate().filter(|(_, hint)| !hint.label.is_empty()) {
         let hint = n.checked_sub(1).and_then(|before| pair(&hints[before], hint)).unwrap_or_else(|| hint.clone());
-        if x + room(&hint) > end {
-            break;
+        // The way out of a window stands behind what else it has.
+        let way_out = hints.iter().skip(n + 1).find(|hint| !global && hint.key == t!("Esc")).map_or(0, room);
+        if x + room(&hint) + way_out > end {
+            if way_out == 0 {
+                break;
+            }
+            continue;
         }
         x = key(cx, canvas, x, &hint);
     }

@@ -34,16 +34,13 @@ pub fn cells(text: &str) -> Cow<'_, str> {
 /// Makes a drawn frame safe for the terminal: nothing that moves the cursor or turns the direction of writing, no SARA AM,
 /// and only characters of the glyph set.
 pub fn apply(buffer: &mut Buffer, theme: &Theme) {
+    split_sara_am(buffer);
     for cell in &mut buffer.content {
         if cell.symbol().chars().any(is_control_or_bidi) {
             cell.set_symbol("?");
         }
         if cell.symbol().is_ascii() {
             continue;
-        }
-        if cell.symbol().contains('\u{e33}') {
-            let symbol = cells(cell.symbol()).into_owned();
-            cell.set_symbol(&symbol);
         }
         let first = cell.symbol().chars().next().unwrap_or(' ');
         match theme.glyphs {
@@ -56,6 +53,22 @@ pub fn apply(buffer: &mut Buffer, theme: &Theme) {
             Glyphs::Ascii => {
                 cell.set_char(ascii(first));
             }
+        }
+    }
+}
+
+/// What a widget of the library has drawn: a letter with SARA AM becomes two cells, as if a canvas had drawn it.
+fn split_sara_am(buffer: &mut Buffer) {
+    let columns = usize::from(buffer.area.width);
+    for at in 0..buffer.content.len() {
+        let symbol = cells(buffer.content[at].symbol());
+        let Cow::Owned(symbol) = symbol else { continue };
+        let letter = symbol.trim_end_matches('\u{e32}');
+        // Alone it has one column.
+        let is_wide = !letter.starts_with('\u{e4d}') && (at + 1) % columns != 0;
+        buffer.content[at].set_symbol(if is_wide { letter } else { &symbol });
+        if is_wide && buffer.content[at + 1].symbol() == " " {
+            buffer.content[at + 1].set_symbol("\u{e32}");
         }
     }
 }

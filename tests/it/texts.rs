@@ -40,8 +40,7 @@ impl Found {
     }
     /// A label of a state is a `&'static str` that is translated where it is drawn.
     fn within(&mut self, signature: &syn::Signature, visit: impl FnOnce(&mut Self)) {
-        let is_label =
-            LABELS.iter().any(|name| signature.ident == name);
+        let is_label = LABELS.iter().any(|name| signature.ident == name);
         let is_text = matches!(&signature.output, syn::ReturnType::Type(_, of)
             if matches!(&**of, syn::Type::Reference(text) if text.lifetime.as_ref().is_some_and(|of| of.ident == "static")));
         let before = std::mem::replace(&mut self.in_label, is_label && is_text);
@@ -101,7 +100,10 @@ impl<'a> Visit<'a> for Found {
             syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
             _ => Vec::new(),
         };
-        if [vec!["row"], vec!["goal"], vec!["Key", "new"], vec!["rows", "words"], vec!["rows", "number"]].iter().any(|row| *row == name) {
+        if [vec!["row"], vec!["goal"], vec!["Key", "new"], vec!["rows", "words"], vec!["rows", "number"]]
+            .iter()
+            .any(|row| *row == name)
+        {
             for argument in &call.args {
                 if let syn::Expr::Lit(literal) = argument
                     && let syn::Lit::Str(text) = &literal.lit

@@ -4,8 +4,17 @@ use std::collections::BTreeSet;
 
 use super::{LANGUAGES, model, replay::replayed, screen, type_keys};
 use crate::{
-    text::{Language, translate},
-    ui::{fixture::Fixture, glyph_filter::cells, tabs::Tab, theme::Theme, widgets::text::take_overwritten},
+    text::{Language, Locale, translate},
+    ui::{
+        Msg,
+        fixture::Fixture,
+        glyph_filter::cells,
+        keys,
+        tabs::Tab,
+        theme::{Glyphs, Theme},
+        update,
+        widgets::text::take_overwritten,
+    },
 };
 
 /// Words that no language changes: letters of controllers, names of protocols, standards and keys.
@@ -152,4 +161,45 @@ fn every_language_has_room_for_the_way_out() {
             assert!(ways.iter().any(|way| footer.contains(&**way)), "{} {place}: {footer}", language.code());
         });
     }
+}
+
+#[test]
+fn a_key_changes_the_language_and_back() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    type_keys(&mut model, "L");
+    let thai = screen(&mut model, 80, 24);
+    assert!(thai.contains("กราฟ") && !thai.contains("Trends"), "{thai}");
+    type_keys(&mut model, "L");
+    assert!(screen(&mut model, 80, 24).contains("Trends"));
+    // In a form a letter is typed; Ctrl-T works there too.
+    model.tabs.shown = Tab::Login;
+    type_keys(&mut model, "pL");
+    assert_eq!(model.locale, Locale::ENGLISH);
+    update(&mut model, Msg::Key(keys::ctrl('t').event()));
+    assert_eq!(model.locale, Language::THAI.locale());
+}
+
+#[test]
+fn a_terminal_without_thai_letters_stays_english() {
+    for theme in [Theme::PLAIN, Theme { glyphs: Glyphs::Block, ..Theme::FULL }] {
+        let mut model = model(&Fixture::normal(), theme);
+        type_keys(&mut model, "L");
+        assert_eq!(model.locale, Locale::ENGLISH);
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains("does not have the letters of that language"), "{shown}");
+    }
+}
+
+#[test]
+fn thai_of_a_plant_file_is_shown_and_found() {
+    let mut fixture = Fixture::normal();
+    let tag = fixture.tag("TIC-1.PV");
+    fixture.def.title = "ถังน้ำร้อน".into();
+    fixture.def.tags[tag.index()].label = "อุณหภูมิน้ำในถัง".into();
+    let mut model = model(&fixture, Theme::FULL);
+    assert!(screen(&mut model, 80, 24).contains(&*cells("ถังน้ำร้อน")));
+    // Typed as two characters it is the same.
+    type_keys(&mut model, ":นํา");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("TIC-1.PV") && shown.contains(&*cells("อุณหภูมิน้ำในถัง")), "{shown}");
 }

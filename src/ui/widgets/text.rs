@@ -362,6 +362,22 @@ mod tests {
     }
 
     #[test]
+    fn thai_is_cut_between_letters_and_broken_between_words() {
+        let check = |text: &str, room, expect: &str| assert_eq!(fit(text, room), expect, "{room}");
+        check("น้ำร้อน", 5, "น้ำร้อน");
+        check("น้ำร้อน", 4, "น้ำร้…");
+        check("น้ำร้อน", 2, "…");
+        check("ถังแก้ว", 4, "ถัง…");
+        check("สัญญาณ\u{200b}เตือน", 9, "สัญญาณ\u{200b}เตือน");
+        check("ตรวจสอบ\u{200b}ไฟเลี้ยง", 9, "ตรวจสอบ…");
+        let phrase = "ตรวจสอบ\u{200b}ไฟเลี้ยง \u{200b}การเดินสาย \u{200b}และหมายเลข\u{200b}อุปกรณ์";
+        let lines: Vec<_> = wrap(phrase, 16).iter().map(|line| line.replace(BREAK, "")).collect();
+        assert_eq!(lines, ["ตรวจสอบไฟเลี้ยง", "การเดินสาย", "และหมายเลข", "อุปกรณ์"]);
+        assert_eq!(wrap("ถังน้ำร้อนเต็ม", 5), ["ถังน้ำ", "ร้อน", "เต็ม"]);
+        assert_eq!(wrap("limit 72.0\u{a0}°C", 8), ["limit", "72.0\u{a0}°C"]);
+    }
+
+    #[test]
     fn nothing_is_drawn_outside_a_canvas() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 6, 3));
         let mut canvas = Canvas::new(&mut buffer, Rect::new(2, 1, 2, 1));

@@ -211,7 +211,9 @@ fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
                     summary = dissection.summary
                 )),
                 (None, false, false) => Some(match names::effect(&dissection.message) {
-                    Some(effect) => t!("{summary}: {effect}. Send it?", summary = dissection.summary, effect = translate(effect)),
+                    Some(effect) => {
+                        t!("{summary}: {effect}. Send it?", summary = dissection.summary, effect = translate(effect))
+                    }
                     None => t!(
                         "{summary}. This bypasses all limits of the plant file and is not read back. Send it?",
                         summary = dissection.summary

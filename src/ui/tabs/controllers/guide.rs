@@ -1,7 +1,7 @@
 //! What the words of a controller mean, and what to change when it does not do what it should: pages to read.
 
-use crate::ui::tabs::prelude::*;
 use crate::text::translation;
+use crate::ui::tabs::prelude::*;
 
 /// The pages, each with its heading behind `# `; a paragraph is a line, its head before two blanks.
 const TEXT: &str = include_str!("guide.txt");
@@ -58,7 +58,9 @@ mod tests {
     #[test]
     fn every_page_can_be_read_whole_on_a_screen_of_80_by_24() {
         assert_eq!(count(), 5);
-        for ((heading, paragraphs), language) in pages().flat_map(|page| LANGUAGES[..2].iter().map(move |of| (page.clone(), of))) {
+        for ((heading, paragraphs), language) in
+            pages().flat_map(|page| LANGUAGES[..2].iter().map(move |of| (page.clone(), of)))
+        {
             let lines = language.locale().within(|| lines(paragraphs, 77));
             assert!(lines.len() <= 16, "{} {heading}: {lines:#?}", language.code());
             assert!(lines.iter().all(|line| !line.ends_with('…')), "{lines:#?}");

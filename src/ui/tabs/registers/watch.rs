@@ -20,6 +20,7 @@ use crate::{
         tag::{ByteOrder, DataType, Table},
     },
     report::value_log,
+    text::file,
     ui::{Effect, widgets::spark},
 };
 
@@ -72,7 +73,7 @@ impl WatchList {
     fn log_row(&mut self, at: Timestamp, cells: Vec<(String, Quality)>) -> Vec<UiAction> {
         let Some(log) = &mut self.log else { return Vec::new() };
         log.rows += 1;
-        let bytes = value_log::row(at, cells.into_iter());
+        let bytes = file(|| value_log::row(at, cells.into_iter()));
         vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path: log.path.clone(), bytes, new: false })]
     }
 
