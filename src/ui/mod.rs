@@ -1,5 +1,6 @@
 //! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
 
+mod answers;
 mod context;
 mod dispatch;
 mod effects;
@@ -56,7 +57,7 @@ use screen_dump::ScreenDump;
 use session_lock::SessionLock;
 pub(crate) use tabs::mimic::preview;
 use tabs::{Tab, Tabs, alarms::actions};
-use theme::{Glyphs, Theme};
+use theme::Theme;
 pub(crate) use tour::Tour;
 use tour::TourEvent;
 use visited::Visited;
@@ -162,9 +163,9 @@ impl Model {
         chrome::layout(self.screen).small
     }
 
-    /// Shows all texts in this language, if the terminal has its letters: fonts of a console have those of English only.
+    /// Shows all texts in this language, if the terminal has its letters.
     pub fn set_locale(&mut self, locale: Locale) {
-        if locale.language == Language::ENGLISH || self.theme.glyphs == Glyphs::Braille {
+        if locale.language == Language::ENGLISH || self.theme.has_all_letters() {
             self.locale = locale;
         } else {
             self.note = Some(t!("This terminal does not have the letters of that language"));
@@ -216,7 +217,9 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Begin(start) => with_tabs(model, |tabs, cx| tabs.registers.begin(cx, start)),
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
         Msg::SessionStatus(session) => session_lock::on_session_status(model, session),
-        Msg::RequestDone(id, answer) => session_lock::on_request_done(model, id, answer),
+        Msg::RequestDone(id, answer) => {
+            session_lock::on_request_done(model, id, answer.map_err(|why| answers::said(&why)))
+        }
         Msg::Extension(state) => {
             model.extension = Some(state);
             Vec::new()

@@ -76,6 +76,11 @@ impl Theme {
         Theme { colours, glyphs, motion: true }
     }
 
+    /// Does the terminal have the letters of every language? Fonts of a console and seven bits have those of English.
+    pub fn has_all_letters(&self) -> bool {
+        self.glyphs == Glyphs::Braille
+    }
+
     /// Ordinary words and values.
     pub fn normal(&self) -> Style {
         self.fg((200, 200, 196), 251, Color::Reset)

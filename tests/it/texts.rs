@@ -249,6 +249,21 @@ fn the_catalogue_has_every_text_and_no_other() {
     assert!(written == document, "en.toml is not what the code shows; missing: {missing:#?}, unused: {unused:#?}");
 }
 
+/// The terminal knows answers of the station by their texts: each stands in the code that gives it.
+#[test]
+fn every_known_answer_is_one_of_the_station() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root.join("access"), &mut files);
+    let access: String = files.iter().map(|path| fs::read_to_string(path).unwrap()).collect();
+    for answer in &texts()["ui/answers"] {
+        let literals = answer.split('{').filter_map(|part| part.rsplit('}').next());
+        for piece in literals.flat_map(|literal| literal.split("; ")) {
+            assert!(piece.is_empty() || access.contains(piece), "{answer:?}: {piece:?} is not in `access`");
+        }
+    }
+}
+
 /// A catalogue as texts and translations.
 fn translations(written: &str) -> BTreeMap<String, String> {
     let files: BTreeMap<String, BTreeMap<String, String>> = toml::from_str(written).unwrap();

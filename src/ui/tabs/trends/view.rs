@@ -15,6 +15,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::{def::Pen, record::AlarmEvent},
+    text::date,
     ui::{
         theme::Glyphs,
         widgets::{
@@ -368,7 +369,7 @@ fn moment_exact(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
 fn stretch(from: Timestamp, to: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     let [from, to, now] = [from, to, now].map(|at| at.to_zoned(zone.clone()));
     let (first, last) = match (from.date() == to.date(), from.date() == now.date()) {
-        _ if from.year() != now.year() => ("%Y-%m-%d", "%Y-%m-%d"),
+        _ if from.year() != now.year() => return format!("{} – {}", date(from.date()), date(to.date())),
         (true, true) => ("%H:%M:%S", "%H:%M:%S"),
         (true, false) => ("%m-%d %H:%M", "%H:%M"),
         (false, _) => ("%m-%d %H:%M", "%m-%d %H:%M"),
