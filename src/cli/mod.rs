@@ -35,6 +35,7 @@ mod status;
 mod times;
 mod tools;
 mod systemd_unit;
+mod terminal;
 
 use std::{
     io::{IsTerminal, Write},
@@ -42,15 +43,14 @@ use std::{
     process::ExitCode,
 };
 
-use clap::{
-    Parser, Subcommand,
-    builder::{PossibleValuesParser, TypedValueParser},
-};
+use clap::{Parser, Subcommand};
 
-use self::times::{span, speed};
+use self::{
+    terminal::TerminalArgs,
+    times::{span, speed},
+};
 use crate::{
-    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile,
-    text::Language, ui,
+    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile, ui,
 };
 
 const EXIT_CODES: &str = "\
@@ -153,28 +153,6 @@ struct StationArgs {
     /// File of the log [default: the user's state folder, a file a day, seven days]
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-}
-
-/// What every command that starts a terminal takes.
-#[derive(Debug, Clone, Default, clap::Args)]
-struct TerminalArgs {
-    /// Language of the screens [default: that of LC_ALL, LC_MESSAGES or LANG, else English]; L changes it
-    #[arg(long, value_name = "LANGUAGE", value_parser = language())]
-    language: Option<Language>,
-}
-
-impl TerminalArgs {
-    /// What can be chosen about a terminal.
-    fn options(&self, leaving: ui::Leaving) -> ui::io::Options {
-        let detected = ui::io::Options::new(leaving);
-        ui::io::Options { language: self.language.unwrap_or(detected.language), ..detected }
-    }
-}
-
-/// Reads the code of a language.
-fn language() -> impl TypedValueParser<Value = Language> {
-    PossibleValuesParser::new(Language::all().map(Language::code))
-        .map(|code| Language::from_code(&code).expect("it is one of them"))
 }
 
 /// Why a command failed.

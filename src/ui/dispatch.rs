@@ -9,14 +9,8 @@ const RECENT_MAX: usize = 8;
 pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     model.note = None;
     model.replay.dismiss();
-    if keys::find(&keys::global(), event) == Some(Global::Lock) {
-        return session_lock::lock(model);
-    }
-    if keys::ctrl('t').is(event) {
-        return on_global(model, Global::Language);
-    }
-    if model.tour.is_some() && tour::SKIP.is(event) {
-        return Vec::new();
+    if let Some(actions) = on_key_of_every_window(model, event) {
+        return actions;
     }
     if session_lock::ask_before_work(model, event) {
         return Vec::new();
@@ -77,6 +71,15 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         Some(global) => on_global(model, global),
         None if !model.may_act(event) => Vec::new(),
         None => on_tab_key(model, event),
+    }
+}
+
+/// Keys that mean the same in every window and while something is typed.
+fn on_key_of_every_window(model: &mut Model, event: KeyEvent) -> Option<Vec<UiAction>> {
+    match keys::find(&keys::global(), event) {
+        Some(Global::Lock) => Some(session_lock::lock(model)),
+        Some(Global::Language) if keys::ctrl('t').is(event) => Some(on_global(model, Global::Language)),
+        Some(_) | None => (model.tour.is_some() && tour::SKIP.is(event)).then(Vec::new),
     }
 }
 

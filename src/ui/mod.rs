@@ -168,7 +168,7 @@ impl Model {
         if locale.language == Language::ENGLISH || self.theme.has_all_letters() {
             self.locale = locale;
         } else {
-            self.note = Some(t!("This terminal does not have the letters of that language"));
+            self.note = Some(t!("This terminal does not have the letters of that language").into());
         }
     }
 
@@ -217,9 +217,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Begin(start) => with_tabs(model, |tabs, cx| tabs.registers.begin(cx, start)),
         Msg::Snapshot(snapshot) => on_snapshot(model, snapshot),
         Msg::SessionStatus(session) => session_lock::on_session_status(model, session),
-        Msg::RequestDone(id, answer) => {
-            session_lock::on_request_done(model, id, answer.map_err(|why| answers::said(&why)))
-        }
+        Msg::RequestDone(id, answer) => session_lock::on_request_done(model, id, answer),
         Msg::Extension(state) => {
             model.extension = Some(state);
             Vec::new()

@@ -90,7 +90,7 @@ const PAGES: &[(Tab, &[&str])] = &[
     (Tab::Alarms, &["", "?", "v", "vv", "vvv", "vvvv", "vvvvv", "⏎", "z", "o", "n", "r", "t", "A"]),
     (Tab::Controllers, &["", "?", "⏎", "T", "f", "⏎p", "h", "h→", "h→→", "D", "x", "⏎m", "⏎g", "⏎S"]),
     (Tab::Reports, &["", "?", "⏎", "u", "/", ";"]),
-    (Tab::Bus, &["", "?", "P", "P⏎", "Pw", "T", "Ts"]),
+    (Tab::Bus, &["", "?", "B", "B⏎", "Bw", "T", "Ts"]),
     (Tab::Users, &["", "?", "n", "⏎", "j", "r", "p"]),
     (Tab::Login, &["", "p", "⏎"]),
 ];
