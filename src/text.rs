@@ -3,71 +3,128 @@
 //! `t!("Log in")` is a text, `t!("locked until {until}", until)` one with values; the compiler checks the English one and its values.
 //! A label of an enum and a row of a key table stay plain English in the code and pass [`translate`] where they are drawn.
 //! `text/en.toml` lists all of them, by the file they stand in: a copy of it with other values is another language. A test keeps it complete.
+//! In the values U+200B is where a line may break; it takes no column and is dropped where a text is drawn or searched.
 
-use std::{cell::Cell, collections::HashMap, fmt::Display};
+mod date;
+
+use std::{cell::Cell, collections::HashMap, fmt::Display, sync::LazyLock};
+
+pub use date::{date, weekday};
 
 thread_local! {
-    static LANGUAGE: Cell<Language> = const { Cell::new(Language::English) };
+    static LOCALE: Cell<Locale> = const { Cell::new(Locale::ENGLISH) };
 }
 
-/// A language of the screens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Language {
-    /// The language of the code: needs no catalogue.
-    #[default]
-    English,
-    /// For tests: every catalogued text with other and more letters, so that a text without the door is seen.
+/// A language of the screens: a row of the table of languages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Language(usize);
+
+struct Definition {
+    /// ISO 639: in the environment and of `--language`.
+    code: &'static str,
+    /// What its speakers call it.
+    name: &'static str,
+    /// Reads its catalogue: empty for the language of the code.
+    load: fn() -> Catalogue,
+    /// The calendar that its readers are used to.
+    calendar: Calendar,
+}
+
+/// One row a language.
+static LANGUAGES: &[Definition] = &[
+    Definition { code: "en", name: "English", load: Catalogue::new, calendar: Calendar::Gregorian },
+    Definition {
+        code: "th", name: "ไทย", load: || read(include_str!("text/th.toml")), calendar: Calendar::Buddhist
+    },
     #[cfg(test)]
-    Pseudo,
+    Definition { code: "pseudo", name: "pseudo", load: tests::pseudo, calendar: Calendar::Gregorian },
+];
+
+/// The catalogues by language, each read when it is first shown.
+static CATALOGUES: LazyLock<Vec<LazyLock<Catalogue>>> =
+    LazyLock::new(|| LANGUAGES.iter().map(|language| LazyLock::new(language.load)).collect());
+
+/// How the years of a date in words are counted. Dates in figures, files and records are always Gregorian.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Calendar {
+    /// Common Era.
+    Gregorian,
+    /// Buddhist Era: 543 years more.
+    Buddhist,
+}
+
+/// The language of a terminal, and what depends on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Locale {
+    /// The language of its texts.
+    pub language: Language,
+    /// The years of its dates in words.
+    pub calendar: Calendar,
 }
 
 type Catalogue = HashMap<String, String>;
 
+fn read(file: &str) -> Catalogue {
+    let files: HashMap<String, Catalogue> = toml::from_str(file).expect("a test reads every catalogue");
+    files.into_values().flatten().collect()
+}
+
 impl Language {
     /// The language of the code.
-    pub const ENGLISH: Language = Language::English;
+    pub const ENGLISH: Language = Language(0);
+    /// For tests: the language with the most marks.
+    #[cfg(test)]
+    pub const THAI: Language = Language(1);
+    /// For tests: every catalogued text with other and more letters, so that a text without the door is seen.
+    #[cfg(test)]
+    pub const PSEUDO: Language = Language(LANGUAGES.len() - 1);
 
     /// Every language that can be chosen.
     pub fn all() -> impl Iterator<Item = Language> {
-        std::iter::once(Language::ENGLISH)
+        (0..LANGUAGES.len() - usize::from(cfg!(test))).map(Language)
     }
-    /// The language of this code.
+    /// The language of this code, also with a country and an encoding behind it: `th`, `th_TH.UTF-8`.
     pub fn from_code(code: &str) -> Option<Language> {
-        Language::all().find(|language| language.code() == code)
+        let code = code.split(['_', '-', '.', '@']).next()?;
+        Language::all().find(|language| language.code().eq_ignore_ascii_case(code))
     }
-    /// ISO 639: in files.
+    /// The language that the environment asks for.
+    pub fn detect(env: impl Fn(&str) -> Option<String>) -> Language {
+        let set = ["LC_ALL", "LC_MESSAGES", "LANG"].into_iter().filter_map(env).find(|value| !value.is_empty());
+        set.and_then(|code| Language::from_code(&code)).unwrap_or(Language::ENGLISH)
+    }
+    /// `th`.
     pub fn code(self) -> &'static str {
-        match self {
-            Language::English => "en",
-            #[cfg(test)]
-            Language::Pseudo => "pseudo",
-        }
+        LANGUAGES[self.0].code
     }
     /// What its speakers call it.
     pub fn name(self) -> &'static str {
-        match self {
-            Language::English => "English",
-            #[cfg(test)]
-            Language::Pseudo => "pseudo",
-        }
+        LANGUAGES[self.0].name
+    }
+    /// The next one of the table, after the last the first.
+    pub fn next(self) -> Language {
+        Language::all().find(|language| language.0 > self.0).unwrap_or(Language::ENGLISH)
+    }
+    /// With the calendar that its readers are used to.
+    pub fn locale(self) -> Locale {
+        Locale { language: self, calendar: LANGUAGES[self.0].calendar }
+    }
+}
+
+impl Locale {
+    /// As the code has it.
+    pub const ENGLISH: Locale = Locale { language: Language::ENGLISH, calendar: Calendar::Gregorian };
+
+    /// That of this thread.
+    pub fn current() -> Locale {
+        LOCALE.get()
     }
     /// Runs `body` with all texts of this thread in this language.
     pub fn within<R>(self, body: impl FnOnce() -> R) -> R {
-        let before = LANGUAGE.replace(self);
+        let before = LOCALE.replace(self);
         let result = body();
-        LANGUAGE.set(before);
+        LOCALE.set(before);
         result
-    }
-
-    fn catalogue(self) -> Option<&'static Catalogue> {
-        match self {
-            Language::English => None,
-            #[cfg(test)]
-            Language::Pseudo => {
-                static PSEUDO: std::sync::LazyLock<Catalogue> = std::sync::LazyLock::new(tests::pseudo);
-                Some(&PSEUDO)
-            }
-        }
     }
 }
 
@@ -78,7 +135,17 @@ pub fn translate(english: &'static str) -> &'static str {
 
 /// The text in the language of this thread, unless that is English.
 pub fn translation(english: &str) -> Option<&'static str> {
-    LANGUAGE.get().catalogue()?.get(english).map(String::as_str)
+    CATALOGUES[LOCALE.get().language.0].get(english).map(String::as_str)
+}
+
+/// Makes a file, which is the same whatever language its terminal shows.
+pub fn file<R>(make: impl FnOnce() -> R) -> R {
+    Locale::ENGLISH.within(make)
+}
+
+/// A text as it is searched: without break points, and SARA AM always as one character.
+pub fn searchable(text: &str) -> String {
+    text.replace('\u{200b}', "").replace("\u{e4d}\u{e32}", "\u{e33}")
 }
 
 /// The pattern with its `{name}`s replaced by the values.
@@ -119,8 +186,8 @@ mod tests {
 
     /// Every text of the catalogue with marked letters and doubled vowels; the values keep their places.
     pub(super) fn pseudo() -> Catalogue {
-        let files: HashMap<String, Catalogue> = toml::from_str(include_str!("text/en.toml")).expect("en.toml is TOML");
-        files.into_values().flatten().map(|(english, text)| (english, marked(&text))).collect()
+        let texts = read(include_str!("text/en.toml")).into_iter();
+        texts.map(|(english, text)| (english, marked(&text))).collect()
     }
 
     fn vowel(letter: char, marked: &str) -> String {
@@ -163,7 +230,36 @@ mod tests {
 
     #[test]
     fn the_language_ends_with_its_body() {
-        let inside = Language::Pseudo.within(|| translate("quit"));
+        let inside = Language::PSEUDO.locale().within(|| translate("quit"));
         assert_eq!((inside, translate("quit")), ("ⓠúúííⓣ", "quit"));
+    }
+
+    #[test]
+    fn the_environment_chooses_the_language() {
+        let check = |set: &[(&str, &str)], expect: &str| {
+            let env = |name: &str| set.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned());
+            assert_eq!(Language::detect(env).code(), expect, "{set:?}");
+        };
+        check(&[], "en");
+        check(&[("LANG", "th_TH.UTF-8")], "th");
+        check(&[("LANG", "TH")], "th");
+        check(&[("LANG", "en_US.UTF-8"), ("LC_MESSAGES", "th_TH.utf8")], "th");
+        check(&[("LANG", "th_TH.UTF-8"), ("LC_ALL", "C")], "en");
+        check(&[("LANG", "th_TH.UTF-8"), ("LC_ALL", "")], "th");
+        check(&[("LANG", "de_DE.UTF-8")], "en");
+    }
+
+    #[test]
+    fn the_languages_follow_each_other_in_a_circle() {
+        let codes: Vec<_> = Language::all().map(Language::code).collect();
+        assert_eq!(codes, ["en", "th"]);
+        assert_eq!(Language::ENGLISH.next().name(), "ไทย");
+        assert_eq!(Language::ENGLISH.next().next(), Language::ENGLISH);
+    }
+
+    #[test]
+    fn a_search_sees_neither_break_points_nor_two_spellings() {
+        assert_eq!(searchable("ถัง\u{200b}น้ำ"), "ถังน้ำ");
+        assert_eq!(searchable("ทํา"), "ทำ");
     }
 }

@@ -25,7 +25,7 @@ use crate::{
 };
 
 use super::{
-    CliError, StationArgs, drill, in_runtime, load, log, own_files, paths, run, say,
+    CliError, StationArgs, TerminalArgs, drill, in_runtime, load, log, own_files, paths, run, say,
     source::{query_station, unexpected},
     span, speed,
 };
@@ -57,6 +57,8 @@ pub struct Args {
     /// Write a report of the whole run at the end, as CSV
     #[arg(long, value_name = "FILE", requires = "headless")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    terminal: TerminalArgs,
     #[command(flatten)]
     station: StationArgs,
 }
@@ -121,7 +123,7 @@ async fn demonstrate(
         let options = ui::io::Options {
             tour: args.tour,
             extension: Some(extension(port)),
-            ..ui::io::Options::new(ui::Leaving::Demo)
+            ..args.terminal.options(ui::Leaving::Demo)
         };
         tokio::select! {
             result = ui::io::run(session, options) => result.map_err(CliError::from),

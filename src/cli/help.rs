@@ -66,6 +66,11 @@ mod tests {
     }
 
     #[test]
+    fn the_arguments_are_well_formed() {
+        super::super::Args::command().debug_assert();
+    }
+
+    #[test]
     fn a_page_is_no_command() {
         for (name, about, text) in TOPICS {
             assert!(super::super::Args::command().find_subcommand(name).is_none(), "{name}");

@@ -36,6 +36,7 @@ mod status;
 mod times;
 mod tools;
 mod systemd_unit;
+mod terminal;
 
 use std::{
     io::{IsTerminal, Write},
@@ -45,7 +46,10 @@ use std::{
 
 use clap::{Parser, Subcommand};
 
-use self::times::{span, speed};
+use self::{
+    terminal::TerminalArgs,
+    times::{span, speed},
+};
 use crate::{
     access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile, ui,
 };
@@ -70,6 +74,8 @@ struct Args {
     /// that runs. Without it: a terminal at the station that runs here
     #[arg(value_name = "PLANT")]
     plant: Option<String>,
+    #[command(flatten)]
+    terminal: TerminalArgs,
     #[command(flatten)]
     station: StationArgs,
 }
@@ -243,8 +249,10 @@ fn parse(words: Vec<std::ffi::OsString>) -> Args {
 fn run_command(args: Args) -> Result<(), CliError> {
     match args.command {
         None => match args.plant {
-            Some(plant) => run::with_terminal(&plant, &args.station).map_err(|error| mistyped(&plant, error)),
-            None => match attach::main(attach::Args { plant: None }) {
+            Some(plant) => {
+                run::with_terminal(&plant, &args.station, &args.terminal).map_err(|error| mistyped(&plant, error))
+            }
+            None => match attach::main(attach::Args { plant: None, terminal: args.terminal }) {
                 Err(error @ CliError::NotRunning(_)) => match menu::without_station()? {
                     Some(words) => run_command(parse(
                         std::iter::once("sightglass".into()).chain(words.into_iter().map(Into::into)).collect(),
@@ -377,16 +385,4 @@ fn say_problems(problems: &profile::Errors) {
     // The rendering holds nothing raw but its own colours.
     let text = profile::render(problems, std::io::stderr().is_terminal() && !plain);
     let _ = writeln!(std::io::stderr(), "sightglass: {text}");
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-
-    #[test]
-    fn the_arguments_are_well_formed() {
-        Args::command().debug_assert();
-    }
 }

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc, time::Duration};
 use clap::Parser;
 
 use super::{
-    CliError, in_runtime, log, menu,
+    CliError, TerminalArgs, in_runtime, log, menu,
     open_log::{self, WatchArgs},
     paths, say,
     tools::{self, PortArgs},
@@ -54,12 +54,14 @@ pub struct Args {
     unit: Option<u8>,
     #[command(flatten)]
     watched: WatchArgs,
+    #[command(flatten)]
+    terminal: TerminalArgs,
 }
 
 /// Finds settings and unit, and shows the registers.
 pub fn main(args: Args) -> Result<(), CliError> {
     if let Some(path) = args.port.log() {
-        return show_log(open_log::read(path)?);
+        return show_log(open_log::read(path)?, &args.terminal);
     }
     let line = args.port.line()?;
     args.unit.map_or(Ok(()), |unit| tools::check_unit(&line, unit))?;
@@ -74,7 +76,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let options = ui::io::Options {
             start,
             profiles: own_profiles(Path::new("")),
-            ..ui::io::Options::new(ui::Leaving::Bench)
+            ..args.terminal.options(ui::Leaving::Bench)
         };
         let result = ui::io::run(session, options).await;
         station.stop().await;
@@ -84,7 +86,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 }
 
 /// Shows a log, without a line.
-fn show_log(start: Start) -> Result<(), CliError> {
+fn show_log(start: Start, terminal: &TerminalArgs) -> Result<(), CliError> {
     ui::io::require_terminal()?;
     let _log = log::start(None, None)?;
     in_runtime(async {
@@ -92,7 +94,7 @@ fn show_log(start: Start) -> Result<(), CliError> {
         let def = Arc::new(PlantDef { name: "log".into(), title, ..PlantDef::default() });
         let station = station::start_transient(def, Clock::real(), Vec::new(), Box::new(|_| {}));
         let session = station.session(&paths::operator());
-        let options = ui::io::Options { start, ..ui::io::Options::new(ui::Leaving::Log) };
+        let options = ui::io::Options { start, ..terminal.options(ui::Leaving::Log) };
         let result = ui::io::run(session, options).await;
         station.stop().await;
         Ok(result?)

@@ -19,7 +19,8 @@ use crate::{
 };
 
 use super::{
-    CliError, StationArgs, attach, client, in_runtime, init, load_with_file, local, log, paths, say, span, status,
+    CliError, StationArgs, TerminalArgs, attach, client, in_runtime, init, load_with_file, local, log, paths, say,
+    span, status,
 };
 
 /// So long an answer takes at most to leave the station before its socket closes.
@@ -108,7 +109,7 @@ fn checked(args: &Args) -> impl Fn() -> Result<Plant, CliError> + Clone + Send +
 }
 
 /// Station and terminal in one process; at the station of this plant, if it runs already.
-pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
+pub fn with_terminal(plant: &str, args: &StationArgs, terminal: &TerminalArgs) -> Result<(), CliError> {
     let (def, file) = load_with_file(plant, args)?;
     let def = Arc::new(def);
     ui::io::require_terminal()?;
@@ -116,7 +117,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
         if args.history.is_none()
             && let Ok(station) = client::find_station(Some(&def.name)).await
         {
-            return attach::attach_to(&station).await;
+            return attach::attach_to(&station, terminal).await;
         }
         let _log = log::start(args.log.as_deref(), Some(&history_file(&def, args)))?;
         let listener = listen(&def)?;
@@ -124,7 +125,7 @@ pub fn with_terminal(plant: &str, args: &StationArgs) -> Result<(), CliError> {
         let mut serving = Serving::new(listener, station);
         let session = serving.station.session(&paths::operator());
         let result = tokio::select! {
-            result = ui::io::run(session, ui::io::Options::new(ui::Leaving::Station)) => result,
+            result = ui::io::run(session, terminal.options(ui::Leaving::Station)) => result,
             _ = handle_lifecycle(&mut serving.station.lifecycle, || Err(CliError::Usage(LEAVE.to_owned()))) => Ok(()),
         };
         serving.stop().await?;

@@ -9,11 +9,8 @@ const RECENT_MAX: usize = 8;
 pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     model.note = None;
     model.replay.dismiss();
-    if keys::find(&keys::global(), event) == Some(Global::Lock) {
-        return session_lock::lock(model);
-    }
-    if model.tour.is_some() && tour::SKIP.is(event) {
-        return Vec::new();
+    if let Some(actions) = on_key_of_every_window(model, event) {
+        return actions;
     }
     if session_lock::ask_before_work(model, event) {
         return Vec::new();
@@ -67,12 +64,23 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
     }
     match keys::find(&keys::global(), event) {
-        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw)) => on_global(model, global),
+        Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw | Global::Language)) => {
+            on_global(model, global)
+        }
         // No command goes to what is not visible.
         Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
         None if !model.may_act(event) => Vec::new(),
         None => on_tab_key(model, event),
+    }
+}
+
+/// Keys that mean the same in every window and while something is typed.
+fn on_key_of_every_window(model: &mut Model, event: KeyEvent) -> Option<Vec<UiAction>> {
+    match keys::find(&keys::global(), event) {
+        Some(Global::Lock) => Some(session_lock::lock(model)),
+        Some(Global::Language) if keys::ctrl('t').is(event) => Some(on_global(model, Global::Language)),
+        Some(_) | None => (model.tour.is_some() && tour::SKIP.is(event)).then(Vec::new),
     }
 }
 
@@ -135,6 +143,7 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             let tab = model.visited.step(shown, &offered, global == Global::Forward);
             tab.map(UiAction::Show).into_iter().collect()
         }
+        Global::Language => vec![UiAction::SetLocale(model.locale().language.next().locale())],
         Global::Help => vec![UiAction::Open(Modal::Help(0))],
         Global::Quit => vec![UiAction::Leave],
         Global::Acknowledge => last_frame::acknowledge(model),

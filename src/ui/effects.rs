@@ -55,6 +55,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 model.preferences_file.set(user.as_deref(), chosen);
                 effects.push(Effect::KeepPreferences(user, chosen));
             }
+            UiAction::SetLocale(locale) => model.set_locale(locale),
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
         }
@@ -87,6 +88,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
             None
         }
         UiAction::Leave
+        | UiAction::SetLocale(_)
         | UiAction::Show(_)
         | UiAction::ShowDevice(_)
         | UiAction::ShowParameter(_)

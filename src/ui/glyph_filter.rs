@@ -7,10 +7,11 @@ use ratatui::buffer::Buffer;
 use super::theme::{Glyphs, Theme};
 use crate::plant::visible::is_control_or_bidi;
 
-/// Rewrites SARA AM (U+0E33) as NIKHAHIT + SARA AA: it looks the same, and every cluster becomes one cell wide.
-/// Terminals put SARA AM in a cell of its own, and the diff of two frames then leaves it behind on the screen.
-pub fn thai_cells(text: &str) -> Cow<'_, str> {
-    if !text.contains('\u{e33}') {
+/// A text as it is put into cells: without break points (U+200B), and with SARA AM (U+0E33) as NIKHAHIT + SARA AA, which looks
+/// the same and makes every cluster one cell wide. Terminals put SARA AM in a cell of its own, and the diff of two frames
+/// then leaves it behind on the screen.
+pub fn cells(text: &str) -> Cow<'_, str> {
+    if !text.contains(['\u{e33}', '\u{200b}']) {
         return Cow::Borrowed(text);
     }
     let mut out = String::with_capacity(text.len() + 8);
@@ -23,7 +24,7 @@ pub fn thai_cells(text: &str) -> Cow<'_, str> {
             out.push('\u{e4d}');
             out.extend(tone);
             out.push('\u{e32}');
-        } else {
+        } else if c != '\u{200b}' {
             out.push(c);
         }
     }
@@ -33,16 +34,13 @@ pub fn thai_cells(text: &str) -> Cow<'_, str> {
 /// Makes a drawn frame safe for the terminal: nothing that moves the cursor or turns the direction of writing, no SARA AM,
 /// and only characters of the glyph set.
 pub fn apply(buffer: &mut Buffer, theme: &Theme) {
+    split_sara_am(buffer);
     for cell in &mut buffer.content {
         if cell.symbol().chars().any(is_control_or_bidi) {
             cell.set_symbol("?");
         }
         if cell.symbol().is_ascii() {
             continue;
-        }
-        if cell.symbol().contains('\u{e33}') {
-            let symbol = thai_cells(cell.symbol()).into_owned();
-            cell.set_symbol(&symbol);
         }
         let first = cell.symbol().chars().next().unwrap_or(' ');
         match theme.glyphs {
@@ -55,6 +53,22 @@ pub fn apply(buffer: &mut Buffer, theme: &Theme) {
             Glyphs::Ascii => {
                 cell.set_char(ascii(first));
             }
+        }
+    }
+}
+
+/// What a widget of the library has drawn: a letter with SARA AM becomes two cells, as if a canvas had drawn it.
+fn split_sara_am(buffer: &mut Buffer) {
+    let columns = usize::from(buffer.area.width);
+    for at in 0..buffer.content.len() {
+        let symbol = cells(buffer.content[at].symbol());
+        let Cow::Owned(symbol) = symbol else { continue };
+        let letter = symbol.trim_end_matches('\u{e32}');
+        // Alone it has one column.
+        let is_wide = !letter.starts_with('\u{e4d}') && (at + 1) % columns != 0;
+        buffer.content[at].set_symbol(if is_wide { letter } else { &symbol });
+        if is_wide && buffer.content[at + 1].symbol() == " " {
+            buffer.content[at + 1].set_symbol("\u{e32}");
         }
     }
 }
@@ -133,8 +147,8 @@ mod tests {
 
     #[test]
     fn sara_am_never_reaches_the_terminal() {
-        assert_eq!(thai_cells("อุณหภูมิน้ำ"), "อุณหภูมิน\u{e4d}\u{e49}\u{e32}");
-        assert_eq!(thai_cells("ทำ"), "ท\u{e4d}\u{e32}");
+        assert_eq!(cells("อุณหภูมิ\u{200b}น้ำ"), "อุณหภูมิน\u{e4d}\u{e49}\u{e32}");
+        assert_eq!(cells("ทำ"), "ท\u{e4d}\u{e32}");
         let mut buffer = Buffer::empty(Rect::new(0, 0, 20, 1));
         buffer.set_string(0, 0, "น้ำในถัง", Style::new());
         apply(&mut buffer, &Theme::FULL);

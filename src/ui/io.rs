@@ -41,6 +41,7 @@ use crate::{
     },
     station::{Request, Session},
     t,
+    text::Language,
 };
 use screen::{Screen, own};
 
@@ -59,6 +60,8 @@ pub struct Options {
     pub theme: Theme,
     /// What its users have chosen.
     pub preferences: PreferencesFile,
+    /// The language that it begins with, if the terminal has its letters.
+    pub language: Language,
     /// What ends with it.
     pub leaving: Leaving,
     /// It begins with the tour of a demonstration.
@@ -82,10 +85,11 @@ pub struct ExtensionPort {
 impl Options {
     /// Looks chosen by the environment and by the users of this account.
     pub fn new(leaving: Leaving) -> Options {
-        let theme = Theme::detect(|name| std::env::var(name).ok());
+        let env = |name: &str| std::env::var(name).ok();
+        let (theme, language) = (Theme::detect(env), Language::detect(env));
         let preferences = preferences::load();
         let (extension, start, profiles) = Default::default();
-        Options { theme, preferences, leaving, tour: false, extension, start, profiles }
+        Options { theme, preferences, language, leaving, tour: false, extension, start, profiles }
     }
 }
 
@@ -117,6 +121,7 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let snapshot = session.snapshots.borrow_and_update().clone();
     let status = session.status.borrow_and_update().clone();
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
+    model.set_locale(options.language.locale());
     model.leaving = options.leaving;
     model.tour = options.tour.then(super::Tour::default);
     let why = options.preferences.problem.as_ref();
@@ -304,9 +309,10 @@ impl Loop {
 
     fn save(&self, tab: Option<Tab>, path: PathBuf, bytes: Vec<u8>, new: bool) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
+        let exists = self.model.locale().within(|| t!("a file of this name is there already"));
         tokio::task::spawn_blocking(move || {
             let why = |error: io::Error| match error.kind() {
-                io::ErrorKind::AlreadyExists => t!("a file of this name is there already").to_owned(),
+                io::ErrorKind::AlreadyExists => exists.to_owned(),
                 _ => error.to_string(),
             };
             let saved = save(&path, &bytes, new).map_err(|error| format!("{}: {}", path.display(), why(error)));

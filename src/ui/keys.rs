@@ -201,6 +201,8 @@ pub enum Global {
     Forward,
     /// Lock this terminal at once.
     Lock,
+    /// Show all texts in the next language.
+    Language,
 }
 
 /// Keys of every tab: first the number keys, which show one.
@@ -224,6 +226,8 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(char(']'), "", "forward again", Global::Forward),
     Key::new(char('@'), "", "replay: the plant as it was at a past time", Global::Replay),
     Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
+    Key::new(char('L'), "", "change the language of the screens", Global::Language),
+    Key::new(ctrl('t'), "", "change the language, in every window too", Global::Language),
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
     Key::new(char('P'), "", "save this screen as text and SVG in the folder of the reports", Global::Dump),
     Key::new(code(KeyCode::F(2)), "", "settings: theme, characters, motion, bell, mouse, language", Global::Settings),

@@ -1,5 +1,6 @@
 //! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
 
+mod answers;
 mod context;
 mod dispatch;
 mod effects;
@@ -46,7 +47,7 @@ use crate::{
     history::{Answer, HistoryError},
     plant::{alarm::AlarmCommand, command::CommandKind, sample::Cause, snapshot::Snapshot},
     t,
-    text::Language,
+    text::{Language, Locale},
 };
 use extension::Extension;
 use keys::Global;
@@ -84,8 +85,8 @@ pub struct Model {
     pub theme: Theme,
     /// What the terminal can show.
     pub limits: Theme,
-    /// The language of its texts, where its user has chosen none.
-    pub language: Language,
+    /// The language of its texts and how it writes dates, where its user has chosen none.
+    pub locale: Locale,
     /// What the user has chosen, or tries.
     pub preferences: Preferences,
     /// What all users have chosen.
@@ -148,7 +149,7 @@ impl Model {
             modal: None,
             theme,
             limits: theme,
-            language: Language::ENGLISH,
+            locale: Locale::ENGLISH,
             preferences: Preferences::default(),
             preferences_file: PreferencesFile::default(),
             rang_at: 0,
@@ -190,6 +191,16 @@ impl Model {
         self.lacks_room().is_some()
     }
 
+    /// Shows all texts in this language, if the terminal has its letters.
+    pub fn set_locale(&mut self, locale: Locale) {
+        if locale.language == Language::ENGLISH || self.theme.has_all_letters() {
+            // It goes before what is preferred, until the terminal ends or another user logs in.
+            (self.locale, self.preferences.language) = (locale, None);
+        } else {
+            self.note = Some(t!("This terminal does not have the letters of that language").into());
+        }
+    }
+
     /// Doubts every value: nothing has been heard of them for too long.
     fn doubt(&mut self) {
         if self.snapshot.samples.iter().any(|sample| sample.quality.is_good()) {
@@ -203,7 +214,7 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
-    model.language().within(|| on_msg(model, msg))
+    model.locale().within(|| on_msg(model, msg))
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
@@ -284,7 +295,7 @@ fn on_input(model: &mut Model, act: impl FnOnce(&mut Model) -> Vec<UiAction>) ->
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    model.language().within(|| chrome::view(model, frame));
+    model.locale().within(|| chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
     model.theme.paint_ground(frame.buffer_mut());
 }

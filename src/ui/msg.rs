@@ -20,6 +20,7 @@ use crate::{
         def::{DeviceId, TagId},
         snapshot::Snapshot,
     },
+    text::Locale,
 };
 
 /// What happens to a terminal.
@@ -153,6 +154,8 @@ pub enum UiAction {
     SessionRequest(Tab, SessionRequest),
     /// Keep what the user has chosen about the terminal.
     KeepPreferences(Preferences),
+    /// Show all texts in this language.
+    SetLocale(Locale),
     /// Ask whether to leave.
     Leave,
     /// Pass on an effect as it is.

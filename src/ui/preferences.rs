@@ -18,7 +18,7 @@ use crate::{
         reader::{self, At, Node, OptionalKey, Raw, Value, toml_tables},
     },
     t,
-    text::Language,
+    text::{Language, Locale},
 };
 
 keyword_enum! {
@@ -212,9 +212,10 @@ impl Model {
         self.session.who.as_ref().map(|who| who.user.as_ref())
     }
 
-    /// The language of the texts.
-    pub(super) fn language(&self) -> Language {
-        self.preferences.language.unwrap_or(self.language)
+    /// The language of the texts: as preferred, if the terminal has its letters.
+    pub(super) fn locale(&self) -> Locale {
+        let preferred = self.preferences.language.filter(|_| self.theme.has_all_letters());
+        preferred.map_or(self.locale, Language::locale)
     }
 
     /// The preferences were kept, or not: that is said.

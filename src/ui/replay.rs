@@ -12,7 +12,7 @@ use super::{
     Effect, Model, QueryId, UiAction, ViewContext,
     keys::{Key, char, code},
     modal::{Modal, Prompt},
-    tabs::{TabView, draw},
+    tabs::TabView,
 };
 use crate::{
     history::{Answer, HistoryError, Query},
@@ -23,6 +23,7 @@ use crate::{
     },
     report::period_parser::{self, PeriodError},
     t,
+    text::date,
 };
 use crossterm::event::KeyCode;
 use search::Search;
@@ -311,8 +312,9 @@ pub fn ask_instant(cx: &ViewContext, tab: &dyn TabView) -> Modal {
 
 /// `2026-11-20 03:12:07`, with milliseconds where it has some.
 pub fn stamp(cx: &ViewContext, at: Timestamp) -> String {
-    let form = if at.subsec_millisecond() == 0 { "%Y-%m-%d %H:%M:%S" } else { "%Y-%m-%d %H:%M:%S%.3f" };
-    draw::local(cx, at, form)
+    let form = if at.subsec_millisecond() == 0 { "%H:%M:%S" } else { "%H:%M:%S%.3f" };
+    let local = at.to_zoned(cx.def().time_zone.clone());
+    format!("{} {}", date(local.date()), local.strftime(form))
 }
 
 /// The instant that was typed: a time, a date with a time, or how long ago; nothing is the one that was selected.
@@ -359,6 +361,7 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         | UiAction::SessionRequest(..)
         | UiAction::KeepPreferences(_)
         | UiAction::Leave
+        | UiAction::SetLocale(_)
         | UiAction::Do(_) => false,
     };
     let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();

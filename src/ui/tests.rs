@@ -11,7 +11,10 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
 
 use super::{Effect, Model, Msg, fixture::Fixture, theme::Theme, update, view};
-use crate::{access::SessionRequest, plant::command::CommandKind};
+use crate::{access::SessionRequest, plant::command::CommandKind, text::Language};
+
+/// The languages that every layout is tested in: that of the code, Thai, and one with longer words.
+pub const LANGUAGES: [Language; 3] = [Language::ENGLISH, Language::THAI, Language::PSEUDO];
 
 pub fn model(fixture: &Fixture, theme: Theme) -> Model {
     let mut model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::session());

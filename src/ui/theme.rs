@@ -104,6 +104,11 @@ impl Theme {
         Theme { colours, glyphs, ..Theme::FULL }
     }
 
+    /// Does the terminal have the letters of every language? Fonts of a console and seven bits have those of English.
+    pub fn has_all_letters(&self) -> bool {
+        self.glyphs == Glyphs::Braille
+    }
+
     /// Ordinary words and values.
     pub fn normal(&self) -> Style {
         self.fg(Role::Normal)

@@ -14,6 +14,9 @@ use syn::{
 
 type Texts = BTreeMap<String, BTreeSet<String>>;
 
+/// Functions and fields whose texts are translated where they are drawn.
+const LABELS: [&str; 7] = ["label", "word", "words", "message", "advice", "mode", "effect"];
+
 /// Texts of one file: of `t!`, of functions that label a state, and of rows of tables.
 #[derive(Default)]
 struct Found {
@@ -37,8 +40,7 @@ impl Found {
     }
     /// A label of a state is a `&'static str` that is translated where it is drawn.
     fn within(&mut self, signature: &syn::Signature, visit: impl FnOnce(&mut Self)) {
-        let is_label =
-            ["label", "word", "words", "message", "advice", "mode"].iter().any(|name| signature.ident == name);
+        let is_label = LABELS.iter().any(|name| signature.ident == name);
         let is_text = matches!(&signature.output, syn::ReturnType::Type(_, of)
             if matches!(&**of, syn::Type::Reference(text) if text.lifetime.as_ref().is_some_and(|of| of.ident == "static")));
         let before = std::mem::replace(&mut self.in_label, is_label && is_text);
@@ -84,7 +86,7 @@ impl<'a> Visit<'a> for Found {
         let of_keys = row.path.segments.last().is_some_and(|name| name.ident == "Key");
         for field in row.fields.iter().filter(|_| of_keys) {
             if let (syn::Member::Named(name), syn::Expr::Lit(literal)) = (&field.member, &field.expr)
-                && (["label", "word", "words", "message", "advice", "mode"].iter().any(|label| name == label))
+                && LABELS.iter().any(|label| name == label)
                 && let syn::Lit::Str(text) = &literal.lit
             {
                 self.add(text.value());
@@ -93,12 +95,15 @@ impl<'a> Visit<'a> for Found {
         visit::visit_expr_struct(self, row);
     }
     fn visit_expr_call(&mut self, call: &'a syn::ExprCall) {
-        // Rows of the tables of keys and of alarm metrics.
+        // Rows of the tables of keys and of alarm metrics, headings of columns.
         let name = match &*call.func {
             syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
             _ => Vec::new(),
         };
-        if [vec!["row"], vec!["goal"], vec!["Key", "new"]].iter().any(|row| *row == name) {
+        if [vec!["row"], vec!["goal"], vec!["Key", "new"], vec!["rows", "words"], vec!["rows", "number"]]
+            .iter()
+            .any(|row| *row == name)
+        {
             for argument in &call.args {
                 if let syn::Expr::Lit(literal) = argument
                     && let syn::Lit::Str(text) = &literal.lit
@@ -197,6 +202,10 @@ fn texts() -> Texts {
         let in_profile = path.starts_with(root.join("profile"));
         let mut found = Found { in_profile, ..Found::default() };
         found.visit_file(&syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap());
+        if path.ends_with("controllers/guide.rs") {
+            let guide = fs::read_to_string(path.with_extension("txt")).unwrap();
+            guide.lines().for_each(|line| found.add(line.trim_start_matches("# ").to_owned()));
+        }
         let new: BTreeSet<String> = found.texts.into_iter().filter(|text| known.insert(text.clone())).collect();
         let name = path.strip_prefix(&root).unwrap().with_extension("").display().to_string();
         if !new.is_empty() {
@@ -206,17 +215,30 @@ fn texts() -> Texts {
     all
 }
 
+/// A file of `src/text`.
+fn catalogue_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src/text").join(name)
+}
+
+/// The catalogue of a language in the order of the code, with the translations that there are.
+fn document(heading: &str, translated: impl Fn(&str) -> Option<String>) -> String {
+    let mut document = heading.to_owned();
+    for (file, texts) in texts() {
+        let known = texts.into_iter().filter_map(|text| Some((translated(&text)?, text)));
+        let table: toml::Table = known.map(|(value, text)| (text, toml::Value::String(value))).collect();
+        if !table.is_empty() {
+            document += &format!("\n[{file:?}]\n{}", toml::to_string(&table).unwrap());
+        }
+    }
+    document
+}
+
 #[test]
 fn the_catalogue_has_every_text_and_no_other() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/text/en.toml");
-    let mut document = String::from(
-        "# Every text of the screens, by the file that it stands in. A language is a copy of this file with other values.\n\
-         # Made from the code: SIGHTGLASS_WRITE=1 cargo test --release --test it the_catalogue_has_every_text\n",
-    );
-    for (file, texts) in texts() {
-        let table: toml::Table = texts.into_iter().map(|text| (text.clone(), toml::Value::String(text))).collect();
-        document += &format!("\n[{file:?}]\n{}", toml::to_string(&table).unwrap());
-    }
+    let path = catalogue_file("en.toml");
+    let heading = "# Every text of the screens, by the file that it stands in. A language is a copy of this file with other values.\n\
+         # Made from the code: SIGHTGLASS_WRITE=1 cargo test --release --test it texts::\n";
+    let document = document(heading, |text| Some(text.to_owned()));
     if std::env::var_os("SIGHTGLASS_WRITE").is_some() {
         fs::write(&path, &document).unwrap();
     }
@@ -225,4 +247,104 @@ fn the_catalogue_has_every_text_and_no_other() {
     let missing: Vec<_> = lines(&document).difference(&lines(&written)).cloned().collect();
     let unused: Vec<_> = lines(&written).difference(&lines(&document)).cloned().collect();
     assert!(written == document, "en.toml is not what the code shows; missing: {missing:#?}, unused: {unused:#?}");
+}
+
+/// The terminal knows answers of the station by their texts: each stands in the code that gives it.
+#[test]
+fn every_known_answer_is_one_of_the_station() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root.join("access"), &mut files);
+    let access: String = files.iter().map(|path| fs::read_to_string(path).unwrap()).collect();
+    for answer in &texts()["ui/answers"] {
+        let literals = answer.split('{').filter_map(|part| part.rsplit('}').next());
+        for piece in literals.flat_map(|literal| literal.split("; ")) {
+            assert!(piece.is_empty() || access.contains(piece), "{answer:?}: {piece:?} is not in `access`");
+        }
+    }
+}
+
+/// A catalogue as texts and translations.
+fn translations(written: &str) -> BTreeMap<String, String> {
+    let files: BTreeMap<String, BTreeMap<String, String>> = toml::from_str(written).unwrap();
+    files.into_values().flatten().collect()
+}
+
+/// `SIGHTGLASS_WRITE=1` sorts a catalogue as the code does and takes out what is not used any more; what is missing is
+/// for a translator.
+#[test]
+fn every_language_has_every_text() {
+    for entry in fs::read_dir(catalogue_file("")).unwrap().map(Result::unwrap) {
+        let name = entry.file_name().into_string().unwrap();
+        if !name.ends_with(".toml") || name == "en.toml" {
+            continue;
+        }
+        let written = fs::read_to_string(entry.path()).unwrap();
+        let translated = translations(&written);
+        let heading =
+            written.lines().take_while(|line| line.starts_with('#')).fold(String::new(), |all, line| all + line + "\n");
+        let document = document(&heading, |text| translated.get(text).cloned());
+        if std::env::var_os("SIGHTGLASS_WRITE").is_some() {
+            fs::write(entry.path(), &document).unwrap();
+        }
+        let used: BTreeSet<String> = texts().into_values().flatten().collect();
+        let missing: Vec<_> = used.iter().filter(|text| !translated.contains_key(*text)).collect();
+        assert!(missing.is_empty(), "{name} lacks {} texts: {missing:#?}", missing.len());
+        let written = fs::read_to_string(entry.path()).unwrap();
+        assert!(written == document, "{name} has unused texts or another order: SIGHTGLASS_WRITE=1 puts it right");
+        let wrong: Vec<_> = translated.iter().flat_map(|(text, value)| faults(text, value)).collect();
+        assert!(wrong.is_empty(), "{name}:\n{}", wrong.join("\n"));
+    }
+}
+
+/// What is wrong with a translation.
+fn faults(text: &str, value: &str) -> Vec<String> {
+    let placeholders = |text: &str| {
+        let mut names: Vec<_> =
+            text.split('{').skip(1).filter_map(|part| Some(part.split_once('}')?.0.to_owned())).collect();
+        names.sort();
+        names
+    };
+    let spaces = |text: &str| (text.starts_with(' '), text.ends_with(' '));
+    // Of two neighbours, the first of one kind and the second of another.
+    let follow = |first: &dyn Fn(char) -> bool, second: &dyn Fn(char) -> bool| {
+        value.chars().zip(value.chars().skip(1)).any(|(a, b)| first(a) && second(b))
+    };
+    let is_tone = |c| ('\u{e48}'..='\u{e4b}').contains(&c);
+    let is_vowel_mark = |c| c == '\u{e31}' || ('\u{e34}'..='\u{e3a}').contains(&c);
+    let is_mark = |c| is_vowel_mark(c) || ('\u{e47}'..='\u{e4e}').contains(&c);
+    let is_consonant = |c| ('\u{e01}'..='\u{e2e}').contains(&c);
+    let rules = [
+        (value.is_empty(), "is empty"),
+        (placeholders(text) != placeholders(value), "has other placeholders"),
+        (spaces(text) != spaces(value), "begins or ends with another space"),
+        (value.chars().any(|c| ('\u{e50}'..='\u{e59}').contains(&c)), "has Thai digits"),
+        (value.contains("\u{e4d}\u{e32}"), "has SARA AM as two characters"),
+        (value.contains("\u{e40}\u{e40}"), "has two SARA E in place of SARA AE"),
+        (follow(&is_tone, &is_vowel_mark), "has a tone mark before a vowel mark"),
+        (follow(&|c| !is_consonant(c) && !is_mark(c), &is_mark), "has a mark without a consonant"),
+        (value.starts_with('\u{200b}') || value.ends_with('\u{200b}'), "begins or ends with a break point"),
+        (value.contains('¦'), "has a break point that is not U+200B"),
+    ];
+    let is_wrong = |(wrong, what): (bool, &str)| wrong.then(|| format!("{text:?} = {value:?} {what}"));
+    rules.into_iter().filter_map(is_wrong).collect()
+}
+
+#[test]
+fn the_rules_of_a_translation_find_its_faults() {
+    let check = |text: &str, value: &str, expect: &str| {
+        let found = faults(text, value).join(", ");
+        assert!(found.ends_with(expect) && found.is_empty() == expect.is_empty(), "{value:?}: {found:?}");
+    };
+    check("water", "น้ำ", "");
+    check("in {n} s", "ใน {n} วินาที", "");
+    check("in {n} s", "ใน วินาที", "other placeholders");
+    check("water", " น้ำ", "another space");
+    check("3", "๓", "Thai digits");
+    check("do", "ท\u{e4d}\u{e32}", "as two characters");
+    check("show", "\u{e40}\u{e40}สดง", "in place of SARA AE");
+    check("that", "ท\u{e48}\u{e35}", "before a vowel mark");
+    check("water", "น\u{e33}\u{e49}", "without a consonant");
+    check("water", "เ\u{e49}น", "without a consonant");
+    check("line", "สาย\u{200b}", "a break point");
 }

@@ -47,8 +47,13 @@ impl Footer {
         let mut x = 1;
         for (n, hint) in hints.iter().enumerate().filter(|(_, hint)| !hint.label.is_empty()) {
             let hint = n.checked_sub(1).and_then(|before| pair(&hints[before], hint)).unwrap_or_else(|| hint.clone());
-            if x + room(&hint) > end {
-                break;
+            // The way out of a window stands behind what else it has.
+            let way_out = hints.iter().skip(n + 1).find(|hint| model.modal.is_some() && hint.key == t!("Esc"));
+            if x + room(&hint) + way_out.map_or(0, room) > end {
+                if way_out.is_none() {
+                    break;
+                }
+                continue;
             }
             let next = x + room(&hint);
             keys.push((x, hint));

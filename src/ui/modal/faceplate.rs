@@ -182,7 +182,7 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     rows.extend([
         (t!("quality"), quality, theme.quality(sample.quality)),
         (t!("read"), format!("{read} ({poll})"), theme.normal()),
-        (t!("range"), range_text(cx, tag).trim_start_matches("range ").to_owned(), theme.normal()),
+        (t!("range"), range_text(cx, tag).trim_start_matches(t!("range ")).to_owned(), theme.normal()),
         (
             t!("access"),
             t!(

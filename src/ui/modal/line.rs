@@ -1,6 +1,7 @@
 //! A one-line text editor.
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use unicode_segmentation::UnicodeSegmentation;
 
 use crate::ui::{
     theme::Theme,
@@ -71,10 +72,10 @@ impl Line {
                 self.text.remove(self.cursor);
             }
             KeyCode::Delete if self.cursor < self.text.len() => {
-                self.text.remove(self.cursor);
+                self.text.drain(self.cursor..self.after());
             }
-            KeyCode::Left => self.cursor = self.cursor.saturating_sub(1),
-            KeyCode::Right => self.cursor = (self.cursor + 1).min(self.text.len()),
+            KeyCode::Left => self.cursor = self.before(),
+            KeyCode::Right => self.cursor = self.after(),
             KeyCode::Home => self.cursor = 0,
             KeyCode::End => self.cursor = self.text.len(),
             _ => return false,
@@ -110,9 +111,24 @@ impl Line {
         let start = if first > 0 { canvas.text(x, y, theme.ellipsis(), theme.strong()) } else { x };
         let end = canvas.text(start, y, &self.text[first..].iter().collect::<String>(), theme.strong());
         let at = start + width(&part(first));
-        let under = self.text.get(self.cursor).copied().unwrap_or(' ');
-        canvas.glyph(at, y, under, theme.focus());
+        let under = self.text[self.cursor..self.after()].iter().collect::<String>();
+        if under.is_empty() {
+            canvas.text(at, y, " ", theme.focus());
+        } else {
+            canvas.paint(at, y, width(&under), 1, theme.focus());
+        }
         end.max(at + 1)
+    }
+
+    /// Where the letter before the cursor begins: marks above and below belong to it.
+    fn before(&self) -> usize {
+        let text: String = self.text[..self.cursor].iter().collect();
+        self.cursor - text.graphemes(true).next_back().map_or(0, |letter| letter.chars().count())
+    }
+    /// Where the letter at the cursor ends.
+    fn after(&self) -> usize {
+        let text: String = self.text[self.cursor..].iter().collect();
+        self.cursor + text.graphemes(true).next().map_or(0, |letter| letter.chars().count())
     }
 
     fn insert(&mut self, c: char) {
@@ -145,6 +161,18 @@ mod tests {
         check(&[Char('7'), Char('2'), Left, Char('0')], "702");
         check(&[Char('7'), Char('2'), Backspace, Backspace, Backspace], "");
         check(&[Char('7'), Char('2'), Home, Delete, End, Char('5')], "25");
+    }
+
+    #[test]
+    fn the_cursor_stands_between_letters_not_marks() {
+        use KeyCode::{Backspace, Char, Delete, Home, Left, Right};
+        let typed = "ถังน้ำ".chars().map(Char);
+        let keys = |more: &[KeyCode]| typed.clone().chain(more.iter().copied()).collect::<Vec<_>>();
+        check(&keys(&[Left, Char('x')]), "ถังxน้ำ");
+        check(&keys(&[Left, Left, Delete]), "ถัน้ำ");
+        check(&keys(&[Home, Right, Char('x')]), "ถัxงน้ำ");
+        check(&keys(&[Home, Delete]), "งน้ำ");
+        check(&keys(&[Backspace]), "ถังน้");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::{Faceplate, Guidance, Modal, Next, line::Line, window};
 use crate::{
     plant::def::{AlarmId, DeviceId, TagId},
     t,
-    text::translate,
+    text::{searchable, translate},
     ui::{
         UiAction, ViewContext,
         keys::{self, Chord, Global},
@@ -81,7 +81,13 @@ struct Row {
 
 impl Row {
     fn new(target: Target, kind: &'static str, name: &str, text: &str) -> Row {
-        Row { target, kind, name: name.to_owned(), text: text.to_owned(), words: format!("{name} {text} {kind}") }
+        Row {
+            target,
+            kind,
+            name: name.to_owned(),
+            text: text.to_owned(),
+            words: searchable(&format!("{name} {text} {kind}")),
+        }
     }
 }
 
@@ -109,7 +115,7 @@ impl Palette {
     }
 
     fn find(&mut self, cx: &ViewContext) {
-        let text = self.line.text();
+        let text = searchable(&self.line.text());
         self.selected = 0;
         self.instant = instant(cx, &text);
         let pattern = Pattern::parse(&text, CaseMatching::Ignore, Normalization::Smart);
@@ -121,8 +127,8 @@ impl Palette {
             // What is called so stands before what only mentions it, above all as a whole word at the end of its name.
             let is_last =
                 |name: &str| name.rsplit(['.', '-', ' ']).next().is_some_and(|part| part.eq_ignore_ascii_case(&text));
-            let exact = is_last(&row.name) || row.text.eq_ignore_ascii_case(&text);
-            Some(all + fits(&row.name).unwrap_or(0) + if exact && !text.is_empty() { EXACT } else { 0 })
+            let exact = is_last(&row.name) || searchable(&row.text).eq_ignore_ascii_case(&text);
+            Some(all + fits(&searchable(&row.name)).unwrap_or(0) + if exact && !text.is_empty() { EXACT } else { 0 })
         };
         // Of those that fit alike a tag stands before its curve and its alarms.
         let rank = |row: &Row| if text.is_empty() { 0 } else { row.target.rank() };

@@ -20,7 +20,7 @@ use crate::{
     ui::{
         UiAction, ViewContext, keys,
         keys::Hint,
-        widgets::text::{Canvas, fit, fit_words, wrap},
+        widgets::text::{Canvas, fit, fit_words, width, wrap},
     },
 };
 use draft::{Draft, Field};
@@ -122,8 +122,9 @@ impl Settings {
         let height = usize::from(canvas.height());
         let shown = fields.len().min(height.saturating_sub(1 + pinned.len()));
         let first = (self.row + 1).saturating_sub(shown);
-        let new_at = NAME + room.saturating_sub(NAME) / 2;
-        canvas.text(NAME, 0, t!("in use"), theme.dim());
+        let used_at = fields.iter().map(|field| width(field.name()) + 3).max().unwrap_or(0).max(NAME);
+        let new_at = used_at + room.saturating_sub(used_at) / 2;
+        canvas.text(used_at, 0, t!("in use"), theme.dim());
         canvas.text(new_at, 0, t!("new"), theme.dim());
         let old = Draft::new(used);
         for (y, (n, field)) in fields.iter().enumerate().skip(first).take(shown).enumerate() {
@@ -131,7 +132,7 @@ impl Settings {
             let selected = n == self.row && self.asking.is_none();
             canvas.text(2, y, field.name(), if selected { theme.focus() } else { theme.normal() });
             let before = old.words(*field);
-            canvas.text(NAME, y, &fit(&before, new_at.saturating_sub(NAME + 2)), theme.dim());
+            canvas.text(used_at, y, &fit(&before, new_at.saturating_sub(used_at + 2)), theme.dim());
             self.value(cx, &mut canvas, (new_at, y), *field, selected, before != self.draft.words(*field));
         }
         let free = height.saturating_sub(1 + shown + pinned.len());
@@ -273,7 +274,7 @@ impl Settings {
     }
 }
 
-/// Columns of a name.
+/// Columns of a name at least.
 const NAME: u16 = 13;
 
 /// The settings that a line works with now.
@@ -303,7 +304,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
     let name = &cx.def().line(line).name;
     match &cx.snapshot.line(line).state {
         LineState::Connecting => (t!("{name} is connecting", name), true),
-        LineState::Disconnected => (t!("{name} is disconnected: connect it with L on tab 4", name), false),
+        LineState::Disconnected => (t!("{name} is disconnected: connect it with D on tab 4", name), false),
         LineState::Testing => (t!("{name} is in use by a test", name), true),
         LineState::Waiting { why, .. } => (t!("{name} is not connected: {why}", name, why), false),
         LineState::Connected => {

@@ -17,6 +17,7 @@ use crate::{
     history::Series,
     plant::def::{CsvDialect, Pen},
     report::{self, Period, ShiftReport},
+    text::file,
     ui::{tabs::trends::span::View, widgets::chart},
 };
 
@@ -272,7 +273,7 @@ impl Reports {
             batches::Action::Overlay => self.batches.lay_over(cx),
             batches::Action::Trend => return self.batches.trend(cx).into_iter().collect(),
             batches::Action::Export => {
-                let bytes = report::batch::csv(self.batches.rows(), cx.def(), self.dialect);
+                let bytes = file(|| report::batch::csv(self.batches.rows(), cx.def(), self.dialect));
                 let listed = !self.batches.rows().is_empty();
                 return self.send(listed.then(|| (self.batches_path(cx), bytes)));
             }
@@ -335,12 +336,9 @@ impl Reports {
 
     /// Writes exactly the figures that are shown.
     fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let file = self
-            .report
-            .value
-            .as_ref()
-            .map(|report| (self.path(cx, report), report::FORMATS[0].render(report, cx.def(), self.dialect)));
-        self.send(file)
+        let render = |report| file(|| report::FORMATS[0].render(report, cx.def(), self.dialect));
+        let written = self.report.value.as_ref().map(|report| (self.path(cx, report), render(report)));
+        self.send(written)
     }
 
     /// Asks the station to record a file, which is then written.

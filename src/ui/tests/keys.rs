@@ -156,7 +156,7 @@ fn closing_a_line_is_asked_and_opening_it_too() {
     for (state, open) in [(LineState::Connected, false), (LineState::Disconnected, true)] {
         fixture.line.state = state;
         let mut model = model(&fixture, Theme::FULL);
-        assert_eq!(sent_kind(&type_keys(&mut model, "4L")), None);
+        assert_eq!(sent_kind(&type_keys(&mut model, "4D")), None);
         assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::Connect(line, open)));
     }
 }

@@ -1,11 +1,11 @@
 //! Screens as an operator sees them: every tab in every mood, every size, with and without colour.
 
+mod cells;
 mod signs;
 
 use std::{collections::HashSet, sync::Arc, time::Duration};
 
 use jiff::SignedDuration;
-use ratatui::buffer::Buffer;
 
 use super::{draw, model, screen, sent_kind, text, type_keys};
 use crate::{
@@ -21,11 +21,10 @@ use crate::{
     ui::{
         Model, Msg,
         fixture::{self, Fixture},
-        glyph_filter,
         modal::{self, Modal},
         tabs::Tab,
         theme::{Colours, Glyphs, Theme},
-        update, widgets,
+        update,
     },
 };
 
@@ -343,41 +342,4 @@ fn what_cannot_be_read_does_not_wait_to_be_read() {
     type_keys(&mut model, "4⏎f");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("now – write only") && !shown.contains("not read"), "{shown}");
-}
-
-#[test]
-fn the_next_frame_leaves_nothing_of_the_last_one() {
-    // Thai clusters and ordinary text, drawn over each other: the diffed screen must equal a fresh one.
-    use ratatui::backend::{Backend, CrosstermBackend};
-    let texts = ["อุณหภูมิน้ำ", "ถังน้ำร้อน", "ทำงาน", "PV 72.4 °C", "", "น้ำ", "ำ"];
-    let frame = |seed: usize| {
-        let mut buffer = Buffer::empty(ratatui::layout::Rect::new(0, 0, 24, 3));
-        for y in 0..3u16 {
-            let text = texts[(seed * 7 + usize::from(y) * 3 + seed / 3) % texts.len()];
-            let area = buffer.area;
-            let mut canvas = widgets::text::Canvas::new(&mut buffer, area);
-            canvas.text((seed * 5 % 9) as u16, y, text, Theme::FULL.normal());
-        }
-        glyph_filter::apply(&mut buffer, &Theme::FULL);
-        buffer
-    };
-    let send = |parser: &mut vt100::Parser, from: &Buffer, to: &Buffer| {
-        let mut bytes = Vec::new();
-        CrosstermBackend::new(&mut bytes).draw(from.diff_iter(to)).expect("a vector takes every byte");
-        parser.process(&bytes);
-    };
-    let empty = Buffer::empty(ratatui::layout::Rect::new(0, 0, 24, 3));
-    let mut living = vt100::Parser::new(3, 24, 0);
-    let mut last = empty.clone();
-    for seed in 0..300 {
-        let next = frame(seed);
-        send(&mut living, &last, &next);
-        let mut fresh = vt100::Parser::new(3, 24, 0);
-        send(&mut fresh, &empty, &next);
-        let rows = |parser: &vt100::Parser| {
-            parser.screen().rows(0, 24).map(|row| row.trim_end().to_owned()).collect::<Vec<_>>()
-        };
-        assert_eq!(rows(&living), rows(&fresh), "frame {seed}");
-        last = next;
-    }
 }

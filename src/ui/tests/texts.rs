@@ -2,10 +2,19 @@
 
 use std::collections::BTreeSet;
 
-use super::{model, replay::replayed, screen, type_keys};
+use super::{LANGUAGES, model, replay::replayed, screen, type_keys};
 use crate::{
-    text::{Language, translate},
-    ui::{fixture::Fixture, tabs::Tab, theme::Theme, widgets::text::take_overwritten},
+    text::{Language, Locale, translate},
+    ui::{
+        Msg,
+        fixture::Fixture,
+        glyph_filter::cells,
+        keys,
+        tabs::Tab,
+        theme::{Glyphs, Theme},
+        update,
+        widgets::text::take_overwritten,
+    },
 };
 
 /// Words that no language changes: letters of controllers, names of protocols, standards and keys.
@@ -35,6 +44,7 @@ const SAME: &[&str] = &[
     "SHA",
     "UTF",
     "CSV",
+    "English",
 ];
 
 /// Screens of the usual terminals; the smallest must show everything.
@@ -73,31 +83,42 @@ fn missed_words(line: &str, given: &BTreeSet<String>) -> Vec<String> {
     runs(line).filter(missed).map(|(word, ..)| word.to_owned()).collect()
 }
 
-/// Draws every page and window with the texts of the test's language, in every size.
-fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
-    let tabs: [(Tab, &[&str]); 8] = [
-        (Tab::Mimic, &["", "?", "q", "⏎", "s", "C", "w", ":", ":pv", "@", "@x⏎", "Z"]),
-        (Tab::Trends, &["", "?", "p", "⏎"]),
-        (Tab::Alarms, &["", "?", "v", "vv", "vvv", "vvvv", "vvvvv", "⏎", "z", "o"]),
-        (Tab::Controllers, &["", "?", "⏎", "T", "f", "⏎p"]),
-        (Tab::Reports, &["", "?", "⏎"]),
-        (Tab::Bus, &["", "?", "v", "vv", "vvv", "vvvv", "⏎", "w"]),
-        (Tab::Users, &["", "?", "n", "⏎"]),
-        (Tab::Login, &["", "p", "⏎"]),
-    ];
-    for fixture in [Fixture::normal(), Fixture::alarm(), Fixture::line_down()] {
-        for (tab, typed) in tabs {
+/// Pages and windows by the keys that lead to them, all of whose texts are in the catalogue.
+const PAGES: &[(Tab, &[&str])] = &[
+    (Tab::Mimic, &["", "?", "q", "⏎", "s", "C", "w", ":", ":pv", "@", "@x⏎", "Z"]),
+    (Tab::Trends, &["", "?", "p", "⏎", "c", "v", "t", "w"]),
+    (Tab::Alarms, &["", "?", "v", "vv", "vvv", "vvvv", "vvvvv", "⏎", "z", "o", "n", "r", "t", "A"]),
+    (Tab::Controllers, &["", "?", "⏎", "T", "f", "⏎p", "h", "h→", "h→→", "D", "x", "⏎m", "⏎g", "⏎S"]),
+    (Tab::Reports, &["", "?", "⏎", "u", "/", ";"]),
+    (Tab::Bus, &["B", "B⏎", "Bw", "T", "Ts"]),
+    (Tab::Users, &["", "?", "n", "⏎", "j", "r", "p"]),
+    (Tab::Login, &["", "p", "⏎"]),
+];
+/// Those that have words of Modbus, names of files or examples too, which are the same in every language.
+const TECHNICAL: &[(Tab, &[&str])] = &[
+    (Tab::Alarms, &["/"]),
+    (Tab::Controllers, &["c"]),
+    (Tab::Reports, &["b"]),
+    (Tab::Bus, &["", "?", "F", "F⏎", "Ff", "Tt", "Tf", "Tm", "R", "c"]),
+];
+
+/// Draws pages and windows with the texts of a language, in every size.
+fn draw_all(language: Language, pages: &[(Tab, &[&str])], mut check: impl FnMut(&Fixture, &str, &str)) {
+    let fixtures =
+        [Fixture::normal(), Fixture::alarm(), Fixture::line_down(), Fixture::traffic(), Fixture::traffic_trouble()];
+    for fixture in fixtures {
+        for (tab, typed) in pages {
             for (keys, (width, height)) in typed.iter().flat_map(|keys| SIZES.map(|size| (keys, size))) {
                 let mut model = model(&fixture, Theme::FULL);
-                model.language = Language::Pseudo;
-                model.tabs.shown = tab;
+                model.locale = language.locale();
+                model.tabs.shown = *tab;
                 type_keys(&mut model, keys);
                 let shown = screen(&mut model, width, height);
                 check(&fixture, &format!("{tab:?} {keys:?} {width}x{height}"), &shown);
             }
             for (keys, (width, height)) in ["", "?"].iter().flat_map(|keys| SIZES.map(|size| (keys, size))) {
-                let mut model = replayed(&fixture, tab);
-                model.language = Language::Pseudo;
+                let mut model = replayed(&fixture, *tab);
+                model.locale = language.locale();
                 type_keys(&mut model, keys);
                 let shown = screen(&mut model, width, height);
                 check(&fixture, &format!("{tab:?} {keys:?} {width}x{height} in the past"), &shown);
@@ -109,7 +130,7 @@ fn draw_all(mut check: impl FnMut(&Fixture, &str, &str)) {
 #[test]
 fn every_text_of_a_screen_is_in_the_catalogue() {
     let mut missed = BTreeSet::new();
-    draw_all(|fixture, place, shown| {
+    draw_all(Language::PSEUDO, PAGES, |fixture, place, shown| {
         let given = given_words(fixture);
         for line in shown.lines() {
             let words = missed_words(line, &given);
@@ -120,20 +141,66 @@ fn every_text_of_a_screen_is_in_the_catalogue() {
 }
 
 #[test]
-fn longer_words_overwrite_nothing() {
+fn no_text_overwrites_another_in_any_language() {
     let mut overwritten = BTreeSet::new();
     take_overwritten();
-    draw_all(|_, place, _| {
-        overwritten.extend(take_overwritten().into_iter().map(|texts| format!("{place}: {texts}")));
-    });
+    for language in LANGUAGES {
+        draw_all(language, &[PAGES, TECHNICAL].concat(), |_, place, _| {
+            let found = take_overwritten().into_iter();
+            overwritten.extend(found.map(|texts| format!("{} {place}: {texts}", language.code())));
+        });
+    }
     assert!(overwritten.is_empty(), "{}", overwritten.into_iter().collect::<Vec<_>>().join("\n"));
 }
 
 #[test]
-fn longer_words_leave_room_for_the_way_out() {
-    let ways = Language::Pseudo.within(|| [translate("help"), translate("Esc"), "Esc"]);
-    draw_all(|_, place, shown| {
-        let footer = shown.lines().last().unwrap_or_default();
-        assert!(ways.iter().any(|way| footer.contains(way)), "{place}: {footer}");
-    });
+fn every_language_has_room_for_the_way_out() {
+    for language in LANGUAGES {
+        let ways = language.locale().within(|| [translate("help"), translate("Esc"), "Esc"]).map(cells);
+        draw_all(language, &[PAGES, TECHNICAL].concat(), |_, place, shown| {
+            let footer = shown.lines().last().unwrap_or_default();
+            assert!(ways.iter().any(|way| footer.contains(&**way)), "{} {place}: {footer}", language.code());
+        });
+    }
+}
+
+#[test]
+fn a_key_changes_the_language_and_back() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    type_keys(&mut model, "L");
+    let thai = screen(&mut model, 80, 24);
+    assert!(thai.contains("กราฟ") && !thai.contains("Trends"), "{thai}");
+    type_keys(&mut model, "L");
+    assert!(screen(&mut model, 80, 24).contains("Trends"));
+    // In a form a letter is typed; Ctrl-T works there too.
+    model.tabs.shown = Tab::Login;
+    type_keys(&mut model, "pL");
+    assert_eq!(model.locale, Locale::ENGLISH);
+    update(&mut model, Msg::Key(keys::ctrl('t').event()));
+    assert_eq!(model.locale, Language::THAI.locale());
+}
+
+#[test]
+fn a_terminal_without_thai_letters_stays_english() {
+    for theme in [Theme::PLAIN, Theme { glyphs: Glyphs::Block, ..Theme::FULL }] {
+        let mut model = model(&Fixture::normal(), theme);
+        type_keys(&mut model, "L");
+        assert_eq!(model.locale, Locale::ENGLISH);
+        let shown = screen(&mut model, 80, 24);
+        assert!(shown.contains("does not have the letters of that language"), "{shown}");
+    }
+}
+
+#[test]
+fn thai_of_a_plant_file_is_shown_and_found() {
+    let mut fixture = Fixture::normal();
+    let tag = fixture.tag("TIC-1.PV");
+    fixture.def.title = "ถังน้ำร้อน".into();
+    fixture.def.tags[tag.index()].label = "อุณหภูมิน้ำในถัง".into();
+    let mut model = model(&fixture, Theme::FULL);
+    assert!(screen(&mut model, 80, 24).contains(&*cells("ถังน้ำร้อน")));
+    // Typed as two characters it is the same.
+    type_keys(&mut model, ":นํา");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("TIC-1.PV") && shown.contains(&*cells("อุณหภูมิน้ำในถัง")), "{shown}");
 }

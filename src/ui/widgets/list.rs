@@ -2,7 +2,7 @@
 
 use crossterm::event::KeyEvent;
 
-use crate::{plant::number::to_u16, ui::keys};
+use crate::{plant::number::to_u16, text::searchable, ui::keys};
 
 /// A movement in a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,7 +113,7 @@ pub struct Words(Vec<String>);
 impl Words {
     /// The words of a text; none lets everything through.
     pub fn parse(text: &str) -> Words {
-        Words(text.split_whitespace().map(str::to_lowercase).collect())
+        Words(searchable(text).to_lowercase().split_whitespace().map(str::to_owned).collect())
     }
     /// Does it let everything through?
     pub fn is_empty(&self) -> bool {
@@ -122,7 +122,7 @@ impl Words {
     /// Does it let this text through?
     pub fn fit(&self, text: &str) -> bool {
         self.is_empty() || {
-            let text = text.to_lowercase();
+            let text = searchable(text).to_lowercase();
             self.0.iter().all(|word| text.contains(word))
         }
     }

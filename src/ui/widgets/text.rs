@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use jiff::{Timestamp, tz::TimeZone};
 use ratatui::{buffer::Buffer, layout::Rect, style::Style};
+use unicode_segmentation::UnicodeSegmentation;
 use unicode_width::UnicodeWidthStr;
 
 use crate::{
@@ -12,7 +13,8 @@ use crate::{
         time::elapsed,
     },
     t,
-    ui::glyph_filter::thai_cells,
+    text::weekday,
+    ui::glyph_filter::cells,
 };
 
 #[cfg(test)]
@@ -53,7 +55,7 @@ impl<'a> Canvas<'a> {
     }
     /// Writes text; returns the column after it.
     pub(crate) fn text(&mut self, x: impl Number, y: impl Number, text: &str, style: Style) -> u16 {
-        let (x, y, text) = (to_u16(x), to_u16(y), thai_cells(text));
+        let (x, y, text) = (to_u16(x), to_u16(y), cells(text));
         if y < self.area.height && x < self.area.width {
             let room = usize::from(self.area.width - x);
             #[cfg(test)]
@@ -72,7 +74,7 @@ impl<'a> Canvas<'a> {
     }
     /// Writes text that ends before column `end`.
     pub(crate) fn text_right(&mut self, end: impl Number, y: impl Number, text: &str, style: Style) {
-        self.text(to_u16(end).saturating_sub(width(&thai_cells(text))), y, text, style);
+        self.text(to_u16(end).saturating_sub(width(text)), y, text, style);
     }
     /// Writes text in the middle of a row.
     pub(crate) fn text_centred(&mut self, y: impl Number, text: &str, style: Style) {
@@ -165,17 +167,26 @@ pub fn fit(text: &str, room: u16) -> String {
     if width(text) <= room {
         return text.to_owned();
     }
-    let mut out = String::new();
-    for c in text.chars() {
-        if width(&out) + width(c.encode_utf8(&mut [0; 4])) + 1 > room {
-            break;
-        }
-        out.push(c);
-    }
-    if room > 0 {
-        out.push('…');
-    }
-    out
+    let head = head(text, room.saturating_sub(1));
+    // A phrase of Thai reads better whole than cut in a word, if most of the room is used.
+    let phrase = head.rfind(BREAK).map(|at| &head[..at]).filter(|phrase| width(phrase) * 4 >= room * 3);
+    format!("{}{}", phrase.unwrap_or(head), if room > 0 { "…" } else { "" })
+}
+
+/// Where a line of Thai may break, between two words: takes no column, and is not drawn.
+const BREAK: char = '\u{200b}';
+
+/// As much of the text as fits. A letter keeps its marks, and a vowel that is written before its consonant does not stand
+/// alone.
+fn head(text: &str, room: u16) -> &str {
+    let mut used = 0;
+    let wide = |cluster: &str| {
+        used += width(cluster);
+        used > room
+    };
+    let end = text.grapheme_indices(true).zip(text.graphemes(true).map(wide)).find(|(_, is_wide)| *is_wide);
+    let head = end.map_or(text, |((at, _), _)| &text[..at]);
+    head.trim_end_matches(|c| ('\u{e40}'..='\u{e44}').contains(&c))
 }
 
 /// The text, or `##` where it does not fit: for numbers, a part of which is another number.
@@ -188,7 +199,7 @@ pub fn fit_words(text: &str, room: u16) -> String {
     if width(text) <= room {
         return text.to_owned();
     }
-    let ends = text.match_indices(' ').map(|(at, _)| &text[..at]);
+    let ends = text.match_indices([' ', BREAK]).map(|(at, _)| &text[..at]);
     match ends.rev().find(|part| width(part) + 2 <= room) {
         Some(part) => format!("{} …", part.trim_end()),
         None if room > 0 => "…".to_owned(),
@@ -210,23 +221,41 @@ pub fn pad_left(text: &str, room: u16) -> String {
     format!("{}{text}", " ".repeat(usize::from(blanks)))
 }
 
-/// The text in lines of at most this width, broken between words where possible.
+/// The text in lines of at most this width, broken between words where possible: at blanks and at U+200B.
 pub fn wrap(text: &str, room: u16) -> Vec<String> {
     let mut lines = Vec::new();
     let mut line = String::new();
-    for word in text.split_whitespace() {
-        if !line.is_empty() && width(&line) + 1 + width(word) > room {
-            lines.push(std::mem::take(&mut line));
+    for word in text.split(|c: char| c.is_whitespace() && c != NO_BREAK).filter(|word| !word.is_empty()) {
+        for (n, part) in word.trim_matches(BREAK).split(BREAK).enumerate() {
+            let blank = if n == 0 && !line.is_empty() { " " } else { "" };
+            if line.is_empty() || width(&line) + width(blank) + width(part) <= room {
+                line.push_str(blank);
+            } else {
+                lines.push(std::mem::take(&mut line));
+            }
+            line.push_str(part);
+            // Thai of a plant file may have no break points.
+            while width(&line) > room && line.contains(is_thai) {
+                let rest = line.split_off(head(&line, room).len());
+                if line.is_empty() {
+                    line = rest;
+                    break;
+                }
+                lines.push(std::mem::replace(&mut line, rest));
+            }
         }
-        if !line.is_empty() {
-            line.push(' ');
-        }
-        line.push_str(word);
     }
     if !line.is_empty() {
         lines.push(line);
     }
     lines.into_iter().map(|line| fit(&line, room)).collect()
+}
+
+/// Keeps a number and its unit in one line.
+const NO_BREAK: char = '\u{a0}';
+
+fn is_thai(c: char) -> bool {
+    ('\u{e01}'..='\u{e5b}').contains(&c)
 }
 
 /// How long ago, short: `0.4s`, `12s`, `4m12s`, `3h05m`, `2d`.
@@ -266,14 +295,11 @@ pub fn stamp(at: Timestamp, zone: &TimeZone) -> String {
 pub fn moment(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     let (days, at) = (elapsed(at, now).as_secs() / 86_400, at.to_zoned(zone.clone()));
     let today = at.date() == now.to_zoned(zone.clone()).date();
-    at.strftime(if today {
-        "%H:%M:%S"
-    } else if days < 6 {
-        "%a %H:%M"
-    } else {
-        t!("%m-%d %Hh")
-    })
-    .to_string()
+    match days {
+        _ if today => at.strftime("%H:%M:%S").to_string(),
+        0..6 => format!("{} {}", weekday(at.weekday()), at.strftime("%H:%M")),
+        _ => at.strftime(t!("%m-%d %Hh")).to_string(),
+    }
 }
 
 #[cfg(test)]
@@ -338,6 +364,22 @@ mod tests {
     fn lines_break_between_words() {
         assert_eq!(wrap("lower SV or stop; check SSR lamp", 12), ["lower SV or", "stop; check", "SSR lamp"]);
         assert_eq!(wrap("", 12), Vec::<String>::new());
+    }
+
+    #[test]
+    fn thai_is_cut_between_letters_and_broken_between_words() {
+        let check = |text: &str, room, expect: &str| assert_eq!(fit(text, room), expect, "{room}");
+        check("น้ำร้อน", 5, "น้ำร้อน");
+        check("น้ำร้อน", 4, "น้ำร้…");
+        check("น้ำร้อน", 2, "…");
+        check("ถังแก้ว", 4, "ถัง…");
+        check("สัญญาณ\u{200b}เตือน", 9, "สัญญาณ\u{200b}เตือน");
+        check("ตรวจสอบ\u{200b}ไฟเลี้ยง", 9, "ตรวจสอบ…");
+        let phrase = "ตรวจสอบ\u{200b}ไฟเลี้ยง \u{200b}การเดินสาย \u{200b}และหมายเลข\u{200b}อุปกรณ์";
+        let lines: Vec<_> = wrap(phrase, 16).iter().map(|line| line.replace(BREAK, "")).collect();
+        assert_eq!(lines, ["ตรวจสอบไฟเลี้ยง", "การเดินสาย", "และหมายเลขอุปกรณ์"]);
+        assert_eq!(wrap("ถังน้ำร้อนเต็ม", 5), ["ถังน้ำร้", "อนเต็ม"]);
+        assert_eq!(wrap("limit 72.0\u{a0}°C", 8), ["limit", "72.0\u{a0}°C"]);
     }
 
     #[test]

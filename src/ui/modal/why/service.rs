@@ -39,7 +39,7 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
     let mut rows = vec![Row::new(t!("device"), text, if well { theme.normal() } else { theme.trouble() })];
     rows.extend(status.diagnosis.map(|reason| {
         let signal = reason.signal();
-        Row::new("", format!("{} {}: {reason}", signal.word(), signal.label()), theme.trouble())
+        Row::new("", format!("{} {}: {reason}", signal.word(), crate::text::translate(signal.label())), theme.trouble())
     }));
     // What stands above already is not said again.
     let notes = cx.snapshot.sample(def.id).quality.cause() == Some(Cause::NotConnected);

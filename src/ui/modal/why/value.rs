@@ -120,7 +120,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
     let of = |fault: Fault| Some(translate(source_frame::advice(fault)).to_owned());
     match cause {
         Cause::NotConnected => match cx.snapshot.line(device.line).state {
-            LineState::Disconnected => Some(t!("connect the line again: tab 4, L").to_owned()),
+            LineState::Disconnected => Some(t!("connect the line again: tab 4, D").to_owned()),
             LineState::Testing => Some(t!("wait for the end of the test, or stop it").to_owned()),
             LineState::Waiting { .. } | LineState::Connecting | LineState::Connected => of(Fault::NotConnected),
         },

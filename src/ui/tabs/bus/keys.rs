@@ -39,7 +39,7 @@ pub enum Action {
 const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "previous page", Action::Turn(-1)),
     Key::new(code(KeyCode::Right), "page", "next page", Action::Turn(1)),
-    Key::new(char('L'), "", "page Line", Action::Show(Page::Line)),
+    Key::new(char('l'), "", "page Line", Action::Show(Page::Line)),
     Key::new(char('B'), "", "page Plan: the blocks that are read", Action::Show(Page::Plan)),
     Key::new(char('F'), "", "page Frames", Action::Show(Page::Frames)),
     Key::new(char('T'), "", "page Test", Action::Show(Page::Test)),
@@ -64,7 +64,7 @@ const TEST_KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "start", "start the selected test", Action::Open).needs(Role::Technician),
     Key::new(char('t'), "", "enter bytes and send them", Action::Try(Tried::Bytes)),
     Key::new(char('f'), "", "build a request from its fields", Action::Try(Tried::Request)),
-    Key::new(char('l'), "", "loopback", Action::Try(Tried::Loopback)),
+    Key::new(char('b'), "", "loopback", Action::Try(Tried::Loopback)),
     Key::new(char('i'), "", "identify a device", Action::Try(Tried::Identify)),
     Key::new(char('s'), "", "scan for units", Action::Try(Tried::Scan)),
     Key::new(char('m'), "", "map of the addresses that a unit answers at", Action::Try(Tried::Sweep)),

@@ -3,7 +3,7 @@
 use super::{
     LineView, Window,
     line::{grouped, ms, short_ms},
-    rows::{self, number, plain, words},
+    rows::{self, plain},
     window::{Shown, TextWindow},
 };
 use crate::ui::tabs::prelude::*;
@@ -92,21 +92,21 @@ impl Plan {
 }
 
 const COLUMNS: [rows::Column; 15] = [
-    words("", 0),
-    words("device", 0),
-    words("function", 1),
-    words("registers", 0),
-    words("wire", 2),
-    number("n", 3),
-    number("tags", 8),
-    number("every", 2),
-    number("ms", 4),
-    number("next", 6),
-    number("ok", 1),
-    number("failed", 1),
-    number("reply", 3),
-    number("late", 7),
-    number("missed", 9),
+    rows::words("", 0),
+    rows::words("device", 0),
+    rows::words("function", 1),
+    rows::words("registers", 0),
+    rows::words("wire", 2),
+    rows::number("n", 3),
+    rows::number("tags", 8),
+    rows::number("every", 2),
+    rows::number("ms", 4),
+    rows::number("next", 6),
+    rows::number("ok", 1),
+    rows::number("failed", 1),
+    rows::number("reply", 3),
+    rows::number("late", 7),
+    rows::number("missed", 9),
 ];
 
 fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
@@ -209,7 +209,7 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
             unit = device.unit,
             code,
             code2 = format!("{code:02X}"),
-            function = names::function(code).unwrap_or_default(),
+            function = translate(names::function(code).unwrap_or_default()),
             span = names::span(code, poll.address, poll.count),
             address = poll.address,
             last,

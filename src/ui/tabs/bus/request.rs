@@ -309,7 +309,7 @@ fn request_text(message: &[u8], framing: Framing) -> Result<Vec<String>, String>
     }
     let whole = frame::wrap(framing, TRANSACTION, message);
     let dissection = dissect::dissect(&whole, Some(framing), Some(Direction::Request), None);
-    let effect = names::effect(message).map(|effect| t!("Effect: {effect}.", effect));
+    let effect = names::effect(message).map(|effect| t!("Effect: {effect}.", effect = translate(effect)));
     Ok([Some(dissection.summary), Some(hex(message)), effect].into_iter().flatten().collect())
 }
 

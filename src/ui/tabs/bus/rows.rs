@@ -82,7 +82,8 @@ pub const fn number(title: &'static str, need: u8) -> Column {
 
 /// Headings and lines of a table, as wide as their widest cell; columns that do not fit are left out whole.
 pub fn table<const N: usize>(columns: &[Column; N], lines: &[[String; N]], room: u16) -> (String, Vec<String>) {
-    let widest = |n: usize| lines.iter().map(|line| width(&line[n])).max().unwrap_or(0).max(width(columns[n].title));
+    let widest =
+        |n: usize| lines.iter().map(|line| width(&line[n])).max().unwrap_or(0).max(width(translate(columns[n].title)));
     let mut kept: Vec<(usize, u16)> = (0..N).map(|n| (n, widest(n))).collect();
     while room < kept.iter().map(|(_, width)| width + 1).sum::<u16>() && 1 < kept.len() {
         let Some(least) = kept.iter().map(|(n, _)| columns[*n].need).max() else { break };
@@ -95,7 +96,7 @@ pub fn table<const N: usize>(columns: &[Column; N], lines: &[[String; N]], room:
         };
         kept.iter().map(cell).collect::<Vec<_>>().join(" ")
     };
-    let heading = line(&|n| columns[n].title.to_owned());
+    let heading = line(&|n| translate(columns[n].title).to_owned());
     (heading, lines.iter().map(|cells| line(&|n| cells[n].clone())).collect())
 }
 

@@ -56,7 +56,7 @@ impl Tried {
             Tried::Request => {
                 ["f", t!("request by fields"), t!("unit, function, address (41003 or 0x03EA), count or value")]
             }
-            Tried::Loopback => ["l", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
+            Tried::Loopback => ["b", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
             Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
             Tried::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
             Tried::Sweep => ["m", t!("map of addresses"), t!("which of the addresses 0 to 65535 a unit answers at")],
@@ -166,7 +166,7 @@ pub fn closed(at: &LineView) -> Option<String> {
         LineState::Connected | LineState::Testing => None,
         LineState::Connecting => Some(t!("line {name} is connecting: nothing can be sent yet", name)),
         LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why)),
-        LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (tab 4, L)", name)),
+        LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (tab 4, D)", name)),
     }
 }
 
@@ -211,7 +211,9 @@ fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
                     summary = dissection.summary
                 )),
                 (None, false, false) => Some(match names::effect(&dissection.message) {
-                    Some(effect) => t!("{summary}: {effect}. Send it?", summary = dissection.summary, effect),
+                    Some(effect) => {
+                        t!("{summary}: {effect}. Send it?", summary = dissection.summary, effect = translate(effect))
+                    }
                     None => t!(
                         "{summary}. This bypasses all limits of the plant file and is not read back. Send it?",
                         summary = dissection.summary

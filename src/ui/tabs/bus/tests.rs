@@ -58,7 +58,7 @@ fn run(
 fn every_page_well_and_in_trouble() {
     let moods = [("well", Fixture::traffic()), ("trouble", Fixture::traffic_trouble())];
     for (mood, fixture) in &moods {
-        for (page, keys) in [("line", "L"), ("plan", "B"), ("frames", "F"), ("test", "T")] {
+        for (page, keys) in [("line", "l"), ("plan", "B"), ("frames", "F"), ("test", "T")] {
             for (width, height) in [(80, 24), (120, 40)] {
                 let mut model = bus(fixture, Theme::FULL, keys);
                 insta::assert_snapshot!(format!("{page}_{mood}_{width}x{height}"), screen(&mut model, width, height));
@@ -211,7 +211,7 @@ fn a_request_is_built_of_fields_with_either_kind_of_address() {
 fn a_closed_line_says_so_instead_of_sending() {
     let mut fixture = Fixture::traffic();
     fixture.line.state = LineState::Disconnected;
-    for keys in ["Tt01 03 00 00 00 01⏎", "Tl⏎", "Ti⏎", "Ts⏎"] {
+    for keys in ["Tt01 03 00 00 00 01⏎", "Tb⏎", "Ti⏎", "Ts⏎"] {
         let mut model = bus(&fixture, Theme::FULL, "");
         assert_eq!(sent_kind(&type_keys(&mut model, keys)), None, "{keys}");
         let shown = screen(&mut model, 80, 24);
@@ -310,7 +310,7 @@ fn no_size_breaks_a_page_or_a_window() {
     let mut fixture = Fixture::traffic_trouble();
     let scan = Scan { first: 1, last: 9, serials: vec![], timeout: Duration::from_millis(100) };
     fixture.line.test = Some(run(Diagnostic::Scan(scan), DiagnosticState::Running, 3, 9, Vec::new()));
-    for keys in ["L", "B", "F", "T", "B⏎", "F⏎", "Tt01 03", "Tf", "R", "Ts", "Tm"] {
+    for keys in ["l", "B", "F", "T", "B⏎", "F⏎", "Tt01 03", "Tf", "R", "Ts", "Tm"] {
         let mut model = bus(&fixture, Theme::FULL, keys);
         for (width, height) in [(60, 16), (61, 17), (79, 23), (81, 25), (200, 60), (400, 20), (70, 200)] {
             assert!(screen(&mut model, width, height).lines().count() <= usize::from(height));

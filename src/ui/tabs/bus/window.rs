@@ -267,7 +267,7 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
         "{code} / 0x{code2} {function}: {span} (0x{address}), {count} in one request",
         code,
         code2 = format!("{code:02X}"),
-        function = names::function(code).unwrap_or_default(),
+        function = translate(names::function(code).unwrap_or_default()),
         span = names::span(code, address, poll.count),
         address = format!("{address:04X}"),
         count = poll.count

@@ -86,7 +86,7 @@ const WHY: Key<Action> = Key::new(char('w'), "why", "explain the value: quality,
 const ACTIONS: Key<Action> =
     Key::new(char('f'), "actions", "actions of the device (save to memory)", Action::Actions).needs(Role::Technician);
 const LINE: Key<Action> =
-    Key::new(char('L'), "line", "disconnect the device's line, or connect it again (asks first)", Action::Line)
+    Key::new(char('D'), "line", "disconnect the device's line, or connect it again (asks first)", Action::Line)
         .needs(Role::Technician);
 const SETTINGS: Key<Action> = Key::new(
     char('c'),

@@ -107,7 +107,7 @@ impl Table {
         // What is only read needs no range; what can be written says that its range is not known.
         let none = !tag.writable() && tag.enum_labels.is_empty() && cx.snapshot.range(tag.id).is_none();
         let range = if none { "–".to_owned() } else { range };
-        let range = range.trim_start_matches("range ").trim_end_matches(&shown.unit).trim_end().to_owned();
+        let range = range.trim_start_matches(t!("range ")).trim_end_matches(&shown.unit).trim_end().to_owned();
         let pen = match (self.defaults && differs(cx, tag), tag.writable()) {
             (true, _) => theme.pick("≠", "#"),
             (false, true) => theme.pick("✎", "w"),

@@ -117,9 +117,9 @@ fn describe(cx: &ViewContext, status: &Status, target: FaultTarget, fault: Injec
     let mut paragraph = |head: &str, text: &str| {
         lines.extend(wrap(&format!("{head}{text}"), room).into_iter().map(|line| (line, theme.normal())));
     };
-    paragraph("", description.cause);
-    paragraph(t!("Symptoms: "), description.symptoms);
-    paragraph(t!("Action: "), description.action);
+    paragraph("", translate(description.cause));
+    paragraph(t!("Symptoms: "), translate(description.symptoms));
+    paragraph(t!("Action: "), translate(description.action));
 
     let truth = compare(cx, status, target);
     let wanted = (to_u16(truth.len()) + 1).min(canvas.height().saturating_sub(to_u16(lines.len()) + 1));

@@ -1,6 +1,7 @@
 //! The view of the login page: the banner, the form or who is in, and the most urgent alarms, which never hide.
 
 use super::Login;
+use crate::text::Locale;
 use crate::ui::tabs::prelude::*;
 use crate::ui::{
     chrome::{alarm_words, counts},
@@ -20,6 +21,11 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
     // A low screen has room for the form and the most urgent alarm.
     let least = if height < 14 { 2 } else { ALARM_ROWS_MIN };
     let above = height.saturating_sub(least);
+    if least > 2 && cx.theme.has_all_letters() {
+        // Whoever cannot read this page finds the way to another language in its own name.
+        let other = Locale::current().language.next().name();
+        canvas.text_right(width.saturating_sub(1), 0, &format!("Ctrl-T {other}"), cx.theme.dim());
+    }
     let mut part = canvas.part(3, u16::from(least > 2), room, above);
     let form = login.form.as_ref().map_or(0, |form| form.height(cx, room) + 4);
     let mut y = banner(cx, &mut part, above.saturating_sub(form));

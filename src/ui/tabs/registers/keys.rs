@@ -79,7 +79,7 @@ pub(super) const KEYS: &[Key<Action>] = &[
     Key::new(char('p'), "watch", "watch the selected register, or no longer", Action::Watch),
     Key::new(char('g'), "graph", "graph of what is watched, full screen", Action::Graph),
     Key::new(char('e'), "name", "name, type, scale and unit of the selected register", Action::Name),
-    Key::new(char('L'), "log", "begin or end a log of what is watched, as CSV: a row for every read", Action::Log),
+    Key::new(char('R'), "log", "begin or end a log of what is watched, as CSV: a row for every read", Action::Log),
     Key::new(
         char('w'),
         "write",

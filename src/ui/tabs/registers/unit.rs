@@ -13,7 +13,7 @@ impl Registers {
 
     pub(super) fn unit_typed(&mut self, cx: &ViewContext, text: &str) -> Result<(), String> {
         if self.watch.is_logging() {
-            return Err(t!("another unit has other registers: end the log first, with L").to_owned());
+            return Err(t!("another unit has other registers: end the log first, with R").to_owned());
         }
         let unit = self.parse_unit(cx, text)?;
         self.show_unit(cx, unit);

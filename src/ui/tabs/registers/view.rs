@@ -169,9 +169,11 @@ fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         canvas.text_right(long + 12, 2, "uint32", theme.dim());
     }
     canvas.text_right(at.float + 11, 2, &format!("float {}", tab.order.word()), theme.dim());
-    canvas.text(at.bits, 2, t!("bits"), theme.dim());
-    if !tab.names.is_empty() {
-        let (x, room) = name_column(&at, canvas.width());
+    let names = (!tab.names.is_empty()).then(|| name_column(&at, canvas.width()));
+    if names.is_none_or(|(x, _)| x != at.bits) {
+        canvas.text(at.bits, 2, t!("bits"), theme.dim());
+    }
+    if let Some((x, room)) = names {
         canvas.text(x, 2, &pad(t!("name and value"), room), theme.dim());
     }
     canvas.text(at.text, 2, "Aa", theme.dim());

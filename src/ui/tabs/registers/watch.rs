@@ -20,6 +20,7 @@ use crate::{
         tag::{ByteOrder, DataType, Table},
     },
     report::value_log,
+    text::file,
     ui::{Effect, widgets::spark},
 };
 
@@ -72,7 +73,7 @@ impl WatchList {
     fn log_row(&mut self, at: Timestamp, cells: Vec<(String, Quality)>) -> Vec<UiAction> {
         let Some(log) = &mut self.log else { return Vec::new() };
         log.rows += 1;
-        let bytes = value_log::row(at, cells.into_iter());
+        let bytes = file(|| value_log::row(at, cells.into_iter()));
         vec![UiAction::Do(Effect::Append { tab: Tab::Registers, path: log.path.clone(), bytes, new: false })]
     }
 
@@ -125,7 +126,7 @@ impl Registers {
     /// Puts the selected register on the list, or takes it off.
     pub(super) fn toggle_watch(&mut self) -> Vec<UiAction> {
         if self.watch.log.is_some() {
-            return notice(t!("The list cannot change while it is logged: L ends the log.").to_owned());
+            return notice(t!("The list cannot change while it is logged: R ends the log.").to_owned());
         }
         let at = (self.table, self.selected);
         if let Some(index) = self.watch.items.iter().position(|item| item.at == at) {
@@ -168,7 +169,7 @@ impl Registers {
     /// Takes a name; an empty text takes it away.
     pub(super) fn name_typed(&mut self, text: &str) -> Result<(), String> {
         if self.watch.log.is_some() {
-            return Err(t!("names cannot change while they are logged: L ends the log").to_owned());
+            return Err(t!("names cannot change while they are logged: R ends the log").to_owned());
         }
         let at = (self.table, self.selected);
         if text.is_empty() {

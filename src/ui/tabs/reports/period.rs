@@ -6,6 +6,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::def::PlantDef,
     report::{Period, PeriodName, period_parser, shift},
+    text::date,
 };
 
 /// The longest free period: five years.
@@ -26,8 +27,9 @@ pub fn at(def: &PlantDef, at: Timestamp) -> Option<Period> {
 pub fn label(name: &PeriodName) -> String {
     match name {
         PeriodName::Free => t!("period").to_owned(),
-        PeriodName::Day(date) => t!("day {date}", date),
-        PeriodName::Shift { .. } | PeriodName::Batch(_) => name.to_string(),
+        PeriodName::Day(day) => t!("day {date}", date = date(*day)),
+        PeriodName::Shift { name, date: day } => format!("{name} {}", date(*day)),
+        PeriodName::Batch(_) => name.to_string(),
     }
 }
 

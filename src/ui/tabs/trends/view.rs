@@ -23,6 +23,7 @@ use crate::{
         def::{Condition, Level, Pen, Subject},
         record::AlarmEvent,
     },
+    text::date,
     ui::{
         theme::Glyphs,
         widgets::chart::{Chart, Curve, Limit, Plan, mark, trace::Trace},
@@ -333,7 +334,7 @@ fn moment_exact(at: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
 fn stretch(from: Timestamp, to: Timestamp, now: Timestamp, zone: &TimeZone) -> String {
     let [from, to, now] = [from, to, now].map(|at| at.to_zoned(zone.clone()));
     let (first, last) = match (from.date() == to.date(), from.date() == now.date()) {
-        _ if from.year() != now.year() => ("%Y-%m-%d", "%Y-%m-%d"),
+        _ if from.year() != now.year() => return format!("{} – {}", date(from.date()), date(to.date())),
         (true, true) => ("%H:%M:%S", "%H:%M:%S"),
         (true, false) => ("%m-%d %H:%M", "%H:%M"),
         (false, _) => ("%m-%d %H:%M", "%m-%d %H:%M"),

@@ -12,7 +12,7 @@ fn a_silent_device_shows_its_next_poll_and_r_polls_it_now() {
     report.retries = vec![(device, now() + jiff::SignedDuration::from_secs(12))];
     fixture.line.report = Some(Arc::new(report));
     for (width, height) in [(80, 24), (120, 40)] {
-        let mut model = bus(&fixture, Theme::FULL, "L");
+        let mut model = bus(&fixture, Theme::FULL, "l");
         let shown = screen(&mut model, width, height);
         assert!(shown.contains("retry 12 s"), "{shown}");
         assert_eq!(sent_kind(&type_keys(&mut model, "r")), Some(&CommandKind::Refresh(device)));
@@ -47,7 +47,7 @@ fn a_frame_or_a_block_is_opened_only_as_it_was_drawn() {
 #[test]
 fn every_page_in_seven_bits_tells_what_is_wrong() {
     for (page, keys, words) in [
-        ("line", "L", "! PLC-1: response timeout at 14:01:50"),
+        ("line", "l", "! PLC-1: response timeout at 14:01:50"),
         ("plan", "B", "! TIC-1"),
         ("frames", "F", "x CRC error: got 3C51"),
         ("test", "T", "scan for units"),
@@ -66,7 +66,7 @@ fn pages_are_turned_by_arrows_and_letters() {
         ("→", "‹Plan›"),
         ("→→", "‹Test›"),
         ("→", "‹Registers›"),
-        ("L←", "‹Registers›"),
+        ("l←", "‹Registers›"),
         ("F", "‹Frames›"),
     ] {
         type_keys(&mut model, keys);
@@ -78,7 +78,7 @@ fn pages_are_turned_by_arrows_and_letters() {
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains("‹Frames›") && shown.contains("This key does nothing here"), "{key}: {shown}");
     }
-    type_keys(&mut model, "Lc");
+    type_keys(&mut model, "lc");
     assert!(matches!(model.modal, Some(Modal::Settings(_))));
 }
 
@@ -153,7 +153,7 @@ fn a_map_that_fails_shows_its_ranges_and_the_whole_reason() {
 
 #[test]
 fn a_wide_screen_shows_line_devices_and_frames_together() {
-    let mut model = bus(&Fixture::traffic(), Theme::FULL, "L");
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "");
     for (width, height, frames) in [(80, 40, false), (120, 40, true), (160, 50, true)] {
         let shown = screen(&mut model, width, height);
         let is_seen = shown.contains("recent frames") && shown.contains(" RX ");

@@ -25,12 +25,12 @@ fn what_is_watched_is_read_wherever_the_window_is() {
 #[test]
 fn a_log_has_a_row_for_every_read_and_no_old_value() {
     let mut bench = Bench::new();
-    bench.keys("L");
+    bench.keys("R");
     assert!(bench.screen(80, 24).contains("Nothing is watched"));
     bench.keys("⎋j1002⏎");
     bench.answer(0, device);
     bench.keys("eSV int16 0.1 °C⏎p");
-    bench.keys("L");
+    bench.keys("R");
     bench.answer(1, device);
     bench.answer(2, |address| if address == 1002 { Some(701) } else { device(address) });
     let (id, read) = bench.asked.pop().expect("a query");
@@ -41,7 +41,7 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
     assert!(bench.screen(120, 40).contains("3 rows"));
     bench.keys("p");
     assert!(bench.screen(120, 40).contains("cannot change while it is logged"));
-    bench.keys("⎋L");
+    bench.keys("⎋R");
     bench.answer(4, device);
     let values: Vec<_> = bench.rows.iter().map(|row| row.split_once(',').unwrap_or_default().1).collect();
     let expect = ["SV °C,SV quality", "70.0,good", "70.1,good", ",uncertain: response timeout"];
@@ -55,7 +55,7 @@ fn a_read_for_a_key_adds_no_row_and_keeps_the_rhythm() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");
     bench.answer(0, device);
-    bench.keys("eSV int16 0.1 °C⏎pL");
+    bench.keys("eSV int16 0.1 °C⏎pR");
     bench.answer(1, device);
     for _ in 0..3 {
         bench.keys("j1010⏎");
@@ -72,7 +72,7 @@ fn a_log_says_when_its_values_became_old() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");
     bench.answer(0, device);
-    bench.keys("pL");
+    bench.keys("pR");
     bench.answer(1, device);
     bench.snapshot(2, LineState::Connected);
     assert_eq!(bench.rows.len(), 2, "a heading and a value: {:?}", bench.rows);
@@ -91,7 +91,7 @@ fn a_log_that_cannot_be_written_ends_and_says_why() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");
     bench.answer(0, device);
-    bench.keys("pL");
+    bench.keys("pR");
     bench.send(Msg::Saved(Some(Tab::Registers), Err("bench.toml: exists".to_owned())));
     assert!(bench.screen(120, 40).contains("nothing was saved"), "another file than the log");
     bench.keys("⎋");
