@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
 
+pub(crate) use self::svg::svg as picture;
 use super::{Effect, Model, QueryId, UiAction};
 use crate::{
     access::{SessionRequest, audit_log::sha256},
@@ -29,7 +30,7 @@ pub(super) fn begin(model: &mut Model) -> Vec<UiAction> {
     let stamp = cx.now.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d-%H%M%S");
     let name = format!("screen-{stamp}-{}", model.tabs.shown.title().to_lowercase());
     let path = |end: &str| cx.def().report.folder.join(format!("{name}.{end}"));
-    let files = vec![(path("txt"), text(&drawn).into_bytes()), (path("svg"), svg::svg(&drawn).into_bytes())];
+    let files = vec![(path("txt"), text(&drawn).into_bytes()), (path("svg"), picture(&drawn).into_bytes())];
     model.screen_dump.files = files;
     next(model)
 }

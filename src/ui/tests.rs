@@ -1,6 +1,7 @@
 //! Tests of the whole terminal: what an operator sees, and what the keys do; here is what they share.
 
 mod keys;
+mod pictures;
 mod replay;
 mod users;
 mod screens;

@@ -21,8 +21,8 @@ const INK: Rgb = (200, 200, 196);
 type Rgb = (u8, u8, u8);
 
 /// A whole SVG document; the same screen gives the same bytes.
-pub(super) fn svg(buffer: &Buffer) -> String {
-    let mut page = Page::default();
+pub(crate) fn svg(buffer: &Buffer) -> String {
+    let mut page = Page { ground: usual_ground(buffer), ..Page::default() };
     for y in 0..buffer.area.height {
         for x in 0..buffer.area.width {
             page.cell(buffer, x, y);
@@ -35,7 +35,7 @@ pub(super) fn svg(buffer: &Buffer) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" font-size=\"14\" \
          font-family=\"ui-monospace,'DejaVu Sans Mono',Menlo,Consolas,monospace\">\n\
          <rect width=\"100%\" height=\"100%\" rx=\"6\" fill=\"{}\"/>\n<g transform=\"translate({MARGIN} {MARGIN})\">\n",
-        hex(GROUND)
+        hex(page.ground)
     );
     for (colour, path) in page.grounds.iter().chain(&page.shapes) {
         // Writing into a string does not fail.
@@ -44,9 +44,18 @@ pub(super) fn svg(buffer: &Buffer) -> String {
     out + &page.texts + "</g>\n</svg>\n"
 }
 
+/// The ground of most cells: that of the page.
+fn usual_ground(buffer: &Buffer) -> Rgb {
+    let mut counts: BTreeMap<Rgb, usize> = BTreeMap::new();
+    buffer.content.iter().for_each(|cell| *counts.entry(colours(cell).1).or_default() += 1);
+    counts.into_iter().max_by_key(|(_, count)| *count).map_or(GROUND, |(ground, _)| ground)
+}
+
 /// Shapes by colour, and text.
 #[derive(Default)]
 struct Page {
+    /// What most cells stand on.
+    ground: Rgb,
     grounds: BTreeMap<Rgb, String>,
     shapes: BTreeMap<Rgb, String>,
     texts: String,
@@ -70,7 +79,7 @@ impl Page {
         let Some(cell) = buffer.cell((x, y)) else { return };
         let (ink, ground) = colours(cell);
         let (left, top) = (f64::from(x) * WIDTH, f64::from(y) * HEIGHT);
-        if ground != GROUND {
+        if ground != self.ground {
             rect(self.grounds.entry(ground).or_default(), left, top, WIDTH, HEIGHT);
         }
         let symbol = cell.symbol().chars().next().unwrap_or(' ');
