@@ -115,12 +115,14 @@
 //! | a device, a plant, a scenario | one TOML file under `profiles` |
 //! | a data type | its variant and rows in `plant/data_type.rs` |
 //! | an alarm condition | `plant/alarm/condition.rs`, its keys in `profile/condition.rs`, one scenario |
+//! | a symbol of the mimic | its kind in `profile/picture/symbol.rs`, its item in `plant/mimic_def.rs`, its drawing in `ui/widgets/mimic` |
+//! | a theme | a column of the table in `ui/theme/palette.rs` |
 //! | a report format | its file in `report`, its row in `report/mod.rs` |
 //! | a tab | its file in `ui/tabs`, its row in `ui/tabs/mod.rs` |
 //! | a key of a tab | its row in the tab's table of keys, which the footer, the help and the clash check read; its action in the tab |
 //! | a renamed TOML key | its row in `profile/renamed.rs` |
 //! | a column of the history | one numbered migration |
-//! | a language | a copy of `text/en.toml`, its variant in `text.rs` |
+//! | a language | a copy of `text/en.toml` with other values, its row in `text.rs` |
 //!
 //! # Modules, in reading order
 //!

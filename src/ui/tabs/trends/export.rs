@@ -9,6 +9,7 @@ use crate::{
         export::{Column, export_csv},
         step_series::HeldValue,
     },
+    text::file,
     ui::tabs::Outgoing,
 };
 
@@ -90,8 +91,8 @@ impl Trends {
             values,
         };
         let columns: Vec<Column> = tags.iter().zip(values).map(column).collect();
-        let bytes = export_csv(cx.def(), from, every, &columns, cx.def().report.csv);
-        self.send(vec![(self.file(cx, "csv"), bytes)])
+        let bytes = file(|| export_csv(cx.def(), from, every, &columns, cx.def().report.csv));
+        self.send(vec![(self.path(cx, "csv"), bytes)])
     }
 
     /// Exports the chart as it is drawn, as SVG and PNG.
@@ -99,9 +100,9 @@ impl Trends {
         if self.export.is_busy() {
             return Vec::new();
         }
-        let page = picture(self, cx);
-        let png = page.png().map(|png| (self.file(cx, "png"), png));
-        self.send([(self.file(cx, "svg"), page.svg())].into_iter().chain(png).collect())
+        let page = file(|| picture(self, cx));
+        let png = page.png().map(|png| (self.path(cx, "png"), png));
+        self.send([(self.path(cx, "svg"), page.svg())].into_iter().chain(png).collect())
     }
 
     fn send(&mut self, files: Vec<(PathBuf, Vec<u8>)>) -> Vec<UiAction> {
@@ -134,7 +135,7 @@ impl Trends {
     }
 
     /// `2026-11-25T093600-TIC-1.csv`: begin of the view and name of the group.
-    fn file(&self, cx: &ViewContext, extension: &str) -> PathBuf {
+    fn path(&self, cx: &ViewContext, extension: &str) -> PathBuf {
         let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '-' };
         let name: String = self.name(cx).chars().map(plain).collect();
         let begin = draw::local(cx, self.span(cx).from, "%Y-%m-%dT%H%M%S");
