@@ -75,7 +75,10 @@ pub fn step_response(of: Loop) -> Option<StepResponse> {
     let way = |value: f64| (value - pv) / (sv.1 - pv);
     let known = || (first..end).filter_map(|n| Some((n, share(of.pv[n]?))));
     let passed = |least: f64| (first..end).find(|n| of.pv[*n].is_some_and(|pv| way(pv) >= least)).and_then(time);
-    let peak = known().filter(|(_, share)| *share > 1.0).max_by(|a, b| a.1.total_cmp(&b.1));
+    // Where PV had not come to the old setpoint, its way may lead against the step.
+    let toward = (sv.1 - pv).signum() * (sv.1 - sv.0).signum();
+    let beyond = |share: f64| (share - 1.0) * toward;
+    let peak = known().filter(|(_, share)| beyond(*share) > 0.0).max_by(|a, b| beyond(a.1).total_cmp(&beyond(b.1)));
     let outside = |n: &usize| of.pv[*n].is_none_or(|value| (share(value) - 1.0).abs() > SETTLED);
     let settled = (last..end).rev().find(outside).map_or(last, |n| n + 1);
     let errors = (first..end).filter_map(|n| Some((of.sv[n]? - of.pv[n]?).abs()));
@@ -86,7 +89,7 @@ pub fn step_response(of: Loop) -> Option<StepResponse> {
         sv,
         pv,
         peak: peak.and_then(|(n, _)| Some((time(n)?, of.pv[n]?))),
-        overshoot: peak.map_or(0.0, |(_, share)| (share - 1.0) * 100.0),
+        overshoot: peak.map_or(0.0, |(_, share)| beyond(share) * 100.0),
         rise: passed(RISE.0).zip(passed(RISE.1)),
         settled: if settled < end { time(settled) } else { None },
         iae: errors.sum::<f64>() * minutes,
@@ -124,6 +127,15 @@ mod tests {
     fn a_step_down_is_the_same_upside_down() {
         let got = response(&[70., 60., 60., 60.], &[70., 70., 59., 60.]).expect("a step");
         assert_eq!((got.overshoot.round(), got.peak, got.settled), (10., Some((at(120), 59.)), Some(at(180))));
+    }
+
+    #[test]
+    fn a_step_down_to_above_pv_is_no_overshoot() {
+        let sv = [70., 60., 60., 60., 60.];
+        let got = response(&sv, &[39., 40., 50., 58., 60.]).expect("a step");
+        assert_eq!((got.overshoot, got.peak), (0., None), "PV comes from below and never passes 60");
+        let passed = response(&sv, &[39., 40., 50., 62., 60.]).expect("a step");
+        assert_eq!((passed.overshoot.round(), passed.peak), (20., Some((at(180), 62.))));
     }
 
     #[test]

@@ -25,6 +25,10 @@ pub(super) fn mimic(table: &MimicTable, defs: &Defs, problems: &mut Problems) ->
     let titled: Vec<(String, &[At<String>])> =
         pages.filter_map(|(name, pictures)| Some((name, &pictures.as_ref()?.value.0[..]))).collect();
     let names: Vec<String> = titled.iter().map(|(name, _)| name.clone()).collect();
+    let mut named = Unique::default();
+    for name in table.pages.iter().filter_map(|page| page.value.name.as_ref()) {
+        named.insert(&name.value, name.at, format!("duplicate page `{}`", name.value), problems);
+    }
     let vocabulary = Vocabulary { defs, aliases: &aliases, pages: &names };
     let pages = titled.into_iter().map(|(name, texts)| {
         let mut pictures: Vec<Picture> = texts.iter().map(|text| picture(text, &vocabulary, problems)).collect();
@@ -68,7 +72,7 @@ fn aliases(table: &Option<At<Raw>>, problems: &mut Problems) -> BTreeMap<String,
 }
 
 /// Letters that mean something on every screen, so that no plant can give them another meaning.
-const KEYS_TAKEN: [char; 3] = ['a', 'q', 'w'];
+const KEYS_TAKEN: [char; 4] = ['a', 'q', 'w', 'y'];
 
 fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut Problems) -> Option<MimicCommand> {
     let (key, name) = (table.key.as_ref()?, table.tag.as_ref()?);
@@ -80,7 +84,7 @@ fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut 
     if letter.is_some_and(|letter| KEYS_TAKEN.contains(&letter)) {
         problems
             .add(key.at, format!("key `{}` is taken", key.value))
-            .label("on every screen `a` acknowledges an alarm, `q` quits and `w` says why");
+            .label("on every screen `a` acknowledges an alarm, `q` quits, `w` says why and `y` copies");
     }
     keys.insert(&key.value, key.at, format!("duplicate key `{}`", key.value), problems);
     let tag = defs.tag(name, problems)?;

@@ -49,7 +49,8 @@ pub(super) fn picture(text: &At<String>, vocabulary: &Vocabulary, problems: &mut
     let mut grid = Grid::new(text, &source);
     let (width, height) = grid.size();
     if width == 0 || width > SIZE_MAX.0 || height > SIZE_MAX.1 {
-        let problem = problems.add(text.at, format!("a picture of {width} by {height} cells cannot be drawn"));
+        let problem =
+            problems.add(grid.span(0, 0, 1), format!("a picture of {width} by {height} cells cannot be drawn"));
         problem.label("expected at most 500 by 200; 80 by 18 fit a terminal of 80 by 24");
         return Picture::default();
     }
@@ -94,7 +95,16 @@ fn symbols(grid: &mut Grid, vocabulary: &Vocabulary, problems: &mut Problems) ->
             };
             let (text, at) = (grid.text(y, x + 1, end), grid.span(x + 1, y, end - x - 1));
             if let Some((symbol, size)) = symbol::read(&text, at, vocabulary, problems) {
-                let area = size.map(|(columns, rows)| (usize::from(columns).max(1), usize::from(rows).max(1)));
+                let area = size.map(|(columns, rows)| (usize::from(columns), usize::from(rows)));
+                if let Some((columns, rows)) =
+                    area.filter(|(w, h)| *w == 0 || *h == 0 || *w > SIZE_MAX.0 || *h > SIZE_MAX.1)
+                {
+                    let problem = problems.add(at, format!("a symbol of {columns} by {rows} cells cannot be drawn"));
+                    problem.label("expected 1x1 to 500x200");
+                    grid.clear(x, y, end + 1 - x);
+                    from = end + 1;
+                    continue;
+                }
                 placed.push(Placed { symbol, x, y, width: end + 1 - x, area, room: 0, label: None });
             }
             grid.clear(x, y, end + 1 - x);

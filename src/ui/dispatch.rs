@@ -21,13 +21,13 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         && Tab::offered(&model.cx()).contains(&tab)
     {
         // The number of a tab leads there from every window that has no use for it.
-        model.modal = None;
+        if let Some(Modal::Confirm(_)) = model.modal.take() {
+            model.note = Some(t!("Cancelled: nothing was sent").into());
+        }
         return on_global(model, show);
     }
-    if keys::find(&keys::global(), event) == Some(Global::Dump)
-        && model.modal.as_ref().is_some_and(|modal| modal.only_looks() && !modal.takes_text())
-    {
-        return on_global(model, Global::Dump);
+    if let Some(actions) = dump_window(model, event) {
+        return actions;
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
         let Model { snapshot, theme, preferences, clock, extension, session, screen, tabs, replay, .. } = model;
@@ -82,6 +82,12 @@ fn on_key_of_every_window(model: &mut Model, event: KeyEvent) -> Option<Vec<UiAc
         Some(Global::Language) if keys::ctrl('t').is(event) => Some(on_global(model, Global::Language)),
         Some(_) | None => (model.tour.is_some() && tour::SKIP.is(event)).then(Vec::new),
     }
+}
+
+/// A window that only shows is saved with the screen; another one takes the letter itself.
+fn dump_window(model: &mut Model, event: KeyEvent) -> Option<Vec<UiAction>> {
+    let shows = model.modal.as_ref().is_some_and(|modal| modal.only_looks() && !modal.takes_text());
+    (shows && keys::find(&keys::global(), event) == Some(Global::Dump)).then(|| on_global(model, Global::Dump))
 }
 
 /// A key of the shown tab; one that is none is answered with where they are listed.

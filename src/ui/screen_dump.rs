@@ -63,7 +63,10 @@ pub(super) fn on_request_done(model: &mut Model, number: u32, answer: Result<(),
 /// A file was written, or not.
 pub(super) fn on_saved(model: &mut Model, result: Result<PathBuf, String>) {
     model.note = Some(match result {
-        Ok(path) => t!("Screen saved: {path}", path = path.display()).into(),
+        Ok(path) => {
+            let (name, folder) = (path.file_name().unwrap_or_default(), path.parent().unwrap_or(&path));
+            t!("Screen saved: {name} in {folder}", name = name.to_string_lossy(), folder = folder.display()).into()
+        }
         Err(why) => t!("The screen was not saved: {why}", why).into(),
     });
 }

@@ -75,7 +75,7 @@ fn a_log_is_shown_again_and_a_damaged_line_is_named() {
         terminal.wait_for(shown);
     }
     // Its keys neither write to it nor leave it.
-    terminal.keys("Lc");
+    terminal.keys("Rc");
     terminal.wait_for("at 14:00:");
     terminal.keys("q");
     terminal.wait_for("The log stays as it is");

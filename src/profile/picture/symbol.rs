@@ -168,7 +168,11 @@ pub(super) fn read(
         let page = rest.iter().map(|word| word.value.as_str()).collect::<Vec<_>>().join(" ");
         let found = vocabulary.pages.iter().position(|known| *known == page);
         if found.is_none() {
-            problems.unknown("page", &At { value: page, at }, vocabulary.pages.iter().map(String::as_str));
+            problems.unknown(
+                "page",
+                &At { value: page, at },
+                vocabulary.pages.iter().filter(|page| !page.is_empty()).map(String::as_str),
+            );
         }
         return Some((Symbol::Page(found?), None));
     }
@@ -196,6 +200,7 @@ fn read_options(kind: SymbolKind, words: &[At<String>], defs: &Defs, problems: &
         };
         let size = word.value.split_once('x').and_then(|(columns, rows)| columns.parse().ok().zip(rows.parse().ok()));
         let window = word.value.parse::<SignedDuration>().ok().and_then(|window| Duration::try_from(window).ok());
+        let window = window.filter(|window| *window >= Duration::from_secs(60));
         match (named, size, window.filter(|_| kind == SymbolKind::Trend)) {
             (Some(("left", name)), _, _) => options.remaining = tag(name, problems),
             (Some(("flow", name)), _, _) => options.flow = tag(name, problems),
@@ -226,7 +231,7 @@ fn read_options(kind: SymbolKind, words: &[At<String>], defs: &Defs, problems: &
 
 fn expected_options(kind: SymbolKind) -> &'static str {
     match kind {
-        SymbolKind::Trend => "expected a size as 30x5 or a window as 1h",
+        SymbolKind::Trend => "expected a size as 30x5 or a window as 1h, at least 1min",
         SymbolKind::Bar | SymbolKind::Controller => "expected a size as 26x6",
         SymbolKind::Sequence => "expected a size as 26x5, left=TAG, states=TAG,TAG or a label",
         SymbolKind::Valve | SymbolKind::Pump => "expected a label or flow=TAG",

@@ -132,7 +132,13 @@ fn what_cannot_be_drawn_is_shown_in_the_picture() {
     check_wrong("\n        {D1.T", &["[small.toml:33:1]", "`{` without `}` in its row"]);
     check_wrong("\n        {D1.X  }", &["[small.toml:33:2]", "unknown tag `D1.X`", "did you mean `D1.T`?"]);
     check_wrong("\n        {vlve D1.MODE}", &["unknown symbol `vlve`", "did you mean `valve`?"]);
-    check_wrong("\n        {trend D1.T 30}", &["`30` means nothing here", "expected a size as 30x5 or a window as 1h"]);
+    check_wrong(
+        "\n        {trend D1.T 30}",
+        &["`30` means nothing here", "expected a size as 30x5 or a window as 1h, at least 1min"],
+    );
+    check_wrong("\n        {trend D1.T 0s}", &["`0s` means nothing here"]);
+    check_wrong("\n        {bar D1.T 9999x9999}", &["9999 by 9999 cells cannot be drawn", "expected 1x1 to 500x200"]);
+    check_wrong("\n        {bar D1.T 0x1}", &["0 by 1 cells cannot be drawn"]);
     check_wrong("\n        {level D1.T}", &["a level outside of a box"]);
     check_wrong(
         "\n        ┌──┐\n        │  │",
@@ -184,6 +190,19 @@ fn pages_have_names_and_link_to_each_other() {
     assert_eq!(cold.pictures.len(), 2);
     assert_eq!(cold.picture((80, 2)).size.1, 1, "the largest that fits");
     assert_eq!(cold.picture((5, 1)).size, cold.pictures[0].size, "the smallest where none fits");
+}
+
+#[test]
+fn the_example_of_the_format_page_is_right() {
+    use crate::profile::{FORMAT_PAGE, Search, load, text_of};
+    let example = FORMAT_PAGE.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    let tank = text_of("tank", &Search::shipped()).expect("a shipped plant");
+    let (before, after) = (tank.split("[mimic]").next().unwrap(), tank.split_once("[[mimic.command]]").unwrap().1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.toml");
+    std::fs::write(&path, format!("{before}{example}\n[[mimic.command]]{after}")).unwrap();
+    let plant = load(&path, &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
+    assert_eq!(plant.mimic.pages[0].pictures.len(), 1);
 }
 
 #[test]

@@ -152,11 +152,11 @@ fn demo_part(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
             let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
             let left =
                 status.scenario.as_ref().map_or(String::new(), |progress| t!(" {left} left", left = left(progress)));
-            (4, t!("EXAM{left}", left), cx.theme.strong())
+            (2, t!("EXAM{left}", left), cx.theme.strong())
         }
-        (true, 0) => (4, t!("DEMO").to_owned(), cx.theme.strong()),
-        (true, 1) => (4, t!("DEMO 1 FAULT").to_owned(), cx.theme.trouble()),
-        (true, count) => (4, t!("DEMO {count} FAULTS", count), cx.theme.trouble()),
+        (true, 0) => (2, t!("DEMO").to_owned(), cx.theme.strong()),
+        (true, 1) => (2, t!("DEMO 1 FAULT").to_owned(), cx.theme.trouble()),
+        (true, count) => (2, t!("DEMO {count} FAULTS", count), cx.theme.trouble()),
     }
 }
 

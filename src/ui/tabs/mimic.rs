@@ -139,8 +139,11 @@ impl TabView for Mimic {
         }
         let (scale, left) = placed(picture, area);
         let mut canvas = canvas.part(left, 0, area.width - left, area.height);
+        let joints =
+            items.iter().filter_map(|item| if let MimicItem::Joint { at, .. } = item { Some(*at) } else { None });
+        let joints: Vec<(u16, u16)> = joints.collect();
         for (n, item) in items.iter().enumerate() {
-            self.item(cx, &mut canvas, item, n, scale);
+            self.item(cx, &mut canvas, item, n, (scale, &joints));
         }
         // When all is drawn it is known where there is room for a mark.
         for item in items {
@@ -258,7 +261,14 @@ impl Mimic {
         self.selected = None;
     }
 
-    fn item(&self, cx: &ViewContext, canvas: &mut Canvas, item: &MimicItem, n: usize, scale: CanvasScale) {
+    fn item(
+        &self,
+        cx: &ViewContext,
+        canvas: &mut Canvas,
+        item: &MimicItem,
+        n: usize,
+        (scale, joints): (CanvasScale, &[(u16, u16)]),
+    ) {
         let selected = self.selected == Some(n);
         let motion = !self.still && cx.theme.motion;
         match item {
@@ -274,7 +284,7 @@ impl Mimic {
             }
             MimicItem::Heater { place, tag } => vessel::heater(cx, canvas, scale.place(*place), *tag, selected),
             MimicItem::Pipe { points, flow, directed } => {
-                pipe::view(cx, canvas, points, flow, scale, (*directed, motion))
+                pipe::view(cx, canvas, points, flow, scale, (*directed, motion), joints)
             }
             MimicItem::Joint { at, branches } => pipe::joint(cx, canvas, *at, *branches, scale),
             MimicItem::Value { place, label, tag } => {

@@ -99,7 +99,7 @@ fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Row> {
         return vec![(t!("before"), t!("collecting data").to_owned(), cx.theme.dim())];
     };
     let head = match times {
-        0 => t!("not in the last {days} days", days),
+        0 => t!("none recorded in the last {days} days", days),
         1 => t!("once in {days} days", days),
         times => t!("{times} times in {days} days", times, days),
     };

@@ -138,6 +138,7 @@ fn list_alone(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     if rows.is_empty() {
         let words = match all {
             0 if tab.page == Page::System => t!("No active system alarms. j: journal."),
+            0 if !cx.snapshot.alarms.is_empty() => t!("No process alarms are active; v: system alarms."),
             0 => t!("No active alarms. j: journal."),
             _ => t!("No alarm matches the filter. Esc: show all."),
         };

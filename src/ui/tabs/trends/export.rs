@@ -130,7 +130,7 @@ impl Trends {
         if result.is_err() {
             self.export.files.clear();
         }
-        self.export.said = Some(result.map(|path| path.display().to_string()));
+        self.export.said = Some(result.map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned()));
         self.export.next()
     }
 

@@ -37,6 +37,7 @@ pub fn view(
     flow: &[Vec<TagId>],
     scale: CanvasScale,
     (arrows, motion): (bool, bool),
+    joints: &[(u16, u16)],
 ) {
     let all_on = |tags: &Vec<TagId>| tags.iter().try_fold(true, |all, tag| value::is_on(cx, *tag).map(|on| all && on));
     let states: Vec<Option<bool>> = flow.iter().map(all_on).collect();
@@ -50,7 +51,7 @@ pub fn view(
         Some(true) => cx.theme.running(),
         Some(false) | None => cx.theme.dim(),
     };
-    let steps = steps(points, scale);
+    let steps = steps(points, scale, joints);
     let shift = if motion { cx.phase as usize / 2 } else { 0 };
     for (n, step) in steps.iter().enumerate() {
         let arrow =
@@ -74,9 +75,15 @@ pub fn joint(cx: &ViewContext, canvas: &mut Canvas, (x, y): (u16, u16), branches
 
 /// The cells of a pipe in the order of its flow. The ends reach to the edge of their nominal cells, so that they touch
 /// what stands beside them at every size.
-fn steps(points: &[(u16, u16)], scale: CanvasScale) -> Vec<Step> {
-    let corners: Vec<(u16, u16)> =
-        points.iter().enumerate().map(|(n, point)| corner(points, n, *point, scale)).collect();
+fn steps(points: &[(u16, u16)], scale: CanvasScale, joints: &[(u16, u16)]) -> Vec<Step> {
+    let closed = points.first() == points.last();
+    let met = |point: &(u16, u16)| closed || joints.contains(point);
+    let middle = |(x, y): (u16, u16)| (scale.middle_column(x), scale.middle_row(y));
+    let place = |(n, point): (usize, &(u16, u16))| match met(point) {
+        true => middle(*point),
+        false => corner(points, n, *point, scale),
+    };
+    let corners: Vec<(u16, u16)> = points.iter().enumerate().map(place).collect();
     let mut steps: Vec<Step> = Vec::new();
     for pair in corners.windows(2) {
         let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
@@ -182,6 +189,7 @@ mod tests {
                 &[vec![fixture.tag("PLC-1.SV-1")]],
                 CanvasScale::new((10, 3), (10, 3)),
                 (true, true),
+                &[],
             );
         });
         buffer.content.chunks(10).map(|row| row.iter().map(|cell| cell.symbol()).collect()).collect()
@@ -208,9 +216,11 @@ mod tests {
 
     #[test]
     fn a_stretched_pipe_still_touches_its_ends() {
-        let steps = steps(&[(2, 1), (4, 1), (4, 3)], CanvasScale::new((10, 5), (25, 15)));
+        let steps = steps(&[(2, 1), (4, 1), (4, 3)], CanvasScale::new((10, 5), (25, 15)), &[]);
         let (first, last) = (steps[0], steps[steps.len() - 1]);
         assert_eq!((first.x, last.y), (5, 11), "the left edge of column 2 and the lower edge of row 3");
+        let met = super::steps(&[(2, 1), (4, 1)], CanvasScale::new((10, 5), (25, 15)), &[(4, 1)]);
+        assert_eq!(met.last().map(|step| step.x), Some(11), "in the middle of the cell where pipes meet");
         assert!(steps.windows(2).all(|pair| pair[0].x.abs_diff(pair[1].x) + pair[0].y.abs_diff(pair[1].y) == 1));
     }
 }
