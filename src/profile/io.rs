@@ -40,7 +40,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// The user's [`config_folder`], then `/etc/sightglass`.
+    /// The user's configuration folder, then `/etc/sightglass`.
     pub fn usual() -> Search {
         Search { folders: config_folder().into_iter().chain([PathBuf::from("/etc/sightglass")]).collect() }
     }
