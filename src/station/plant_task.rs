@@ -220,6 +220,8 @@ impl PlantTask {
 
     fn publish(&mut self) {
         let mut snapshot = self.plant.snapshot();
+        // The plant stands at its last event or tick: what else is news must not set the clock of a terminal back.
+        snapshot.at = snapshot.at.max(self.clock.now());
         snapshot.move_to_utc(self.clock.behind_utc());
         if let Some(audit) = &mut self.persistence.audit {
             audit.mark(&mut snapshot);

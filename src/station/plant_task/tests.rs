@@ -100,6 +100,23 @@ fn alarm_events(history: &Path) -> Vec<AlarmEvent> {
 }
 
 #[tokio::test]
+async fn a_snapshot_is_of_the_time_at_which_it_is_published() {
+    let folder = tempfile::tempdir().unwrap();
+    let clock = Clock::real();
+    let mut station = Station::start_with(&folder.path().join("fixture.duckdb"), clock).await;
+    let is_silent = |snapshot: &Arc<Snapshot>| snapshot.alarms.iter().any(|alarm| alarm.id == fixture::SILENT);
+    let first = station.snapshots.wait_for(is_silent).await.unwrap().clone();
+    // An event of a moment ago: the clock of a terminal must not go back to it.
+    let (before, at) = (clock.now(), first.at);
+    let event = Event::Failed { at, device: fixture::PLC, tags: Vec::new(), fault: Fault::BackedOff, exchange: None };
+    station.events.send(event).await.unwrap();
+    station.snapshots.changed().await.unwrap();
+    let shown = station.snapshots.borrow_and_update().at;
+    assert!(shown >= before, "{shown} is before {before}");
+    station.stop().await;
+}
+
+#[tokio::test]
 async fn a_shown_acknowledgement_is_on_disk_without_a_history() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("fixture.duckdb");
