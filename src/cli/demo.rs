@@ -174,7 +174,8 @@ async fn headless(session: Session, clock: Clock, duration: Option<Duration>, ar
         say(&line);
     }
     if let Some(path) = &args.report {
-        let bytes = report::FORMATS[0].render(&report, &last.def, last.def.report.csv);
+        let bytes = report::render(report::FORMATS[0], &report, &last.def, &report::Style::of(&last.def))
+            .map_err(CliError::Failed)?;
         write_for_user(path, &bytes).map_err(CliError::io(format!("cannot write {}", path.display())))?;
         say(&format!("report written: {}", path.display()));
     }

@@ -1,10 +1,12 @@
 //! `sightglass report`: the report of a shift or period from the history, through the station while it runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::{
     history::{Answer, Query},
-    report::{self, ReportFormat},
+    plant::PlantDef,
+    report::{self, ReportFormat, ShiftReport, Style, content::document, document::Document, tables},
+    text::Language,
 };
 
 use super::{
@@ -17,14 +19,25 @@ use super::{
 pub struct Args {
     #[command(flatten)]
     history: HistoryArgs,
-    /// File to write, `-` for standard output [default: the plant's report folder]
+    /// File to write, `-` for standard output; a folder for several formats [default: the plant's report folder]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    #[arg(long, value_name = "FORMAT", help = report::formats_help(), value_parser = report::format,
-          default_value = report::FORMATS[0].name())]
-    format: &'static dyn ReportFormat,
+    #[arg(long, value_name = "FORMATS", help = report::formats_help(), value_parser = report::format,
+          value_delimiter = ',', default_value = report::FORMATS[0].name())]
+    format: Vec<&'static dyn ReportFormat>,
+    /// Instead: a CSV file for each table, into this folder
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "format"])]
+    tables: Option<PathBuf>,
+    /// Language of its texts: en, th [default: that of the plant file]
+    #[arg(long, value_name = "CODE", value_parser = language)]
+    language: Option<Language>,
     #[command(flatten)]
     csv: CsvArgs,
+}
+
+fn language(code: &str) -> Result<Language, String> {
+    let known = || Language::all().map(Language::code).collect::<Vec<_>>().join(", ");
+    Language::from_code(code).ok_or_else(|| format!("expected one of {}", known()))
 }
 
 /// Writes the report.
@@ -43,8 +56,47 @@ pub fn main(args: Args) -> Result<(), CliError> {
                 gap.why
             ));
         }
-        let bytes = args.format.render(&report, &def, args.csv.dialect(&def));
-        let file = || def.report.folder.join(args.format.file_name(&def, &report.period, report.until));
-        source.export(&args.out.clone().unwrap_or_else(file), &bytes).await
+        let language = args.language.unwrap_or_else(|| report::language(&def));
+        let document = document(&report, &def, language.locale());
+        for (path, bytes) in files(&args, &def, &report, &document)? {
+            source.export(&path, &bytes).await?;
+        }
+        Ok(())
     })
+}
+
+/// What is written, and where.
+fn files(
+    args: &Args,
+    def: &PlantDef,
+    report: &ShiftReport,
+    document: &Document,
+) -> Result<Vec<(PathBuf, Vec<u8>)>, CliError> {
+    let style = Style { csv: args.csv.dialect(def), ..Style::of(def) };
+    let name = |format: &dyn ReportFormat| format.file_name(def, &report.period, report.until);
+    if let Some(folder) = &args.tables {
+        let stem = name(report::FORMATS[0]);
+        let stem = stem.strip_suffix(".csv").unwrap_or(&stem);
+        let file =
+            |(table, bytes): (&str, Vec<u8>)| (folder.join(format!("{stem}-{}.csv", table.replace(' ', "-"))), bytes);
+        return Ok(tables(document, style.csv).into_iter().map(file).collect());
+    }
+    let folder = match &args.out {
+        None => Some(def.report.folder.as_path()),
+        Some(out) => (args.format.len() > 1 || is_folder(out)).then_some(out.as_path()),
+    };
+    if args.format.len() > 1 && args.out.as_ref().is_some_and(|out| out.as_os_str() == "-") {
+        return Err(CliError::Usage("standard output takes one format: give --out a folder".to_owned()));
+    }
+    let file = |format: &&'static dyn ReportFormat| {
+        let bytes = format.render(document, &style).map_err(CliError::Failed)?;
+        let path = folder.map(|folder| folder.join(name(*format))).or_else(|| args.out.clone());
+        Ok((path.unwrap_or_default(), bytes))
+    };
+    args.format.iter().map(file).collect()
+}
+
+/// Is it a folder, or written as one?
+fn is_folder(path: &Path) -> bool {
+    path.is_dir() || path.to_string_lossy().ends_with('/')
 }

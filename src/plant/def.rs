@@ -14,6 +14,7 @@ pub use super::{
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Serial, Transport},
     mimic_def::{MimicDef, MimicPage, Picture},
+    report_def::{CsvDialect, Paper, ReportDef, Section},
     role::{Reauthentication, Role},
 };
 pub(crate) use super::{
@@ -63,6 +64,8 @@ pub struct PlantDef {
     pub history: HistoryDef,
     /// The simulated process that `demo` and `sim` serve for this plant, by name (`tank`).
     pub simulation: Option<String>,
+    /// SHA-256 of the plant file in hexadecimal; empty for a plant without one.
+    pub file_sha256: String,
 }
 
 impl Default for PlantDef {
@@ -86,6 +89,7 @@ impl Default for PlantDef {
             report: ReportDef::default(),
             history: HistoryDef::default(),
             simulation: None,
+            file_sha256: String::new(),
         }
     }
 }
@@ -298,34 +302,4 @@ pub struct ShiftDef {
     pub name: String,
     /// Local start; it lasts until the next shift starts.
     pub start: Time,
-}
-
-/// What reports contain and how their CSV is written.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct ReportDef {
-    /// Where reports are written, relative to the working folder.
-    pub folder: std::path::PathBuf,
-    /// Tags in the table; empty means every stored tag with a unit.
-    pub tags: Vec<TagId>,
-    /// The thesis's raw record (date, time, SV, PV, ER): the controller, and the interval.
-    pub record: Option<(DeviceId, Duration)>,
-    /// How CSV is written.
-    pub csv: CsvDialect,
-}
-
-/// How CSV is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CsvDialect {
-    /// `,` or `;`.
-    pub separator: char,
-    /// `.` or `,`; never the separator.
-    pub decimal: char,
-    /// Write a UTF-8 byte order mark first, for spreadsheets.
-    pub bom: bool,
-}
-
-impl Default for CsvDialect {
-    fn default() -> Self {
-        CsvDialect { separator: ',', decimal: '.', bom: false }
-    }
 }

@@ -100,8 +100,9 @@ pub fn plant() -> PlantDef {
         batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
-        report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: Default::default() },
+        report: ReportDef::default(),
         simulation: None,
+        file_sha256: String::new(),
     }
 }
 

@@ -22,6 +22,7 @@ pub(crate) mod program;
 pub mod traffic;
 pub(crate) mod data_type;
 pub(crate) mod mimic_def;
+pub(crate) mod report_def;
 pub mod def;
 pub(crate) mod simulate;
 pub mod tag;

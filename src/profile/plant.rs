@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, rc::Rc, time::Duration};
 
 use jiff::tz::TimeZone;
+use sha2::{Digest, Sha256};
 
 use super::{
     access, alarm, batch, calculated, device,
@@ -20,6 +21,7 @@ use crate::plant::{
     def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, PlantDef, TagId},
     number::to_u16,
     poll_class,
+    record::hex,
     tag::{Access, PollClass, TagDef},
 };
 
@@ -47,7 +49,9 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(Plan
         assemble(name, &file, library, &mut problems)
     });
     match problems.finish_warned(built)? {
-        (Some(plant), warnings) => Ok((plant, warnings)),
+        (Some(built), warnings) => {
+            Ok((PlantDef { file_sha256: hex(&Sha256::digest(&plant.bytes)), ..built }, warnings))
+        }
         // A text that gave no plant always gave a problem; this keeps the promise without a panic.
         (None, _) => Err(Errors::unreadable(format!("{} is not a plant file", plant.file), String::new())),
     }
@@ -84,7 +88,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let trends = mimic::trends(&file.trends, &defs, problems);
     let batches = batch::batches(&file.batches, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
-    let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, problems);
+    let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
     let classes = poll_class::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
@@ -106,6 +110,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         simulation: file.simulation.as_ref().map(|simulation| simulation.value.clone()),
         devices,
         tags,
+        file_sha256: String::new(),
     })
 }
 

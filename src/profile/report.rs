@@ -5,10 +5,13 @@ use std::{path::PathBuf, time::Duration};
 use super::{
     diagnostic::Problems,
     names::{Defs, Unique},
-    reader::{At, OptionalKey},
+    reader::{At, OptionalKey, text},
     schema::{CsvTable, ReportTable, ShiftTable},
 };
-use crate::plant::def::{CsvDialect, ReportDef, ShiftDef};
+use crate::{
+    plant::def::{CsvDialect, ReportDef, ShiftDef, TrendGroup},
+    text::Language,
+};
 
 /// The shifts in order of their start.
 pub(super) fn shifts(tables: &[At<ShiftTable>], problems: &mut Problems) -> Vec<ShiftDef> {
@@ -25,9 +28,13 @@ pub(super) fn shifts(tables: &[At<ShiftTable>], problems: &mut Problems) -> Vec<
 }
 
 /// What reports contain and where they go.
-pub(super) fn report(table: Option<&ReportTable>, defs: &Defs, problems: &mut Problems) -> ReportDef {
-    let mut report =
-        ReportDef { folder: PathBuf::from("reports"), tags: Vec::new(), record: None, csv: CsvDialect::default() };
+pub(super) fn report(
+    table: Option<&ReportTable>,
+    defs: &Defs,
+    trends: &[TrendGroup],
+    problems: &mut Problems,
+) -> ReportDef {
+    let mut report = ReportDef::default();
     let Some(table) = table else { return report };
     if let Some(folder) = &table.folder {
         report.folder = PathBuf::from(&folder.value);
@@ -50,7 +57,42 @@ pub(super) fn report(table: Option<&ReportTable>, defs: &Defs, problems: &mut Pr
     if let Some(csv) = &table.csv {
         report.csv = dialect(&csv.value, problems);
     }
+    page(table, trends, &mut report, problems);
     report
+}
+
+/// What stands on its pages.
+fn page(table: &ReportTable, trends: &[TrendGroup], report: &mut ReportDef, problems: &mut Problems) {
+    (report.logo, report.title, report.text) = (text(&table.logo), text(&table.title), text(&table.text));
+    report.signatures = table.signatures.iter().map(|name| name.value.clone()).collect();
+    report.paper = table.paper.value_or(report.paper);
+    if !table.sections.is_empty() {
+        let mut known = Unique::default();
+        for section in &table.sections {
+            known.insert(section.value.word(), section.at, "this section is named twice", problems);
+        }
+        report.sections = table.sections.iter().map(|section| section.value).collect();
+    }
+    let names = || trends.iter().map(|group| group.name.as_str()).collect::<Vec<_>>().join(", ");
+    for group in &table.curves {
+        match trends.iter().position(|known| known.name == group.value) {
+            Some(place) => report.curves.push(place),
+            None => {
+                let label = format!("expected one of {}", names());
+                problems.add(group.at, format!("no trend group `{}`", group.value)).label(label);
+            }
+        }
+    }
+    if let Some(language) = &table.language {
+        match Language::from_code(&language.value) {
+            Some(_) => report.language = language.value.clone(),
+            None => {
+                let codes: Vec<_> = Language::all().map(Language::code).collect();
+                let label = format!("expected one of {}", codes.join(", "));
+                problems.add(language.at, format!("no language `{}`", language.value)).label(label);
+            }
+        }
+    }
 }
 
 fn dialect(table: &CsvTable, problems: &mut Problems) -> CsvDialect {

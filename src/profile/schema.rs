@@ -14,7 +14,7 @@ use super::{
     condition::AlarmTable,
     reader::{Choice, Raw, Texts, toml_tables},
 };
-use crate::plant::def::{Parity, ParquetVersion, Role, Rs485};
+use crate::plant::def::{Paper, Parity, ParquetVersion, Role, Rs485, Section};
 
 toml_tables! {
     /// A plant file.
@@ -211,6 +211,14 @@ toml_tables! {
         list "tags" tags: String,
         opt "record" record: RecordTable,
         opt "csv" csv: CsvTable,
+        opt "logo" logo: String,
+        opt "title" title: String,
+        opt "text" text: String,
+        list "sections" sections: Section,
+        list "curves" curves: String,
+        list "signatures" signatures: String,
+        opt "language" language: String,
+        opt "paper" paper: Paper,
     }
 
     /// What the history may take of its disk, and for how long it keeps what.

@@ -1,13 +1,13 @@
 //! A batch with the figures of its tags, and the list of batches as CSV.
 
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
     Gap, Period, PeriodName, TagFigures,
-    csv::{self, Table, floor_percent, iso, number, plain},
+    csv::{self, floor_percent, iso, number, plain},
     text::mean_or_difference,
 };
 use crate::plant::{
@@ -103,18 +103,6 @@ pub fn csv(batches: &[BatchReport], def: &PlantDef, dialect: CsvDialect) -> Vec<
     };
     let rows: Vec<Vec<String>> = batches.iter().map(row).collect();
     csv::write(std::iter::once(header).chain(rows), dialect)
-}
-
-/// The batches of a period as a section of its report.
-pub(super) fn add_section(table: &mut Table, batches: &[BatchReport], def: &PlantDef, dialect: CsvDialect) {
-    table.section("batches", &[HEADER.as_slice(), &["phases, minutes"]].concat());
-    for report in batches {
-        let phase = |(name, time): &(Arc<str>, Duration)| format!("{name} {}", minutes(*time, dialect));
-        let phases: Vec<String> = report.batch.phases.iter().map(phase).collect();
-        let mut row = own_cells(report, def, dialect);
-        row.push(csv::text(&phases.join(" | ")));
-        table.row(row);
-    }
 }
 
 fn own_cells(report: &BatchReport, def: &PlantDef, dialect: CsvDialect) -> Vec<String> {

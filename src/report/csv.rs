@@ -2,6 +2,7 @@
 
 use jiff::{Timestamp, tz::TimeZone};
 
+use super::document::digits;
 use crate::plant::def::CsvDialect;
 
 impl CsvDialect {
@@ -23,33 +24,6 @@ impl CsvDialect {
             _ => CsvDialect { separator: ';', decimal: ',', bom: true },
         };
         if self == plant { other } else { plant }
-    }
-}
-
-/// Rows of cells, made equally wide when written.
-#[derive(Default)]
-pub(super) struct Table(Vec<Vec<String>>);
-
-impl Table {
-    pub(super) fn section(&mut self, title: &str, header: &[&str]) {
-        if !self.0.is_empty() {
-            self.0.push(Vec::new());
-        }
-        self.0.push(vec![text(title)]);
-        self.0.push(header.iter().map(|word| plain(*word)).collect());
-    }
-
-    pub(super) fn row(&mut self, cells: Vec<String>) {
-        self.0.push(cells);
-    }
-
-    pub(super) fn write(self, dialect: CsvDialect) -> Vec<u8> {
-        let width = self.0.iter().map(Vec::len).max().unwrap_or(0);
-        let widened = |mut row: Vec<String>| {
-            row.resize(width, String::new());
-            row
-        };
-        write(self.0.into_iter().map(widened), dialect)
     }
 }
 
@@ -85,21 +59,10 @@ pub(super) fn plain(cell: impl Into<String>) -> String {
 /// A number with fixed decimals; empty if there is none.
 pub(super) fn number(value: Option<f64>, decimals: u8, dialect: CsvDialect) -> String {
     let Some(value) = value.filter(|value| value.is_finite()) else { return String::new() };
-    let digits = format!("{value:.*}", usize::from(decimals));
-    // A value that rounds to nothing has no sign.
-    let digits = match digits.strip_prefix('-') {
-        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-        _ => digits,
-    };
-    localised(digits, dialect)
+    localised(digits(value, Some(decimals)), dialect)
 }
 
-/// A number with as many digits as it has; empty if there is none.
-pub(super) fn shortest(value: Option<f64>, dialect: CsvDialect) -> String {
-    value.filter(|value| value.is_finite()).map_or_else(String::new, |value| localised(value.to_string(), dialect))
-}
-
-fn localised(digits: String, dialect: CsvDialect) -> String {
+pub(super) fn localised(digits: String, dialect: CsvDialect) -> String {
     if dialect.decimal == '.' { digits } else { digits.replace('.', &dialect.decimal.to_string()) }
 }
 

@@ -1,18 +1,19 @@
 //! The figures of a period: from stored samples and alarm events to the rows of a report.
 
 use std::{
-    collections::{BTreeMap, HashMap, HashSet},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     time::Duration,
 };
 
 use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
-    DECIMALS_UNKNOWN, RecordRow, SuppressedSummary, TagFigures,
+    DECIMALS_UNKNOWN, Outage, RecordRow, RunFigures, SuppressedSummary, TagFigures,
     step_series::{IntervalStats, gain, good_value},
 };
 use crate::plant::{
-    def::TagId,
+    alarm::manager::subject_name,
+    def::{Condition, PlantDef, TagId},
     record::{AlarmEvent, AlarmRecord},
     sample::Sample,
     tag::{Decimals, TagDef},
@@ -57,8 +58,10 @@ pub fn scaling_tags(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
 }
 
 /// Computes the figures of one tag over a period, from stretches of good values in order of time.
+#[derive(Debug, Clone, Copy)]
 pub struct Figures {
     seconds: f64,
+    first: Option<f64>,
     stats: Option<IntervalStats>,
     counted: f64,
 }
@@ -66,18 +69,30 @@ pub struct Figures {
 impl Figures {
     /// Over `from..until`; nothing has come yet.
     pub fn new(from: Timestamp, until: Timestamp) -> Figures {
-        Figures { seconds: until.duration_since(from).as_secs_f64(), stats: None, counted: 0.0 }
+        Figures { seconds: until.duration_since(from).as_secs_f64(), first: None, stats: None, counted: 0.0 }
     }
 
     /// The next stretch, by its first value, its figures, and how far it counted from the first to the last.
     pub fn add(&mut self, first: f64, stats: IntervalStats, counted: f64) {
+        self.first.get_or_insert(first);
         self.counted += self.stats.map_or(0.0, |stats| gain(stats.last, first)) + counted;
         IntervalStats::add(&mut self.stats, stats);
     }
 
+    /// How long and how often the tag, 0 or 1, was on.
+    pub fn runs(self, tag: String) -> RunFigures {
+        let two_states = self.stats.filter(|stats| 0.0 <= stats.min && stats.max <= 1.0);
+        RunFigures {
+            tag,
+            on: two_states.map(|stats| Duration::from_secs_f64((stats.mean * stats.seconds).max(0.0))),
+            starts: two_states.map(|_| self.counted),
+            good: self.stats.map_or(0.0, |stats| (stats.seconds / self.seconds).clamp(0.0, 1.0)),
+        }
+    }
+
     /// The figures, when the last stretch has come.
     pub fn end(self, label: TagDescription, in_alarm: Duration) -> TagFigures {
-        let Figures { seconds, stats, counted } = self;
+        let Figures { seconds, first, stats, counted } = self;
         let (mean, difference) = match label.counts {
             true => (None, stats.map(|_| counted)),
             false => (stats.map(|stats| stats.mean), None),
@@ -86,6 +101,7 @@ impl Figures {
             tag: label.tag,
             unit: label.unit,
             decimals: label.decimals,
+            first,
             min: stats.map(|stats| stats.min),
             mean,
             difference,
@@ -95,6 +111,66 @@ impl Figures {
             good: stats.map_or(0.0, |stats| (stats.seconds / seconds).clamp(0.0, 1.0)),
         }
     }
+}
+
+/// The times in which alarms say that a device does not answer, in order of their begins. `events` begin with those of the alarms that
+/// were active at `from`; what has not ended lasts until `until`.
+pub fn not_responding<'a>(
+    def: &PlantDef,
+    events: impl Iterator<Item = &'a AlarmRecord>,
+    from: Timestamp,
+    until: Timestamp,
+) -> Vec<Outage> {
+    let of_devices = def.alarms.iter().filter(|alarm| alarm.condition == Condition::NotResponding);
+    let known: HashSet<(&str, &str)> =
+        of_devices.map(|alarm| (subject_name(def, alarm.subject), alarm.message.as_str())).collect();
+    let mut open: BTreeMap<(&str, &str), Timestamp> = BTreeMap::new();
+    let mut outages = Vec::new();
+    let outage = |(what, why): (&str, &str), begun: Timestamp, ended: Timestamp| Outage {
+        from: begun,
+        to: ended,
+        what: Some(what.to_owned()),
+        why: why.to_owned(),
+    };
+    for event in events {
+        let Some(name) = known.get(&(&*event.subject, &*event.message)).copied() else { continue };
+        match event.event {
+            AlarmEvent::Raised | AlarmEvent::RaisedSuppressed => {
+                open.entry(name).or_insert(event.at.max(from));
+            }
+            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
+                outages.extend(open.remove(&name).map(|begun| outage(name, begun, event.at)));
+            }
+            AlarmEvent::Acknowledged
+            | AlarmEvent::ReAlarmed
+            | AlarmEvent::Reset
+            | AlarmEvent::Shelved
+            | AlarmEvent::Unshelved
+            | AlarmEvent::SuppressedByDesign
+            | AlarmEvent::Unsuppressed
+            | AlarmEvent::OutOfService
+            | AlarmEvent::InService => {}
+        }
+    }
+    outages.extend(open.into_iter().map(|(name, begun)| outage(name, begun, until)));
+    outages.retain(|outage| outage.from < outage.to);
+    outages
+}
+
+/// The times in which no station ran: 10-minute windows, counted from 1970, in which nothing is stored.
+pub fn not_running(watched: &BTreeSet<i64>, from: Timestamp, until: Timestamp) -> Vec<Outage> {
+    const WINDOW: i64 = 600_000_000;
+    let (first, last) = (from.as_microsecond().div_euclid(WINDOW), (until.as_microsecond() - 1).div_euclid(WINDOW));
+    let mut outages: Vec<Outage> = Vec::new();
+    for window in (first..=last).filter(|window| !watched.contains(window)) {
+        let instant = |window: i64| Timestamp::from_microsecond(window * WINDOW).unwrap_or(from).clamp(from, until);
+        let (begun, ended) = (instant(window), instant(window + 1));
+        match outages.last_mut().filter(|outage| outage.to == begun) {
+            Some(outage) => outage.to = ended,
+            None => outages.push(Outage { from: begun, to: ended, what: None, why: String::new() }),
+        }
+    }
+    outages
 }
 
 /// Time within `from..until` in which at least one alarm of a subject was active. The events are all of this subject, in

@@ -6,6 +6,10 @@ pub mod step_series;
 pub(crate) mod figures;
 pub mod batch;
 pub(crate) mod alarm_metrics;
+pub mod curve;
+pub(crate) mod chart;
+pub mod document;
+pub mod content;
 mod csv;
 pub(crate) mod shift_csv;
 mod record_csv;
@@ -13,6 +17,8 @@ pub(crate) mod drawing;
 pub(crate) mod export;
 pub(crate) mod value_log;
 pub(crate) mod text;
+mod html;
+mod json;
 #[cfg(test)]
 pub(crate) mod testing;
 
@@ -21,10 +27,15 @@ use std::{fmt, sync::Arc, time::Duration};
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
 
-use crate::plant::{
-    alarm::PeriodMetrics,
-    def::{CsvDialect, PlantDef, Priority},
-    record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
+pub use self::shift_csv::tables;
+use self::{chart::Chart, document::Document};
+use crate::{
+    plant::{
+        alarm::PeriodMetrics,
+        def::{CsvDialect, Paper, PlantDef, Priority},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
+    },
+    text::Language,
 };
 
 /// A format of the shift report. To add one: a file with this trait, and its module and row of [`FORMATS`] here.
@@ -40,8 +51,8 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
         "csv"
     }
 
-    /// The bytes of its file.
-    fn render(&self, report: &ShiftReport, def: &PlantDef, csv: CsvDialect) -> Vec<u8>;
+    /// The bytes of its file: the same for the same document. `Err` says why there is none.
+    fn render(&self, document: &Document, style: &Style) -> Result<Vec<u8>, String>;
 
     /// The name of its file: `2026-11-21-morning.csv`; for a running shift with the time up to which it has data:
     /// `2026-11-21-morning-until-0930.csv`.
@@ -61,7 +72,39 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
 }
 
 /// Every format of the report; the first is the default.
-pub const FORMATS: [&dyn ReportFormat; 3] = [&shift_csv::ShiftCsv, &record_csv::RecordCsv, &text::Text];
+pub const FORMATS: [&dyn ReportFormat; 5] =
+    [&shift_csv::ShiftCsv, &record_csv::RecordCsv, &text::Text, &html::Html, &json::Json];
+
+/// The language of the reports of a plant.
+pub fn language(def: &PlantDef) -> Language {
+    Language::from_code(&def.report.language).unwrap_or(Language::ENGLISH)
+}
+
+/// The bytes of a report in the language of its plant.
+pub fn render(
+    format: &dyn ReportFormat,
+    report: &ShiftReport,
+    def: &PlantDef,
+    style: &Style,
+) -> Result<Vec<u8>, String> {
+    format.render(&content::document(report, def, language(def).locale()), style)
+}
+
+/// How a document is set, where a format leaves a choice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Style {
+    /// CSV.
+    pub csv: CsvDialect,
+    /// The paper of pages.
+    pub paper: Paper,
+}
+
+impl Style {
+    /// As the plant file has it.
+    pub fn of(def: &PlantDef) -> Style {
+        Style { csv: def.report.csv, paper: def.report.paper }
+    }
+}
 
 /// The help of `--format`: every format with what it holds.
 pub fn formats_help() -> String {
@@ -171,6 +214,14 @@ pub struct ShiftReport {
     pub unreadable: Vec<Gap>,
     /// One row a tag.
     pub tags: Vec<TagFigures>,
+    /// The same of earlier periods to compare with.
+    pub compared: Vec<Compared>,
+    /// One row an actuator.
+    pub runs: Vec<RunFigures>,
+    /// When devices did not answer, and when no station ran.
+    pub outages: Vec<Outage>,
+    /// The curves of trend groups.
+    pub charts: Vec<Chart>,
     /// The batches that ran in the period, newest first.
     pub batches: Vec<batch::BatchReport>,
     /// Alarms that were active while they were suppressed, shelved or out of service.
@@ -196,6 +247,8 @@ pub struct TagFigures {
     pub unit: String,
     /// Decimals to print.
     pub decimals: u8,
+    /// First good value.
+    pub first: Option<f64>,
     /// Least good value.
     pub min: Option<f64>,
     /// Time-weighted mean over good time.
@@ -210,6 +263,41 @@ pub struct TagFigures {
     pub in_alarm: Duration,
     /// Share of the period with a good value, 0–1.
     pub good: f64,
+}
+
+/// The figures of an earlier period.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Compared {
+    /// Which.
+    pub period: Period,
+    /// One row a tag.
+    pub tags: Vec<TagFigures>,
+}
+
+/// How long an actuator was on, and how often it was switched on; `None` where its state was never known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunFigures {
+    /// Its output: `PLC-1.P-1`.
+    pub tag: String,
+    /// Time in which it was on.
+    pub on: Option<Duration>,
+    /// Changes from off to on.
+    pub starts: Option<f64>,
+    /// Share of the period in which its state was known, 0–1.
+    pub good: f64,
+}
+
+/// A time without values, and why.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outage {
+    /// From, inclusive.
+    pub from: Timestamp,
+    /// To, exclusive.
+    pub to: Timestamp,
+    /// The device; `None` is the station.
+    pub what: Option<String>,
+    /// `not responding`.
+    pub why: String,
 }
 
 /// An alarm that was active without being annunciated.

@@ -4,9 +4,17 @@ use std::time::Duration;
 
 use jiff::{Timestamp, civil::time, tz::TimeZone};
 
-use super::{PeriodName, figures::Figures, step_series::StepSeries};
+use super::{
+    Compared, Gap, Outage, Period, PeriodName, RecordRow, RunFigures, ShiftReport, SuppressedSummary, TagFigures,
+    alarm_metrics,
+    chart::{Chart, ChartCurve},
+    curve::Bucket,
+    figures::Figures,
+    step_series::StepSeries,
+};
 use crate::plant::{
-    def::{CsvDialect, DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, ReportDef, ShiftDef, TagId},
+    def::{DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, Priority, ReportDef, ShiftDef, TagId},
+    record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
     sample::Sample,
     tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
 };
@@ -89,13 +97,9 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             .map(|&(name, hour, minute)| ShiftDef { name: name.into(), start: time(hour, minute, 0, 0) })
             .collect(),
         history: Default::default(),
-        report: ReportDef {
-            folder: "reports".into(),
-            tags: Vec::new(),
-            record: Some((device, Duration::from_secs(10))),
-            csv: CsvDialect::default(),
-        },
+        report: ReportDef { record: Some((device, Duration::from_secs(10))), ..ReportDef::default() },
         simulation: None,
+        file_sha256: String::new(),
     }
 }
 
@@ -121,4 +125,148 @@ pub fn figures_of(samples: impl Iterator<Item = Sample>, from: Timestamp, until:
     let held: Vec<_> = samples.filter_map(|sample| steps.next(sample)).collect();
     held.into_iter().chain(steps.end()).for_each(|held| figures.add(held.value, held.into(), 0.0));
     figures
+}
+
+/// The report of a morning: figures with and without values, a counter, every list filled, names that are formulas.
+pub fn shift_report() -> ShiftReport {
+    let from = at("2026-11-21T06:00+07");
+    ShiftReport {
+        period: Period { name: named("morning 2026-11-21"), from, to: at("2026-11-21T14:00+07") },
+        until: at("2026-11-21T13:59:30+07"),
+        audit: Some(ChainHash { number: 17, hash: [0xA5; 32] }),
+        unreadable: vec![Gap {
+            from: from + Duration::from_secs(3_600),
+            to: from + Duration::from_secs(3_720),
+            why: "checksum".into(),
+        }],
+        batches: Vec::new(),
+        compared: vec![Compared {
+            period: Period {
+                name: named("night 2026-11-20"),
+                from: at("2026-11-20T22:00+07"),
+                to: at("2026-11-21T06:00+07"),
+            },
+            tags: vec![TagFigures {
+                tag: "TIC-1.PV".into(),
+                unit: "°C".into(),
+                decimals: 1,
+                first: Some(20.0),
+                min: Some(20.0),
+                mean: Some(50.0),
+                max: Some(70.0),
+                last: Some(27.0),
+                difference: None,
+                in_alarm: Duration::ZERO,
+                good: 1.0,
+            }],
+        }],
+        runs: vec![RunFigures {
+            tag: "PLC-1.P-1".into(),
+            on: Some(Duration::from_secs(5_400)),
+            starts: Some(3.0),
+            good: 0.875,
+        }],
+        outages: vec![Outage {
+            from: at("2026-11-21T08:00+07"),
+            to: at("2026-11-21T08:10+07"),
+            what: Some("PLC-1".into()),
+            why: "not responding".into(),
+        }],
+        charts: vec![Chart {
+            title: "TIC-1".into(),
+            from,
+            to: at("2026-11-21T13:59:30+07"),
+            curves: vec![ChartCurve {
+                name: "TIC-1.PV".into(),
+                unit: "°C".into(),
+                decimals: 1,
+                from,
+                step: 3_600.0,
+                columns: [Some(27.0), Some(71.2), None, Some(70.0)].map(|value| value.map(bucket)).into(),
+            }],
+        }],
+        tags: vec![
+            TagFigures {
+                tag: "TIC-1.PV".into(),
+                unit: "°C".into(),
+                decimals: 1,
+                first: Some(27.0),
+                min: Some(-0.04),
+                mean: Some(54.3219),
+                max: Some(71.2),
+                last: Some(70.0),
+                difference: None,
+                in_alarm: Duration::from_secs(90),
+                good: 0.99999,
+            },
+            TagFigures {
+                tag: "TIC-1.MV".into(),
+                unit: "%".into(),
+                decimals: 0,
+                first: None,
+                min: None,
+                mean: None,
+                max: None,
+                last: None,
+                difference: None,
+                in_alarm: Duration::ZERO,
+                good: 0.0,
+            },
+            TagFigures {
+                tag: "PM-1.E".into(),
+                unit: "kWh".into(),
+                decimals: 2,
+                first: Some(1250.0),
+                min: Some(1250.0),
+                mean: None,
+                max: Some(1262.5),
+                last: Some(1262.5),
+                difference: Some(12.5),
+                in_alarm: Duration::ZERO,
+                good: 1.0,
+            },
+        ],
+        suppressed: vec![SuppressedSummary {
+            subject: "PLC-1.LT-1".into(),
+            message: "level low".into(),
+            priority: Priority::Low,
+            raised: 2,
+            active: Duration::from_secs(486),
+        }],
+        alarms: vec![AlarmRecord {
+            at: at("2026-11-21T06:12:45.5+07"),
+            subject: "TIC-1.PV".into(),
+            message: "temperature high; \"check\" heater".into(),
+            priority: Priority::High,
+            event: AlarmEvent::Raised,
+            value: Some(-85.25),
+            limit: Some(85.0),
+            by: None,
+            reason: None,
+            until: None,
+            first_out: None,
+        }],
+        alarm_metrics: alarm_metrics::tests::figures(),
+        actions: vec![ActionRecord {
+            at: at("2026-11-21T06:13+07"),
+            by: "=cmd|' /C calc'!A0".into(),
+            action: "write".into(),
+            target: "TIC-1.SV".into(),
+            old: Some("-70.0 °C".into()),
+            new: Some("60.0 °C".into()),
+            outcome: "verified".into(),
+            from: "".into(),
+            note: None,
+            chain_hash: None,
+        }],
+        record: vec![
+            RecordRow { at: from, sv: Some(70.0), pv: Some(72.5), er: Some(-2.5) },
+            RecordRow { at: from + Duration::from_secs(10), sv: Some(70.0), pv: None, er: None },
+        ],
+        record_of: Some(("TIC-1".into(), "°C".into())),
+    }
+}
+
+fn bucket(value: f64) -> Bucket {
+    Bucket { min: value, max: value, mean: value, last: value }
 }

@@ -1,11 +1,17 @@
-//! A report as plain lines for the terminal: facts, tags, counts.
+//! A report as plain lines of at most 80 columns, for a printer, a mail and the terminal.
+
+use unicode_width::UnicodeWidthStr;
 
 use super::{
-    ReportFormat, ShiftReport, TagFigures,
-    csv::{floor_percent, iso},
-    raised,
+    ReportFormat, Style, TagFigures,
+    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
 };
-use crate::plant::def::{CsvDialect, PlantDef, Priority};
+use crate::t;
+
+/// Columns of a page.
+const WIDTH: usize = 80;
+/// A column of texts, which wrap, is at least as wide as its longest word, up to this.
+const TEXT_MIN: usize = 14;
 
 /// The format `text`.
 #[derive(Debug)]
@@ -16,67 +22,122 @@ impl ReportFormat for Text {
         "text"
     }
     fn about(&self) -> &'static str {
-        "a summary"
+        "plain text of 80 columns"
     }
 
     fn extension(&self) -> &'static str {
         "txt"
     }
 
-    fn render(&self, report: &ShiftReport, def: &PlantDef, _csv: CsvDialect) -> Vec<u8> {
-        shift_text(report, def).into_bytes()
+    fn render(&self, document: &Document, _style: &Style) -> Result<Vec<u8>, String> {
+        Ok((lines(document, WIDTH).join("\n") + "\n").into_bytes())
     }
 }
 
-/// The report as lines, without alarm list, actions and record; a missing figure is `—`.
-fn shift_text(report: &ShiftReport, def: &PlantDef) -> String {
-    let zone = &def.time_zone;
-    let mut lines = vec![
-        format!("{}, {}", def.title, report.period.name),
-        format!("{} to {}", iso(zone, report.period.from), iso(zone, report.period.to)),
-    ];
-    if report.until < report.period.to {
-        lines.push(format!("still running: figures until {}", iso(zone, report.until)));
-    }
-    lines.extend(report.audit.map(|entry| format!("audit log: entry {entry}")));
-    for gap in &report.unreadable {
-        lines.push(format!("not readable, not counted: {} to {}", iso(zone, gap.from), iso(zone, gap.to)));
-    }
-    let width = report.tags.iter().map(|tag| tag.tag.chars().count()).max().unwrap_or(0).max(3);
-    lines.push(String::new());
-    lines.push(format!(
-        "{:width$} {:>10} {:>10} {:>10} {:>10} {:>8} {:>7}  unit",
-        "tag", "min", "mean/+", "max", "last", "alarm/m", "good %"
-    ));
-    lines.extend(report.tags.iter().map(|tag| tag_line(tag, width)));
-    lines.push(String::new());
-    let counts = Priority::ALL.map(|priority| format!("{} {}", raised(&report.alarms, priority), priority.word()));
-    lines.push(format!("alarms raised: {}", counts.join(", ")));
-    for alarm in &report.suppressed {
-        let (subject, minutes) = (&alarm.subject, alarm.active.as_secs_f64() / 60.0);
-        let raised = alarm.raised;
-        lines.push(format!("suppressed: {subject} {}, active {minutes:.1} min, raised {raised} times", alarm.message));
-    }
-    lines.push(format!("operator actions: {}", report.actions.len()));
-    lines.join("\n") + "\n"
+/// The report as lines of at most `width` columns, unless numbers alone take more; a missing figure is `–`.
+pub fn lines(document: &Document, width: usize) -> Vec<String> {
+    document.locale.within(|| {
+        let mut lines = Vec::new();
+        lines.extend((!document.logo.is_empty()).then(|| document.logo.clone()));
+        lines.push(document.title.clone());
+        lines.push(document.heading.clone());
+        let words = t!("times are local, UTC{offset}", offset = offset(&document.zone, document.until));
+        lines.push(plain(&words));
+        for section in &document.sections {
+            section_lines(document, section, width, &mut lines);
+        }
+        lines
+    })
 }
 
-fn tag_line(tag: &TagFigures, width: usize) -> String {
-    let value = |value: Option<f64>, decimals: u8| match value {
-        Some(value) => format!("{value:.*}", usize::from(decimals)),
-        None => "—".into(),
+fn section_lines(document: &Document, section: &Section, width: usize, lines: &mut Vec<String>) {
+    let body: Vec<String> = match &section.content {
+        Content::Facts(facts) => fact_lines(document, facts, width),
+        Content::Table(table) => table_lines(document, &table.dense(), width),
+        Content::Lines(paragraphs) => paragraphs.iter().flat_map(|line| wrapped(line, width)).collect(),
+        Content::Signatures(names) => {
+            names.iter().flat_map(|name| [String::new(), format!("{name} {}", "_".repeat(30))]).collect()
+        }
+        Content::Charts(_) => return,
     };
-    format!(
-        "{:width$} {:>10} {:>10} {:>10} {:>10} {:>8.1} {:>7.1}  {}",
-        tag.tag,
-        value(tag.min, tag.decimals),
-        mean_or_difference(tag),
-        value(tag.max, tag.decimals),
-        value(tag.last, tag.decimals),
-        tag.in_alarm.as_secs_f64() / 60.0,
-        floor_percent(tag.good),
-        tag.unit,
-    )
+    lines.push(String::new());
+    lines.push(section.title.clone());
+    lines.push("-".repeat(section.title.width()));
+    lines.extend(body);
+}
+
+fn fact_lines(document: &Document, facts: &[Fact], width: usize) -> Vec<String> {
+    let name = facts.iter().map(|fact| fact.name.width()).max().unwrap_or(0);
+    let fact = |fact: &Fact| {
+        let room = width.saturating_sub(name + 2).max(TEXT_MIN);
+        let words = document.fact(&fact.cell);
+        let begins = std::iter::once(fact.name.as_str()).chain(std::iter::repeat(""));
+        let lines = wrapped(&words, room).into_iter().zip(begins);
+        lines.map(|(words, begin)| format!("{}  {words}", padded(begin, name, false))).collect::<Vec<_>>()
+    };
+    facts.iter().flat_map(fact).collect()
+}
+
+fn table_lines(document: &Document, table: &Table, width: usize) -> Vec<String> {
+    let words = |row: &Vec<Cell>| -> Vec<String> {
+        row.iter().zip(&table.columns).map(|(cell, column)| document.words(cell, column.kind)).collect()
+    };
+    let rows: Vec<Vec<String>> = table.rows.iter().map(words).collect();
+    let headings: Vec<String> = table.columns.iter().map(|column| column.heading.clone()).collect();
+    let widths = widths(table, &headings, &rows, width);
+    let rule = widths.iter().map(|width| "-".repeat(*width)).collect::<Vec<_>>().join(" ");
+    let mut lines = row_lines(table, &headings, &widths);
+    lines.push(rule);
+    lines.extend(rows.iter().flat_map(|row| row_lines(table, row, &widths)));
+    lines
+}
+
+/// Widths of columns that keep every number and time whole: headings wrap first, then texts.
+fn widths(table: &Table, headings: &[String], rows: &[Vec<String>], width: usize) -> Vec<usize> {
+    let longest = |text: &str| text.split(' ').map(UnicodeWidthStr::width).max().unwrap_or(0);
+    let cells = |n: usize| rows.iter().map(|row| row[n].width()).max().unwrap_or(0);
+    let word = |n: usize| rows.iter().map(|row| longest(&row[n])).max().unwrap_or(0);
+    let mut widths: Vec<usize> = (0..headings.len()).map(|n| cells(n).max(headings[n].width())).collect();
+    let over = |widths: &[usize]| (widths.iter().sum::<usize>() + widths.len()).saturating_sub(width + 1);
+    while 0 < over(&widths) {
+        let spare = |n: usize| {
+            let least = match table.columns[n].kind {
+                ColumnKind::Text => word(n).min(TEXT_MIN),
+                ColumnKind::Number | ColumnKind::Time | ColumnKind::Milliseconds => cells(n),
+            };
+            let least = least.max(longest(&headings[n]));
+            widths[n].saturating_sub(least)
+        };
+        let widest = (0..widths.len()).filter(|n| 0 < spare(*n)).max_by_key(|n| {
+            let heading_only = cells(*n) < widths[*n];
+            (heading_only, widths[*n])
+        });
+        let Some(widest) = widest else { break };
+        widths[widest] -= 1;
+    }
+    widths
+}
+
+fn row_lines(table: &Table, cells: &[String], widths: &[usize]) -> Vec<String> {
+    let cells: Vec<Vec<String>> = cells.iter().zip(widths).map(|(cell, width)| wrapped(cell, *width)).collect();
+    let height = cells.iter().map(Vec::len).max().unwrap_or(0);
+    let line = |at: usize| {
+        let parts = cells.iter().zip(&table.columns).zip(widths).map(|((lines, column), width)| {
+            let right = column.kind == ColumnKind::Number;
+            padded(lines.get(at).map_or("", String::as_str), *width, right)
+        });
+        parts.collect::<Vec<_>>().join(" ").trim_end().to_owned()
+    };
+    (0..height).map(line).collect()
+}
+
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    textwrap::wrap(text, width.max(1)).into_iter().map(|line| line.into_owned()).collect()
+}
+
+fn padded(text: &str, width: usize, right: bool) -> String {
+    let spaces = " ".repeat(width.saturating_sub(text.width()));
+    if right { spaces + text } else { text.to_owned() + &spaces }
 }
 
 /// `54.32`; of a counter `+12.5`, its difference; of neither a dash.
@@ -87,66 +148,5 @@ pub fn mean_or_difference(tag: &TagFigures) -> String {
         (Some(mean), _) => format!("{mean:.*}", decimals + 1),
         (None, Some(difference)) => format!("{difference:+.decimals$}"),
         (None, None) => "—".into(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use super::*;
-    use crate::{
-        plant::record::ChainHash,
-        report::{
-            Period,
-            testing::{THREE, at, named, plant},
-        },
-    };
-
-    #[test]
-    fn a_missing_figure_is_a_dash_and_a_running_shift_says_so() {
-        let report = ShiftReport {
-            period: Period {
-                name: named("morning 2026-11-21"),
-                from: at("2026-11-21T06:00+07"),
-                to: at("2026-11-21T14:00+07"),
-            },
-            until: at("2026-11-21T09:00+07"),
-            audit: Some(ChainHash { number: 7, hash: [0xA5; 32] }),
-            unreadable: Vec::new(),
-            batches: Vec::new(),
-            tags: vec![TagFigures {
-                tag: "TIC-1.PV".into(),
-                unit: "°C".into(),
-                decimals: 1,
-                min: Some(27.0),
-                mean: Some(54.321),
-                max: Some(71.2),
-                last: None,
-                difference: None,
-                in_alarm: Duration::from_secs(90),
-                good: 0.5,
-            }],
-            suppressed: Vec::new(),
-            alarms: Vec::new(),
-            alarm_metrics: crate::plant::alarm::PeriodMetrics::default(),
-            actions: Vec::new(),
-            record: Vec::new(),
-            record_of: None,
-        };
-        let text = shift_text(&report, &plant("Asia/Bangkok", &THREE));
-        let expect = "\
-Water tank, morning 2026-11-21
-2026-11-21T06:00:00+07:00 to 2026-11-21T14:00:00+07:00
-still running: figures until 2026-11-21T09:00:00+07:00
-audit log: entry 7 a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5a5
-
-tag             min     mean/+        max       last  alarm/m  good %  unit
-TIC-1.PV       27.0      54.32       71.2          —      1.5    50.0  °C
-
-alarms raised: 0 critical, 0 high, 0 medium, 0 low
-operator actions: 0
-";
-        assert_eq!(text, expect);
     }
 }

@@ -28,7 +28,7 @@ use jiff::{Timestamp, tz::TimeZone};
 use sightglass::{
     history::{Query, io::store::Store},
     plant::{
-        def::{CsvDialect, DeviceId, MimicDef, PlantDef, ReportDef, TagId},
+        def::{DeviceId, MimicDef, PlantDef, ReportDef, TagId},
         record::Record,
         sample::Sample,
         tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
@@ -64,7 +64,8 @@ fn tank() -> Arc<PlantDef> {
         batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
-        report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: CsvDialect::default() },
+        file_sha256: String::new(),
+        report: ReportDef::default(),
         simulation: None,
     })
 }

@@ -14,9 +14,7 @@ use sightglass::{
     bus::plan::{Block, UnreadableRanges, blocks, cost, single},
     plant::{
         PlantDef,
-        def::{
-            CsvDialect, DeviceDef, DeviceId, Limits, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport,
-        },
+        def::{DeviceDef, DeviceId, Limits, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport},
         tag::{ByteOrder, DataType, Point, Table, TagDef},
     },
 };
@@ -80,7 +78,8 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
-        report: ReportDef { folder: "reports".into(), tags: Vec::new(), record: None, csv: CsvDialect::default() },
+        report: ReportDef::default(),
+        file_sha256: String::new(),
         simulation: None,
     }
 }

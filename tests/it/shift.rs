@@ -13,10 +13,10 @@ use sightglass::{
     plant::{
         PlantDef,
         command::{CommandKind, Outcome},
-        def::{CsvDialect, LineId},
+        def::LineId,
     },
     profile::{self, Search},
-    report::{FORMATS, period_parser},
+    report::{self, FORMATS, Style, period_parser},
     sim::{
         io::{SimulatorHandle, Wire, serve_line},
         rig::Rig,
@@ -92,7 +92,7 @@ async fn a_shift_of_eight_hours_is_reported_truly() {
     assert_eq!(store.alarm_metrics(day.from, day.until, now).unwrap(), *day, "the screen shows what the journal has");
     let report = store.report(&period, now).unwrap();
     let file = folder.path().join("morning.csv");
-    std::fs::write(&file, FORMATS[0].render(&report, &def, CsvDialect::default())).unwrap();
+    std::fs::write(&file, report::render(FORMATS[0], &report, &def, &Style::of(&def)).unwrap()).unwrap();
     if have("python3", "python3") {
         check(&file);
     }

@@ -100,9 +100,10 @@ impl<'a> Visit<'a> for Found {
             syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
             _ => Vec::new(),
         };
-        if [vec!["row"], vec!["goal"], vec!["Key", "new"], vec!["rows", "words"], vec!["rows", "number"]]
+        if [vec!["row"], vec!["goal"], vec!["Key", "new"], vec!["rows", "words"], vec!["rows", "number"], vec!["fact"]]
             .iter()
             .any(|row| *row == name)
+            || name.first().is_some_and(|name| name == "Column")
         {
             for argument in &call.args {
                 if let syn::Expr::Lit(literal) = argument

@@ -81,7 +81,7 @@ impl Store {
 
     /// The windows in which anything was stored. Lines have a row every minute; where there is none, single windows are
     /// read for samples, and many are read at once.
-    fn watched(&self, from: Timestamp, to: Timestamp) -> Result<BTreeSet<i64>, HistoryError> {
+    pub(super) fn watched(&self, from: Timestamp, to: Timestamp) -> Result<BTreeSet<i64>, HistoryError> {
         let span = params![utc(from), utc(to), ROWS_MAX + 1];
         let list = |sql| self.whole_list(sql, span, |row| row.get::<_, i64>(0));
         let mut watched: BTreeSet<i64> = list(sql::WATCHED_BY_LINES)?.into_iter().collect();

@@ -67,7 +67,7 @@ impl Store {
         report.alarms = Some(events.iter().filter(|event| event.event == AlarmEvent::Raised).count() as u64);
         let mut tags = rule.tags.clone();
         tags.extend(rule.energy.filter(|energy| !tags.contains(energy)));
-        let mut gathered = self.gather(&tags, std::iter::empty(), (from, until))?;
+        let gathered = self.gather(&tags, std::iter::empty(), (from, until))?;
         report.tags = gathered.rows(&self.def, &tags, active.iter().chain(&events));
         let energy = rule.energy.map(|energy| self.def.tag(energy).name.as_str());
         let energy = report.tags.iter().find(|figures| Some(figures.tag.as_str()) == energy);

@@ -90,7 +90,12 @@ impl Store {
         self.whole_list(&sql::restore(), params![ROWS_MAX + 1, utc(Timestamp::MAX)], alarm)
     }
 
-    fn curves(&self, tags: &[TagId], span: series::Span, buckets: usize) -> Result<Vec<Series>, HistoryError> {
+    pub(super) fn curves(
+        &self,
+        tags: &[TagId],
+        span: series::Span,
+        buckets: usize,
+    ) -> Result<Vec<Series>, HistoryError> {
         check_span(span.from, span.to)?;
         let tags = Distinct::new(tags);
         let (span, buckets, tier) = series::grid(span, buckets, self.finest(span.from)?);

@@ -18,15 +18,29 @@ use super::{
 use crate::{
     history::{
         HistoryError,
+        series::Span,
         tiers::{Aggregate, CurvePart, Tier},
     },
-    plant::{PlantDef, def::TagId, record::AlarmRecord, time::elapsed},
+    plant::{
+        PlantDef,
+        def::{Section, TagId, TrendGroup},
+        record::AlarmRecord,
+        tag::DataType,
+        time::elapsed,
+    },
     report::{
-        Gap, Period, RecordRow, ShiftReport, TagFigures,
+        Compared, Gap, Outage, Period, RecordRow, RunFigures, ShiftReport, TagFigures,
+        chart::{Chart, ChartCurve},
         figures::{self, Figures, TagDescription},
+        shift,
         step_series::ValuesAt,
     },
 };
+
+/// Charts of a report whose plant file names none.
+const CHARTS: usize = 6;
+/// Columns of a curve.
+const COLUMNS: usize = 240;
 
 /// What is gathered of one tag.
 struct Gathered {
@@ -59,7 +73,7 @@ impl GatheredTags {
     /// The figures of some of them, each once. `events` are those of the span in order, after the raising events of the
     /// alarms that were active at its begin.
     pub(super) fn rows<'a>(
-        &mut self,
+        &self,
         def: &PlantDef,
         tags: &[TagId],
         events: impl Iterator<Item = &'a AlarmRecord>,
@@ -71,9 +85,15 @@ impl GatheredTags {
             let label = TagDescription::new(def.tag(*tag), &self.latest);
             let events = by_subject.get(label.tag.as_str()).into_iter().flatten().copied();
             let in_alarm = figures::time_in_alarm(events, from, until);
-            Some(self.of.get_mut(tag)?.figures.take()?.end(label, in_alarm))
+            Some(self.of.get(tag)?.figures?.end(label, in_alarm))
         };
         tags.iter().filter_map(row).collect()
+    }
+
+    /// The run hours of the actuators.
+    fn runs(&self, def: &PlantDef) -> Vec<RunFigures> {
+        let row = |tag: TagId| Some(self.of.get(&tag)?.figures?.runs(def.tag(tag).name.clone()));
+        outputs(def).filter_map(row).collect()
     }
 }
 
@@ -100,7 +120,8 @@ impl Store {
         let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(chain_hash(row.get(0)?, row.get(1)?)))?;
         let audit = audit.into_iter().flatten().next();
         let more = recorded.iter().flat_map(|recorded| [recorded.sv, recorded.pv]);
-        let mut gathered = self.gather(&reported, more, (from, until))?;
+        let shown: Vec<TagId> = reported.iter().copied().chain(outputs(def)).collect();
+        let gathered = self.gather(&shown, more, (from, until))?;
         let (record, record_of) = match recorded {
             Some(recorded) => {
                 let rows = self.record(&recorded, (from, until))?;
@@ -109,7 +130,11 @@ impl Store {
             None => (Vec::new(), None),
         };
         let tags = gathered.rows(def, &reported, active.iter().chain(&alarms));
+        let runs = gathered.runs(def);
+        let charts = self.charts((from, until), &gathered.latest)?;
         let unreadable = gathered.unreadable;
+        let compared = self.compared(&reported, period, until)?;
+        let outages = self.outages((from, until), &active, &alarms)?;
         let alarm_metrics = self.alarm_metrics(from, until, now)?;
         let batches = match def.batches.as_slice() {
             [] => Vec::new(),
@@ -122,6 +147,10 @@ impl Store {
             audit,
             unreadable,
             tags,
+            compared,
+            runs,
+            outages,
+            charts,
             batches,
             suppressed,
             alarms,
@@ -130,6 +159,69 @@ impl Store {
             record,
             record_of,
         })
+    }
+
+    /// The figures of the periods that a closed one is compared with, where anything of them is kept.
+    fn compared(&self, tags: &[TagId], period: &Period, until: Timestamp) -> Result<Vec<Compared>, HistoryError> {
+        let periods = if until < period.to { Vec::new() } else { shift::comparable(&self.def, period) };
+        let figures = |period: Period| {
+            let gathered = self.gather(tags, std::iter::empty(), (period.from, period.to))?;
+            Ok(Compared { tags: gathered.rows(&self.def, tags, std::iter::empty()), period })
+        };
+        let mut compared = periods.into_iter().map(figures).collect::<Result<Vec<_>, HistoryError>>()?;
+        compared.retain(|compared| compared.tags.iter().any(|tag| 0.0 < tag.good));
+        Ok(compared)
+    }
+
+    /// The curves of the trend groups that the plant file asks for, or of the first ones.
+    fn charts(
+        &self,
+        (from, until): (Timestamp, Timestamp),
+        latest: &HashMap<TagId, f64>,
+    ) -> Result<Vec<Chart>, HistoryError> {
+        let def = &*self.def;
+        if !def.report.sections.contains(&Section::Curves) {
+            return Ok(Vec::new());
+        }
+        let groups: Vec<&TrendGroup> = match def.report.curves.as_slice() {
+            [] => def.trends.iter().take(CHARTS).collect(),
+            places => places.iter().filter_map(|place| def.trends.get(*place)).collect(),
+        };
+        let chart = |group: &&TrendGroup| {
+            let tags: Vec<TagId> =
+                group.pens.iter().map(|pen| pen.tag).filter(|tag| def.tag(*tag).is_stored()).collect();
+            let span = Span { from, to: until, until };
+            let series = if tags.is_empty() { Vec::new() } else { self.curves(&tags, span, COLUMNS)? };
+            let curves = series.into_iter().map(|series| {
+                let label = TagDescription::new(def.tag(series.tag), latest);
+                let (name, unit, decimals) = (label.tag, label.unit, label.decimals);
+                ChartCurve {
+                    name,
+                    unit,
+                    decimals,
+                    from: series.from,
+                    step: series.step.as_secs_f64(),
+                    columns: series.buckets,
+                }
+            });
+            Ok(Chart { title: group.name.clone(), from, to: until, curves: curves.collect() })
+        };
+        let mut charts = groups.iter().map(chart).collect::<Result<Vec<_>, HistoryError>>()?;
+        charts.retain(|chart| !chart.is_empty());
+        Ok(charts)
+    }
+
+    /// When devices did not answer, and the 10-minute windows in which nothing was stored.
+    fn outages(
+        &self,
+        (from, until): (Timestamp, Timestamp),
+        active: &[AlarmRecord],
+        alarms: &[AlarmRecord],
+    ) -> Result<Vec<Outage>, HistoryError> {
+        let mut outages = figures::not_running(&self.watched(from, until)?, from, until);
+        outages.extend(figures::not_responding(&self.def, active.iter().chain(alarms), from, until));
+        outages.sort_by_key(|outage| outage.from);
+        Ok(outages)
     }
 
     /// Gathers the figures of some tags over a span, and the latest good values of those that choose their units and
@@ -185,6 +277,12 @@ impl Store {
         let instants = figures::record_grid(interval, &self.def.time_zone, from, until).into();
         Ok(Some(Recorded { name: device.name.clone(), sv, pv: face.pv, instants }))
     }
+}
+
+/// The stored outputs of actuators that are on or off.
+fn outputs(def: &PlantDef) -> impl Iterator<Item = TagId> {
+    let outputs = def.logic.actuators.iter().map(|actuator| actuator.output);
+    outputs.filter(|tag| def.tag(*tag).is_stored() && def.tag(*tag).point.kind == DataType::Bool)
 }
 
 fn rows(from: Timestamp, until: Timestamp, interval: Duration) -> u64 {

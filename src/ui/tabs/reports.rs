@@ -16,7 +16,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::def::{CsvDialect, Pen},
-    report::{self, Period, ShiftReport},
+    report::{self, Period, ReportFormat, ShiftReport, Style},
     text::file,
     ui::{tabs::trends::span::View, widgets::chart},
 };
@@ -87,6 +87,7 @@ pub struct Reports {
     curve: Answered<Vec<Series>>,
     batches: Batches,
     dialect: CsvDialect,
+    format: &'static dyn ReportFormat,
     export: Export,
     /// The CSV that waits for the station's word.
     outgoing: Option<Outgoing>,
@@ -117,6 +118,7 @@ impl TabView for Reports {
             curve: Answered::default(),
             batches: Batches::default(),
             dialect: snapshot.def.report.csv,
+            format: report::FORMATS[0],
             export: Export::Not,
             outgoing: None,
             scroll: Scroll::default(),
@@ -336,9 +338,15 @@ impl Reports {
 
     /// Writes exactly the figures that are shown.
     fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let render = |report| file(|| report::FORMATS[0].render(report, cx.def(), self.dialect));
-        let written = self.report.value.as_ref().map(|report| (self.path(cx, report), render(report)));
-        self.send(written)
+        let style = Style { csv: self.dialect, ..Style::of(cx.def()) };
+        let Some(report) = &self.report.value else { return self.send(None) };
+        match report::render(self.format, report, cx.def(), &style) {
+            Ok(bytes) => self.send(Some((self.path(cx, report), bytes))),
+            Err(why) => {
+                self.export = Export::Failed(why);
+                Vec::new()
+            }
+        }
     }
 
     /// Asks the station to record a file, which is then written.
@@ -363,6 +371,6 @@ impl Reports {
     }
 
     fn path(&self, cx: &ViewContext, report: &ShiftReport) -> PathBuf {
-        cx.def().report.folder.join(report::FORMATS[0].file_name(cx.def(), &report.period, report.until))
+        cx.def().report.folder.join(self.format.file_name(cx.def(), &report.period, report.until))
     }
 }

@@ -119,6 +119,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         tag: tag.to_owned(),
         unit: unit.to_owned(),
         decimals,
+        first: None,
         min: full.then_some(min),
         mean: full.then_some(mean),
         max: full.then_some(max),
@@ -166,6 +167,10 @@ fn report(period: Period, full: bool) -> ShiftReport {
         until,
         audit: full.then_some(ChainHash { number: 1_042, hash: [0xA5; 32] }),
         unreadable: Vec::new(),
+        compared: Vec::new(),
+        runs: Vec::new(),
+        outages: Vec::new(),
+        charts: Vec::new(),
         batches: Vec::new(),
         tags: vec![
             tag("TIC-1.PV", "°C", 1, 26.8, 58.31, 72.6, Some(72.4), 41, 0.989_99),
@@ -297,9 +302,9 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     stand.press("e");
     let (path, bytes) = stand.saved.pop().expect("the key writes");
     assert_eq!(path, PathBuf::from("reports/2026-11-21-afternoon-until-1402.csv"));
-    let Stand { model, .. } = &stand;
-    let shown = model.tabs.reports.report.value.as_ref().expect("a report is shown");
-    assert_eq!(bytes, report::FORMATS[0].render(shown, &model.snapshot.def, CsvDialect::default()));
+    let (def, shown) = (&stand.model.snapshot.def, stand.model.tabs.reports.report.value.as_ref());
+    let csv = shown.map(|shown| report::render(report::FORMATS[0], shown, def, &Style::of(def)));
+    assert_eq!(Some(Ok(bytes)), csv);
     stand.send(Msg::Saved(Some(Tab::Reports), Ok(path)));
     assert!(stand.screen().contains("✓ written reports/2026-11-21-afternoon-until-1402.csv"));
     stand.press(";e");
