@@ -12,6 +12,7 @@ use super::{
     Effect, Model, QueryId, UiAction, ViewContext,
     keys::{Key, char, code},
     modal::{Modal, Prompt},
+    msg::Scope,
     tabs::TabView,
 };
 use crate::{
@@ -346,23 +347,10 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         return actions;
     }
     let count = actions.len();
-    let is_command = |action: &UiAction| match action {
-        UiAction::Command(_) | UiAction::SendCommand(..) | UiAction::Do(Effect::Command(..) | Effect::Extension(_)) => {
-            true
-        }
-        UiAction::Open(modal) => gives_command(modal),
-        UiAction::Show(_)
-        | UiAction::ShowDevice(_)
-        | UiAction::ShowParameter(_)
-        | UiAction::ShowOnMimic(_)
-        | UiAction::ShowOnTrends(..)
-        | UiAction::Replay(_)
-        | UiAction::ReplayStep(_)
-        | UiAction::SessionRequest(..)
-        | UiAction::KeepPreferences(_)
-        | UiAction::Leave
-        | UiAction::SetLocale(_)
-        | UiAction::Do(_) => false,
+    let is_command = |action: &UiAction| match action.scope() {
+        Scope::Plant => true,
+        Scope::Window(modal) => gives_command(modal),
+        Scope::View | Scope::Files | Scope::Station => false,
     };
     let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();
     if rest.len() < count {
