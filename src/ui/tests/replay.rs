@@ -100,6 +100,22 @@ fn the_past_is_below_the_rule_and_the_present_above_it() {
 }
 
 #[test]
+fn escape_closes_the_page_before_the_past() {
+    let mut model = replayed(&Fixture::alarm(), Tab::Controllers);
+    type_keys(&mut model, "h");
+    let guide = screen(&mut model, 80, 24);
+    assert!(guide.contains("Esc back") && !guide.contains("Esc present"), "{guide}");
+    type_keys(&mut model, "⎋⏎");
+    let device = screen(&mut model, 80, 24);
+    assert!(device.contains("Esc back"), "{device}");
+    type_keys(&mut model, "⎋");
+    assert!(screen(&mut model, 80, 24).contains("Esc present"));
+    assert_eq!(shown_at(&model), Some(ago(600)));
+    type_keys(&mut model, "⎋");
+    assert_eq!(shown_at(&model), None);
+}
+
+#[test]
 fn nothing_is_done_in_the_past() {
     let letters = (' '..='~').chain(['⏎', '↑', '↓', '←', '→']);
     let keys: Vec<String> =
