@@ -27,7 +27,7 @@ use std::{
     path::PathBuf,
 };
 
-pub use self::keys::{Action, KEYS};
+pub use self::keys::{Action, KEYS, LIST};
 use self::{
     cursors::Between,
     events::Events,
@@ -199,7 +199,7 @@ impl TabView for Trends {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.export.said = None;
-        find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
+        find(if self.values.is_some() { LIST } else { KEYS }, event).map(|action| self.act(cx, action)).unwrap_or_default()
     }
 
     fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
@@ -220,13 +220,18 @@ impl TabView for Trends {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        if self.values.is_some() {
+            // In a replay Esc leads back here before it ends the past.
+            let back = cx.is_past().then(|| Hint::new("Esc", t!("back"), t!("previous page")));
+            return back.into_iter().chain(hints(LIST)).collect();
+        }
         let keys = KEYS.iter().filter(|key| !cx.is_past() || !key.action.is_of_present());
         hints(&keys.copied().collect::<Vec<_>>())
     }
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        vec![("trends", crate::ui::keys::chords_of(KEYS))]
+        [KEYS, LIST].map(|keys| ("trends", crate::ui::keys::chords_of(keys))).to_vec()
     }
 }
 
