@@ -112,6 +112,8 @@ pub struct Replay {
     event: Option<Event>,
     /// Place in [`SPEEDS`].
     speed: usize,
+    /// The last instant before the present is among those that will be played.
+    ends: bool,
     /// Instants that will be played, each with its query and its answer.
     prefetched: VecDeque<(Timestamp, u32, Option<Shown>)>,
     /// Why the last query led nowhere.
@@ -197,7 +199,12 @@ impl Replay {
 
     fn pause(&mut self) {
         self.speed = 0;
+        self.forget_prefetched();
+    }
+
+    fn forget_prefetched(&mut self) {
         self.prefetched.clear();
+        self.ends = false;
     }
 
     /// A key, at a present.
@@ -209,7 +216,7 @@ impl Replay {
             Action::Play => {
                 self.speed = (self.speed + 1) % SPEEDS.len();
                 (self.requested, self.search, self.trouble) = (None, None, None);
-                self.prefetched.clear();
+                self.forget_prefetched();
                 self.prefetch(present)
             }
             // A window asks for it.
@@ -237,9 +244,12 @@ impl Replay {
     fn prefetch(&mut self, present: Timestamp) -> Vec<Effect> {
         let step = SignedDuration::from_millis(500) * self.speed();
         let mut effects = Vec::new();
-        while step > SignedDuration::ZERO && self.prefetched.len() < PREFETCH_MAX {
+        while step > SignedDuration::ZERO && self.prefetched.len() < PREFETCH_MAX && !self.ends {
             let last = self.prefetched.back().map(|(at, ..)| *at).or_else(|| self.shown().map(|shown| shown.at));
-            let Some(at) = last.and_then(|last| last.checked_add(step).ok()).filter(|at| *at < present) else { break };
+            let Some(last) = last.filter(|last| *last < present) else { break };
+            // The last step is as long as there is time: a fast pace would end minutes before the present.
+            let at = last.checked_add(step).unwrap_or(present).min(present);
+            self.ends = at == present;
             effects.push(self.ask(Query::Past { at }));
             self.prefetched.push_back((at, self.asked, None));
         }

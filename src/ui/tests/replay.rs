@@ -209,6 +209,28 @@ fn steps_lead_from_where_it_is_to_the_present_at_most() {
 }
 
 #[test]
+fn the_past_has_the_marks_of_its_actuators() {
+    let mut fixture = Fixture::normal();
+    for (tag, value) in [("PLC-1.AUTO", 0.0), ("PLC-1.MAN.P-1", 1.0), ("PLC-1.TK-2", 19.5)] {
+        fixture.set(tag, value);
+    }
+    for (stored, blocked, expect) in [(60, false, Some("≠ not ON")), (0, false, None), (60, true, Some("⊘ blocked"))] {
+        fixture.set("PLC-1.TK-2", if blocked { 19.5 } else { 9.5 });
+        fixture.set("PLC-1.MAN.P-1", if blocked { 0.0 } else { 1.0 });
+        let at = ago(600);
+        let samples =
+            fixture.samples.iter().map(|sample| crate::plant::sample::Sample { at: ago(600 + stored), ..*sample });
+        let past = Past { at, samples: samples.collect(), events: Vec::new(), minutes: vec![None] };
+        let mut model = model(&Fixture::normal(), Theme::FULL);
+        let effects = type_keys(&mut model, "@-10m⏎");
+        answer(&mut model, asked(&effects)[0].0, Ok(Answer::Past(Box::new(past))));
+        let shown = screen(&mut model, 80, 24);
+        let found = ["≠ not ON", "⊘ blocked"].into_iter().find(|mark| shown.contains(mark));
+        assert_eq!(found, expect, "{stored}:\n{shown}");
+    }
+}
+
+#[test]
 fn playing_fetches_ahead_and_waits_for_what_comes_late() {
     let mut model = replayed(&Fixture::normal(), Tab::Mimic);
     let effects = type_keys(&mut model, "***");
@@ -236,10 +258,13 @@ fn playing_ends_at_the_present_and_at_an_error() {
     let effects = type_keys(&mut model, "@-40s⏎");
     answer_instants(&mut model, &effects);
     let effects = type_keys(&mut model, "***");
-    assert_eq!(instants(&effects).last(), Some(&ago(10)), "{effects:?}");
+    assert_eq!(instants(&effects)[6..], [ago(10), now()], "the last step is a short one");
     answer_instants(&mut model, &effects);
     tick(&mut model);
-    assert_eq!((shown_at(&model), model.replay.speed()), (Some(ago(10)), 0));
+    assert!(tick(&mut model).is_empty());
+    assert_eq!((shown_at(&model), model.replay.speed()), (Some(now()), 0));
+    let effects = type_keys(&mut model, "@-40s⏎");
+    answer_instants(&mut model, &effects);
     let effects = type_keys(&mut model, "*");
     let failed = asked(&effects)[0].0;
     answer(&mut model, failed, Err(HistoryError::Engine("the disk is gone".into())));
