@@ -60,6 +60,7 @@ use preferences::{Bell, Preferences, PreferencesFile};
 use replay::Replay;
 use screen_dump::ScreenDump;
 use session_lock::SessionLock;
+pub(crate) use screen_dump::text as text_of;
 pub(crate) use tabs::mimic::preview;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
