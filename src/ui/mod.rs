@@ -17,6 +17,7 @@ pub(crate) mod modal;
 pub(crate) mod mouse;
 pub(crate) mod msg;
 pub(crate) mod preferences;
+pub(crate) mod plain;
 pub(crate) mod session_lock;
 pub(crate) mod replay;
 pub(crate) mod screen_dump;
