@@ -8,6 +8,7 @@ mod export;
 mod keys;
 mod lanes;
 mod legend;
+mod numbers;
 mod pens;
 mod picture;
 mod plots;
@@ -283,6 +284,9 @@ impl Trends {
             (None, Action::Csv) => self.export_csv(cx),
             (None, Action::Picture) => return self.export_picture(cx),
             (None, Action::Plot) => self.plot = self.plot.next(),
+            (None, Action::Numbers) => {
+                self.plot = if self.plot == Plot::Numbers { Plot::Time } else { Plot::Numbers };
+            }
             (None, Action::Stroke) => self.next_stroke(cx),
             (None, Action::Scale) => return self.ask_scale(cx),
             (None, Action::GoTo) => {

@@ -20,6 +20,8 @@ pub enum Action {
     Picture,
     /// Curves over time, or another plot.
     Plot,
+    /// The pens as large numbers, or the curves.
+    Numbers,
     /// The next look of the selected pen.
     Stroke,
     /// Ask for the scale of the selected pen.
@@ -113,7 +115,8 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('g'), "group", "next group of pens", Action::Group),
     Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),
-    Key::new(char('x'), "plot", "curves, x-y plot, histogram, or step response", Action::Plot),
+    Key::new(char('x'), "plot", "curves, x-y plot, histogram, step response, or large numbers", Action::Plot),
+    Key::new(char('B'), "", "the pens as large numbers for the wall, or the curves", Action::Numbers),
     Key::new(char('k'), "", "look of the selected pen: steps, lines, dots, bars", Action::Stroke),
     Key::new(char('e'), "export", "write the values of the view as CSV", Action::Csv).needs(Role::Technician),
     Key::new(char('E'), "", "write the chart as SVG and PNG", Action::Picture).needs(Role::Technician),
