@@ -209,7 +209,8 @@ pub(super) fn fit_screen(model: &mut Model) {
 /// the palette only leads on. What it held is dropped, nothing is done.
 pub(super) fn close_unseen(model: &mut Model) {
     let small = model.small();
-    let closes = |modal: &Modal| !modal.is_quit() && (small || !(modal.only_shows() || matches!(modal, Modal::Palette(_))));
+    let closes =
+        |modal: &Modal| !modal.is_quit() && (small || !(modal.only_shows() || matches!(modal, Modal::Palette(_))));
     if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
         model.note = Some(effects::needs_room().into());
     }

@@ -276,7 +276,9 @@ mod tests {
     fn every_task_and_the_way_on_fit_at_every_size() {
         let mut model = begun(&Fixture::normal());
         for task in Task::ALL {
-            for (width, height, message) in [(160, 50, task.message()), (80, 24, task.message()), (60, 20, task.brief())] {
+            for (width, height, message) in
+                [(160, 50, task.message()), (80, 24, task.message()), (60, 20, task.brief())]
+            {
                 let shown = screen(&mut model, width, height);
                 let row = shown.lines().find(|row| row.contains(message)).unwrap_or_default();
                 assert!(row.contains("Ctrl-N: next"), "{task:?} at {width}x{height}:\n{shown}");

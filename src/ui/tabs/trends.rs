@@ -200,7 +200,9 @@ impl TabView for Trends {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.export.said = None;
-        find(if self.values.is_some() { LIST } else { KEYS }, event).map(|action| self.act(cx, action)).unwrap_or_default()
+        find(if self.values.is_some() { LIST } else { KEYS }, event)
+            .map(|action| self.act(cx, action))
+            .unwrap_or_default()
     }
 
     fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {

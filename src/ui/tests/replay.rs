@@ -214,7 +214,8 @@ fn the_past_has_the_marks_of_its_actuators() {
     for (tag, value) in [("PLC-1.AUTO", 0.0), ("PLC-1.MAN.P-1", 1.0), ("PLC-1.TK-2", 19.5)] {
         fixture.set(tag, value);
     }
-    for (stored, blocked, expect) in [(60, false, Some("≠ not ON")), (0, false, None), (60, true, Some("⊘ blocked"))] {
+    for (stored, blocked, expect) in [(60, false, Some("≠ not ON")), (0, false, None), (60, true, Some("⊘ blocked"))]
+    {
         fixture.set("PLC-1.TK-2", if blocked { 19.5 } else { 9.5 });
         fixture.set("PLC-1.MAN.P-1", if blocked { 0.0 } else { 1.0 });
         let at = ago(600);

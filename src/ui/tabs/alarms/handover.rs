@@ -254,8 +254,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
             running = running(lasts)
         ))
     });
-    let unknown =
-        cx.is_past().then(|| t!("tests and settings: not kept in the history").to_owned());
+    let unknown = cx.is_past().then(|| t!("tests and settings: not kept in the history").to_owned());
     lines.chain(devices).chain(sequences).chain(stubborn).chain(unknown).collect()
 }
 
