@@ -56,14 +56,7 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     }
     let replayed = keys::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some());
     if let Some(action) = replayed.filter(|action| *action == replay::Action::Leave || !model.small()) {
-        let present = model.present_cx().now;
-        let actions = match action {
-            replay::Action::GoTo => on_global(model, Global::Replay),
-            // What lies on top of the tab closes before the past does.
-            replay::Action::Leave if !model.small() && step_back(model) => Vec::new(),
-            _ => model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect(),
-        };
-        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
+        return on_replay_key(model, action);
     }
     match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw | Global::Language)) => {
@@ -75,6 +68,20 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         None if !model.may_act(event) => Vec::new(),
         None => on_tab_key(model, event),
     }
+}
+
+/// A key of the past that is shown; what lies on top of the tab closes before the past does.
+fn on_replay_key(model: &mut Model, action: replay::Action) -> Vec<UiAction> {
+    let present = model.present_cx().now;
+    let closed = action == replay::Action::Leave && !model.small() && step_back(model);
+    let actions = if closed {
+        Vec::new()
+    } else if action == replay::Action::GoTo {
+        on_global(model, Global::Replay)
+    } else {
+        model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect()
+    };
+    actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
 }
 
 /// Keys that mean the same in every window and while something is typed.
