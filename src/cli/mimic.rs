@@ -17,7 +17,7 @@ use super::{CliError, say};
 use crate::{
     plant::PlantDef,
     profile::{self, Search},
-    ui::{preview, theme::Theme},
+    ui::{self, preview, theme::Theme},
 };
 
 /// Rows that a terminal has beside the mimic.
@@ -58,9 +58,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     let plant = load(&args.plant)?;
     let page = page_of(&plant, args.page)?;
     let drawn = draw(&plant, page, size(), 0);
-    for row in drawn.content.chunks(usize::from(drawn.area.width.max(1))) {
-        say(row.iter().map(|cell| cell.symbol()).collect::<String>().trim_end());
-    }
+    ui::text_of(&drawn).lines().for_each(say);
     Ok(())
 }
 

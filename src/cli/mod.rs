@@ -252,7 +252,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
             Some(plant) => {
                 run::with_terminal(&plant, &args.station, &args.terminal).map_err(|error| mistyped(&plant, error))
             }
-            None => match attach::main(attach::Args { plant: None, terminal: args.terminal }) {
+            None => match attach::terminal(None, &args.terminal) {
                 Err(error @ CliError::NotRunning(_)) => match menu::without_station()? {
                     Some(words) => run_command(parse(
                         std::iter::once("sightglass".into()).chain(words.into_iter().map(Into::into)).collect(),

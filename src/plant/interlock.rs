@@ -167,6 +167,16 @@ impl ActuatorTracker {
         self.since.iter_mut().flatten()
     }
 
+    /// As stored values tell it: since the last of the values that it depends on was stored, so never too early.
+    pub(super) fn from_stored(logic: &ControlLogic, sample: impl Fn(TagId) -> Sample) -> ActuatorTracker {
+        let since = |actuator: &ActuatorDef| {
+            let needs = actuator.needs.iter().map(|(tag, _)| *tag);
+            let last = needs.chain([actuator.command, actuator.output]).map(|tag| sample(tag).at).max();
+            last.filter(|_| logic.differs(actuator, &sample))
+        };
+        ActuatorTracker { since: logic.actuators.iter().map(since).collect() }
+    }
+
     /// Notes what differs at `at`, and since when.
     pub fn update(&mut self, logic: &ControlLogic, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
         self.since.resize(logic.actuators.len(), None);

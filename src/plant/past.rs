@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     def::{DeviceDef, LineId, PlantDef},
     event::{LineCounters, LineState},
+    interlock::ActuatorTracker,
     line_minute::LineMinute,
     record::AlarmRecord,
     reducer::Plant,
@@ -35,6 +36,8 @@ impl Past {
         plant.restore(&self.events);
         plant.set_samples(&self.samples);
         let mut snapshot = plant.snapshot();
+        let samples = &snapshot.samples;
+        snapshot.actuators = ActuatorTracker::from_stored(&def.logic, |tag| samples[tag.index()]);
         for device in &def.devices {
             snapshot.devices[device.id.index()].state = self.device(&def, device);
         }

@@ -46,8 +46,8 @@ pub fn view(model: &Model, frame: &mut Frame) {
     model.tabs.shown().view(cx, frame, parts.body);
     status(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.status));
     if let Some(tour) = &model.tour {
-        // The line above the tab says which past is shown.
-        let row = if cx.is_past() { parts.status } else { parts.rule };
+        // The line above the tab says which past is shown; the smallest screen has none.
+        let row = if cx.is_past() || parts.rule.is_empty() { parts.status } else { parts.rule };
         tour.view(cx, &mut Canvas::new(frame.buffer_mut(), row));
     }
     Footer::new(model, cx, parts.footer.width).view(cx, &mut Canvas::new(frame.buffer_mut(), parts.footer));

@@ -56,12 +56,7 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     }
     let replayed = keys::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some());
     if let Some(action) = replayed.filter(|action| *action == replay::Action::Leave || !model.small()) {
-        let present = model.present_cx().now;
-        let actions = match action {
-            replay::Action::GoTo => on_global(model, Global::Replay),
-            _ => model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect(),
-        };
-        return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
+        return on_replay_key(model, action);
     }
     match keys::find(&keys::global(), event) {
         Some(global @ (Global::Quit | Global::Acknowledge | Global::Redraw | Global::Language)) => {
@@ -73,6 +68,20 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         None if !model.may_act(event) => Vec::new(),
         None => on_tab_key(model, event),
     }
+}
+
+/// A key of the past that is shown; what lies on top of the tab closes before the past does.
+fn on_replay_key(model: &mut Model, action: replay::Action) -> Vec<UiAction> {
+    let present = model.present_cx().now;
+    let closed = action == replay::Action::Leave && !model.small() && step_back(model);
+    let actions = if closed {
+        Vec::new()
+    } else if action == replay::Action::GoTo {
+        on_global(model, Global::Replay)
+    } else {
+        model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect()
+    };
+    actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
 }
 
 /// Keys that mean the same in every window and while something is typed.
@@ -174,14 +183,21 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             model.replay.cancel();
             let failed = model.last_command.take().is_some_and(|pending| pending.is_trouble());
             if !failed {
-                with_tabs(model, |tabs, cx| {
-                    tabs.shown_mut().back(cx);
-                    Vec::new()
-                });
+                step_back(model);
             }
             Vec::new()
         }
     }
+}
+
+/// Closes what lies on top of the first page of the tab; `false` if nothing does.
+fn step_back(model: &mut Model) -> bool {
+    let mut closed = false;
+    with_tabs(model, |tabs, cx| {
+        closed = tabs.shown_mut().back(cx);
+        Vec::new()
+    });
+    closed
 }
 
 /// The screen has another size: a tab that it has no room for gives way to the values, as long as these are offered.
@@ -196,11 +212,12 @@ pub(super) fn fit_screen(model: &mut Model) {
     close_unseen(model);
 }
 
-/// A window that cannot be seen must not take keys, and none that gives commands opens where it may not be seen whole.
-/// What it held is dropped, nothing is done.
+/// A window that cannot be seen must not take keys, and none that gives commands opens where it may not be seen whole;
+/// the palette only leads on. What it held is dropped, nothing is done.
 pub(super) fn close_unseen(model: &mut Model) {
     let small = model.small();
-    let closes = |modal: &Modal| !modal.is_quit() && (small || !modal.only_shows());
+    let closes =
+        |modal: &Modal| !modal.is_quit() && (small || !(modal.only_shows() || matches!(modal, Modal::Palette(_))));
     if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
         model.note = Some(effects::needs_room().into());
     }

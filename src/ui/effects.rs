@@ -81,25 +81,5 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     model.visited.note(model.tabs.shown, tab);
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
-    let effects = asked.into_iter().filter_map(|action| match action {
-        UiAction::Do(effect) => Some(effect),
-        UiAction::Open(modal) => {
-            model.modal = Some(modal);
-            None
-        }
-        UiAction::Leave
-        | UiAction::SetLocale(_)
-        | UiAction::Show(_)
-        | UiAction::ShowDevice(_)
-        | UiAction::ShowParameter(_)
-        | UiAction::ShowOnMimic(_)
-        | UiAction::ShowOnTrends(..)
-        | UiAction::Replay(_)
-        | UiAction::ReplayStep(_)
-        | UiAction::Command(_)
-        | UiAction::SendCommand(..)
-        | UiAction::KeepPreferences(_)
-        | UiAction::SessionRequest(..) => None,
-    });
-    effects.collect()
+    perform(model, asked)
 }

@@ -125,7 +125,7 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     model.leaving = options.leaving;
     model.tour = options.tour.then(super::Tour::default);
     let why = options.preferences.problem.as_ref();
-    model.note = why.map(|why| t!("Preferences are not used, F2 says why: {why}", why).into());
+    model.note = why.map(|why| t!("A preference is not used: {why}", why).into());
     model.preferences_file = options.preferences;
     model.tabs.registers.profiles = options.profiles;
     let mut extension = options.extension;

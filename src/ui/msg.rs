@@ -178,7 +178,47 @@ pub enum Leaving {
     Terminal,
 }
 
+/// What an action reaches: the rules of the past and of a locked terminal go by it.
+#[derive(Debug, Clone, Copy)]
+pub enum Scope<'a> {
+    /// What the terminal shows.
+    View,
+    /// A window: what comes of it depends on the window.
+    Window(&'a Modal),
+    /// The plant, or the simulated one.
+    Plant,
+    /// Files and preferences of the user.
+    Files,
+    /// Queries, requests of a session, and the terminal itself.
+    Station,
+}
+
 impl UiAction {
+    /// What it reaches.
+    pub fn scope(&self) -> Scope<'_> {
+        match self {
+            UiAction::Open(modal) => Scope::Window(modal),
+            UiAction::Command(_)
+            | UiAction::SendCommand(..)
+            | UiAction::Do(Effect::Command(..) | Effect::Extension(_)) => Scope::Plant,
+            UiAction::KeepPreferences(_)
+            | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
+            | UiAction::Do(Effect::SaveReport { .. } | Effect::Append { new: true, .. } | Effect::Load { .. }) => {
+                Scope::Files
+            }
+            UiAction::Show(_)
+            | UiAction::ShowDevice(_)
+            | UiAction::ShowParameter(_)
+            | UiAction::ShowOnMimic(_)
+            | UiAction::ShowOnTrends(..)
+            | UiAction::Replay(_)
+            | UiAction::ReplayStep(_)
+            | UiAction::SetLocale(_)
+            | UiAction::Leave => Scope::View,
+            UiAction::SessionRequest(..) | UiAction::Do(_) => Scope::Station,
+        }
+    }
+
     /// Queries the history on behalf of a tab.
     pub fn query(tab: Tab, number: u32, query: Query) -> UiAction {
         UiAction::Do(Effect::Query(QueryId { tab: Some(tab), number }, query))

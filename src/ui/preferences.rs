@@ -13,7 +13,6 @@ use super::{
 use crate::{
     plant::keyword::keyword_enum,
     profile::{
-        Errors,
         diagnostic::{Problems, Span},
         reader::{self, At, Node, OptionalKey, Raw, Value, toml_tables},
     },
@@ -96,7 +95,7 @@ impl Preferences {
 pub struct PreferencesFile {
     /// Where it is, for people.
     pub path: String,
-    /// Why it is not used: file, line, found, expected. Then it is not written either.
+    /// What is wrong with it: file, line, found, expected. What is right is used; the file is not written over.
     pub problem: Option<String>,
     /// For a terminal without a login, and for users without a section.
     default: Preferences,
@@ -153,11 +152,12 @@ impl PreferencesFile {
         }
     }
 
-    /// Reads its text; an empty one holds no choice.
-    pub fn read(path: &str, bytes: &[u8]) -> Result<PreferencesFile, Errors> {
+    /// Reads its text, key by key: where one is wrong, its usual value stands in and the problem is named. An empty text
+    /// holds no choice.
+    pub fn read(path: &str, bytes: &[u8]) -> PreferencesFile {
         let mut file = PreferencesFile::new(path, None);
         if bytes.trim_ascii().is_empty() {
-            return Ok(file);
+            return file;
         }
         let mut problems = Problems::default();
         if let Some(raw) = reader::parse(path, bytes, &mut problems) {
@@ -169,7 +169,14 @@ impl PreferencesFile {
                 file.users.extend(section.map(|section| (user, of_section(&section))));
             }
         }
-        problems.finish(file)
+        if let Err(errors) = problems.finish(()) {
+            let first = errors.full_lines().next().unwrap_or_default();
+            file.problem = Some(match errors.count() - 1 {
+                0 => first,
+                more => t!("{first}, and {more} more", first, more),
+            });
+        }
+        file
     }
 
     /// Its text.

@@ -12,6 +12,7 @@ use super::{
     Effect, Model, QueryId, UiAction, ViewContext,
     keys::{Key, char, code},
     modal::{Modal, Prompt},
+    msg::Scope,
     tabs::TabView,
 };
 use crate::{
@@ -111,6 +112,8 @@ pub struct Replay {
     event: Option<Event>,
     /// Place in [`SPEEDS`].
     speed: usize,
+    /// The last instant before the present is among those that will be played.
+    ends: bool,
     /// Instants that will be played, each with its query and its answer.
     prefetched: VecDeque<(Timestamp, u32, Option<Shown>)>,
     /// Why the last query led nowhere.
@@ -196,7 +199,12 @@ impl Replay {
 
     fn pause(&mut self) {
         self.speed = 0;
+        self.forget_prefetched();
+    }
+
+    fn forget_prefetched(&mut self) {
         self.prefetched.clear();
+        self.ends = false;
     }
 
     /// A key, at a present.
@@ -208,7 +216,7 @@ impl Replay {
             Action::Play => {
                 self.speed = (self.speed + 1) % SPEEDS.len();
                 (self.requested, self.search, self.trouble) = (None, None, None);
-                self.prefetched.clear();
+                self.forget_prefetched();
                 self.prefetch(present)
             }
             // A window asks for it.
@@ -236,9 +244,12 @@ impl Replay {
     fn prefetch(&mut self, present: Timestamp) -> Vec<Effect> {
         let step = SignedDuration::from_millis(500) * self.speed();
         let mut effects = Vec::new();
-        while step > SignedDuration::ZERO && self.prefetched.len() < PREFETCH_MAX {
+        while step > SignedDuration::ZERO && self.prefetched.len() < PREFETCH_MAX && !self.ends {
             let last = self.prefetched.back().map(|(at, ..)| *at).or_else(|| self.shown().map(|shown| shown.at));
-            let Some(at) = last.and_then(|last| last.checked_add(step).ok()).filter(|at| *at < present) else { break };
+            let Some(last) = last.filter(|last| *last < present) else { break };
+            // The last step is as long as there is time: a fast pace would end minutes before the present.
+            let at = last.checked_add(step).unwrap_or(present).min(present);
+            self.ends = at == present;
             effects.push(self.ask(Query::Past { at }));
             self.prefetched.push_back((at, self.asked, None));
         }
@@ -346,23 +357,10 @@ pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<
         return actions;
     }
     let count = actions.len();
-    let is_command = |action: &UiAction| match action {
-        UiAction::Command(_) | UiAction::SendCommand(..) | UiAction::Do(Effect::Command(..) | Effect::Extension(_)) => {
-            true
-        }
-        UiAction::Open(modal) => gives_command(modal),
-        UiAction::Show(_)
-        | UiAction::ShowDevice(_)
-        | UiAction::ShowParameter(_)
-        | UiAction::ShowOnMimic(_)
-        | UiAction::ShowOnTrends(..)
-        | UiAction::Replay(_)
-        | UiAction::ReplayStep(_)
-        | UiAction::SessionRequest(..)
-        | UiAction::KeepPreferences(_)
-        | UiAction::Leave
-        | UiAction::SetLocale(_)
-        | UiAction::Do(_) => false,
+    let is_command = |action: &UiAction| match action.scope() {
+        Scope::Plant => true,
+        Scope::Window(modal) => gives_command(modal),
+        Scope::View | Scope::Files | Scope::Station => false,
     };
     let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();
     if rest.len() < count {

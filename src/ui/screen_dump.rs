@@ -6,7 +6,12 @@ mod tests;
 
 use std::path::PathBuf;
 
-use ratatui::{Terminal, backend::TestBackend, buffer::Buffer};
+use ratatui::{
+    Terminal,
+    backend::TestBackend,
+    buffer::{Buffer, Cell},
+};
+use unicode_width::UnicodeWidthStr;
 
 pub(crate) use self::svg::svg as picture;
 use super::{Effect, Model, QueryId, UiAction};
@@ -81,5 +86,16 @@ fn drawn(model: &Model) -> Buffer {
 /// The characters of a screen, one line a row.
 pub(crate) fn text(buffer: &Buffer) -> String {
     let rows = buffer.content.chunks(usize::from(buffer.area.width.max(1)));
-    rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>().trim_end().to_owned() + "\n").collect()
+    rows.map(|row| row_text(row) + "\n").collect()
+}
+
+/// A row without the cells that a wide letter covers.
+fn row_text(row: &[Cell]) -> String {
+    let mut free = 0;
+    let shown = row.iter().enumerate().filter(|(x, cell)| {
+        let covered = *x < free;
+        free = if covered { free } else { x + cell.symbol().width().max(1) };
+        !covered
+    });
+    shown.map(|(_, cell)| cell.symbol()).collect::<String>().trim_end().to_owned()
 }

@@ -10,6 +10,7 @@ use super::{
     context::with_tabs,
     keys::{self, Global},
     modal::{Modal, Notice, UserForm, user_form::Purpose},
+    msg::Scope,
     replay::Replay,
     screen_dump,
     tabs::{Tab, TabView, Tabs, login},
@@ -166,30 +167,17 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
     let mut held = None;
     let mut rest = Vec::new();
     for action in actions {
-        match action {
-            UiAction::Open(modal) if !modal.only_looks() && !modal.is_unlock() => held = Some(Some(modal)),
-            UiAction::Command(_)
-            | UiAction::SendCommand(..)
-            | UiAction::KeepPreferences(_)
-            | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
-            | UiAction::Do(
-                Effect::SaveReport { .. }
-                | Effect::Append { new: true, .. }
-                | Effect::Load { .. }
-                | Effect::Extension(_),
-            ) => held = held.or(Some(None)),
-            UiAction::Open(_)
-            | UiAction::Leave
-            | UiAction::SetLocale(_)
-            | UiAction::Show(_)
-            | UiAction::ShowDevice(_)
-            | UiAction::ShowParameter(_)
-            | UiAction::ShowOnMimic(_)
-            | UiAction::ShowOnTrends(..)
-            | UiAction::Replay(_)
-            | UiAction::ReplayStep(_)
-            | UiAction::SessionRequest(..)
-            | UiAction::Do(_) => rest.push(action),
+        let waits = match action.scope() {
+            Scope::Plant | Scope::Files => true,
+            Scope::Window(modal) => !modal.only_looks() && !modal.is_unlock(),
+            Scope::View | Scope::Station => false,
+        };
+        if !waits {
+            rest.push(action);
+        } else if let UiAction::Open(modal) = action {
+            held = Some(Some(modal));
+        } else {
+            held = held.or(Some(None));
         }
     }
     if let Some(wanted) = held {

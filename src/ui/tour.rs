@@ -8,6 +8,7 @@ use super::{
     Effect, Model, Msg, UiAction, ViewContext,
     extension::ExtensionMessage,
     keys,
+    layout::Size,
     modal::{Modal, Notice},
     tabs::Tab,
     widgets::text::{Canvas, fit_words, running, width},
@@ -60,6 +61,20 @@ impl Task {
             Task::Why => "Why is a value bad? Esc, 1, select one with arrow keys, w",
             Task::Past => "It answers again. See it as it was: Esc, @, -20s, ⏎",
             Task::Report => "Take the report home: Esc (the present), 5, e",
+        }
+    }
+
+    /// The same where there is less room.
+    fn brief(self) -> &'static str {
+        match self {
+            Task::Look => t!("Select TIC-1 with the arrow keys, ⏎"),
+            Task::Set => t!("Esc, s, type 60, ⏎ and ⏎ again"),
+            Task::Follow => t!("2 shows curves, c a cursor: ← →"),
+            Task::Acknowledge => t!("A device is silent. Acknowledge: a"),
+            Task::Guidance => t!("What to do? 3 lists alarms, ⏎"),
+            Task::Why => t!("Why is it bad? Esc, 1, select one, w"),
+            Task::Past => t!("See it as it was: Esc, @, -20s, ⏎"),
+            Task::Report => t!("Take the report home: Esc, 5, e"),
         }
     }
 
@@ -160,15 +175,20 @@ impl Tour {
     /// The present task over the line above the tab; at its right end while the past stands in it.
     pub(super) fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let Some(task) = self.task() else { return };
-        let message = cx.theme.enter(translate(task.message()));
-        let number = t!("TOUR {number}/{count}", number = self.took.len() + 1, count = Task::ALL.len());
-        let room = canvas.width().saturating_sub(2);
-        let words = [
-            t!(" {number}  {message}   (Ctrl-N: next) ", number, message),
-            t!(" {number}  {message} ", number, message),
-        ];
-        let words = words.iter().find(|words| width(words) <= room).cloned();
-        let words = words.unwrap_or_else(|| fit_words(&format!(" {message} "), room));
+        let [message, brief] = [translate(task.message()), task.brief()].map(|words| cx.theme.enter(words));
+        let place = format!("{}/{}", self.took.len() + 1, Task::ALL.len());
+        let (room, next) = (canvas.width().saturating_sub(2), t!("Ctrl-N: next"));
+        let words = match cx.size {
+            // The tasks lead to what a smaller screen does not show.
+            Size::Tiny | Size::Compact => vec![t!(" TOUR: needs 60x16 ").to_owned()],
+            Size::Narrow | Size::Normal | Size::Wide | Size::Overview => vec![
+                t!(" TOUR {place}  {message}   ({next}) ", place, message, next),
+                format!(" {place}  {message}  {next} "),
+                format!(" {place}  {brief}  {next} "),
+            ],
+        };
+        let fits = words.iter().find(|words| width(words) <= room).cloned();
+        let words = fits.unwrap_or_else(|| fit_words(&format!(" {brief} "), room));
         canvas.text_right(canvas.width().saturating_sub(1), 0, &words, cx.theme.focus());
     }
 }
@@ -244,7 +264,7 @@ mod tests {
     #[test]
     fn a_task_is_shown_until_it_is_done() {
         let mut model = begun(&Fixture::normal());
-        assert!(screen(&mut model, 80, 24).contains("TOUR 1/8  Look at a controller"));
+        assert!(screen(&mut model, 80, 24).contains(" 1/8  Look at a controller"));
         type_keys(&mut model, "→⏎");
         assert_eq!(task(&model), Some(Task::Set), "its faceplate was opened");
         type_keys(&mut model, "⎋2c");
@@ -253,10 +273,17 @@ mod tests {
     }
 
     #[test]
-    fn every_task_stands_whole_in_80_columns() {
+    fn every_task_and_the_way_on_fit_at_every_size() {
         let mut model = begun(&Fixture::normal());
         for task in Task::ALL {
-            assert!(screen(&mut model, 80, 24).contains(task.message()), "{task:?}");
+            for (width, height, message) in
+                [(160, 50, task.message()), (80, 24, task.message()), (60, 20, task.brief())]
+            {
+                let shown = screen(&mut model, width, height);
+                let row = shown.lines().find(|row| row.contains(message)).unwrap_or_default();
+                assert!(row.contains("Ctrl-N: next"), "{task:?} at {width}x{height}:\n{shown}");
+            }
+            assert!(screen(&mut model, 40, 12).contains("TOUR: needs 60x16"));
             update(&mut model, Msg::Key(SKIP.event()));
         }
         let last = screen(&mut model, 80, 24);

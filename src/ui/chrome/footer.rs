@@ -4,7 +4,7 @@ use super::super::{
     Model, ViewContext,
     keys::{self, Chord, Hint},
     layout::Size,
-    replay, rights,
+    rights,
     tabs::Tab,
     widgets::text::{Canvas, width},
 };
@@ -26,7 +26,7 @@ impl Footer {
         let shown = |hint: Hint| Hint { key: cx.theme.enter(&hint.key), ..hint };
         let hints = match &model.modal {
             Some(modal) => modal.hints(cx),
-            None if cx.is_past() => [keys::hints(replay::KEYS), past::own_keys(model, cx)].concat(),
+            None if cx.is_past() => past::hints(model, cx),
             None if cx.size <= Size::Compact => super::compact_hints(model, cx),
             None => model.tabs.shown().hints(cx),
         };

@@ -1,12 +1,14 @@
 //! The frame of a past that is shown: which instant, how long ago, whether it plays, and what happened then.
 
 use super::{Canvas, Model, ViewContext, width};
+use crossterm::event::KeyCode;
+
 use crate::{
     plant::time::elapsed,
     t,
     ui::{
-        keys::Hint,
-        replay::{Event, stamp},
+        keys::{self, Hint, code},
+        replay::{self, Event, stamp},
         tabs::alarms::{action_text, event_text},
         widgets::text::age,
     },
@@ -46,7 +48,11 @@ pub(super) fn words(model: &Model, cx: &ViewContext) -> Option<String> {
     })
 }
 
-/// Keys of the tab that only look.
-pub(super) fn own_keys(model: &Model, cx: &ViewContext) -> Vec<Hint> {
-    model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none()).collect()
+/// The keys of the replay, then those of the tab that only look; where Esc leads back on the tab it does not end the past.
+pub(super) fn hints(model: &Model, cx: &ViewContext) -> Vec<Hint> {
+    let own: Vec<Hint> = model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none()).collect();
+    let is_escape = |hint: &Hint| hint.chord.is_some_and(|chord| chord == code(KeyCode::Esc));
+    let (escape, own): (Vec<Hint>, Vec<Hint>) = own.into_iter().partition(is_escape);
+    let replay = keys::hints(replay::KEYS).into_iter().filter(|hint| escape.is_empty() || !is_escape(hint));
+    escape.iter().cloned().chain(replay).chain(own).collect()
 }

@@ -40,10 +40,7 @@ fn no_folder() -> String {
 fn load_from(path: &Path) -> PreferencesFile {
     let name = path.display().to_string();
     let problem = match read(path) {
-        Ok(bytes) => match PreferencesFile::read(&name, &bytes) {
-            Ok(file) => return file,
-            Err(errors) => errors.full_lines().next(),
-        },
+        Ok(bytes) => return PreferencesFile::read(&name, &bytes),
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         Err(error) => Some(format!("{name}: {error}")),
     };
@@ -59,7 +56,7 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A file that cannot be read is never written over.
+/// A file with a problem is never written over: what is wrong in it was meant to be something.
 fn keep_in(path: &Path, user: Option<&str>, chosen: Preferences) -> Result<PreferencesFile, String> {
     let mut file = load_from(path);
     if let Some(problem) = file.problem {
@@ -76,7 +73,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::ui::theme::ThemeName;
+    use crate::ui::{preferences::Bell, theme::ThemeName};
 
     #[test]
     fn choices_are_kept_beside_those_of_others() {
@@ -94,10 +91,11 @@ mod tests {
     fn a_damaged_file_is_reported_and_never_written_over() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("preferences.toml");
-        fs::write(&path, "[default]\ntheme = \"pink\"\n").unwrap();
+        fs::write(&path, "[default]\ntheme = \"pink\"\nbell = \"once an alarm\"\n").unwrap();
         let file = load_from(&path);
+        assert_eq!(file.of(None).bell, Bell::Once, "what is right is used");
         assert!(file.problem.is_some_and(|problem| problem.contains("preferences.toml:2:9")));
         assert!(keep_in(&path, None, Preferences::default()).unwrap_err().contains("preferences.toml:2:9"));
-        assert_eq!(fs::read_to_string(&path).unwrap(), "[default]\ntheme = \"pink\"\n");
+        assert!(fs::read_to_string(&path).unwrap().contains("pink"));
     }
 }

@@ -18,6 +18,7 @@ use crate::{
     ui::{
         UiAction, ViewContext,
         keys::{self, Chord, Global},
+        layout::Size,
         modal::confirm::subject,
         replay,
         tabs::{Tab, TabView, alarms},
@@ -201,8 +202,9 @@ fn room(body: Rect) -> usize {
 }
 
 fn instant(cx: &ViewContext, text: &str) -> Option<Row> {
-    // A bench has no history.
-    let at = (!cx.def().is_bench() && text.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
+    // A bench has no history, the smallest screen no row that says that a past is shown.
+    let has_past = !cx.def().is_bench() && Size::Compact < cx.size;
+    let at = (has_past && text.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
         .then(|| replay::instant(cx, text).ok())??;
     Some(Row::new(Target::Instant(at), t!("time"), &replay::stamp(cx, at), t!("replay")))
 }

@@ -20,7 +20,7 @@ fn each_user_has_a_section_and_others_the_default() {
     file.set(Some("som chai"), light());
     let dark = Preferences { theme: ThemeName::HighContrast, ..Preferences::default() };
     file.set(None, dark);
-    let read = PreferencesFile::read("p.toml", file.text().as_bytes()).expect("its own text");
+    let read = PreferencesFile::read("p.toml", file.text().as_bytes());
     assert_eq!(read, file, "{}", file.text());
     assert_eq!((read.of(Some("som chai")), read.of(Some("anna")), read.of(None)), (light(), dark, dark));
 }
@@ -35,11 +35,22 @@ fn what_is_wrong_in_the_file_has_line_and_expectation() {
         ("[default]\nlanguage = \"tlh\"\n", ["p.toml:2:12: unknown language `tlh`", "expected one of en"]),
         ("[default\n", ["p.toml:1:", "TOML syntax error"]),
     ] {
-        let errors = PreferencesFile::read("p.toml", text.as_bytes()).expect_err(text);
-        let line = errors.full_lines().next().unwrap_or_default();
+        let line = PreferencesFile::read("p.toml", text.as_bytes()).problem.expect(text);
         assert!(parts.iter().all(|part| line.contains(part)), "{line}");
     }
-    assert_eq!(PreferencesFile::read("p.toml", b" \n").map(|file| file.of(None)), Ok(Preferences::default()));
+    assert_eq!(PreferencesFile::read("p.toml", b" \n"), PreferencesFile::new("p.toml", None));
+}
+
+#[test]
+fn one_wrong_key_does_not_discard_the_others() {
+    let text = "[default]\nbell = \"once an alarm\"\n[users.anna]\ntheme = \"pink\"\nmotion = false\n\
+                [users.somchai]\ntheme = \"light\"\nmouse = 3\n";
+    let file = PreferencesFile::read("p.toml", text.as_bytes());
+    let anna = Preferences { motion: false, ..Preferences::default() };
+    assert_eq!((file.of(None).bell, file.of(Some("anna"))), (Bell::Once, anna));
+    assert_eq!(file.of(Some("somchai")).theme, ThemeName::Light);
+    let problem = file.problem.unwrap_or_default();
+    assert!(problem.contains("p.toml:4:9: unknown theme `pink`") && problem.ends_with("and 1 more"), "{problem}");
 }
 
 #[test]

@@ -157,7 +157,10 @@ impl TabView for Alarms {
         ];
         let mut keys = keys::table(self.page);
         hide(&mut keys, &lacking);
-        [keys::everywhere(self.page), hints(&keys)].concat()
+        // Esc leaves the past once it leads nowhere back here.
+        let leads_back = self.page != Page::Active || !self.marked.is_empty() || !self.filter.is_off();
+        let back = (cx.is_past() && leads_back).then(|| Hint::new("Esc", t!("back"), t!("previous page")));
+        [back.into_iter().collect(), keys::everywhere(self.page), hints(&keys)].concat()
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {

@@ -175,8 +175,13 @@ impl TabView for Controllers {
             hide(&mut keys, &lacking);
         }
         let mut hints = hints(&keys);
-        // On the page of a device there is no room left for a key that every operator tries anyway.
-        if !matches!(self.page, Page::List | Page::Device) {
+        // On the page of a device there is no room left for a key that every operator tries anyway; in the past there is.
+        let leads_back = match self.page {
+            Page::List => false,
+            Page::Device => cx.is_past() && 1 < cx.def().devices.len(),
+            Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
+        };
+        if leads_back {
             let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
             let place = enter.map_or(keys.len(), |enter| enter + 1);
             hints.insert(place, Hint::new("Esc", t!("back"), t!("previous page")));

@@ -8,6 +8,7 @@ mod export;
 mod keys;
 mod lanes;
 mod legend;
+mod numbers;
 mod pens;
 mod picture;
 mod plots;
@@ -27,7 +28,7 @@ use std::{
     path::PathBuf,
 };
 
-pub use self::keys::{Action, KEYS};
+pub use self::keys::{Action, KEYS, LIST};
 use self::{
     cursors::Between,
     events::Events,
@@ -199,7 +200,9 @@ impl TabView for Trends {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.export.said = None;
-        find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
+        find(if self.values.is_some() { LIST } else { KEYS }, event)
+            .map(|action| self.act(cx, action))
+            .unwrap_or_default()
     }
 
     fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
@@ -220,13 +223,18 @@ impl TabView for Trends {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        if self.values.is_some() {
+            // In a replay Esc leads back here before it ends the past.
+            let back = cx.is_past().then(|| Hint::new("Esc", t!("back"), t!("previous page")));
+            return back.into_iter().chain(hints(LIST)).collect();
+        }
         let keys = KEYS.iter().filter(|key| !cx.is_past() || !key.action.is_of_present());
         hints(&keys.copied().collect::<Vec<_>>())
     }
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        vec![("trends", crate::ui::keys::chords_of(KEYS))]
+        [KEYS, LIST].map(|keys| ("trends", crate::ui::keys::chords_of(keys))).to_vec()
     }
 }
 
@@ -278,6 +286,9 @@ impl Trends {
             (None, Action::Csv) => self.export_csv(cx),
             (None, Action::Picture) => return self.export_picture(cx),
             (None, Action::Plot) => self.plot = self.plot.next(),
+            (None, Action::Numbers) => {
+                self.plot = if self.plot == Plot::Numbers { Plot::Time } else { Plot::Numbers };
+            }
             (None, Action::Stroke) => self.next_stroke(cx),
             (None, Action::Scale) => return self.ask_scale(cx),
             (None, Action::GoTo) => {

@@ -2,7 +2,7 @@
 
 use super::{
     chart::axis::Scale,
-    text::{Canvas, width},
+    text::{Canvas, fit, width},
 };
 use crate::{
     plant::number::{to_u16, to_usize},
@@ -40,19 +40,19 @@ impl Axes<'_> {
         }
         let line = theme.pick("─", "-").repeat(to_usize(f64::from(columns)));
         canvas.text(left - 1, rows + 1, &format!("{}{line}", theme.pick("└", "+")), style);
+        // The name stands at the right of the labels, whatever else finds room.
+        let name = fit(self.names.0, canvas.width() / 2);
+        let name_start = canvas.width().saturating_sub(width(&name));
+        canvas.text(name_start, rows + 2, &name, style);
         let mut free = 0;
         for tick in self.x.ticks() {
             let x = left + to_u16((self.x.share(tick) * f64::from(columns - 1)).round());
             canvas.text(x, rows + 1, theme.pick("┴", "+"), style);
             let label = self.x.label(tick);
             let start = x.saturating_sub(width(&label) / 2).min(canvas.width().saturating_sub(width(&label)));
-            if start >= free {
+            if start >= free && start + width(&label) < name_start {
                 free = canvas.text(start, rows + 2, &label, style) + 1;
             }
-        }
-        let name = width(self.names.0);
-        if canvas.width().saturating_sub(name + 1) > free {
-            canvas.text_right(canvas.width(), rows + 2, self.names.0, style);
         }
         (left, 1, columns, rows)
     }

@@ -83,7 +83,7 @@ impl Handover {
             Some(shown) => canvas.text(x, 0, &period::words(cx, &shown), theme.normal()),
             None => x,
         };
-        match &self.actions.trouble {
+        let x = match &self.actions.trouble {
             Some(trouble) => canvas.text(x + 2, 0, trouble, theme.trouble()),
             None if self.actions.value.is_none() => canvas.text(x + 2, 0, t!("collecting data"), theme.dim()),
             None => x,
@@ -91,7 +91,10 @@ impl Handover {
         let mut below = canvas.part(0, 1, width, height.saturating_sub(1));
         let more = draw::lines(&mut below, &self.lines(cx, width), self.scroll);
         if more > 0 {
-            canvas.text_right(width.saturating_sub(1), 0, &t!("{more} more below", more), theme.strong());
+            let brief = format!(" {more} {}", theme.pick("↓", "v"));
+            let words = [t!("{more} more below", more), brief.clone()];
+            let fits = words.into_iter().find(|words| x + 1 + text::width(words) < width).unwrap_or(brief);
+            canvas.text_right(width.saturating_sub(1), 0, &fits, theme.strong());
         }
     }
 
@@ -251,8 +254,7 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
             running = running(lasts)
         ))
     });
-    let unknown =
-        cx.is_past().then(|| t!("tests, settings and outputs that did not follow: not kept in the history").to_owned());
+    let unknown = cx.is_past().then(|| t!("tests and settings: not kept in the history").to_owned());
     lines.chain(devices).chain(sequences).chain(stubborn).chain(unknown).collect()
 }
 

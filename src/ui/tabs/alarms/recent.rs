@@ -129,6 +129,17 @@ impl Recent {
         self.alarms.value.as_deref()
     }
 
+    /// What was looked through, where the journal holds more.
+    pub fn searched(&self) -> Option<String> {
+        let alarms = self.alarms.value.as_ref().filter(|records| EVENTS_MAX <= records.len());
+        let actions = self.actions.value.as_ref().filter(|records| ACTIONS_MAX <= records.len());
+        let words = [
+            alarms.map(|_| t!("only the last {count} alarm events are searched", count = EVENTS_MAX)),
+            actions.map(|_| t!("only the last {count} actions are searched", count = ACTIONS_MAX)),
+        ];
+        words.into_iter().flatten().reduce(|first, second| format!("{first}; {second}"))
+    }
+
     /// How often an alarm was raised before this time, and the last times; `None` until the history has answered.
     pub fn before(&self, cx: &ViewContext, def: &AlarmDef, now: Timestamp) -> Option<(usize, Vec<Occurrence>)> {
         let (records, actions) = (self.alarms.value.as_ref()?, self.actions.value.as_ref()?);
@@ -297,5 +308,15 @@ mod tests {
         assert_eq!(times, 1, "this time and one without a beginning do not count");
         assert_eq!((all[0].raised_at, all[0].lasted), (ago(60), Some(Duration::from_secs(600))));
         assert_eq!(all[0].done, ["anna: relay replaced", "tom: TIC-1.SV 70.0 °C → 65.0 °C"]);
+    }
+
+    #[test]
+    fn a_search_that_does_not_reach_back_says_so() {
+        let mut recent = Recent::default();
+        let event = AlarmRecord::new(now(), "TIC-1.PV", "high", Priority::High, AlarmEvent::Raised);
+        recent.alarms.value = Some(vec![event; EVENTS_MAX - 1]);
+        assert_eq!(recent.searched(), None);
+        recent.alarms.value.iter_mut().for_each(|events| events.push(events[0].clone()));
+        assert_eq!(recent.searched().as_deref(), Some("only the last 2000 alarm events are searched"));
     }
 }

@@ -104,12 +104,15 @@ fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Row> {
         times => t!("{times} times in {days} days", times, days),
     };
     let mut rows = vec![(t!("before"), head, normal)];
+    rows.extend(tab.recent.searched().map(|words| ("", words, cx.theme.strong())));
     for occurrence in all.iter().take(TIMES_MAX) {
         let at = draw::local(cx, occurrence.raised_at, "%m-%d %H:%M");
         let lasted = occurrence.lasted.map(|lasted| t!("  for {lasted}", lasted = running(lasted)));
         rows.push(("", format!("{at}{}", lasted.unwrap_or_default()), normal));
         rows.extend(occurrence.done.iter().map(|done| ("", format!("· {done}"), cx.theme.strong())));
     }
+    let more = all.len().saturating_sub(TIMES_MAX);
+    rows.extend((more > 0).then(|| ("", t!("… and {more} earlier times", more), cx.theme.dim())));
     rows
 }
 

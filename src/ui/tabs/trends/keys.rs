@@ -20,6 +20,8 @@ pub enum Action {
     Picture,
     /// Curves over time, or another plot.
     Plot,
+    /// The pens as large numbers, or the curves.
+    Numbers,
     /// The next look of the selected pen.
     Stroke,
     /// Ask for the scale of the selected pen.
@@ -89,8 +91,8 @@ impl Action {
 pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", Action::Side(-1)),
     Key::new(code(KeyCode::Right), "", "later (with the cursor on: cursor to the right)", Action::Side(1)),
-    Key::new(code(KeyCode::PageUp), "", "a whole window earlier; a page up", Action::Move(Motion::Pages(-1))),
-    Key::new(code(KeyCode::PageDown), "", "a whole window later; a page down", Action::Move(Motion::Pages(1))),
+    Key::new(code(KeyCode::PageUp), "", "a whole window earlier", Action::Move(Motion::Pages(-1))),
+    Key::new(code(KeyCode::PageDown), "", "a whole window later", Action::Move(Motion::Pages(1))),
     Key::new(code(KeyCode::Up), "", "select the pen above", Action::Move(Motion::Rows(-1))),
     Key::new(code(KeyCode::Down), "", "select the pen below", Action::Move(Motion::Rows(1))),
     Key::new(char('l'), "live", "back to the present", Action::Live),
@@ -111,9 +113,10 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('n'), "event", "cursor to the next event: alarm, command, note, batch", Action::Event(1)),
     Key::new(char('N'), "", "cursor to the event before", Action::Event(-1)),
     Key::new(char('g'), "group", "next group of pens", Action::Group),
-    Key::new(char(' '), "pen", "switch the selected pen on or off; in the list of values: mark as pen", Action::Toggle),
+    Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),
-    Key::new(char('x'), "plot", "curves, x-y plot, histogram, or step response", Action::Plot),
+    Key::new(char('x'), "plot", "curves, x-y plot, histogram, step response, or large numbers", Action::Plot),
+    Key::new(char('B'), "", "the pens as large numbers for the wall, or the curves", Action::Numbers),
     Key::new(char('k'), "", "look of the selected pen: steps, lines, dots, bars", Action::Stroke),
     Key::new(char('e'), "export", "write the values of the view as CSV", Action::Csv).needs(Role::Technician),
     Key::new(char('E'), "", "write the chart as SVG and PNG", Action::Picture).needs(Role::Technician),
@@ -122,10 +125,18 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
     Key::new(char('m'), "mode", "moving window, or everything since the start of the day", Action::Mode),
     Key::new(char('u'), "rate", "refresh interval of the curves: 0.5, 1, 2, 5, 10 s", Action::Rate),
-    Key::new(
-        code(KeyCode::Enter),
-        "",
-        "zoom to the time between the cursors; in the list of values: show the curve, or the marked ones",
-        Action::Open,
-    ),
+    Key::new(code(KeyCode::Enter), "", "zoom to the time between the cursors", Action::Open),
+];
+
+/// Keys of the list of all values.
+pub const LIST: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Enter), "curve", "show the curve of the value, or of the marked ones", Action::Open),
+    Key::new(char(' '), "mark", "mark the value as a pen, or unmark it", Action::Toggle),
+    Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Action::Find),
+    Key::new(char('v'), "curves", "back to the curves", Action::Values),
+    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
+    Key::new(code(KeyCode::Up), "", "a row up", Action::Move(Motion::Rows(-1))),
+    Key::new(code(KeyCode::Down), "select", "a row down", Action::Move(Motion::Rows(1))),
+    Key::new(code(KeyCode::PageUp), "", "a page up", Action::Move(Motion::Pages(-1))),
+    Key::new(code(KeyCode::PageDown), "", "a page down", Action::Move(Motion::Pages(1))),
 ];

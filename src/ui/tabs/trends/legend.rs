@@ -94,12 +94,14 @@ fn draw_name(trends: &Trends, cx: &ViewContext, row: &mut Canvas, (n, pen): (usi
 fn draw_measured(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, (a, b): (Timestamp, Timestamp)) {
     let (theme, span) = (cx.theme, b.duration_since(a));
     let column = (8 + canvas.width().saturating_sub(80) / 14).min(12);
-    let room = canvas.width().saturating_sub(8 * column + 1);
+    // Where there is no room for all figures and the name, the first ones stay.
+    let count = if canvas.width() < 8 * column + 15 { 4 } else { 8 };
+    let room = canvas.width().saturating_sub(count * column + 1);
     let end = |n: usize| room + column * (to_u16(n) + 1);
     let delta = theme.pick("Δ", "d");
     let per_minute = t!("{delta}/min", delta);
     let heads = ["A", "B", delta, &per_minute, t!("min"), t!("mean"), t!("max"), t!("good")];
-    for (n, head) in heads.into_iter().enumerate() {
+    for (n, head) in heads.into_iter().take(count.into()).enumerate() {
         canvas.text_right(end(n), 0, head, theme.dim());
     }
     let time = format!("{delta}t {}", signed_time(span));
@@ -111,7 +113,8 @@ fn draw_measured(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, (a, b):
             return;
         }
         let Some(measured) = trends.measured(cx, pen.1.tag) else { return };
-        for (n, (text, style)) in cells(cx, pen.1.tag, &measured, span).into_iter().enumerate() {
+        let cells = cells(cx, pen.1.tag, &measured, span).into_iter().take(count.into());
+        for (n, (text, style)) in cells.enumerate() {
             row.text_right(end(n), 0, &text, style);
         }
     });

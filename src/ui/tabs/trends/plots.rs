@@ -28,6 +28,8 @@ pub enum Plot {
     Histogram,
     /// The answer of a controller to its last step of the setpoint.
     Response,
+    /// The pens as large numbers.
+    Numbers,
 }
 
 impl Plot {
@@ -37,7 +39,8 @@ impl Plot {
             Plot::Time => Plot::Xy,
             Plot::Xy => Plot::Histogram,
             Plot::Histogram => Plot::Response,
-            Plot::Response => Plot::Time,
+            Plot::Response => Plot::Numbers,
+            Plot::Numbers => Plot::Time,
         }
     }
 }

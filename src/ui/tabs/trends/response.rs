@@ -102,7 +102,7 @@ pub(super) fn draw_response(trends: &Trends, cx: &ViewContext, canvas: &mut Canv
     let limit = |value, high, text: &str| Limit { curve: 0, value, high, text: text.to_owned() };
     let number = |value: f64| cx.snapshot.format(tags[1], value);
     let word = |at, text: String| (at, Line::styled(text, theme.normal()));
-    let mut cursors = vec![word(found.at, t!("step").to_owned())];
+    let mut cursors = vec![word(found.at, t!("SV step").to_owned())];
     cursors.extend(found.rise.map(|(_, end)| word(end, t!("90 %").to_owned())));
     cursors.extend(found.peak.map(|(at, value)| word(at, t!("peak {value}", value = number(value)))));
     cursors.extend(found.settled.map(|at| word(at, t!("settled").to_owned())));

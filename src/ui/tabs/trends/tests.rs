@@ -240,7 +240,10 @@ fn the_list_of_all_values() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.press("v↓↓");
     stand.answer();
-    insta::assert_snapshot!(stand.screen());
+    let screen = stand.screen();
+    let footer = screen.lines().last().unwrap_or_default();
+    assert!(footer.contains("⏎ curve") && !footer.contains("zoom"), "{footer}");
+    insta::assert_snapshot!(screen);
 }
 
 #[test]

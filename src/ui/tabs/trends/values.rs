@@ -76,11 +76,10 @@ pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
         canvas.text_right(end, 1, text, theme.dim());
     }
     canvas.text(high + 2, 1, t!("last hour"), theme.dim());
-    let (words, style) = match trouble(trends, cx) {
-        Some(trouble) => (trouble, theme.trouble()),
-        None => (t!("space mark   / find   {pick} curve   v back", pick = theme.pick("⏎", t!("Enter"))), theme.dim()),
-    };
-    canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&words, canvas.width().saturating_sub(30)), style);
+    if let Some(trouble) = trouble(trends, cx) {
+        let room = canvas.width().saturating_sub(30);
+        canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&trouble, room), theme.trouble());
+    }
     for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
         let (y, def, shown) = (to_u16(y) + 2, cx.def().tag(*tag), value::show(cx, *tag));
         let style = if n == selected { theme.strong() } else { theme.normal() };

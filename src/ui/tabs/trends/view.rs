@@ -11,6 +11,7 @@ use super::{
     events::{draw_event_words, draw_events},
     lanes::draw_lane,
     legend::draw_legend,
+    numbers::draw_numbers,
     plots::{Plot, draw_histogram, draw_xy},
     response::draw_response,
     span::{RATES, WINDOWS, midnight, rate_text, window_text},
@@ -53,9 +54,12 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let (width, height) = (canvas.width(), canvas.height());
     let legend = legend_rows(trends, cx, height);
     draw_title(trends, cx, canvas);
+    if trends.plot == Plot::Numbers {
+        return draw_numbers(trends, cx, &mut canvas.part(0, 1, width, height.saturating_sub(1)));
+    }
     let mut plot = canvas.part(0, 1, width, height.saturating_sub(1 + legend));
     let draw: Option<fn(&Trends, &ViewContext, &mut Canvas)> = match trends.plot {
-        Plot::Time => None,
+        Plot::Time | Plot::Numbers => None,
         Plot::Xy => Some(draw_xy),
         Plot::Histogram => Some(draw_histogram),
         Plot::Response => Some(draw_response),

@@ -50,6 +50,25 @@ fn a_target_is_shown() {
     assert!(matches!(at(Tab::Mimic, ":zzzz⏎").modal, Some(Modal::Palette(_))), "nothing fits: it stays");
 }
 
+/// What is typed is never taken for keys of the tab, such as `a` for acknowledge.
+#[test]
+fn the_palette_opens_on_the_smallest_screen() {
+    for (width, height) in [(36, 8), (40, 12), (59, 15)] {
+        let mut model = at(Tab::Mimic, "");
+        screen(&mut model, width, height);
+        assert_eq!(type_keys(&mut model, ":alarms"), []);
+        let shown = screen(&mut model, width, height);
+        assert!(shown.contains(": alarms") && shown.contains("Alarms"), "{shown}");
+        type_keys(&mut model, "⏎:tic pv⏎");
+        assert_eq!(model.tabs.shown, Tab::Alarms);
+        assert!(matches!(model.modal, Some(Modal::Faceplate(_))));
+        assert_eq!(type_keys(&mut model, "⎋:-10m⏎"), [], "there is no room for the past");
+        assert!(matches!(model.modal, Some(Modal::Palette(_))));
+        type_keys(&mut model, "⎋:pv trend⏎");
+        assert_eq!((model.tabs.shown, model.note.is_some()), (Tab::Alarms, true), "it says that this needs room");
+    }
+}
+
 #[test]
 fn what_was_chosen_comes_first_the_next_time() {
     let mut model = at(Tab::Mimic, ":tic pv⏎⎋:plc-1 dev⏎:");

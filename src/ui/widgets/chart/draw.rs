@@ -193,28 +193,39 @@ impl Chart<'_> {
         }
     }
 
-    /// A line through the empty cells of the column of each cursor, and the words above it, on whichever side there is
-    /// room; those of the next cursor begin behind them.
-    pub(super) fn draw_cursors(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
-        let plot = plan.plot;
+    /// A line through the empty cells of a column, and its foot on the time axis.
+    fn draw_cursor(&self, plan: &Plan, buf: &mut Buffer, x: u16, has_axis: bool) {
         let (line, foot) = match self.theme.glyphs {
             Glyphs::Braille => ("┊", "┷"),
             Glyphs::Block => ("│", "┴"),
             Glyphs::Ascii => (":", "^"),
         };
+        for y in plan.plot.y..plan.plot.bottom() {
+            let cell = &mut buf[(x, y)];
+            if matches!(cell.symbol(), " " | "·") {
+                cell.set_symbol(line).set_style(self.theme.normal());
+            } else {
+                cell.set_style(self.theme.focus());
+            }
+        }
+        if has_axis {
+            buf[(x, plan.plot.bottom())].set_symbol(foot).set_style(self.theme.normal());
+        }
+    }
+
+    /// The line of each cursor, and the words above it, on whichever side there is room; those of the next cursor begin
+    /// behind them.
+    pub(super) fn draw_cursors(&self, plan: &Plan, area: Rect, buf: &mut Buffer) {
+        let plot = plan.plot;
         let mut free = plot.x;
         for (n, (at, words)) in self.cursors.iter().enumerate() {
-            let Some(x) = self.cell(*at, plot.width).map(|x| plot.x + x) else { continue };
-            for y in plot.y..plot.bottom() {
-                let cell = &mut buf[(x, y)];
-                if matches!(cell.symbol(), " " | "·") {
-                    cell.set_symbol(line).set_style(self.theme.normal());
-                } else {
-                    cell.set_style(self.theme.focus());
-                }
+            let column = self.cell(*at, plot.width).map(|x| plot.x + x);
+            if let Some(x) = column {
+                self.draw_cursor(plan, buf, x, plot.y > area.y);
             }
             if plot.y > area.y {
-                buf[(x, plot.bottom())].set_symbol(foot).set_style(self.theme.normal());
+                // One that has left the view is named at the end at which it left.
+                let x = column.unwrap_or(if *at < self.from { plot.x } else { plot.right() });
                 let later: usize = self.cursors[n + 1..].iter().map(|(_, words)| words.width() + 2).sum();
                 let end = plot.right().saturating_sub(2 + to_u16(later));
                 let width = to_u16(words.width()).min(end.saturating_sub(free));
@@ -234,19 +245,27 @@ impl Chart<'_> {
             Glyphs::Block => "-",
             Glyphs::Ascii => "~",
         };
+        // Where rows are few, two limits may share one: then both are named.
+        let mut rows: Vec<(u16, String)> = Vec::new();
         for limit in &self.limits {
             let Some((_, scale)) = plan.scales.get(limit.curve) else { continue };
             if limit.value < scale.low || scale.high < limit.value {
                 continue;
             }
             let y = plot.y + self.row(*scale, limit.value, plot.height);
+            match rows.iter_mut().find(|(row, _)| *row == y) {
+                Some((_, text)) => *text = format!("{text}  {}", limit.text),
+                None => rows.push((y, limit.text.clone())),
+            }
+        }
+        for (y, text) in rows {
             let is_blank = |buf: &Buffer, x: u16| matches!(buf[(x, y)].symbol(), " " | "·");
             let taken = (plot.x..plot.right()).filter(|x| !is_blank(buf, *x)).count();
             if taken > usize::from(plot.width / 2) {
                 // A curve runs along it.
                 continue;
             }
-            let width = to_u16(limit.text.width()) + 2;
+            let width = to_u16(text.width()) + 2;
             // The name stands where nothing is drawn, as far to the right as it can.
             let places = (plot.x..plot.right().saturating_sub(width)).rev();
             let name = places.step_by(2).find(|x| (*x..x + width).all(|x| is_blank(buf, x)));
@@ -256,7 +275,7 @@ impl Chart<'_> {
                 }
             }
             if let Some(x) = name {
-                buf.set_string(x, y, format!(" {} ", limit.text), style);
+                buf.set_string(x, y, format!(" {text} "), style);
             }
         }
     }

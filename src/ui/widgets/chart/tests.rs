@@ -152,3 +152,13 @@ fn the_labels_of_an_axis_stand_evenly() {
         }
     }
 }
+
+#[test]
+fn two_limits_in_one_row_are_both_named() {
+    let pv = trace((0..120).map(wave));
+    let limit = |value, text: &str| Limit { curve: 0, value, high: true, text: text.to_owned() };
+    let limits = vec![limit(84.0, "H 84.0"), limit(85.0, "HH 85.0")];
+    let curves = vec![Curve { fixed: Some((0.0, 100.0)), ..curve(&pv, 0, "°C") }];
+    let shown = picture(&Chart { limits, ..chart(&Theme::FULL, curves) }, 70, 10);
+    assert!(shown.contains("H 84.0  HH 85.0"), "{shown}");
+}

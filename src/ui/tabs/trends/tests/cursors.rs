@@ -19,6 +19,39 @@ fn two_cursors_measure_every_pen_between_them() {
 }
 
 #[test]
+fn cursors_that_left_the_view_keep_their_times() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("c←←←←←←←←←←b→→");
+    stand.answer();
+    let header = |stand: &Stand| stand.screen().lines().nth(5).unwrap_or_default().to_owned();
+    let (before, time) = (header(&stand), |header: &str, letter: &str| {
+        let words: Vec<String> = header.split_whitespace().map(str::to_owned).collect();
+        words.iter().position(|word| word == letter).map(|place| words[place + 1].clone())
+    });
+    assert!(time(&before, "A").is_some() && time(&before, "B").is_some(), "{before}");
+    stand.send(Msg::Key(KeyEvent::new(KeyCode::PageUp, KeyModifiers::NONE)));
+    stand.send(Msg::Key(KeyEvent::new(KeyCode::PageUp, KeyModifiers::NONE)));
+    stand.answer();
+    let after = header(&stand);
+    for letter in ["A", "B"] {
+        assert_eq!(time(&after, letter), time(&before, letter), "{after}");
+    }
+}
+
+#[test]
+fn the_legend_of_two_cursors_has_names_at_60_columns() {
+    let mut stand = Stand::new(Theme::FULL, 60, 20);
+    stand.answer();
+    stand.press("c←←←←←←←←←←b→→");
+    stand.answer();
+    let screen = stand.screen();
+    for pen in ["● TIC-1.PV", "○ TIC-1.SV", "▲ TIC-1.MV"] {
+        assert!(screen.contains(pen), "{screen}");
+    }
+}
+
+#[test]
 fn figures_of_another_interval_are_not_shown() {
     let mut stand = Stand::new(Theme::FULL, 120, 40);
     stand.answer();

@@ -53,3 +53,27 @@ fn a_typed_scale_says_where_the_curve_lies() {
     scale(&mut stand, "plant");
     assert!(stand.screen().contains("100┤"));
 }
+
+#[test]
+fn large_numbers_are_good_numbers() {
+    let blocks = |screen: &str| screen.lines().skip(5).any(|row| row.contains('█') || row.contains('▀'));
+    for (width, height) in [(60, 20), (80, 24), (120, 40), (160, 50)] {
+        let mut stand = Stand::new(Theme::FULL, width, height);
+        stand.press("B");
+        let screen = stand.screen();
+        assert!(blocks(&screen), "{width}x{height}:\n{screen}");
+        assert!(screen.contains("TIC-1.PV  process value") && screen.contains("SV 70.0 °C   RUN   good"), "{screen}");
+        let mut bad = Fixture::line_down();
+        let tags: Vec<String> = bad.def.tags.iter().map(|tag| tag.name.clone()).collect();
+        for name in tags {
+            let tag = bad.tag(&name);
+            bad.samples[tag.index()] = bad.samples[tag.index()].uncertain(crate::plant::sample::Cause::Stale);
+        }
+        stand.send(Msg::Snapshot(bad.snapshot()));
+        let screen = stand.screen();
+        assert!(!blocks(&screen) && screen.contains("64.2?"), "{width}x{height}:\n{screen}");
+    }
+    let mut stand = Stand::new(Theme::FULL, 160, 50);
+    stand.press("B");
+    insta::assert_snapshot!(stand.screen());
+}
