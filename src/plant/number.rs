@@ -16,7 +16,7 @@ macro_rules! numbers {
     )* };
 }
 
-numbers! { u8 u16 u32 u64 i16 i32 i64 i128 }
+numbers! { u8 u16 u32 u64 i8 i16 i32 i64 i128 }
 
 impl Number for u128 {
     fn whole(self) -> i128 {

@@ -79,6 +79,11 @@ impl Drawing {
         Drawing { width, height, shapes: Vec::new() }
     }
 
+    /// Its width and height.
+    pub fn size(&self) -> (u16, u16) {
+        (self.width, self.height)
+    }
+
     /// A line through these points.
     pub fn line(&mut self, points: Vec<(f32, f32)>, ink: Ink, width: f32, dashed: bool) {
         if points.len() > 1 {

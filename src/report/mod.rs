@@ -19,6 +19,8 @@ pub(crate) mod value_log;
 pub(crate) mod text;
 mod html;
 mod json;
+mod xlsx;
+mod docx;
 #[cfg(test)]
 pub(crate) mod testing;
 
@@ -72,8 +74,8 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
 }
 
 /// Every format of the report; the first is the default.
-pub const FORMATS: [&dyn ReportFormat; 5] =
-    [&shift_csv::ShiftCsv, &record_csv::RecordCsv, &text::Text, &html::Html, &json::Json];
+pub const FORMATS: [&dyn ReportFormat; 7] =
+    [&shift_csv::ShiftCsv, &record_csv::RecordCsv, &text::Text, &html::Html, &json::Json, &xlsx::Xlsx, &docx::Docx];
 
 /// The language of the reports of a plant.
 pub fn language(def: &PlantDef) -> Language {

@@ -22,6 +22,11 @@ impl ReportFormat for RecordCsv {
         "time, SV, PV and ER as CSV"
     }
 
+    /// Its file may lie beside that of `csv`.
+    fn extension(&self) -> &'static str {
+        "record.csv"
+    }
+
     fn render(&self, document: &Document, style: &Style) -> Result<Vec<u8>, String> {
         let section = document.sections.iter().find(|section| section.kind == Section::Record);
         let Some(Content::Table(table)) = section.map(|section| &section.content) else {

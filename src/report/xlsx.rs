@@ -1,0 +1,230 @@
+//! A report as an Excel workbook: the facts on the first sheet, a sheet for each table, the curves as charts over their values.
+
+use jiff::{Timestamp, tz::TimeZone};
+use rust_xlsxwriter::{
+    Chart, ChartEmptyCells, ChartType, DocProperties, ExcelDateTime, Format, FormatAlign, FormatBorder, Workbook,
+    Worksheet, XlsxError,
+};
+
+use super::{
+    ReportFormat, Style, chart,
+    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, digits, offset, plain},
+};
+use crate::{
+    plant::{
+        def::Paper,
+        number::{to_u8, to_u16, to_u32},
+    },
+    t,
+};
+
+/// The format `xlsx`.
+#[derive(Debug)]
+pub struct Xlsx;
+
+impl ReportFormat for Xlsx {
+    fn name(&self) -> &'static str {
+        "xlsx"
+    }
+    fn about(&self) -> &'static str {
+        "an Excel workbook with a sheet for each table"
+    }
+
+    fn extension(&self) -> &'static str {
+        "xlsx"
+    }
+
+    fn render(&self, document: &Document, style: &Style) -> Result<Vec<u8>, String> {
+        document.locale.within(|| workbook(document, style)).map_err(|error| error.to_string())
+    }
+}
+
+/// Letters of the name of a sheet at most, and what it may not contain.
+const NAME_MAX: usize = 31;
+const NAME_WITHOUT: [char; 7] = ['[', ']', ':', '*', '?', '/', '\\'];
+
+fn workbook(document: &Document, style: &Style) -> Result<Vec<u8>, XlsxError> {
+    let mut book = Workbook::new();
+    let made = date_time(&TimeZone::UTC, document.until)?;
+    let properties = DocProperties::new().set_title(format!("{}: {}", document.title, document.heading));
+    book.set_properties(&properties.set_author("sightglass").set_creation_datetime(&made));
+    facts(&mut book, document)?;
+    for section in &document.sections {
+        match &section.content {
+            Content::Table(rows) => table(named(book.add_worksheet(), &section.title)?, document, rows)?,
+            Content::Charts(charts) => curves(&mut book, document, &section.title, charts)?,
+            Content::Facts(_) | Content::Lines(_) | Content::Signatures(_) => {}
+        }
+    }
+    for sheet in book.worksheets_mut() {
+        // By Excel's numbers of papers: Letter is 1, A4 is 9. One page wide, as many pages as it takes.
+        sheet.set_paper_size(if style.paper == Paper::A4 { 9 } else { 1 }).set_print_fit_to_pages(1, 0).set_landscape();
+    }
+    book.save_to_buffer()
+}
+
+fn named<'a>(sheet: &'a mut Worksheet, title: &str) -> Result<&'a mut Worksheet, XlsxError> {
+    let name: String = title.chars().filter(|letter| !NAME_WITHOUT.contains(letter)).take(NAME_MAX).collect();
+    sheet.set_name(name)
+}
+
+fn head() -> Format {
+    Format::new().set_bold().set_background_color("F2F2F2").set_border_bottom(FormatBorder::Thin).set_text_wrap()
+}
+
+/// What it is, and the facts of all sections.
+fn facts(book: &mut Workbook, document: &Document) -> Result<(), XlsxError> {
+    let sheet = book.add_worksheet();
+    let name = |section: &&Section| matches!(section.content, Content::Facts(_));
+    let title = document.sections.iter().find(name).map_or(document.heading.as_str(), |section| &section.title);
+    named(sheet, title)?.set_column_width(0, 30)?.set_column_width(1, 40)?;
+    let title = Format::new().set_bold().set_font_size(14);
+    let mut row = 0;
+    let times = t!("times are local, UTC{offset}", offset = offset(&document.zone, document.until));
+    let lines = [document.logo.as_str(), &document.title, &document.heading, &plain(&times)];
+    for line in lines.into_iter().filter(|line| !line.is_empty()) {
+        let format = if line == document.title { title.clone() } else { Format::new() };
+        sheet.write_string_with_format(row, 0, line, &format)?;
+        row += 1;
+    }
+    for section in &document.sections {
+        let Content::Facts(facts) = &section.content else { continue };
+        row += 1;
+        sheet.write_string_with_format(row, 0, &section.title, &head())?;
+        row += 1;
+        for Fact { name, cell, .. } in facts {
+            sheet.write_string(row, 0, name)?;
+            write(sheet, (row, 1), cell, cell.kind(), &document.zone)?;
+            row += 1;
+        }
+    }
+    Ok(())
+}
+
+/// A table with frozen heads and filters. An instant takes two columns, the second has its offset.
+fn table(sheet: &mut Worksheet, document: &Document, table: &Table) -> Result<(), XlsxError> {
+    let mut column = 0;
+    let places: Vec<u16> = table
+        .columns
+        .iter()
+        .map(|of| {
+            let place = column;
+            column += if of.kind.is_time() { 2 } else { 1 };
+            place
+        })
+        .collect();
+    for (of, place) in table.columns.iter().zip(&places) {
+        let align = if of.kind == ColumnKind::Number { FormatAlign::Right } else { FormatAlign::Left };
+        sheet.write_string_with_format(0, *place, &of.heading, &head().set_align(align))?;
+        if of.kind.is_time() {
+            sheet.write_string_with_format(0, place + 1, plain(t!("offset")), &head())?;
+        }
+    }
+    for (row, cells) in (1..).zip(&table.rows) {
+        for ((cell, of), place) in cells.iter().zip(&table.columns).zip(&places) {
+            write(sheet, (row, *place), cell, of.kind, &document.zone)?;
+            if let Cell::Time(at) = cell {
+                sheet.write_string(row, place + 1, offset(&document.zone, *at))?;
+            }
+        }
+    }
+    sheet.set_freeze_panes(1, 0)?.set_repeat_rows(0, 0)?;
+    sheet.autofilter(0, 0, to_u32(table.rows.len()), column.saturating_sub(1))?;
+    sheet.autofit();
+    Ok(())
+}
+
+/// A text is never a formula, whatever it begins with.
+fn write(
+    sheet: &mut Worksheet,
+    (row, column): (u32, u16),
+    cell: &Cell,
+    kind: ColumnKind,
+    zone: &TimeZone,
+) -> Result<(), XlsxError> {
+    match cell {
+        Cell::Empty => {}
+        Cell::Text(text) => {
+            sheet.write_string(row, column, text)?;
+        }
+        Cell::Number(value, decimals) => {
+            // The figure of the report, not a finer one behind it.
+            let figure = digits(*value, *decimals).parse().unwrap_or(*value);
+            sheet.write_number_with_format(row, column, figure, &number_format(*decimals))?;
+        }
+        Cell::Time(at) => {
+            let form = if kind == ColumnKind::Milliseconds { "yyyy-mm-dd hh:mm:ss.000" } else { "yyyy-mm-dd hh:mm:ss" };
+            let format = Format::new().set_num_format(form).set_align(FormatAlign::Left);
+            sheet.write_datetime_with_format(row, column, date_time(zone, *at)?, &format)?;
+        }
+    }
+    Ok(())
+}
+
+fn number_format(decimals: Option<u8>) -> Format {
+    match decimals {
+        None => Format::new(),
+        Some(0) => Format::new().set_num_format("0"),
+        Some(decimals) => Format::new().set_num_format(format!("0.{}", "0".repeat(decimals.into()))),
+    }
+}
+
+/// Local time: a sheet has no zones.
+fn date_time(zone: &TimeZone, at: Timestamp) -> Result<ExcelDateTime, XlsxError> {
+    let local = at.to_zoned(zone.clone());
+    let unsigned = |part: i8| to_u8(part);
+    let day = ExcelDateTime::from_ymd(to_u16(local.year()), unsigned(local.month()), unsigned(local.day()))?;
+    day.and_hms_milli(
+        to_u16(local.hour()),
+        unsigned(local.minute()),
+        unsigned(local.second()),
+        to_u16(local.millisecond()),
+    )
+}
+
+/// The values of all charts, side by side, and the charts over them.
+fn curves(book: &mut Workbook, document: &Document, title: &str, charts: &[chart::Chart]) -> Result<(), XlsxError> {
+    let sheet = named(book.add_worksheet(), title)?;
+    let name = sheet.name();
+    let mut first = 0;
+    let mut top = 1;
+    let beside: u16 = charts.iter().map(|chart| to_u16(chart.curves.len()) + 2).sum();
+    for chart in charts {
+        let rows = chart.curves.iter().map(|curve| curve.columns.len()).max().unwrap_or(0);
+        sheet.write_string_with_format(0, first, plain(t!("time")), &head())?;
+        sheet.set_column_width(first, 20)?;
+        let Some(begin) = chart.curves.first() else { continue };
+        for row in 0..rows {
+            let after = jiff::SignedDuration::from_secs_f64(begin.step * row as f64);
+            let at = begin.from.checked_add(after).unwrap_or(begin.from);
+            write(sheet, (to_u32(row + 1), first), &Cell::Time(at), ColumnKind::Time, &document.zone)?;
+        }
+        let mut drawn = Chart::new(ChartType::ScatterStraight);
+        drawn.title().set_name(&chart.title);
+        drawn.x_axis().set_num_format(if chart.to.duration_since(chart.from).as_hours() > 36 {
+            "mm-dd"
+        } else {
+            "hh:mm"
+        });
+        drawn.show_empty_cells_as(ChartEmptyCells::Gaps).set_width(900).set_height(360);
+        for (place, curve) in (first + 1..).zip(&chart.curves) {
+            let heading = format!("{} {}", curve.name, curve.unit);
+            sheet.write_string_with_format(0, place, heading.trim(), &head())?;
+            for (row, bucket) in (1..).zip(&curve.columns) {
+                let mean = Cell::number(bucket.map(|bucket| bucket.mean), curve.decimals.saturating_add(1));
+                write(sheet, (row, place), &mean, ColumnKind::Number, &document.zone)?;
+            }
+            let last = to_u32(rows);
+            drawn
+                .add_series()
+                .set_name((name.as_str(), 0, place))
+                .set_categories((name.as_str(), 1, first, last, first))
+                .set_values((name.as_str(), 1, place, last, place));
+        }
+        sheet.insert_chart(top, beside, &drawn)?;
+        top += 20;
+        first += to_u16(chart.curves.len()) + 2;
+    }
+    sheet.set_freeze_panes(1, 0)?;
+    Ok(())
+}
