@@ -8,7 +8,7 @@ use super::{
     document::digits,
     drawing::{Anchor, Drawing, Ink, TEXT},
 };
-use crate::plant::number::{to_f32, to_u16};
+use crate::plant::number::{to_f32, to_u8, to_u16, to_usize};
 
 /// Curves over one time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,7 +59,34 @@ struct Panel<'a> {
     decimals: u8,
     low: f64,
     high: f64,
+    /// Between two ticks.
+    step: f64,
     curves: Vec<(usize, &'a ChartCurve)>,
+}
+
+impl Panel<'_> {
+    /// Widens the scale to whole steps; a constant stands inside of them.
+    fn round(&mut self) {
+        let least = 10f64.powi(-i32::from(self.decimals));
+        let raw = ((self.high - self.low) / 4.0).max(least);
+        let power = 10f64.powf(raw.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|of| of * power).find(|step| raw <= *step).unwrap_or(raw);
+        if self.low == self.high {
+            (self.low, self.high) = (self.low - step, self.high + step);
+        }
+        (self.low, self.high) = ((self.low / step).floor() * step, (self.high / step).ceil() * step);
+        self.step = step;
+    }
+
+    /// Its ticks, with the decimals that they need.
+    fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
+        let decimals = to_u8((-self.step.log10().floor()).max(0.0));
+        let count = to_usize(((self.high - self.low) / self.step).round());
+        (0..=count).map(move |n| {
+            let value = self.low + self.step * n as f64;
+            (value, digits(value, Some(decimals)))
+        })
+    }
 }
 
 impl Chart {
@@ -102,15 +129,12 @@ impl Chart {
                     decimals: curve.decimals,
                     low,
                     high,
+                    step: 1.0,
                     curves: vec![(n, curve)],
                 }),
             }
         }
-        for panel in &mut panels {
-            // A constant stands in the middle of its panel.
-            let margin = ((panel.high - panel.low) * 0.05).max(0.5 * 10f64.powi(-i32::from(panel.decimals)));
-            (panel.low, panel.high) = (panel.low - margin, panel.high + margin);
-        }
+        panels.iter_mut().for_each(Panel::round);
         panels
     }
 
@@ -127,10 +151,9 @@ impl Chart {
         let span = self.to.duration_since(self.from).as_secs_f64().max(1.0);
         let x = |seconds: f64| left + (right - left) * to_f32((seconds / span).clamp(0.0, 1.0));
         let y = |value: f64| bottom - (bottom - top) * to_f32((value - panel.low) / (panel.high - panel.low));
-        for share in [0.0, 0.5, 1.0] {
-            let value = panel.low + (panel.high - panel.low) * share;
+        for (value, label) in panel.ticks() {
             page.line(vec![(left, y(value)), (right, y(value))], Ink::Grid, 1.0, false);
-            page.text((left - 4.0, y(value)), Anchor::End, digits(value, Some(panel.decimals)), Ink::Text);
+            page.text((left - 4.0, y(value)), Anchor::End, label, Ink::Text);
         }
         for at in self.ticks(zone) {
             let at_x = x(at.duration_since(self.from).as_secs_f64());
@@ -209,11 +232,14 @@ mod tests {
         let mut chart = Chart { title: "TIC-1".into(), from, to, curves };
         assert_eq!(chart.panels().len(), 1);
         let [panel] = &chart.panels()[..] else { unreachable!() };
-        assert!(panel.low < 20.0 && 30.0 < panel.high && panel.curves.len() == 2);
+        assert_eq!((panel.low, panel.high, panel.curves.len()), (20.0, 30.0, 2));
+        assert_eq!(panel.ticks().map(|(_, label)| label).collect::<Vec<_>>(), ["20", "25", "30"]);
         let [first, _] = &chart.curves[..] else { unreachable!() };
         assert_eq!(paths(first, from, |x| x as f32, |y| y as f32).len(), 2, "the gap ends a line");
         chart.curves.push(curve("TIC-1.MV", "%", &[None]));
         assert_eq!(chart.panels().len(), 1, "a curve without values has no panel");
+        chart.curves.push(curve("PLC-1.LT-1", "cm", &[Some(9.5)]));
+        assert_eq!(chart.panels()[1].ticks().map(|(_, label)| label).collect::<Vec<_>>(), ["9.4", "9.5", "9.6"]);
         let svg = String::from_utf8(chart.drawing(&zone("Asia/Bangkok"), 640).svg()).expect("SVG is text");
         assert!(svg.contains(">08:00</text>") && svg.contains(">TIC-1.SV</text>"), "{svg}");
     }

@@ -132,11 +132,13 @@ impl Body {
     fn row(&mut self, cells: &[(String, bool)], head: bool) {
         let repeated = if head { "<w:tblHeader/>" } else { "" };
         self.add(format_args!("<w:tr><w:trPr><w:cantSplit/>{repeated}</w:trPr>"));
-        for (text, right) in cells {
-            let shade = if head { "<w:tcPr><w:shd w:val=\"clear\" w:fill=\"F2F2F2\"/></w:tcPr>" } else { "" };
+        for (place, (text, right)) in cells.iter().enumerate() {
+            let shade = if head { "<w:shd w:val=\"clear\" w:fill=\"F2F2F2\"/>" } else { "" };
+            // A name is not broken at its hyphen.
+            let whole = if place == 0 { "<w:noWrap/>" } else { "" };
             let align = if *right { "<w:jc w:val=\"right\"/>" } else { "" };
             self.add(format_args!(
-                "<w:tc>{shade}<w:p><w:pPr><w:pStyle w:val=\"Cell\"/>{align}</w:pPr>{}</w:p></w:tc>",
+                "<w:tc><w:tcPr>{shade}{whole}</w:tcPr><w:p><w:pPr><w:pStyle w:val=\"Cell\"/>{align}</w:pPr>{}</w:p></w:tc>",
                 run(text, head)
             ));
         }

@@ -18,7 +18,7 @@ body{font:16px/1.45 Sarabun,\"Noto Sans Thai\",system-ui,sans-serif;margin:1rem 
 h1{font-size:1.35rem;margin:.2rem 0}h2{font-size:1.1rem;margin:1.6rem 0 .4rem;border-bottom:1px solid #bbb}\
 p{margin:.2rem 0}.wide{overflow-x:auto}table{border-collapse:collapse;font-size:.9rem}\
 th,td{padding:.2rem .6rem;text-align:left;vertical-align:top;border-bottom:1px solid #ddd}th{background:#f2f2f2;white-space:nowrap}\
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}td.t{white-space:nowrap}td{overflow-wrap:anywhere;min-width:3rem}\
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}td.t{white-space:nowrap}td{overflow-wrap:break-word}td:first-child{white-space:nowrap}td:last-child:not(.n){min-width:9rem}\
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.1rem 1rem;margin:0}dt{color:#555}dd{margin:0;overflow-wrap:anywhere}\
 svg{max-width:100%;height:auto}.sign{margin-top:2.2rem;border-top:1px solid #555;max-width:18rem}\
 @media print{body{font-size:11px}tr{break-inside:avoid}thead{display:table-header-group}}";

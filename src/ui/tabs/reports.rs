@@ -34,8 +34,12 @@ pub enum Action {
     Move(Motion),
     /// Write the CSV.
     Export,
+    /// The next format.
+    Format,
     /// The other way to write CSV.
     Dialect,
+    /// The report as it will be written, or its figures again.
+    Preview,
     /// Ask the history again.
     Refresh,
     /// Why the values of the report are what they are now.
@@ -52,8 +56,10 @@ const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Right), "later", "next shift", Action::Shift(1)),
     Key::new(char('l'), "running", "current shift", Action::Running),
     Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
-    Key::new(char('e'), "export", "write the report as CSV", Action::Export).needs(Role::Technician),
-    Key::new(char(';'), "format", "CSV with , and . or with ; and ,", Action::Dialect),
+    Key::new(char('e'), "export", "write the report to a file", Action::Export).needs(Role::Technician),
+    Key::new(char('f'), "format", "next format: CSV, text, HTML, Excel, Word, …", Action::Format),
+    Key::new(char('p'), "preview", "the report as text, as it is written", Action::Preview),
+    Key::new(char(';'), "", "CSV with , and . or with ; and ,", Action::Dialect),
     Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
     Key::new(char('T'), "", "chart of the previous tag", Action::Tag(-1)),
     Key::new(char('u'), "", "refresh the figures", Action::Refresh),
@@ -88,6 +94,8 @@ pub struct Reports {
     batches: Batches,
     dialect: CsvDialect,
     format: &'static dyn ReportFormat,
+    /// The report as text, while that is shown.
+    preview: Option<Vec<String>>,
     export: Export,
     /// The CSV that waits for the station's word.
     outgoing: Option<Outgoing>,
@@ -119,6 +127,7 @@ impl TabView for Reports {
             batches: Batches::default(),
             dialect: snapshot.def.report.csv,
             format: report::FORMATS[0],
+            preview: None,
             export: Export::Not,
             outgoing: None,
             scroll: Scroll::default(),
@@ -146,6 +155,7 @@ impl TabView for Reports {
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.report.on_answer(cx, number, &answer);
+        self.set_preview(cx);
         self.curve.on_answer(cx, number, &answer);
         self.batches.rows.on_answer(cx, number, &answer);
         self.batches.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
@@ -195,7 +205,7 @@ impl TabView for Reports {
         match self.batches.shown {
             true if self.batches.overlay.take().is_some() => true,
             true => self.batches.rows.query.cancel(cx) || std::mem::take(&mut self.batches.shown),
-            false => self.report.query.cancel(cx),
+            false => self.preview.take().is_some() || self.report.query.cancel(cx),
         }
     }
 
@@ -232,6 +242,14 @@ impl Reports {
             }
             Action::Move(motion) => self.scroll(cx, motion),
             Action::Export => return self.export(cx),
+            Action::Format => {
+                let place = report::FORMATS.iter().position(|format| format.name() == self.format.name());
+                self.format = report::FORMATS[place.map_or(0, |place| place + 1) % report::FORMATS.len()];
+            }
+            Action::Preview => {
+                (self.preview, self.scroll) = (self.preview.is_none().then(Vec::new), Scroll::default());
+                self.set_preview(cx);
+            }
             Action::Dialect => {
                 self.dialect = self.dialect.toggled(cx.def().report.csv);
                 self.export = Export::Not;
@@ -293,15 +311,24 @@ impl Reports {
 }
 
 impl Reports {
+    /// Sets the report that is shown as text, if it is wanted.
+    fn set_preview(&mut self, cx: &ViewContext) {
+        if let (Some(lines), Some(report)) = (&mut self.preview, &self.report.value) {
+            let document = report::content::document(report, cx.def(), report::language(cx.def()).locale());
+            *lines = report::text::lines(&document, usize::from(cx.area.width.saturating_sub(2)).clamp(60, 120));
+        }
+    }
+
     /// Shows another period; figures of the old one must not stand under its name.
     fn show(&mut self, period: Option<Period>) {
+        self.preview.iter_mut().for_each(Vec::clear);
         (self.period, self.follow, self.scroll) = (period, false, Scroll::default());
         (self.export, self.report, self.curve) = (Export::Not, Answered::default(), Answered::default());
     }
 
     /// The tag that has the chart, and the part of the period that is over, where there is room for it.
     fn chart(&self, cx: &ViewContext) -> Option<(Pen, View)> {
-        let room = view::chart_columns(cx).filter(|_| !self.batches.shown)?;
+        let room = view::chart_columns(cx).filter(|_| !self.batches.shown && self.preview.is_none())?;
         let rows = &self.report.value.as_ref()?.tags;
         let tag = cx.def().tag_named(&rows.get(self.charted)?.tag)?;
         let period = self.period.as_ref()?;
@@ -311,7 +338,12 @@ impl Reports {
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
-        let lines = self.report.value.as_ref().map_or(0, |report| view::lines(cx, report, None).len());
+        let figures = |report: &ShiftReport| view::lines(cx, report, None).len();
+        let lines = match (&self.preview, &self.report.value) {
+            (Some(lines), _) => lines.len(),
+            (None, Some(report)) => figures(report),
+            (None, None) => 0,
+        };
         self.scroll.on(motion, lines, rows);
     }
 

@@ -31,8 +31,16 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
     draw_title(reports, cx, period, &mut canvas);
     let rows = height.saturating_sub(3);
     let left = columns.saturating_sub(chart_columns(cx).map_or(0, |beside| beside + 1));
-    match &reports.report.value {
-        Some(report) => {
+    match (&reports.report.value, &reports.preview) {
+        (Some(report), Some(lines)) => {
+            let first = reports.scroll.first(lines.len(), usize::from(rows + 1));
+            for (y, line) in (1..=rows + 1).zip(lines.iter().skip(first)) {
+                canvas.text(1, y, line, cx.theme.normal());
+            }
+            let hidden = lines.len().saturating_sub(first + usize::from(rows + 1));
+            draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
+        }
+        (Some(report), None) => {
             draw_chart(reports, cx, &mut canvas.part(left, 1, columns - left, rows + 1));
             let cx = &ViewContext { area: Rect { width: left, ..cx.area }, ..*cx };
             let charted = (left < columns).then_some(reports.charted);
@@ -47,7 +55,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             canvas.text(0, 1, &heading(left), cx.theme.dim());
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
-        None => {
+        (None, _) => {
             let waiting = reports.report.query.shown_waiting(cx);
             let words = reports.report.trouble.as_deref().or(waiting.as_deref()).unwrap_or(t!("collecting data"));
             let style = if reports.report.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
@@ -106,7 +114,7 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     }
 }
 
-/// What the CSV is like, and where it went.
+/// What the file is like, and where it went.
 fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden: usize, row: &mut Canvas) {
     let (theme, dialect) = (cx.theme, reports.dialect);
     let separator = if dialect.separator == ';' { t!("semicolons") } else { t!("commas") };
@@ -116,11 +124,20 @@ fn draw_export(reports: &Reports, cx: &ViewContext, report: &ShiftReport, hidden
     let more = t!("   {pick} {hidden} more", pick = theme.pick("↓", t!("down")), hidden);
     let more = if hidden > 0 { more } else { String::new() };
     // The path matters most: the format is written in full where there is room.
-    let kinds = [
-        t!("CSV: {separator}, {decimal}{bom}{more}", separator, decimal, bom, more),
-        t!("CSV {separator} {decimal}{bom}{more}", separator = dialect.separator, decimal = dialect.decimal, bom, more),
-        more.trim().to_owned(),
-    ];
+    let kinds = match reports.format.extension().ends_with("csv") {
+        true => [
+            t!("CSV: {separator}, {decimal}{bom}{more}", separator, decimal, bom, more),
+            t!(
+                "CSV {separator} {decimal}{bom}{more}",
+                separator = dialect.separator,
+                decimal = dialect.decimal,
+                bom,
+                more
+            ),
+            more.trim().to_owned(),
+        ],
+        false => [format!("{}{more}", reports.format.about()), more.trim().to_owned(), more.trim().to_owned()],
+    };
     let end = row.width().saturating_sub(1);
     let fits = |kind: &String| width(&text) + width(kind) + 4 <= end;
     let kind = kinds.iter().find(|kind| fits(kind)).unwrap_or(&kinds[2]);
@@ -178,7 +195,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>) -> 
         lines.push(Line::styled(words, theme.trouble()));
     }
     if let Some((of, _)) = &report.record_of {
-        let words = t!("  record of {of}: {count} rows in the CSV", of, count = report.record.len());
+        let words = t!("  record of {of}: {count} rows in the file", of, count = report.record.len());
         lines.push(Line::styled(words, theme.normal()));
     }
     // The name of a shift has its day; only a longer period needs the date in every line.
@@ -254,7 +271,7 @@ fn section<'a>(cx: &ViewContext, title: &str, rows: impl ExactSizeIterator<Item 
         lines.insert(0, heading);
     }
     if 0 < more {
-        lines.push(Line::styled(t!("  and {n} more in the CSV", n = more), cx.theme.dim()));
+        lines.push(Line::styled(t!("  and {n} more in the file", n = more), cx.theme.dim()));
     }
     lines
 }

@@ -1,0 +1,97 @@
+//! Every format of the same report: the same file each time, in every language, with nothing that runs.
+
+use super::{
+    FORMATS, Style,
+    content::document,
+    document::{Cell, Content},
+    testing::{THREE, plant, shift_report},
+};
+use crate::{
+    plant::def::Section,
+    text::{Language, Locale},
+};
+
+fn render(name: &str, locale: Locale) -> Vec<u8> {
+    let def = plant("Asia/Bangkok", &THREE);
+    let format = super::format(name).expect("a format");
+    format.render(&document(&shift_report(), &def, locale), &Style::of(&def)).expect("every format can be made")
+}
+
+fn text(name: &str, locale: Locale) -> String {
+    String::from_utf8(render(name, locale)).expect("it is text")
+}
+
+#[test]
+fn the_same_report_is_the_same_file() {
+    for format in FORMATS {
+        for language in Language::all() {
+            let [first, again] = [(); 2].map(|()| render(format.name(), language.locale()));
+            assert!(!first.is_empty() && first == again, "{} in {}", format.name(), language.code());
+        }
+    }
+}
+
+#[test]
+fn a_language_changes_words_and_no_figure() {
+    let figures = |locale| -> Vec<Vec<Cell>> {
+        let document = document(&shift_report(), &plant("Asia/Bangkok", &THREE), locale);
+        let tables = document.sections.into_iter().filter_map(|section| match section.content {
+            Content::Table(table) => Some(table.rows),
+            Content::Facts(_) | Content::Charts(_) | Content::Lines(_) | Content::Signatures(_) => None,
+        });
+        let numbers = |row: Vec<Cell>| row.into_iter().filter(|cell| !matches!(cell, Cell::Text(_))).collect();
+        tables.flatten().map(numbers).collect()
+    };
+    let english = figures(Locale::ENGLISH);
+    assert!(english.len() > 20 && english == figures(Language::THAI.locale()));
+    let thai = text("text", Language::THAI.locale());
+    assert!(thai.contains("รายงานกะ") && !thai.contains('\u{200b}'), "{thai}");
+}
+
+#[test]
+fn names_do_not_become_markup() {
+    let html = text("html", Locale::ENGLISH);
+    assert!(
+        html.contains("temperature high; &quot;check&quot; heater")
+            || html.contains("temperature high; \"check\" heater")
+    );
+    assert!(!html.contains("<script") && html.matches("<svg").count() == 1);
+    let json: serde_json::Value = serde_json::from_str(&text("json", Locale::ENGLISH)).expect("JSON");
+    let row = &json["values"][0];
+    assert_eq!(
+        (row["tag"].as_str(), row["mean"].as_f64(), row["max"].as_f64()),
+        (Some("TIC-1.PV"), Some(54.32), Some(71.2))
+    );
+    assert_eq!(json["alarms"][0]["time"].as_str(), Some("2026-11-21T06:12:45.500+07:00"));
+    assert_eq!(json["values"][1]["min"], serde_json::Value::Null);
+}
+
+#[test]
+fn text_keeps_to_80_columns_and_every_number_whole() {
+    let text = text("text", Locale::ENGLISH);
+    let long: Vec<&str> = text.lines().filter(|line| unicode_width::UnicodeWidthStr::width(*line) > 80).collect();
+    assert_eq!(long, Vec::<&str>::new());
+    insta::assert_snapshot!(text.replace(env!("CARGO_PKG_VERSION"), "VERSION"));
+}
+
+#[test]
+fn the_plant_file_chooses_sections_title_and_signatures() {
+    let mut def = plant("Asia/Bangkok", &THREE);
+    def.report.sections = vec![Section::Values, Section::Signatures];
+    def.report.signatures = vec!["operator".into(), "supervisor".into()];
+    (def.report.title, def.report.logo) = ("Batch sheet".into(), "ACME Co., Ltd.".into());
+    let made = document(&shift_report(), &def, Locale::ENGLISH);
+    assert_eq!(made.sections.iter().map(|section| section.kind).collect::<Vec<_>>(), def.report.sections);
+    let text = super::text::lines(&made, 80).join("\n");
+    assert!(text.starts_with("ACME Co., Ltd.\nWater tank\nBatch sheet: morning 2026-11-21\n"), "{text}");
+    assert!(text.contains("supervisor ____"), "{text}");
+}
+
+#[test]
+fn a_record_that_no_plant_file_asks_for_is_refused() {
+    let mut def = plant("Asia/Bangkok", &THREE);
+    def.report.sections = vec![Section::Values];
+    let made = document(&shift_report(), &def, Locale::ENGLISH);
+    let refused = super::format("record").and_then(|format| format.render(&made, &Style::of(&def)));
+    assert!(refused.as_ref().is_err_and(|why| why.contains("[report] record")), "{refused:?}");
+}
