@@ -38,7 +38,7 @@ pub enum Times {
     Clock,
     /// `2026-11-21 06:12:45`.
     Date,
-    /// `2026-11-21 06:12:45 +07:00`: of a period in which the clocks were changed.
+    /// `2026-11-21 06:12:45 UTC+07:00`: of a period in which the clocks were changed.
     Offset,
 }
 
@@ -224,9 +224,9 @@ pub fn local(zone: &TimeZone, at: Timestamp, kind: ColumnKind) -> String {
     at.to_zoned(zone.clone()).strftime(form).to_string()
 }
 
-/// `+07:00`.
+/// `UTC+07:00`: a spreadsheet would take `+07:00` for a formula.
 pub fn offset(zone: &TimeZone, at: Timestamp) -> String {
-    at.to_zoned(zone.clone()).strftime("%:z").to_string()
+    at.to_zoned(zone.clone()).strftime("UTC%:z").to_string()
 }
 
 impl Column {

@@ -64,10 +64,7 @@ impl Body {
         }
         body.paragraph("Title", &document.title);
         body.paragraph("", &document.heading);
-        body.paragraph(
-            "",
-            &plain(&t!("times are local, UTC{offset}", offset = offset(&document.zone, document.until))),
-        );
+        body.paragraph("", &plain(&t!("times are local, {offset}", offset = offset(&document.zone, document.until))));
         document.sections.iter().for_each(|section| body.section(document, section));
         body
     }

@@ -47,7 +47,7 @@ impl ReportFormat for Html {
 fn page(document: &Document) -> String {
     let (title, heading) = (escaped(&document.title), escaped(&document.heading));
     let language = document.locale.language.code();
-    let times = t!("times are local, UTC{offset}", offset = offset(&document.zone, document.until));
+    let times = t!("times are local, {offset}", offset = offset(&document.zone, document.until));
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"{language}\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\

@@ -41,7 +41,7 @@ pub fn lines(document: &Document, width: usize) -> Vec<String> {
         lines.extend((!document.logo.is_empty()).then(|| document.logo.clone()));
         lines.push(document.title.clone());
         lines.push(document.heading.clone());
-        let words = t!("times are local, UTC{offset}", offset = offset(&document.zone, document.until));
+        let words = t!("times are local, {offset}", offset = offset(&document.zone, document.until));
         lines.push(plain(&words));
         for section in &document.sections {
             section_lines(document, section, width, &mut lines);

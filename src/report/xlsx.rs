@@ -80,7 +80,7 @@ fn facts(book: &mut Workbook, document: &Document) -> Result<(), XlsxError> {
     named(sheet, title)?.set_column_width(0, 30)?.set_column_width(1, 40)?;
     let title = Format::new().set_bold().set_font_size(14);
     let mut row = 0;
-    let times = t!("times are local, UTC{offset}", offset = offset(&document.zone, document.until));
+    let times = t!("times are local, {offset}", offset = offset(&document.zone, document.until));
     let lines = [document.logo.as_str(), &document.title, &document.heading, &plain(&times)];
     for line in lines.into_iter().filter(|line| !line.is_empty()) {
         let format = if line == document.title { title.clone() } else { Format::new() };

@@ -42,6 +42,7 @@ mod commands;
 mod devices;
 mod durability;
 mod endings;
+mod formats;
 mod guarded;
 mod hostile;
 mod kills;

@@ -30,13 +30,13 @@ use crate::support::{folder, have};
 
 /// Checks the report with Python's own strict reader and prints what it found.
 const READER: &str = r#"
-import csv, sys
+import csv, itertools, sys
 rows = list(csv.reader(open(sys.argv[1], newline="", encoding="utf-8"), strict=True))
 assert len({len(row) for row in rows}) == 1, "rows of different lengths"
 pv = next(row for row in rows if row[0] == "TIC-1.PV")
-print("pv", *pv[2:8])
-start = next(i for i, row in enumerate(rows) if row[:5] == ["date", "time", "SV", "PV", "ER"]) + 1
-record = [row for row in rows[start:] if row[0]]
+print("pv", *pv[3:7], *pv[8:10])
+start = next(i for i, row in enumerate(rows) if row[:5] == ["time", "offset", "SV", "PV", "ER"]) + 1
+record = list(itertools.takewhile(lambda row: row[0], rows[start:]))
 bad = [row for row in record if row[4] and abs(float(row[2]) - float(row[3]) - float(row[4])) > 0.051]
 print("record", len(record), "wrong", len(bad), "mean", sum(float(row[3]) for row in record if row[3]) / len(record))
 for row in rows:

@@ -242,6 +242,12 @@ pub fn engines() -> Option<PathBuf> {
 }
 
 /// A virtual environment with packages of PyPI, in these very versions.
+/// Python with readers of Excel and Word files.
+pub fn office() -> Option<PathBuf> {
+    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
+    PYTHON.get_or_init(|| venv("office-venv", &["openpyxl==3.1.5", "python-docx==1.2.0"])).clone()
+}
+
 fn venv(name: &str, packages: &[&str]) -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let python = folder.join("bin/python");

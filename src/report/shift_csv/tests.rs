@@ -56,8 +56,8 @@ fn every_dialect_gives_the_same_cells_to_a_strict_reader() {
 fn the_record_alone_is_a_plain_table() {
     let bytes = RecordCsv.render(&document(Locale::ENGLISH), &style(dialect(';', ',', false))).unwrap();
     let csv = String::from_utf8(bytes).unwrap();
-    let expect = "time;offset;SV;PV;ER\r\n2026-11-21 06:00:00;+07:00;70,0;72,5;-2,5\r\n\
-        2026-11-21 06:00:10;+07:00;70,0;;\r\n";
+    let expect = "time;offset;SV;PV;ER\r\n2026-11-21 06:00:00;UTC+07:00;70,0;72,5;-2,5\r\n\
+        2026-11-21 06:00:10;UTC+07:00;70,0;;\r\n";
     assert_eq!(csv, expect);
 }
 

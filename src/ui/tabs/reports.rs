@@ -2,6 +2,7 @@
 
 pub(super) mod period;
 mod batches;
+mod export;
 mod overlay;
 mod view;
 
@@ -10,13 +11,13 @@ mod tests;
 
 use std::path::PathBuf;
 
-use self::batches::Batches;
+use self::{batches::Batches, export::Export};
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::def::{CsvDialect, Pen},
-    report::{self, Period, ReportFormat, ShiftReport, Style},
+    report::{self, Period, ReportFormat, ShiftReport},
     text::file,
     ui::{tabs::trends::span::View, widgets::chart},
 };
@@ -101,19 +102,6 @@ pub struct Reports {
     outgoing: Option<Outgoing>,
     scroll: Scroll,
     number: u32,
-}
-
-/// How the CSV stands.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Export {
-    /// Nothing written of this period.
-    Not,
-    /// On its way to the disk.
-    Writing,
-    /// Written here.
-    Done(PathBuf),
-    /// Why not.
-    Failed(String),
 }
 
 impl TabView for Reports {
@@ -301,13 +289,6 @@ impl Reports {
         }
         self.ask(cx)
     }
-
-    /// Clears the note about the last file.
-    fn dismiss(&mut self) {
-        if matches!(self.export, Export::Done(_) | Export::Failed(_)) {
-            self.export = Export::Not;
-        }
-    }
 }
 
 impl Reports {
@@ -366,43 +347,5 @@ impl Reports {
             self.curve.ask(cx, (Tab::Reports, &mut self.number), every, real(cx, TIMEOUT_S), query)
         });
         query.into_iter().chain(curve).collect()
-    }
-
-    /// Writes exactly the figures that are shown.
-    fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let style = Style { csv: self.dialect, ..Style::of(cx.def()) };
-        let Some(report) = &self.report.value else { return self.send(None) };
-        match report::render(self.format, report, cx.def(), &style) {
-            Ok(bytes) => self.send(Some((self.path(cx, report), bytes))),
-            Err(why) => {
-                self.export = Export::Failed(why);
-                Vec::new()
-            }
-        }
-    }
-
-    /// Asks the station to record a file, which is then written.
-    fn send(&mut self, file: Option<(PathBuf, Vec<u8>)>) -> Vec<UiAction> {
-        let Some((path, bytes)) = file else {
-            self.export = Export::Failed(t!("nothing to export yet").to_owned());
-            return Vec::new();
-        };
-        if self.outgoing.is_some() {
-            return Vec::new();
-        }
-        let outgoing = Outgoing { tab: Tab::Reports, path, bytes };
-        let request = outgoing.export_request();
-        (self.export, self.outgoing) = (Export::Writing, Some(outgoing));
-        vec![request]
-    }
-
-    /// `2026-11-24-batches.csv`: the list as it is on that day.
-    fn batches_path(&self, cx: &ViewContext) -> PathBuf {
-        let day = cx.now.to_zoned(cx.def().time_zone.clone()).date();
-        cx.def().report.folder.join(format!("{day}-batches.csv"))
-    }
-
-    fn path(&self, cx: &ViewContext, report: &ShiftReport) -> PathBuf {
-        cx.def().report.folder.join(self.format.file_name(cx.def(), &report.period, report.until))
     }
 }

@@ -74,6 +74,9 @@ const HARMLESS: &[&str] = &[
     "crossterm::event::KeyEvent",
     "crossterm::event::KeyEventKind",
     "crossterm::event::KeyModifiers",
+    // Memory, and the trait to write into it; a file needs `std::fs`.
+    "std::io::Cursor",
+    "std::io::Write",
 ];
 
 /// What files of `station` and `cli` may touch. A file that is not here decides, and touches nothing.
@@ -100,7 +103,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("src/cli/open_log.rs", &["files"]),
     ("src/cli/own_files.rs", &["files"]),
     ("src/cli/paths.rs", &["process"]),
-    ("src/cli/progress.rs", &["tasks", "files", "terminal", "clock", "process"]),
+    ("src/cli/progress.rs", &["tasks", "terminal", "clock", "process"]),
     ("src/cli/prompt.rs", &["channels", "tasks", "files", "terminal", "process"]),
     ("src/cli/report.rs", &["files"]),
     ("src/cli/run.rs", &["channels", "tasks", "files", "process"]),
