@@ -25,7 +25,7 @@ const PENS: [Rgb; 8] = [
 
 /// A colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rgb(u8, u8, u8);
+pub struct Rgb(pub u8, pub u8, pub u8);
 
 /// What a line or text is, which decides its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,14 +57,29 @@ pub struct Drawing {
     shapes: Vec<Shape>,
 }
 
+/// A shape of a page.
 #[derive(Debug, Clone, PartialEq)]
-enum Shape {
+pub enum Shape {
+    /// A line through points.
     Line { points: Vec<(f32, f32)>, ink: Ink, width: f32, dashed: bool },
+    /// A text with its middle at this height.
     Text { at: (f32, f32), anchor: Anchor, text: String, ink: Ink },
 }
 
+impl Anchor {
+    /// The share of a text that stands before its place.
+    pub fn before(self) -> f32 {
+        match self {
+            Anchor::Start => 0.0,
+            Anchor::Middle => 0.5,
+            Anchor::End => 1.0,
+        }
+    }
+}
+
 impl Ink {
-    fn rgb(self) -> Rgb {
+    /// Its colour.
+    pub fn rgb(self) -> Rgb {
         match self {
             Ink::Text => Rgb(30, 30, 30),
             Ink::Grid => Rgb(210, 210, 210),
@@ -82,6 +97,11 @@ impl Drawing {
     /// Its width and height.
     pub fn size(&self) -> (u16, u16) {
         (self.width, self.height)
+    }
+
+    /// What stands on it.
+    pub fn shapes(&self) -> &[Shape] {
+        &self.shapes
     }
 
     /// A line through these points.

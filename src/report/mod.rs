@@ -21,6 +21,7 @@ mod html;
 mod json;
 mod xlsx;
 mod docx;
+mod pdf;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
@@ -76,8 +77,16 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
 }
 
 /// Every format of the report; the first is the default.
-pub const FORMATS: [&dyn ReportFormat; 7] =
-    [&shift_csv::ShiftCsv, &record_csv::RecordCsv, &text::Text, &html::Html, &json::Json, &xlsx::Xlsx, &docx::Docx];
+pub const FORMATS: [&dyn ReportFormat; 8] = [
+    &shift_csv::ShiftCsv,
+    &record_csv::RecordCsv,
+    &text::Text,
+    &html::Html,
+    &json::Json,
+    &xlsx::Xlsx,
+    &docx::Docx,
+    &pdf::PdfFile,
+];
 
 /// The language of the reports of a plant.
 pub fn language(def: &PlantDef) -> Language {

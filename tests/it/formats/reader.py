@@ -1,5 +1,5 @@
 """Reads a report in every format and compares its figures with those of the samples."""
-import csv, datetime, glob, html.parser, json, sys
+import csv, datetime, glob, html.parser, json, subprocess, sys
 
 import docx, openpyxl
 
@@ -101,9 +101,11 @@ page = Rows()
 page.feed(open(the(".html"), encoding="utf-8").read())
 word = [[cell.text for cell in row.cells] for table in docx.Document(the(".docx")).tables for row in table.rows]
 text = [line.split() for line in open(the(".txt"), encoding="utf-8")]
-for rows in (page.rows, word, text):
+printed = subprocess.run(["pdftotext", "-layout", the(".pdf"), "-"], capture_output=True, text=True, check=True).stdout
+pages = [line.split() for line in printed.splitlines()]
+for rows in (page.rows, word, text, pages):
     for tag, row in lines.items():
         [of_tag] = [other for other in rows if other[:1] == [tag] and other[1] == row[1] and len(other) > 6]
         shown = [cell for cell in of_tag[2:] if cell not in ("", "–")]
         assert shown == [cell for cell in row[2:10] if cell], (tag, of_tag, row)
-print("figures agree:", sum(len(row) for row in lines.values()), "cells in six formats")
+print("figures agree:", sum(len(row) for row in lines.values()), "cells in seven formats")
