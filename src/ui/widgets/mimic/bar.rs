@@ -11,7 +11,7 @@ use crate::{
     ui::{ViewContext, widgets::text::Canvas},
 };
 
-/// Draws the range with the band between the inner limits, the limits and the good value: `░░▒▒▒▒◆▒▒╎░░`.
+/// Draws the range with the normal band (else what lies between the inner limits), the limits and the good value: `░░▒▒▒▒◆▒▒╎░░`.
 /// Upright it is filled up to the value. Without a good value it has none.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, tag: TagId, selected: bool) {
     let (theme, upright) = (cx.theme, at.height > 1);
@@ -26,7 +26,8 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, tag: TagId, selec
         share.is_finite().then(|| to_u16((share.clamp(0.0, 1.0) * f64::from(length.saturating_sub(1))).round()))
     };
     let inner = |high: bool| limits(cx, tag).filter(move |(_, level)| is_high(*level) == high).map(|(limit, _)| limit);
-    let (low, high) = (inner(false).fold(min, f64::max), inner(true).fold(max, f64::min));
+    let inside = || [inner(false).fold(min, f64::max), inner(true).fold(max, f64::min)];
+    let [low, high] = cx.def().tag(tag).normal.unwrap_or_else(inside);
     let (low, high) = (place(low).unwrap_or(0), place(high).unwrap_or(length.saturating_sub(1)));
     let value = cx.snapshot.sample(tag).good_value().and_then(place);
     for n in 0..length {
