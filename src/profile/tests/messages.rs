@@ -19,13 +19,16 @@ fn a_file_that_is_no_toml_is_not_taken_for_a_wrong_one() {
 
 #[test]
 fn a_key_of_every_screen_is_no_command_of_a_plant() {
-    for key in ["a", "q", "w", "y"] {
+    for key in ["a", "q", "v", "w", "y"] {
         let from = "[mimic]\n";
         let to = format!("[mimic]\ncommand = [{{ key = \"{key}\", label = \"go\", tag = \"D1.MODE\" }}]\n");
         check(
             from,
             &to,
-            &[&format!("key `{key}` is taken"), "`a` acknowledges an alarm, `q` quits, `w` says why and `y` copies"],
+            &[
+                &format!("key `{key}` is taken"),
+                "`a` acknowledges an alarm, `q` quits, `v` shows the overview, `w` says why and `y` copies",
+            ],
         );
     }
 }

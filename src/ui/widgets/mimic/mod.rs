@@ -191,7 +191,7 @@ pub(super) fn alarm_mark(cx: &ViewContext, tag: TagId) -> Option<(&'static str, 
 
 /// Writes a value with unit, doubt and alarm mark; returns the column after it. What does not fit into the room or on
 /// the screen goes in this order: the mark, the unit, the number itself (`##`).
-pub(super) fn put_value(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
+pub(crate) fn put_value(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
     let room = room.min(canvas.width().saturating_sub(x));
     let mark = alarm_mark(cx, tag);
     let taken = mark.map_or(0, |(mark, _)| super::text::width(mark) + 1);
