@@ -5,11 +5,13 @@ mod cards;
 mod command;
 mod companions;
 mod forecast;
+mod may_change;
 mod neighbour;
 mod overview;
 mod point;
 mod preview;
 mod shift;
+mod steps;
 #[cfg(test)]
 mod tests;
 
@@ -192,6 +194,9 @@ impl TabView for Mimic {
                 let above = y.saturating_sub(1);
                 let rows = if *vertical { [y, y + 1, above] } else { [above, y + 1, y + 2] };
                 unit::mark(cx, &mut canvas, x + 1, &rows, *tag);
+            }
+            if let MimicItem::Vessel { place, level: Some(level), .. } = item {
+                vessel::limit_marks(cx, &mut canvas, scale.place(*place), *level);
             }
             if let MimicItem::Pump { place, tag, .. } = item {
                 let at = scale.place(*place);

@@ -2,7 +2,10 @@
 
 use std::{cmp::Reverse, collections::BTreeSet};
 
-use super::attention::{needs_action, not_normal, sections};
+use super::{
+    attention::{needs_action, not_normal, sections},
+    may_change, steps,
+};
 use crate::ui::tabs::{
     alarms::{action_text, event_text},
     prelude::*,
@@ -130,7 +133,9 @@ impl Companions {
 
     fn column(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let (width, dim) = (canvas.width(), cx.theme.dim());
-        let lists = [(t!("needs action"), needs_action(cx)), (t!("not normal"), not_normal(cx))];
+        let mut lists = vec![(t!("needs action"), needs_action(cx)), (t!("not normal"), not_normal(cx))];
+        let others = [(t!("steps"), steps::rows(cx)), (t!("commands now"), may_change::rows(cx))];
+        lists.extend(others.into_iter().filter(|(_, rows)| !rows.is_empty()));
         let mut y = sections(cx, canvas, ROWS_MAX, &lists);
         canvas.text(0, y, t!("last events"), dim);
         y += 1;

@@ -174,12 +174,16 @@ pub(crate) fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = (f64,
 
 /// Cuts words out of the liquid that they stand in: a number is read on the ground, not on a fill.
 pub(super) fn cut(canvas: &mut Canvas, x: u16, y: u16, length: u16) {
-    const LIQUID: &str = "█▁▂▃▄▅▆▇▒░";
     for column in x.saturating_sub(1)..x.saturating_add(length + 1).min(canvas.width()) {
-        if canvas.symbol(column, y).is_some_and(|symbol| LIQUID.contains(symbol)) {
+        if canvas.symbol(column, y).is_some_and(is_liquid) {
             canvas.glyph(column, y, ' ', Style::reset());
         }
     }
+}
+
+/// Is it a part of the liquid in a vessel?
+pub(super) fn is_liquid(symbol: &str) -> bool {
+    "█▁▂▃▄▅▆▇▒░".contains(symbol)
 }
 
 /// The mark of the most urgent alarm of a tag.
