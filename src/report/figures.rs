@@ -238,7 +238,11 @@ pub fn suppressed(
             AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => (false, alarm.quiet),
             AlarmEvent::Shelved | AlarmEvent::SuppressedByDesign | AlarmEvent::OutOfService => (alarm.active, true),
             AlarmEvent::Unshelved | AlarmEvent::Unsuppressed | AlarmEvent::InService => (alarm.active, false),
-            AlarmEvent::Acknowledged | AlarmEvent::ReAlarmed | AlarmEvent::Reset => continue,
+            AlarmEvent::Acknowledged
+            | AlarmEvent::ReAlarmed
+            | AlarmEvent::Reset
+            | AlarmEvent::StepDone
+            | AlarmEvent::StepUndone => continue,
         };
         alarm.found.raised += u64::from(event.event == AlarmEvent::RaisedSuppressed);
         alarm.set(active, quiet, event.at);

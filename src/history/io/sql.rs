@@ -236,7 +236,8 @@ pub fn restore() -> String {
     let columns = EVENT_COLUMNS.join(", ");
     format!(
         "SELECT {columns} FROM alarm_journal
-         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal WHERE utc < $2 GROUP BY subject, message, event)
+         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal WHERE utc < $2
+            GROUP BY subject, message, event, CASE WHEN event IN ('step done', 'step undone') THEN reason END)
          ORDER BY rowid LIMIT $1"
     )
 }
