@@ -55,8 +55,7 @@ impl Row {
 
     /// The refusal for a user without the right.
     fn why(&self, person: usize) -> String {
-        let least = if self.by.contains('T') { "technician" } else { "supervisor" };
-        WHY[person].replace("{}", least)
+        WHY[person].replace("{}", if self.by.contains('T') { "technician" } else { "supervisor" })
     }
 }
 
@@ -105,8 +104,7 @@ fn of_command(kind: &CommandKind) -> Row {
 }
 
 fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
-    let (alarm, device, line) = (AlarmId(0), DeviceId(0), LineId(0));
-    let at = Timestamp::UNIX_EPOCH;
+    let (alarm, device, line, at) = (AlarmId(0), DeviceId(0), LineId(0), Timestamp::UNIX_EPOCH);
     let scan = |serials| Diagnostic::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
     let set = ParameterSet {
         name: "none".into(),

@@ -230,8 +230,7 @@ fn raised_at(others: &str, is: &str) -> String {
     )
 }
 
-/// Of each alarm the last event of every kind before an instant, in the order in which they were written: all that its state
-/// depends on.
+/// Of each alarm the last event of every kind (and step) before an instant, as written: all that its state depends on.
 pub fn restore() -> String {
     let columns = EVENT_COLUMNS.join(", ");
     format!(

@@ -202,7 +202,7 @@ impl AlarmManager {
         Ok(std::iter::once(back).chain(self.raise_again(&alarm, note.at, value)).collect())
     }
 
-    /// Ticks a step of the action, or takes the tick back, unless the alarm was raised anew after `raised_at`.
+    /// Ticks a step of the action, or takes the tick back, unless the alarm was raised again after `raised_at`.
     pub fn tick(
         &mut self,
         id: AlarmId,
