@@ -149,7 +149,9 @@ pub fn not_responding<'a>(
             | AlarmEvent::SuppressedByDesign
             | AlarmEvent::Unsuppressed
             | AlarmEvent::OutOfService
-            | AlarmEvent::InService => {}
+            | AlarmEvent::InService
+            | AlarmEvent::StepDone
+            | AlarmEvent::StepUndone => {}
         }
     }
     outages.extend(open.into_iter().map(|(name, begun)| outage(name, begun, until)));
