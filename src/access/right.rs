@@ -48,7 +48,8 @@ pub fn of_command(kind: &CommandKind) -> Right {
             | AlarmCommand::Silence
             | AlarmCommand::Reset(_)
             | AlarmCommand::Shelve { .. }
-            | AlarmCommand::Unshelve(_),
+            | AlarmCommand::Unshelve(_)
+            | AlarmCommand::Tick { .. },
         )
         | CommandKind::Refresh(_)
         | CommandKind::Connect(..)

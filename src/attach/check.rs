@@ -91,6 +91,7 @@ fn of_alarms(def: &PlantDef, alarm_command: &AlarmCommand) -> Result<(), String>
         }
         AlarmCommand::Silence => Ok(()),
         AlarmCommand::Acknowledge { alarm: id, .. }
+        | AlarmCommand::Tick { alarm: id, .. }
         | AlarmCommand::Reset(id)
         | AlarmCommand::Shelve { alarm: id, .. }
         | AlarmCommand::Unshelve(id)

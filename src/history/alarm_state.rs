@@ -1,4 +1,4 @@
-//! The text of the alarm-state file: of each alarm the last event of every kind, one checked line each, oldest first.
+//! The text of the alarm-state file: of each alarm the last event of every kind (and step of its action), one checked line each, oldest first.
 //!
 //! ```text
 //! sightglass alarm state 2
@@ -18,7 +18,7 @@ use crate::plant::record::AlarmRecord;
 
 /// The first line; its number goes up with every change of the others.
 pub const HEADER: &str = "sightglass alarm state 2\n";
-/// Most events that are kept: thirteen kinds of some thousand alarms, also of those that the plant file no longer has.
+/// Most events that are kept: fifteen kinds of some thousand alarms, also of those that the plant file no longer has.
 const EVENTS_MAX: usize = 50_000;
 /// Hexadecimal digits of a checksum.
 const DIGITS: usize = 16;
@@ -62,11 +62,12 @@ impl LatestEvents {
     }
 }
 
-/// Which alarm, and the kind of its event.
-type Key = (Arc<str>, Arc<str>, &'static str);
+/// Which alarm, the kind of its event, and the step of its action that the event is about.
+type Key = (Arc<str>, Arc<str>, &'static str, Option<Arc<str>>);
 
 fn key(event: &AlarmRecord) -> Key {
-    (event.subject.clone(), event.message.clone(), event.event.word())
+    let step = event.reason.clone().filter(|_| event.event.is_of_step());
+    (event.subject.clone(), event.message.clone(), event.event.word(), step)
 }
 
 /// An event as a line, with its end.

@@ -57,7 +57,9 @@ impl CommandKind {
     pub fn move_from_utc(&mut self, by: SignedDuration) {
         let CommandKind::Alarm(command) = self else { return };
         match command {
-            AlarmCommand::Acknowledge { annunciated_at, .. } => move_by(annunciated_at, -by),
+            AlarmCommand::Acknowledge { annunciated_at: at, .. } | AlarmCommand::Tick { raised_at: at, .. } => {
+                move_by(at, -by);
+            }
             AlarmCommand::AcknowledgeAll { alarms } => {
                 *alarms = alarms.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
             }
@@ -127,7 +129,7 @@ impl ActiveAlarm {
     fn move_to_utc(&mut self, by: SignedDuration) {
         let times = [&mut self.raised_at, &mut self.annunciated_at].into_iter().chain(&mut self.returned_at);
         times.for_each(|at| move_by(at, by));
-        self.acknowledged.iter_mut().for_each(|note| move_note(note, by));
+        self.acknowledged.iter_mut().chain(&mut self.steps).for_each(|note| move_note(note, by));
         move_first_out(&mut self.first_out, by);
     }
 }

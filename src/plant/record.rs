@@ -105,6 +105,10 @@ keyword_enum! {
         OutOfService => "out of service",
         /// An operator put it back.
         InService => "in service",
+        /// An operator did a step of its action; the reason of the event is the step.
+        StepDone => "step done",
+        /// The operator took that back.
+        StepUndone => "step undone",
     }
 }
 
@@ -112,6 +116,11 @@ impl AlarmEvent {
     /// Does it belong to an alarm that is not annunciated?
     pub fn is_suppressed(self) -> bool {
         matches!(self, AlarmEvent::RaisedSuppressed | AlarmEvent::ReturnedSuppressed)
+    }
+
+    /// Is it about a step of the action?
+    pub fn is_of_step(self) -> bool {
+        matches!(self, AlarmEvent::StepDone | AlarmEvent::StepUndone)
     }
 
     /// An active alarm is annunciated no longer: its condition cleared, or it was suppressed.

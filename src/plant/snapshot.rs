@@ -274,6 +274,8 @@ pub struct ActiveAlarm {
     pub value: Option<f64>,
     /// Who acknowledged it, when, with which note.
     pub acknowledged: Option<OperatorNote>,
+    /// The steps of its action that were done: who, when, and the step as the reason.
+    pub steps: Vec<OperatorNote>,
     /// Activations since the station started.
     pub times: u32,
     /// Its place among the alarms that were raised together.
@@ -283,13 +285,21 @@ pub struct ActiveAlarm {
 impl ActiveAlarm {
     /// An alarm without value, actions and first-out group.
     pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
-        let (returned_at, value, acknowledged, times, first_out) = (None, None, None, 1, None);
+        let (returned_at, value, acknowledged, steps, times, first_out) = (None, None, None, Vec::new(), 1, None);
         let annunciated_at = raised_at;
-        ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, times, first_out }
+        ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, steps, times, first_out }
     }
     /// The command to acknowledge it, as it is seen here.
     pub fn acknowledge(&self) -> CommandKind {
         CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: self.id, annunciated_at: self.annunciated_at })
+    }
+    /// Who did this step of the action, and when.
+    pub fn step(&self, text: &str) -> Option<&OperatorNote> {
+        self.steps.iter().find(|ticked| ticked.reason.as_deref() == Some(text))
+    }
+    /// The command to tick a step of the action, or to take its tick back.
+    pub fn tick(&self, step: u8, done: bool) -> CommandKind {
+        CommandKind::Alarm(AlarmCommand::Tick { alarm: self.id, raised_at: self.raised_at, step, done })
     }
 }
 

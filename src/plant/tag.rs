@@ -51,6 +51,8 @@ pub struct TagDef {
     pub min: Option<Bound>,
     /// Highest value that may be written, and high end of bars.
     pub max: Option<Bound>,
+    /// Where the value usually lies, from lowest to highest.
+    pub normal: Option<[f64; 2]>,
     /// What may be done with it.
     pub access: Access,
     /// Asked before a write, beyond old and new value.
@@ -116,6 +118,7 @@ impl TagDef {
             unit_from: None,
             min: None,
             max: None,
+            normal: None,
             access: Access::Read,
             confirm: None,
             reauthenticate: None,

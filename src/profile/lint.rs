@@ -10,7 +10,7 @@ use super::{
     diagnostic::{Problems, Span},
     reader::{At, text},
 };
-use crate::plant::def::Priority;
+use crate::plant::{def::Priority, tag::TagDef};
 
 /// From so many alarms up their split by priority says something.
 const SPLIT_MIN: usize = 20;
@@ -19,11 +19,12 @@ const SPLIT_MIN: usize = 20;
 const URGENT_MAX: usize = 20;
 
 /// Looks through the alarms of a plant file; those that are wrong by themselves are passed over.
-pub(super) fn lint(tables: &[At<AlarmTable>], problems: &mut Problems) {
+pub(super) fn lint(tables: &[At<AlarmTable>], tags: &[TagDef], problems: &mut Problems) {
     let valid: Vec<&AlarmTable> = tables.iter().map(|table| &table.value).filter(|table| table.valid).collect();
     for table in &valid {
         incomplete(table, problems);
         delay(table, problems);
+        normal(table, tags, problems);
     }
     twice(&valid, problems);
     split(&valid, problems);
@@ -67,6 +68,18 @@ fn delay(table: &AlarmTable, problems: &mut Problems) {
             problem.label("longer than `response_time`").also(time.at, "the response time");
         }
         (Some(_) | None, _, _) => {}
+    }
+}
+
+/// A limit inside the normal band: where the value usually lies is no alarm.
+fn normal(table: &AlarmTable, tags: &[TagDef], problems: &mut Problems) {
+    // One that is enabled in a state of the plant only says what is normal then.
+    let Some(name) = table.tag.as_ref().filter(|_| table.enabled_when.is_none()) else { return };
+    let Some([low, high]) = tags.iter().find(|tag| tag.name == name.value).and_then(|tag| tag.normal) else { return };
+    let limits = [table.high_high, table.high, table.low, table.low_low].into_iter().flatten();
+    for limit in limits.filter(|limit| low < limit.value && limit.value < high) {
+        let message = format!("the limit {} lies inside normal = [{low}, {high}] of {}", limit.value, name.value);
+        problems.warn(limit.at, message).label("an alarm while the value is normal");
     }
 }
 
@@ -139,11 +152,15 @@ mod tests {
 
     /// What the lint says of a plant with these alarms, a line each.
     fn warnings(alarms: &str) -> Vec<String> {
+        warnings_with(alarms, METER)
+    }
+
+    fn warnings_with(alarms: &str, meter: &str) -> Vec<String> {
         let start = PLANT.find("[[alarm]]").expect("the plant has an alarm");
         let end = PLANT.find("[mimic]").expect("the plant has a mimic");
         let text = format!("{}{alarms}{}", &PLANT[..start], &PLANT[end..]);
         let find = |name: &str| {
-            let text = if name == "meter" { METER } else { PLC };
+            let text = if name == "meter" { meter } else { PLC };
             Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
         };
         let library = Library { find: &find, names: Vec::new() };
@@ -196,6 +213,15 @@ mod tests {
             &alarm(&HOT.replace("5s", "11min")),
             &["comes later than it must be answered (longer than `response_time`)"],
         );
+    }
+
+    #[test]
+    fn a_limit_inside_the_normal_band_is_found() {
+        let with =
+            |band: &str| warnings_with(&alarm(HOT), &METER.replace("max = 100\n", &format!("max = 100\n{band}\n")));
+        assert_eq!(with("normal = [20, 80]"), [""; 0]);
+        let found = with("normal = [20, 90]");
+        assert!(found.len() == 1 && found[0].contains("small.toml:26:8: the limit 80 lies inside"), "{found:?}");
     }
 
     #[test]

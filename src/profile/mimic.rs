@@ -72,7 +72,7 @@ fn aliases(table: &Option<At<Raw>>, problems: &mut Problems) -> BTreeMap<String,
 }
 
 /// Letters that mean something on every screen, so that no plant can give them another meaning.
-const KEYS_TAKEN: [char; 4] = ['a', 'q', 'w', 'y'];
+const KEYS_TAKEN: [char; 5] = ['a', 'q', 'v', 'w', 'y'];
 
 fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut Problems) -> Option<MimicCommand> {
     let (key, name) = (table.key.as_ref()?, table.tag.as_ref()?);
@@ -84,7 +84,7 @@ fn command(table: &CommandTable, defs: &Defs, keys: &mut Unique, problems: &mut 
     if letter.is_some_and(|letter| KEYS_TAKEN.contains(&letter)) {
         problems
             .add(key.at, format!("key `{}` is taken", key.value))
-            .label("on every screen `a` acknowledges an alarm, `q` quits, `w` says why and `y` copies");
+            .label("`a` acknowledges an alarm, `q` quits, `v` shows the overview, `w` says why and `y` copies");
     }
     keys.insert(&key.value, key.at, format!("duplicate key `{}`", key.value), problems);
     let tag = defs.tag(name, problems)?;

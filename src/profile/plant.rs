@@ -81,7 +81,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     );
     let defs = Defs { names: &names, lines: &lines, devices: &devices, tags: &tags };
     let alarms = alarm::alarms(&file.alarms, &defs, problems);
-    lint::lint(&file.alarms, problems);
+    lint::lint(&file.alarms, &tags, problems);
     let mimic = file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| mimic::mimic(&mimic.value, &defs, problems));
     let access = access::access(file.access.as_ref().map(|table| &table.value), problems);
     let logic = interlock::logic(file, &defs, problems);

@@ -1,10 +1,15 @@
 //! One row of a register map becomes the definition of a tag, and is checked against itself and its device.
 
 mod bits;
+mod scaling;
 
 use std::time::Duration;
 
-use self::bits::{bit_field, bit_labels, enum_labels};
+pub(super) use self::scaling::range_of;
+use self::{
+    bits::{bit_field, bit_labels, enum_labels},
+    scaling::check_scaling,
+};
 use super::{
     address::{check_modicon, locate},
     diagnostic::{Problems, Span},
@@ -84,6 +89,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         unit_from: links.unit.map(|tag| (tag, Vec::new())),
         min: links.min.map(Bound::From).or(fixed(&row.min)),
         max: links.max.map(Bound::From).or(fixed(&row.max)),
+        normal: row.normal.map(|normal| normal.value),
         access,
         confirm: row.confirm.as_ref().map(|confirm| confirm.value.clone()),
         reauthenticate: row.reauthenticate.map(|kind| kind.value),
@@ -307,57 +313,6 @@ fn store_every(row: &TagTable, problems: &mut Problems) -> Duration {
         problems.add(every.at, "a value can be stored every 1 to 60 s").label("expected \"1 s\" … \"60 s\"");
     }
     every.value
-}
-
-/// Checks scale and bounds against each other and against what the raw type can hold.
-fn check_scaling(row: &TagTable, kind: Option<Raws>, decimals: Decimals, problems: &mut Problems) {
-    if let Some(scale) = row.scale.filter(|scale| scale.value == 0.0) {
-        problems.add(scale.at, "a scale of 0 makes every value 0").label("expected a number other than 0");
-        return;
-    }
-    if let Some(deadband) = row.deadband.filter(|deadband| deadband.value < 0.0) {
-        problems.add(deadband.at, "a deadband cannot be negative").label("expected 0 or more");
-    }
-    if let (Some(min), Some(max)) = (row.min, row.max)
-        && min.value >= max.value
-    {
-        problems
-            .add(max.at, format!("max {} is not above min {}", max.value, min.value))
-            .label("too low")
-            .also(min.at, "min");
-    }
-    let (Some(kind), Decimals::Fixed(_)) = (kind, decimals) else { return };
-    let scale = row.scale.value_or(1.0);
-    let offset = row.offset.value_or(0.0);
-    let Some((low, high)) = value_range(kind, scale, offset) else { return };
-    for (bound, word) in [(row.min, "min"), (row.max, "max")] {
-        let Some(bound) = bound.filter(|bound| bound.value < low || bound.value > high) else { continue };
-        let problem = problems.add(bound.at, format!("{word} {} is outside what the register can hold", bound.value));
-        problem.label(format!("it holds {low} to {high}"));
-    }
-}
-
-/// What a tag can hold at all, in its unit; `None` if its decimals come from the device or it is a float.
-pub(super) fn range_of(tag: &TagDef) -> Option<(f64, f64)> {
-    let kind = (tag.point.kind, tag.point.field.map(|(_, bits)| bits));
-    match tag.decimals {
-        Decimals::Fixed(_) => value_range(kind, tag.scale, tag.offset),
-        Decimals::From(_) => None,
-    }
-}
-
-fn value_range(kind: Raws, scale: f64, offset: f64) -> Option<(f64, f64)> {
-    let (low, high) = raw_range(kind)?;
-    let round = |value: f64| (value * 1e6).round() / 1e6;
-    let (a, b) = (round(low * scale + offset), round(high * scale + offset));
-    Some((a.min(b), a.max(b)))
-}
-
-fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
-    if let Some(bits) = field {
-        return Some((0.0, 2f64.powi(i32::from(bits)) - 1.0));
-    }
-    kind.whole_range()
 }
 
 fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Access {

@@ -8,9 +8,9 @@ use crate::plant::tag::{Access, ByteOrder, Point, StorePolicy};
 
 /// Keys that a text does not have.
 #[rustfmt::skip]
-const FOR_NUMBERS: [&str; 15] = [
+const FOR_NUMBERS: [&str; 16] = [
     "scale", "offset", "decimals", "decimals_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
-    "bad_if", "quality_from", "deadband",
+    "bad_if", "quality_from", "deadband", "normal",
 ];
 
 /// Keys that belong to a register.

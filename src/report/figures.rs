@@ -149,7 +149,9 @@ pub fn not_responding<'a>(
             | AlarmEvent::SuppressedByDesign
             | AlarmEvent::Unsuppressed
             | AlarmEvent::OutOfService
-            | AlarmEvent::InService => {}
+            | AlarmEvent::InService
+            | AlarmEvent::StepDone
+            | AlarmEvent::StepUndone => {}
         }
     }
     outages.extend(open.into_iter().map(|(name, begun)| outage(name, begun, until)));
@@ -238,7 +240,11 @@ pub fn suppressed(
             AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => (false, alarm.quiet),
             AlarmEvent::Shelved | AlarmEvent::SuppressedByDesign | AlarmEvent::OutOfService => (alarm.active, true),
             AlarmEvent::Unshelved | AlarmEvent::Unsuppressed | AlarmEvent::InService => (alarm.active, false),
-            AlarmEvent::Acknowledged | AlarmEvent::ReAlarmed | AlarmEvent::Reset => continue,
+            AlarmEvent::Acknowledged
+            | AlarmEvent::ReAlarmed
+            | AlarmEvent::Reset
+            | AlarmEvent::StepDone
+            | AlarmEvent::StepUndone => continue,
         };
         alarm.found.raised += u64::from(event.event == AlarmEvent::RaisedSuppressed);
         alarm.set(active, quiet, event.at);

@@ -126,7 +126,11 @@ impl CommitBarrier {
             !self.events.contains_key(&name)
         };
         for alarm in Arc::make_mut(&mut snapshot.alarms) {
-            alarm.acknowledged.iter_mut().for_each(|note| note.recorded = is_recorded(alarm.id));
+            alarm
+                .acknowledged
+                .iter_mut()
+                .chain(&mut alarm.steps)
+                .for_each(|note| note.recorded = is_recorded(alarm.id));
         }
         for alarm in Arc::make_mut(&mut snapshot.suppressed) {
             alarm.note.recorded = is_recorded(alarm.id);

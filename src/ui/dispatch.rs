@@ -116,7 +116,12 @@ fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
         Target::Key(chord) => return on_key(model, chord.event()),
         // It is typed again as fast as it is found.
         Target::Instant(_) => {}
-        Target::Tab(_) | Target::Device(_) | Target::Tag(_) | Target::Trend(_) | Target::Alarm(_) => {
+        Target::Tab(_)
+        | Target::Overview
+        | Target::Device(_)
+        | Target::Tag(_)
+        | Target::Trend(_)
+        | Target::Alarm(_) => {
             model.recent.retain(|earlier| *earlier != target);
             model.recent.insert(0, target);
             model.recent.truncate(RECENT_MAX);

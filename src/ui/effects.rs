@@ -8,6 +8,10 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
         match action {
             UiAction::Open(modal) => model.modal = Some(modal),
             UiAction::Show(tab) => effects.extend(show(model, tab)),
+            UiAction::ShowOverview => {
+                model.tabs.mimic.show_overview();
+                effects.extend(show(model, Tab::Mimic));
+            }
             UiAction::ShowDevice(device) => {
                 model.tabs.controllers.show(device);
                 effects.extend(show(model, Tab::Controllers));

@@ -9,10 +9,11 @@ use ratatui::style::Style;
 use super::{
     ViewContext,
     modal::Notice,
+    rights,
     widgets::{text::age, value},
 };
 use crate::plant::{
-    command::{CommandStatus, NotConfirmed, Outcome},
+    command::{CommandKind, CommandStatus, NotConfirmed, Outcome},
     def::TagId,
     interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
     tag::{DataType, TagDef},
@@ -45,6 +46,26 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
 /// Is this value of a tag certainly without effect, so that it is not to be sent?
 pub fn is_refused(cx: &ViewContext, tag: TagId, value: f64) -> bool {
     cx.def().logic.refusal(tag, cx.snapshot.rounded_to_device(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
+}
+
+/// What forbids a command now: the missing right, the line, an interlock or the mode; nothing where it can be given. Of two
+/// states the other one is meant.
+pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
+    let def = cx.def().tag(tag);
+    let value = match two_states(def) {
+        Some(_) => other_state(cx, tag),
+        None => cx.snapshot.sample(tag).good_value(),
+    };
+    let kind = CommandKind::Write { tag, value: value.unwrap_or_default() };
+    let blocks = |value| {
+        let value = cx.snapshot.rounded_to_device(tag, value);
+        cx.def().logic.interlocks_of(tag, value).find_map(|lock| interlock_text(cx, lock)).map(|(words, _)| words)
+    };
+    rights::missing(cx, &kind)
+        .or_else(|| Notice::why_unreachable(cx, def.device))
+        .or_else(|| value.is_none().then(|| t!("? unknown: {name} is not good", name = def.name)))
+        .or_else(|| blocks(value?))
+        .or_else(|| unmet_text(cx, tag))
 }
 
 /// All there is to say before a value is written, with its look.

@@ -134,6 +134,8 @@ pub enum UiAction {
     Open(Modal),
     /// Show a tab.
     Show(Tab),
+    /// Show all devices at a glance.
+    ShowOverview,
     /// Show a device on the controllers tab.
     ShowDevice(DeviceId),
     /// The same with one of its parameters selected.
@@ -207,6 +209,7 @@ impl UiAction {
                 Scope::Files
             }
             UiAction::Show(_)
+            | UiAction::ShowOverview
             | UiAction::ShowDevice(_)
             | UiAction::ShowParameter(_)
             | UiAction::ShowOnMimic(_)

@@ -55,8 +55,7 @@ impl Row {
 
     /// The refusal for a user without the right.
     fn why(&self, person: usize) -> String {
-        let least = if self.by.contains('T') { "technician" } else { "supervisor" };
-        WHY[person].replace("{}", least)
+        WHY[person].replace("{}", if self.by.contains('T') { "technician" } else { "supervisor" })
     }
 }
 
@@ -78,6 +77,7 @@ fn of_command(kind: &CommandKind) -> Row {
         CommandKind::Alarm(AlarmCommand::Reset(_)) => row("reset", "--TS--"),
         CommandKind::Alarm(AlarmCommand::Shelve { .. }) => row("shelve", "--TS--"),
         CommandKind::Alarm(AlarmCommand::Unshelve(_)) => row("unshelve", "--TS--"),
+        CommandKind::Alarm(AlarmCommand::Tick { .. }) => row("step done", "--TS--"),
         CommandKind::Alarm(AlarmCommand::OutOfService(_)) => row("out of service", "---S--"),
         CommandKind::Alarm(AlarmCommand::InService(_)) => row("in service", "---S--"),
         CommandKind::Refresh(_) => look("refresh", "--TS--"),
@@ -104,8 +104,7 @@ fn of_command(kind: &CommandKind) -> Row {
 }
 
 fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
-    let (alarm, device, line) = (AlarmId(0), DeviceId(0), LineId(0));
-    let at = Timestamp::UNIX_EPOCH;
+    let (alarm, device, line, at) = (AlarmId(0), DeviceId(0), LineId(0), Timestamp::UNIX_EPOCH);
     let scan = |serials| Diagnostic::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
     let set = ParameterSet {
         name: "none".into(),
@@ -127,6 +126,7 @@ fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
         CommandKind::Alarm(AlarmCommand::Reset(alarm)),
         CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: Duration::from_secs(60) }),
         CommandKind::Alarm(AlarmCommand::Unshelve(alarm)),
+        CommandKind::Alarm(AlarmCommand::Tick { alarm, raised_at: at, step: 0, done: true }),
         CommandKind::Alarm(AlarmCommand::OutOfService(alarm)),
         CommandKind::Alarm(AlarmCommand::InService(alarm)),
         CommandKind::Refresh(device),

@@ -230,13 +230,13 @@ fn raised_at(others: &str, is: &str) -> String {
     )
 }
 
-/// Of each alarm the last event of every kind before an instant, in the order in which they were written: all that its state
-/// depends on.
+/// Of each alarm the last event of every kind (and step) before an instant, as written: all that its state depends on.
 pub fn restore() -> String {
     let columns = EVENT_COLUMNS.join(", ");
     format!(
         "SELECT {columns} FROM alarm_journal
-         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal WHERE utc < $2 GROUP BY subject, message, event)
+         WHERE rowid IN (SELECT max(rowid) FROM alarm_journal WHERE utc < $2
+            GROUP BY subject, message, event, CASE WHEN event IN ('step done', 'step undone') THEN reason END)
          ORDER BY rowid LIMIT $1"
     )
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     AlarmManager,
+    lists::raised_at_of,
     state::{AlarmState, OperatorNote},
 };
 use crate::plant::{
@@ -51,6 +52,17 @@ pub enum AlarmCommand {
     OutOfService(AlarmId),
     /// Put an alarm back in service.
     InService(AlarmId),
+    /// Tick a step of the action as done, or take the tick back.
+    Tick {
+        /// Which alarm.
+        alarm: AlarmId,
+        /// When the activation that the operator saw was raised.
+        raised_at: Timestamp,
+        /// The step, from 0.
+        step: u8,
+        /// Done, or not.
+        done: bool,
+    },
 }
 
 /// Why a request about an alarm was refused.
@@ -98,6 +110,12 @@ pub enum AlarmRefusal {
     /// It is in service.
     #[error("{}", t!("already in service"))]
     InService,
+    /// The action has no such step.
+    #[error("{}", t!("no such step"))]
+    NoSuchStep,
+    /// The step has that tick, or has none.
+    #[error("{}", t!("the step was ticked or unticked by another user"))]
+    TickedAlready,
 }
 
 impl AlarmManager {
@@ -182,6 +200,27 @@ impl AlarmManager {
         }
         let back = self.record_action(&alarm, event, value, None, note);
         Ok(std::iter::once(back).chain(self.raise_again(&alarm, note.at, value)).collect())
+    }
+
+    /// Ticks a step of the action, or takes the tick back, unless the alarm was raised again after `raised_at`.
+    pub fn tick(
+        &mut self,
+        id: AlarmId,
+        raised_at: Timestamp,
+        (step, done): (u8, bool),
+        note: &OperatorNote,
+    ) -> Result<AlarmRecord, AlarmRefusal> {
+        let alarm = self.alarm(id)?;
+        let text = alarm.guidance.steps().nth(step.into()).ok_or(AlarmRefusal::NoSuchStep)?;
+        let machine = self.machine(id);
+        if raised_at_of(machine) != raised_at || machine.state() == AlarmState::Normal {
+            return Err(AlarmRefusal::RaisedSince);
+        }
+        if machine.steps.iter().any(|ticked| ticked.reason.as_deref() == Some(text)) == done {
+            return Err(AlarmRefusal::TickedAlready);
+        }
+        let event = if done { AlarmEvent::StepDone } else { AlarmEvent::StepUndone };
+        Ok(self.record_action(&alarm, event, None, Some(text.into()), note))
     }
 
     fn record_action(

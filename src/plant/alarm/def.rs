@@ -140,3 +140,10 @@ pub struct Guidance {
     /// How soon.
     pub response_time: Option<Duration>,
 }
+
+impl Guidance {
+    /// The steps of the action, which its text separates by semicolons.
+    pub fn steps(&self) -> impl Iterator<Item = &str> {
+        self.action.split(';').map(str::trim).filter(|step| !step.is_empty())
+    }
+}

@@ -63,8 +63,7 @@ impl AlarmManager {
 }
 
 fn shown(id: AlarmId, machine: &AlarmStateMachine) -> ActiveAlarm {
-    // Whatever the journal has lost, the alarm itself is not.
-    let raised_at = machine.raised_at.or(machine.returned_at).unwrap_or(Timestamp::UNIX_EPOCH);
+    let raised_at = raised_at_of(machine);
     ActiveAlarm {
         id,
         state: machine.state(),
@@ -73,9 +72,15 @@ fn shown(id: AlarmId, machine: &AlarmStateMachine) -> ActiveAlarm {
         returned_at: machine.returned_at,
         value: machine.value,
         acknowledged: machine.acknowledged.clone(),
+        steps: machine.steps.clone(),
         times: machine.times,
         first_out: machine.first_out,
     }
+}
+
+/// When an alarm was raised: whatever the journal has lost, the alarm itself is not.
+pub(super) fn raised_at_of(machine: &AlarmStateMachine) -> Timestamp {
+    machine.raised_at.or(machine.returned_at).unwrap_or(Timestamp::UNIX_EPOCH)
 }
 
 fn suppressed_alarm(id: AlarmId, machine: &AlarmStateMachine) -> Option<SuppressedAlarm> {

@@ -112,6 +112,8 @@ pub struct AlarmStateMachine {
     pub returned_at: Option<Timestamp>,
     /// The last acknowledgement since it was raised.
     pub acknowledged: Option<OperatorNote>,
+    /// The steps of the action that were done since it was raised: who, when, and the step as the reason.
+    pub steps: Vec<OperatorNote>,
     /// The value that raised it.
     pub value: Option<f64>,
     /// Its place among the alarms that were raised together.
@@ -186,6 +188,7 @@ impl AlarmStateMachine {
                 self.annunciated_at = Some(event.at);
                 self.latched |= latch;
                 (self.raised_at, self.returned_at, self.acknowledged) = (Some(event.at), None, None);
+                self.steps.clear();
                 (self.value, self.first_out) = (event.value, event.first_out);
                 self.times = self.times.saturating_add(1);
             }
@@ -197,6 +200,7 @@ impl AlarmStateMachine {
                     (self.latched, self.unacknowledged) = (true, true);
                     (self.raised_at, self.returned_at, self.acknowledged) = (Some(event.at), None, None);
                     (self.annunciated_at, self.value) = (Some(event.at), event.value);
+                    self.steps.clear();
                 }
             }
             AlarmEvent::ReAlarmed => (self.unacknowledged, self.annunciated_at) = (true, Some(event.at)),
@@ -225,6 +229,12 @@ impl AlarmStateMachine {
                 self.keep_latched();
             }
             AlarmEvent::InService => self.out_of_service = None,
+            AlarmEvent::StepDone | AlarmEvent::StepUndone => {
+                self.steps.retain(|ticked| ticked.reason != event.reason);
+                if event.event == AlarmEvent::StepDone {
+                    self.steps.push(note());
+                }
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! The manager as a whole: what is annunciated, acknowledged, suppressed, reminded of and restored.
 
 mod anything;
+mod steps;
 mod suppression;
 
 use std::{sync::Arc, time::Duration};

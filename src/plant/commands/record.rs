@@ -76,6 +76,11 @@ pub fn alarm_action(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static s
         AlarmCommand::Unshelve(alarm) => ("unshelve", name(alarm), None),
         AlarmCommand::OutOfService(alarm) => ("out of service", name(alarm), None),
         AlarmCommand::InService(alarm) => ("in service", name(alarm), None),
+        AlarmCommand::Tick { alarm, step, done, .. } => {
+            let guidance = def.alarms.get(alarm.index()).map(|alarm| &alarm.guidance);
+            let step = guidance.and_then(|guidance| guidance.steps().nth(usize::from(*step)));
+            (if *done { "step done" } else { "step undone" }, name(alarm), step.map(str::to_owned))
+        }
     }
 }
 

@@ -50,6 +50,9 @@ impl Plant {
             AlarmCommand::Shelve { alarm, lasts } => one(manager.shelve(alarm, lasts, &note)),
             AlarmCommand::Unshelve(alarm) => manager.reinstate(alarm, AlarmEvent::Unshelved, value(alarm), &note),
             AlarmCommand::OutOfService(alarm) => one(manager.out_of_service(alarm, &note)),
+            AlarmCommand::Tick { alarm, raised_at, step, done } => {
+                one(manager.tick(alarm, raised_at, (step, done), &note))
+            }
             AlarmCommand::InService(alarm) => manager.reinstate(alarm, AlarmEvent::InService, value(alarm), &note),
         };
         let done = done.map(|events| effects.records.extend(events.into_iter().map(Record::Alarm)));

@@ -90,6 +90,8 @@ toml_tables! {
         opt "max" max: f64,
         opt "min_from" min_from: String,
         opt "max_from" max_from: String,
+        /// Where the value usually lies.
+        opt "normal" normal: [f64; 2],
         opt "access" access: Access,
         opt "verify" verify: bool,
         opt "confirm" confirm: String,

@@ -1,6 +1,6 @@
 //! Fields of bits in a register, and the names of numbers and bits.
 
-use super::{Raws, raw_range};
+use super::{Raws, scaling::raw_range};
 use crate::{
     plant::{
         number::to_u8,

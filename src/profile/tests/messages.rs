@@ -19,13 +19,16 @@ fn a_file_that_is_no_toml_is_not_taken_for_a_wrong_one() {
 
 #[test]
 fn a_key_of_every_screen_is_no_command_of_a_plant() {
-    for key in ["a", "q", "w", "y"] {
+    for key in ["a", "q", "v", "w", "y"] {
         let from = "[mimic]\n";
         let to = format!("[mimic]\ncommand = [{{ key = \"{key}\", label = \"go\", tag = \"D1.MODE\" }}]\n");
         check(
             from,
             &to,
-            &[&format!("key `{key}` is taken"), "`a` acknowledges an alarm, `q` quits, `w` says why and `y` copies"],
+            &[
+                &format!("key `{key}` is taken"),
+                "`a` acknowledges an alarm, `q` quits, `v` shows the overview, `w` says why and `y` copies",
+            ],
         );
     }
 }
@@ -187,4 +190,16 @@ fn endless_lines_and_problems_are_reported_in_bounded_text() {
             errors.to_string().len()
         );
     }
+}
+
+#[test]
+fn a_normal_band_is_a_range_within_the_bounds() {
+    let with = |band: &str, expect: &[&str]| check("max = 100\n", &format!("max = 100\nnormal = {band}\n"), expect);
+    with("[70, 60]", &["meter.toml:20:10", "ends at 60 and begins at 70", "expected [low, high]"]);
+    with("[-5, 60]", &["meter.toml:20:10", "begins below min 0"]);
+    with("[60, 101.5]", &["ends above max 100"]);
+    with("[60]", &["normal"]);
+    let meter = METER.replace("max = 100\n", "max = 100\nnormal = [60, 70.5]\n");
+    let def = load(PLANT.as_bytes(), &meter, PLC).unwrap();
+    assert_eq!(def.tag(def.tag_named("D1.T").unwrap()).normal, Some([60.0, 70.5]));
 }

@@ -43,13 +43,20 @@ impl Footer {
             tail.remove(0);
         }
         let mut end = columns.saturating_sub(1 + tail.iter().map(room).sum::<u16>());
+        let refused = refused.first().and_then(lacks).map(|role| {
+            let named = |hint: &&Hint| !hint.label.is_empty();
+            let keys: Vec<&str> = refused.iter().filter(named).map(|hint| hint.key.as_str()).collect();
+            format!("{}: {}", rights::title(role), keys.join(" "))
+        });
+        // What may not be pressed is said before the least wanted of what may.
+        let most = end.saturating_sub(refused.as_ref().map_or(0, |words| width(words) + 1));
         let mut keys = Vec::new();
         let mut x = 1;
         for (n, hint) in hints.iter().enumerate().filter(|(_, hint)| !hint.label.is_empty()) {
             let hint = n.checked_sub(1).and_then(|before| pair(&hints[before], hint)).unwrap_or_else(|| hint.clone());
             // The way out of a window stands behind what else it has.
             let way_out = hints.iter().skip(n + 1).find(|hint| model.modal.is_some() && hint.key == t!("Esc"));
-            if x + room(&hint) + way_out.map_or(0, room) > end {
+            if x + room(&hint) + way_out.map_or(0, room) > most {
                 if way_out.is_none() {
                     break;
                 }
@@ -59,10 +66,7 @@ impl Footer {
             keys.push((x, hint));
             x = next;
         }
-        let refused = refused.first().and_then(lacks).and_then(|role| {
-            let named = |hint: &&Hint| !hint.label.is_empty();
-            let keys: Vec<&str> = refused.iter().filter(named).map(|hint| hint.key.as_str()).collect();
-            let keys = format!("{}: {}", rights::title(role), keys.join(" "));
+        let refused = refused.and_then(|keys| {
             let words = [t!("needs {keys}", keys), keys];
             words.into_iter().find(|words| x + width(words) < end).map(|words| (x, words))
         });

@@ -154,6 +154,7 @@ impl Confirm {
                 AlarmCommand::Unshelve(_) => t!("unshelve"),
                 AlarmCommand::OutOfService(_) => t!("take out of service"),
                 AlarmCommand::InService(_) => t!("return to service"),
+                AlarmCommand::Tick { .. } => t!("tick"),
             },
             ConfirmAction::Command(CommandKind::Refresh(_)) => t!("refresh"),
             ConfirmAction::Command(CommandKind::Connect(_, true)) => t!("connect"),

@@ -263,7 +263,7 @@ impl Modal {
             Modal::Reason(reason) => reason.hints(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![Hint::in_window(t!("Esc"), t!("close"))],
-            Modal::Guidance(guidance) => guidance.hints(),
+            Modal::Guidance(guidance) => guidance.hints(cx),
             Modal::Why(why) => why.hints(),
             Modal::Settings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),

@@ -42,6 +42,8 @@ const WIDTH: u16 = 76;
 pub enum Target {
     /// A tab.
     Tab(Tab),
+    /// All devices at a glance.
+    Overview,
     /// A device, on the controllers tab.
     Device(DeviceId),
     /// The faceplate of a tag.
@@ -59,7 +61,7 @@ pub enum Target {
 impl Target {
     fn rank(self) -> u8 {
         match self {
-            Target::Instant(_) | Target::Tab(_) => 0,
+            Target::Instant(_) | Target::Tab(_) | Target::Overview => 0,
             Target::Device(_) => 1,
             Target::Tag(_) => 2,
             Target::Trend(_) => 3,
@@ -230,13 +232,16 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let tags = def.tags.iter().map(|tag| Row::new(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
     let stored = def.tags.iter().filter(|tag| tag.is_stored());
     let trends = stored.map(|tag| Row::new(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
-    tabs.chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()
+    let overview = Row::new(Target::Overview, t!("page"), t!("overview"), t!("all devices at a glance"));
+    let overview = Some(overview).filter(|_| !def.is_bench());
+    tabs.chain(overview).chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()
 }
 
 /// What a choice leads to, but for a key, which is pressed.
 pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
     match target {
         Target::Tab(tab) => vec![UiAction::Show(tab)],
+        Target::Overview => vec![UiAction::ShowOverview],
         Target::Device(device) => vec![UiAction::ShowDevice(device)],
         Target::Tag(tag) => {
             let faceplate = Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]);

@@ -1,20 +1,35 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
+mod attention;
+mod cards;
+mod command;
 mod companions;
+mod forecast;
+mod may_change;
+mod neighbour;
+mod overview;
 mod point;
 mod preview;
+mod shift;
+mod steps;
+#[cfg(test)]
+mod tests;
 
+pub use command::command_of;
 use companions::{Companions, Parts, parts};
+use neighbour::neighbour;
+use overview::Overview;
+use point::{placed, scale};
 pub use preview::preview;
+use shift::Shift;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::def::{MimicCommand, MimicItem, MimicRect, Picture},
+    plant::def::{MimicItem, Picture},
     ui::{
-        interlock,
-        modal::Choice,
-        widgets::mimic::{CanvasScale, bar, list, panel, pipe, place, tags, title, trend, unit, vessel},
+        layout::Size,
+        widgets::mimic::{CanvasScale, bar, list, panel, pipe, tags, title, trend, unit, vessel},
     },
 };
 
@@ -33,6 +48,8 @@ pub enum Action {
     Motion,
     /// Show a page so many further on.
     Page(isize),
+    /// Show the overview, or the mimic.
+    Overview,
 }
 
 /// Keys of this tab; the plant file adds its own, and [`Mimic::hints`] lists the four arrows as one.
@@ -44,6 +61,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "open", "faceplate of the selected item", Action::Open),
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
     Key::new(char('C'), "commands", "all valves, pumps and heaters with their commands", Action::Actuators),
+    Key::new(char('v'), "overview", "all devices at a glance, or the mimic", Action::Overview),
     Key::new(char('M'), "", "animation of agitators and arrows on or off", Action::Motion),
     Key::new(code(KeyCode::PageUp), "", "the page before", Action::Page(-1)),
     Key::new(code(KeyCode::PageDown), "page", "the next page of the mimic", Action::Page(1)),
@@ -66,6 +84,10 @@ pub struct Mimic {
     /// Curves of the small trends, by the item's place.
     trends: Vec<(usize, Answered<Vec<Series>>)>,
     companions: Companions,
+    /// Is the overview shown where there is a mimic too?
+    at_a_glance: bool,
+    overview: Overview,
+    shift: Shift,
     /// Queries asked so far.
     asked: u32,
 }
@@ -82,18 +104,26 @@ impl TabView for Mimic {
                 .needs(Role::Technician)
         });
         let mut table = KEYS.to_vec();
-        keys::hide(&mut table, &[(Action::Page(1), cx.def().mimic.pages.len() < 2)]);
+        let pages = cx.def().mimic.pages.len();
+        keys::hide(
+            &mut table,
+            &[(Action::Page(1), pages < 2), (Action::Overview, pages == 0 || cx.size < Size::Normal)],
+        );
         commands.chain([Hint::new("←↑↓→", t!("select"), t!("select an item"))]).chain(keys::hints(&table)).collect()
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
         let item = self.selected.and_then(|n| self.shown(cx, cx.area).0.items.get(n));
-        item.into_iter().flat_map(|item| tags(cx, item)).map(|tag| value::line(cx, tag)).collect()
+        let tags = match self.is_overview(cx) {
+            true => self.overview.card(cx).map_or(Vec::new(), |card| card.tags),
+            false => item.map_or(Vec::new(), |item| tags(cx, item)),
+        };
+        tags.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
 
     fn on_point(&mut self, cx: &ViewContext, at: Position) -> bool {
         let (picture, parts) = self.shown(cx, cx.area);
-        if list::is_shown(cx, picture, parts.picture) || !parts.picture.contains(at) {
+        if self.is_overview(cx) || list::is_shown(cx, picture, parts.picture) || !parts.picture.contains(at) {
             return false;
         }
         self.selected = point::item_at(picture, parts.picture, at).or(self.selected);
@@ -101,8 +131,13 @@ impl TabView for Mimic {
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if self.is_overview(cx) {
+            let shift = self.shift.ask(cx, Overview::columns(cx), &mut self.asked);
+            return self.overview.ask(cx, &self.shift, &mut self.asked).into_iter().chain(shift).collect();
+        }
         let (picture, parts) = self.shown(cx, cx.area);
         self.follow(picture);
+        let shift = parts.shift.map_or(Vec::new(), |area| self.shift.ask(cx, area.width, &mut self.asked));
         let beside = self.companions.ask(cx, &parts, &mut self.asked);
         let asks = self.trends.iter_mut().filter_map(|(item, trend)| {
             let MimicItem::Trend { tag, window, place } = picture.items.get(*item)? else { return None };
@@ -111,29 +146,36 @@ impl TabView for Mimic {
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
             trend.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
         });
-        asks.chain(beside).collect()
+        asks.chain(beside).chain(shift).collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.companions.awaits(number) || self.trends.iter().any(|(_, trend)| trend.query.awaits(number))
+        let pages = self.overview.awaits(number) || self.shift.awaits(number) || self.companions.awaits(number);
+        pages || self.trends.iter().any(|(_, trend)| trend.query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.companions.on_answer(cx, number, &answer);
+        self.overview.on_answer(cx, number, &answer);
+        self.shift.on_answer(cx, number, &answer);
         self.trends.iter_mut().for_each(|(_, trend)| trend.on_answer(cx, number, &answer));
         Vec::new()
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        if self.is_overview(cx) {
+            return self.overview.view(cx, frame, area, &self.shift);
+        }
         let (picture, parts) = self.shown(cx, area);
         self.companions.view(cx, frame, &parts);
+        if let Some(area) = parts.shift {
+            let area = Rect { x: area.x + 1, width: area.width.saturating_sub(2), ..area };
+            self.shift.view(cx, &mut Canvas::new(frame.buffer_mut(), area));
+        }
         self.headings(cx, &mut Canvas::new(frame.buffer_mut(), area));
         let area = parts.picture;
         let items = &picture.items;
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        if items.is_empty() {
-            canvas.text(1, 1, t!("the plant file defines no mimic"), cx.theme.dim());
-        }
         if list::is_shown(cx, picture, area) {
             return list::view(cx, &mut canvas, items, self.selected);
         }
@@ -152,6 +194,9 @@ impl TabView for Mimic {
                 let above = y.saturating_sub(1);
                 let rows = if *vertical { [y, y + 1, above] } else { [above, y + 1, y + 2] };
                 unit::mark(cx, &mut canvas, x + 1, &rows, *tag);
+            }
+            if let MimicItem::Vessel { place, level: Some(level), .. } = item {
+                vessel::limit_marks(cx, &mut canvas, scale.place(*place), *level);
             }
             if let MimicItem::Pump { place, tag, .. } = item {
                 let at = scale.place(*place);
@@ -175,6 +220,16 @@ impl TabView for Mimic {
 }
 
 impl Mimic {
+    /// The overview takes the place of a mimic that there is not; small screens have the list of values.
+    fn is_overview(&self, cx: &ViewContext) -> bool {
+        cx.def().mimic.pages.is_empty() || self.at_a_glance && Size::Normal <= cx.size
+    }
+
+    /// Shows the overview.
+    pub fn show_overview(&mut self) {
+        self.at_a_glance = true;
+    }
+
     /// The picture for the room there is, and the parts of the tab; a row above is left for the names of several pages.
     fn shown<'a>(&self, cx: &ViewContext<'a>, area: Rect) -> (&'a Picture, Parts) {
         static NONE: Picture = Picture { size: (1, 1), items: Vec::new() };
@@ -213,6 +268,9 @@ impl Mimic {
     }
 
     fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+        if self.is_overview(cx) {
+            return self.act_on_overview(cx, action);
+        }
         let (picture, parts) = self.shown(cx, cx.area);
         let items = &picture.items;
         let listed = list::is_shown(cx, picture, parts.picture);
@@ -220,14 +278,16 @@ impl Mimic {
             Action::Move(dx, dy) if listed => self.selected = list::neighbour(cx, items, self.selected, (dx, dy)),
             Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
             Action::Motion => self.still = !self.still,
+            Action::Overview if cx.size < Size::Normal => {}
+            Action::Overview => {
+                self.at_a_glance = true;
+                return self.on_snapshot(cx);
+            }
             Action::Page(by) => {
                 let pages = cx.def().mimic.pages.len();
                 return if pages > 1 { self.show_page(cx, around(self.page, by, pages)) } else { Vec::new() };
             }
-            Action::Actuators => {
-                let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
-                return open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate));
-            }
+            Action::Actuators => return actuators(cx),
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
                 let item = self.selected.and_then(|n| items.get(n));
@@ -244,8 +304,26 @@ impl Mimic {
         Vec::new()
     }
 
+    fn act_on_overview(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+        match action {
+            Action::Move(dx, dy) => self.overview.on_move(cx, &self.shift, (dx, dy)),
+            Action::Motion | Action::Page(_) => {}
+            Action::Actuators => return actuators(cx),
+            Action::Overview => {
+                self.at_a_glance = false;
+                return self.on_snapshot(cx);
+            }
+            Action::Why => return Why::open(self.overview.card(cx).and_then(|card| Why::of_all(cx, card.tags))),
+            Action::Open => {
+                return self.overview.card(cx).map(|card| UiAction::ShowDevice(card.device)).into_iter().collect();
+            }
+        }
+        Vec::new()
+    }
+
     /// Selects the first item that shows one of these tags, on whatever page; none if the mimic has none of them.
     pub fn select(&mut self, cx: &ViewContext, wanted: &[TagId]) {
+        self.at_a_glance = false;
         let shows = |item: &MimicItem| tags(cx, item).iter().any(|tag| wanted.contains(tag));
         let pages = cx.def().mimic.pages.len();
         for page in std::iter::once(self.page).chain(0..pages) {
@@ -312,85 +390,8 @@ impl Mimic {
     }
 }
 
-fn scale(picture: &Picture, area: Rect) -> CanvasScale {
-    CanvasScale::new(picture.size, (area.width, area.height))
-}
-
-/// The scale of a picture, and its first column: one that is not stretched stands in the middle.
-fn placed(picture: &Picture, area: Rect) -> (CanvasScale, u16) {
-    let scale = scale(picture, area);
-    let spare = area.width.saturating_sub(scale.column(picture.size.0));
-    (scale, spare / 2)
-}
-
-/// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
-pub fn command_of(cx: &ViewContext, event: KeyEvent) -> Option<Modal> {
-    let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event))?;
-    command_window(cx, command)
-}
-
-/// The window of a plant command, or why it cannot be given: a fixed value, or the other of two known states, is confirmed;
-/// of two states the present one of which is unknown one is chosen from a list; any other value is entered.
-fn command_window(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
-    let tag = command.tag;
-    let def = cx.def().tag(tag);
-    if let Some(notice) = Notice::unreachable(cx, def.device) {
-        return Some(Modal::Notice(notice));
-    }
-    if let Some(value) = command.value {
-        return Some(Modal::Confirm(Confirm::write(cx, tag, value)));
-    }
-    if let Some(new) = interlock::other_state(cx, tag) {
-        return Some(Modal::Confirm(Confirm::write(cx, tag, new)));
-    }
-    // Unknown whether it runs: offer the stop, which never takes more than two keys.
-    if cx.def().logic.sequences.iter().any(|sequence| sequence.run == tag) {
-        return Some(Modal::Confirm(Confirm::write(cx, tag, 0.0)));
-    }
-    match def.enum_labels.as_slice() {
-        [_, _] => Some(Modal::Choice(Choice::values(cx, tag))),
-        _ => Modal::write(cx, tag),
-    }
-}
-
-/// The nearest item in a direction; the first one when none is selected; the same when there is none further on.
-fn neighbour(items: &[MimicItem], selected: Option<usize>, (dx, dy): (i32, i32)) -> Option<usize> {
-    let centre = |place: MimicRect| {
-        let middle = |from: u16, length: u16| i32::from(from) * 2 + i32::from(length);
-        // A row is about as high as two columns are wide.
-        (middle(place.x, place.width), middle(place.y, place.height) * 2)
-    };
-    let places = || items.iter().enumerate().filter_map(|(n, item)| Some((n, centre(place(item)?))));
-    let Some((_, (x, y))) = selected.and_then(|selected| places().find(|(n, _)| *n == selected)) else {
-        return places().next().map(|(n, _)| n);
-    };
-    let ahead = places().filter_map(|(n, (to_x, to_y))| {
-        let along = (to_x - x) * dx + (to_y - y) * dy;
-        let aside = ((to_x - x) * dy).abs() + ((to_y - y) * dx).abs();
-        (along > 0 && aside <= along * 3).then_some((along + 2 * aside, n))
-    });
-    ahead.min().map(|(_, n)| n).or(selected)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ui::fixture::Fixture;
-
-    #[test]
-    fn arrow_keys_reach_every_item() {
-        let items = Fixture::normal().def.mimic.pages[0].pictures[0].items.clone();
-        let mut reached = vec![false; items.len()];
-        let mut open: Vec<usize> = neighbour(&items, None, (1, 0)).into_iter().collect();
-        while let Some(n) = open.pop() {
-            if !std::mem::replace(&mut reached[n], true) {
-                open.extend(
-                    [(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().filter_map(|way| neighbour(&items, Some(n), way)),
-                );
-            }
-        }
-        for (n, item) in items.iter().enumerate() {
-            assert_eq!(reached[n], place(item).is_some(), "{item:?}");
-        }
-    }
+/// The window of all actuators.
+fn actuators(cx: &ViewContext) -> Vec<UiAction> {
+    let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
+    open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate))
 }

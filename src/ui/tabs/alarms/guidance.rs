@@ -23,19 +23,46 @@ pub fn names() -> u16 {
 }
 
 /// What there is to say about a listed alarm.
-pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> [(&'static str, String); 4] {
-    rows_of_any(cx, alarm.id, now_text(cx, alarm))
+pub fn rows(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<(&'static str, String)> {
+    rows_of_any(cx, alarm.id, now_text(cx, alarm), Some(alarm))
 }
 
-/// What there is to say about any alarm; `now` says how it stands.
-pub fn rows_of_any(cx: &ViewContext, alarm: AlarmId, now: String) -> [(&'static str, String); 4] {
+/// What there is to say about any alarm; `now` says how it stands. The action of a listed one is a checklist: its steps are
+/// rows of their own, without a label but for the first.
+pub fn rows_of_any(
+    cx: &ViewContext,
+    alarm: AlarmId,
+    now: String,
+    listed: Option<&ActiveAlarm>,
+) -> Vec<(&'static str, String)> {
     let guidance = &cx.def().alarm(alarm).guidance;
-    [
+    let mut rows = vec![
         (t!("now"), now),
         (t!("cause"), or_dash(&guidance.cause).to_owned()),
         (t!("effect"), or_dash(&guidance.effect).to_owned()),
-        (t!("action"), or_dash(&guidance.action).to_owned()),
-    ]
+    ];
+    let steps = listed.into_iter().flat_map(|listed| guidance.steps().map(|step| step_text(cx, listed, step)));
+    let labels = std::iter::once(t!("action")).chain(std::iter::repeat(""));
+    let steps: Vec<_> = labels.zip(steps).collect();
+    if steps.is_empty() {
+        rows.push((t!("action"), or_dash(&guidance.action).to_owned()));
+    }
+    rows.extend(steps);
+    rows
+}
+
+/// `[x] lower SV (anna 14:02:31)`, `[_] check SSR lamp`.
+fn step_text(cx: &ViewContext, alarm: &ActiveAlarm, step: &str) -> String {
+    let Some(done) = alarm.step(step) else { return format!("[_] {step}") };
+    let by = done.by.as_deref().unwrap_or(t!("the station"));
+    let at = moment(done.at, cx.now, &cx.def().time_zone);
+    let lost = if done.recorded { "" } else { t!(" (NOT RECORDED)") };
+    format!("[x] {step} ({by} {at}){lost}")
+}
+
+/// Is it a row of the action?
+pub fn is_of_action(label: &str) -> bool {
+    label.is_empty() || label == t!("action")
 }
 
 /// The rows of the screen that all of it needs, with its title and the way on.
@@ -51,7 +78,7 @@ pub fn view(cx: &ViewContext, id: AlarmId, listed: Option<&ActiveAlarm>, now: St
     let style = |overdue| if overdue { cx.theme.trouble() } else { cx.theme.strong() };
     let respond = respond.map(|(words, overdue)| (format!(" {words} "), style(overdue)));
     let cut = title(cx, def, listed, respond, canvas);
-    draw(cx, cut.as_deref(), &rows_of_any(cx, id, now), &go_text(cx, def, listed), canvas);
+    draw(cx, cut.as_deref(), &rows_of_any(cx, id, now, listed), &go_text(cx, def, listed), canvas);
 }
 
 /// Which alarm it is about; at the right how long there is to respond. Its whole name, where there was no room for that.
@@ -93,6 +120,8 @@ fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str,
     }
     // Where there is no room for all of it the action is shown whole, and one line of the others; the least wanted go.
     let free = usize::from(height.saturating_sub(1 + y));
+    // More steps than rows end above the last row; the window has all of them.
+    let last = height.saturating_sub(1);
     let mut rows: Vec<&(&str, String)> = rows.iter().collect();
     for least in [t!("effect"), t!("cause"), t!("now")] {
         if free < rows.len() {
@@ -101,21 +130,28 @@ fn draw(cx: &ViewContext, name: Option<&str>, rows: &[(&str, String)], go: &str,
     }
     let lines: Vec<Vec<String>> = rows.iter().map(|(_, text)| wrap(text, room)).collect();
     let whole = lines.iter().map(Vec::len).sum::<usize>() <= free;
-    let spare = (free + 1).saturating_sub(rows.len()).max(1);
+    let mut spare = free.saturating_sub(rows.len());
     for ((label, text), lines) in rows.iter().zip(lines) {
-        let style = if *label == t!("action") { theme.strong() } else { theme.normal() };
-        canvas.text(1, y, label, theme.dim());
-        let shown = match (whole, *label == t!("action")) {
+        let style = if is_of_action(label) { theme.strong() } else { theme.normal() };
+        if y < last {
+            canvas.text(1, y, label, theme.dim());
+        }
+        let shown = match (whole, is_of_action(label)) {
             (true, _) => lines,
-            (false, true) => lines.into_iter().take(spare).collect(),
+            (false, true) => {
+                let more = lines.len().saturating_sub(1).min(spare);
+                spare -= more;
+                lines.into_iter().take(1 + more).collect()
+            }
             (false, false) => vec![fit_words(text, room)],
         };
         for line in shown {
-            canvas.text(names(), y, &line, style);
+            if y < last {
+                canvas.text(names(), y, &line, style);
+            }
             y += 1;
         }
     }
-    let last = height.saturating_sub(1);
     canvas.text(1, last, t!("go to"), theme.dim());
     canvas.text(names(), last, &fit_words(go, room), theme.normal());
 }

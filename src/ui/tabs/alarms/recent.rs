@@ -199,6 +199,7 @@ fn ribbon(steps: &[(Timestamp, AlarmEvent)], state: AlarmState, now: Timestamp, 
                 before_end(steps, at)
             }
             Some(AlarmEvent::SuppressedByDesign) => before_end(steps, at),
+            Some(AlarmEvent::StepDone | AlarmEvent::StepUndone) => ends,
             Some(
                 AlarmEvent::RaisedSuppressed
                 | AlarmEvent::ReturnedSuppressed

@@ -64,7 +64,7 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
     }
     y += 1;
     let guide = guidance::rows(cx, alarm).into_iter().map(|(label, text)| {
-        let style = if label == t!("action") { theme.strong() } else { theme.normal() };
+        let style = if guidance::is_of_action(label) { theme.strong() } else { theme.normal() };
         (label, text, style)
     });
     let rows: Vec<Row> = guide.chain(before(tab, cx, alarm)).collect();

@@ -187,7 +187,7 @@ fn guidance_below(
     now: String,
 ) {
     let (width, height) = (canvas.width(), canvas.height());
-    let needs = guidance::height(&guidance::rows_of_any(cx, alarm, now.clone()), width);
+    let needs = guidance::height(&guidance::rows_of_any(cx, alarm, now.clone(), listed), width);
     let rows = least.max(needs.min(height.saturating_sub(used)));
     guidance::view(cx, alarm, listed, now, &mut canvas.part(0, height.saturating_sub(rows), width, rows));
 }

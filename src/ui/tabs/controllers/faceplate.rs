@@ -132,7 +132,7 @@ fn ends(cx: &ViewContext, tag: TagId) -> Option<(String, String)> {
     Some((text(min), format!("{} {}", text(max), cx.snapshot.unit(tag)).trim_end().to_owned()))
 }
 
-/// `├███████──▼──┃──┤`: filled up to the value; the setpoint as a triangle, alarm limits as bars; of SV only the
+/// `├███━━━━━──▼──┃──┤`: filled up to the value; the normal band is heavy, the setpoint a triangle, alarm limits are bars; of SV only the
 /// triangle, on a track that is dotted where it may not be set. Without a good value there is no filling.
 fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId, scale: TagId) {
     let theme = cx.theme;
@@ -146,6 +146,10 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tag: TagId,
         share.is_finite().then(|| 1 + to_u16((share.clamp(0.0, 1.0) * f64::from(inner.saturating_sub(1))).round()))
     };
     let now = cx.snapshot.sample(tag).good_value();
+    let band = cx.def().tag(tag).normal.map(|[low, high]| (column(low), column(high)));
+    if let Some((Some(low), Some(high))) = band {
+        canvas.run(low, 0, (high + 1).saturating_sub(low), theme.pick('━', '='), theme.normal());
+    }
     if tag == faceplate.sv_to_show() {
         if let Some((low, high)) =
             cx.snapshot.range(faceplate.sv).and_then(|(low, high)| Some((column(low)?, column(high)?)))

@@ -52,7 +52,7 @@ fn heading(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &
 }
 
 /// `RUN, ramp 2, 03:12 of 10 min`.
-fn now_text(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> String {
+pub fn now_text(cx: &ViewContext, device: &DeviceDef, program: &ProgramDef) -> String {
     let command = value::show(cx, program.command).text;
     let Some(place) = place(cx, program) else { return t!("{command}, position unknown", command) };
     let (what, length) = match place {

@@ -2,6 +2,10 @@
 
 use std::{cmp::Reverse, collections::BTreeSet};
 
+use super::{
+    attention::{needs_action, not_normal, sections},
+    may_change, steps,
+};
 use crate::ui::tabs::{
     alarms::{action_text, event_text},
     prelude::*,
@@ -10,22 +14,10 @@ use crate::ui::tabs::{
 use crate::{
     history::Series,
     plant::{
-        alarm::AlarmState,
         def::Pen,
-        event::LineState,
         record::{ActionRecord, AlarmRecord},
-        sample::Cause,
-        snapshot::ActiveAlarm,
     },
-    ui::{
-        chrome::since,
-        layout::Size,
-        modal::{
-            confirm::subject,
-            faceplate::{device_text, line_state_text},
-        },
-        widgets::chart,
-    },
+    ui::{layout::Size, widgets::chart},
 };
 
 /// Least and greatest width of the column beside the mimic.
@@ -34,14 +26,14 @@ const SIDE: (u16, u16) = (30, 56);
 const GROWS: f64 = 1.35;
 /// Least rows of the trend below the mimic.
 const TREND_MIN: u16 = 9;
+/// Rows of the shift: its hours, two lanes, alarms and operators, and a blank one.
+const SHIFT: u16 = 6;
 /// What the trend shows.
 const WINDOW_S: i64 = 3_600;
 /// Pens of the trend.
 const PENS_MAX: usize = 3;
 /// Rows of a section that may be longer.
 const ROWS_MAX: usize = 8;
-/// Columns by which the second line of a row stands back.
-const INDENT: u16 = 5;
 /// Events that are listed at most, of the last day.
 const EVENTS_MAX: usize = 40;
 const EVENTS_SPAN: SignedDuration = SignedDuration::from_hours(24);
@@ -58,12 +50,14 @@ pub struct Parts {
     pub side: Option<Rect>,
     /// The trend below it.
     pub trend: Option<Rect>,
+    /// The shift below the trend.
+    pub shift: Option<Rect>,
 }
 
 /// The parts of a tab for a mimic of this nominal size: all of it on a usual screen; on a wide one the mimic keeps its
 /// proportions and leaves room beside and below it.
 pub fn parts(nominal: (u16, u16), area: Rect) -> Parts {
-    let alone = Parts { picture: area, side: None, trend: None };
+    let alone = Parts { picture: area, side: None, trend: None, shift: None };
     let room = area.width.saturating_sub(nominal.0.saturating_add(1));
     if !Size::is_wide(area.width) || room < SIDE.0 {
         return alone;
@@ -75,8 +69,11 @@ pub fn parts(nominal: (u16, u16), area: Rect) -> Parts {
     let below = area.height - high;
     let height = if below < TREND_MIN { area.height } else { high };
     let picture = Rect { width, height, ..area };
-    let trend = (TREND_MIN <= below).then(|| Rect { y: area.y + height, height: area.height - height, ..picture });
-    Parts { picture, side: Some(Rect { x: area.x + width + 1, width: side, ..area }), trend }
+    let shift = if Size::Overview.least().0 <= area.width && TREND_MIN + SHIFT <= below { SHIFT } else { 0 };
+    let bottom = area.y + area.height - shift;
+    let trend = (TREND_MIN <= below).then(|| Rect { y: area.y + height, height: below - shift, ..picture });
+    let shift = (0 < shift).then_some(Rect { y: bottom, height: shift, ..picture });
+    Parts { picture, side: Some(Rect { x: area.x + width + 1, width: side, ..area }), trend, shift }
 }
 
 /// What the companions have asked for.
@@ -136,26 +133,10 @@ impl Companions {
 
     fn column(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let (width, dim) = (canvas.width(), cx.theme.dim());
-        let mut y = 0;
-        for (title, rows) in [(t!("alarms"), alarms(cx)), (t!("not normal"), not_normal(cx))] {
-            canvas.text(0, y, title, dim);
-            y += 1;
-            if rows.is_empty() {
-                canvas.text(0, y, t!("none"), dim);
-                y += 1;
-            }
-            for (text, style) in rows.iter().take(ROWS_MAX) {
-                for (n, line) in wrap(text, width.saturating_sub(INDENT)).into_iter().enumerate() {
-                    canvas.text(if n == 0 { 0 } else { INDENT }, y, &line, *style);
-                    y += 1;
-                }
-            }
-            if let more @ 1.. = rows.len().saturating_sub(ROWS_MAX) {
-                canvas.text(0, y, &t!("and {more} more", more), cx.theme.normal());
-                y += 1;
-            }
-            y += 1;
-        }
+        let mut lists = vec![(t!("needs action"), needs_action(cx)), (t!("not normal"), not_normal(cx))];
+        let others = [(t!("steps"), steps::rows(cx)), (t!("commands now"), may_change::rows(cx))];
+        lists.extend(others.into_iter().filter(|(_, rows)| !rows.is_empty()));
+        let mut y = sections(cx, canvas, ROWS_MAX, &lists);
         canvas.text(0, y, t!("last events"), dim);
         y += 1;
         let events = self.events(cx);
@@ -202,72 +183,14 @@ fn view(cx: &ViewContext, trend: Rect) -> View {
     View::live(cx.now, WINDOW_S, chart::dots(cx.theme, trend.width, units.len()))
 }
 
-/// The active alarms, in order of urgency.
-fn alarms(cx: &ViewContext) -> Vec<(String, Style)> {
-    let row = |alarm: &ActiveAlarm| {
-        let def = cx.def().alarm(alarm.id);
-        let (mark, since) = (cx.theme.priority_mark(def.priority), running(elapsed(since(alarm), cx.now)));
-        let text = format!("{mark} {since}  {} {}", subject(cx, alarm.id), def.message);
-        (text, cx.theme.alarm(def.priority, alarm.state, cx.flash()))
-    };
-    cx.snapshot.alarms.iter().map(row).collect()
-}
-
-/// Has a value of this cause been asked for in vain? What is not polled or stored is as it should be.
-fn is_trouble(cause: Cause) -> bool {
-    match cause {
-        Cause::Timeout
-        | Cause::Corrupt
-        | Cause::Exception
-        | Cause::Stale
-        | Cause::SensorFault
-        | Cause::Unscaled
-        | Cause::Undefined
-        | Cause::Unreadable => true,
-        Cause::NotRead
-        | Cause::NotReadBack
-        | Cause::DeviceDown
-        | Cause::NotConnected
-        | Cause::StationOff
-        | Cause::NotAuthorised
-        | Cause::NotStored => false,
-    }
-}
-
-/// Lines and devices that are not well, values that are bad or uncertain beside them, and how many alarms are suppressed.
-fn not_normal(cx: &ViewContext) -> Vec<(String, Style)> {
-    let (def, snapshot, trouble) = (cx.def(), cx.snapshot, cx.theme.trouble());
-    let lines = def.lines.iter().filter(|line| snapshot.line(line.id).state != LineState::Connected);
-    let lines = lines.map(|line| (format!("{}  {}", line.name, line_state_text(cx, line.id)), trouble));
-    let well = |device: &DeviceDef| snapshot.device(device.id).state == DeviceState::Responding;
-    let devices = def.devices.iter().filter(|device| !well(device));
-    let devices = devices.map(|device| (format!("{}  {}", device.name, device_text(cx, device.id)), trouble));
-    // What the state of its device does not explain.
-    let values = def.tags.iter().filter(|tag| well(def.device(tag.device)));
-    let values = values.filter(|tag| snapshot.sample(tag.id).quality.cause().is_some_and(is_trouble)).map(|tag| {
-        let shown = value::show(cx, tag.id);
-        (format!("{}  {} {}", tag.name, shown.text, shown.note), shown.style)
-    });
-    let suppressed = snapshot.suppressed.iter().filter(|alarm| alarm.state != AlarmState::SuppressedByDesign);
-    let suppressed = match suppressed.count() {
-        0 => None,
-        many => Some((t!("{many} alarms suppressed by operators", many), cx.theme.normal())),
-    };
-    lines.chain(devices).chain(values).chain(suppressed).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        plant::{
-            def::Priority,
-            record::AlarmEvent,
-            sample::{Quality, Sample},
-        },
+        plant::{def::Priority, record::AlarmEvent},
         ui::{
             Effect, Msg, QueryId,
-            fixture::{Fixture, now, with_cx},
+            fixture::{Fixture, now},
             tests::{model, screen},
             theme::Theme,
             update,
@@ -286,8 +209,8 @@ mod tests {
         check(109, 34, (109, 34), 0, 0);
         check(120, 34, (89, 24), 30, 10);
         check(120, 30, (89, 30), 30, 0);
-        check(160, 44, (108, 24), 51, 20);
-        check(200, 54, (143, 24), 56, 30);
+        check(160, 44, (108, 24), 51, 14);
+        check(200, 54, (143, 24), 56, 24);
     }
 
     #[test]
@@ -295,7 +218,7 @@ mod tests {
         for (width, height) in (60..260).flat_map(|width| (10..80).map(move |height| (width, height))) {
             let area = Rect::new(0, 4, width, height);
             let parts = parts((80, 18), area);
-            let all = [Some(parts.picture), parts.side, parts.trend];
+            let all = [Some(parts.picture), parts.side, parts.trend, parts.shift];
             for (n, part) in all.iter().enumerate() {
                 let Some(part) = part else { continue };
                 assert_eq!(part.intersection(area), *part, "{parts:?}");
@@ -304,23 +227,6 @@ mod tests {
             }
             assert!(parts.side.is_none() || 80 <= parts.picture.width, "the mimic is never cut for them: {parts:?}");
         }
-    }
-
-    #[test]
-    fn what_is_not_normal_is_listed_once() {
-        let rows = |fixture: &Fixture| {
-            let rows = with_cx(&fixture.snapshot(), not_normal);
-            rows.into_iter().map(|(text, _)| text).collect::<Vec<_>>()
-        };
-        assert!(rows(&Fixture::normal()).is_empty());
-        let mut stale = Fixture::normal();
-        let pv = stale.tag("TIC-1.PV");
-        stale.samples[pv.index()] = Sample { quality: Quality::Uncertain(Cause::Stale), ..stale.samples[pv.index()] };
-        let shown = rows(&stale);
-        assert!(shown.len() == 1 && shown[0].starts_with("TIC-1.PV  64.2?"), "{shown:?}");
-        // The line and its devices explain their values.
-        let down = rows(&Fixture::line_down());
-        assert!(down.len() == 3 && down[0].contains("not connected"), "{down:?}");
     }
 
     #[test]
@@ -344,7 +250,8 @@ mod tests {
             update(&mut model, Msg::Answer(id, Ok(answer)));
         }
         let shown = screen(&mut model, 120, 40);
-        for words in ["alarms", "00:41  TIC-1.PV", "not normal", "last events", "14:01:50  ‹2›! TIC-1.PV", "last hour"]
+        for words in
+            ["needs action", "00:41  TIC-1.PV", "not normal", "last events", "14:01:50  ‹2›! TIC-1.PV", "last hour"]
         {
             assert!(shown.contains(words), "{words}: {shown}");
         }

@@ -1,11 +1,10 @@
 //! Which item of a picture stands where.
 
-use super::placed;
 use crate::{
     plant::def::Picture,
     ui::{
         tabs::prelude::*,
-        widgets::mimic::{Bounds, place},
+        widgets::mimic::{Bounds, CanvasScale, place},
     },
 };
 use ratatui::layout::Position;
@@ -26,4 +25,16 @@ pub(super) fn item_at(picture: &Picture, area: Rect, at: Position) -> Option<usi
     let near = items.filter_map(|(n, item)| Some((distance(scale.place(place(item)?)), n)));
     let near = near.filter(|((x, y, _), _)| *x <= NEAR.0 && *y <= NEAR.1);
     near.min_by_key(|((x, y, size), _)| (x + 2 * y, *size)).map(|(_, n)| n)
+}
+
+/// The scale of a picture on an area.
+pub(super) fn scale(picture: &Picture, area: Rect) -> CanvasScale {
+    CanvasScale::new(picture.size, (area.width, area.height))
+}
+
+/// The scale of a picture, and its first column: one that is not stretched stands in the middle.
+pub(super) fn placed(picture: &Picture, area: Rect) -> (CanvasScale, u16) {
+    let scale = scale(picture, area);
+    let spare = area.width.saturating_sub(scale.column(picture.size.0));
+    (scale, spare / 2)
 }

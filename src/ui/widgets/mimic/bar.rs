@@ -11,27 +11,36 @@ use crate::{
     ui::{ViewContext, widgets::text::Canvas},
 };
 
-/// Draws the range with the band between the inner limits, the limits and the good value: `░░▒▒▒▒◆▒▒╎░░`.
+/// Draws the range with the normal band (else what lies between the inner limits, if there are any), the limits and the good value: `░░▒▒▒▒◆▒▒╎░░`.
 /// Upright it is filled up to the value. Without a good value it has none.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, tag: TagId, selected: bool) {
-    let (theme, upright) = (cx.theme, at.height > 1);
-    let length = if upright { at.height } else { at.width };
-    let mut canvas = canvas.part(at.x, at.y, at.width, at.height);
+    indicator(cx, &mut canvas.part(at.x, at.y, at.width, at.height), tag, selected);
+}
+
+/// The same on a canvas of its own. The PV of a controller has its setpoint on it.
+pub fn indicator(cx: &ViewContext, canvas: &mut Canvas, tag: TagId, selected: bool) {
+    let (across, height) = (canvas.width(), canvas.height());
+    let (theme, upright) = (cx.theme, height > 1);
+    let length = if upright { height } else { across };
     let cell = |n: u16| if upright { (0, length - 1 - n) } else { (n, 0) };
     let dim = if selected { theme.focus() } else { theme.dim() };
-    let across = if upright { at.width } else { 1 };
+    let across = if upright { across } else { 1 };
     let Some((min, max)) = cx.snapshot.range(tag) else { return };
     let place = |value: f64| {
         let share = (value - min) / (max - min);
         share.is_finite().then(|| to_u16((share.clamp(0.0, 1.0) * f64::from(length.saturating_sub(1))).round()))
     };
     let inner = |high: bool| limits(cx, tag).filter(move |(_, level)| is_high(*level) == high).map(|(limit, _)| limit);
-    let (low, high) = (inner(false).fold(min, f64::max), inner(true).fold(max, f64::min));
-    let (low, high) = (place(low).unwrap_or(0), place(high).unwrap_or(length.saturating_sub(1)));
+    let inside = || {
+        let has_limits = limits(cx, tag).next().is_some();
+        has_limits.then(|| [inner(false).fold(min, f64::max), inner(true).fold(max, f64::min)])
+    };
+    // Where neither is given nothing says what is normal.
+    let band = cx.def().tag(tag).normal.or_else(inside).and_then(|[low, high]| Some(place(low)?..=place(high)?));
     let value = cx.snapshot.sample(tag).good_value().and_then(place);
     for n in 0..length {
         let (x, y) = cell(n);
-        let band = (low..=high).contains(&n);
+        let band = band.as_ref().is_some_and(|band| band.contains(&n));
         let filled = upright && value.is_some_and(|value| n <= value);
         let (glyph, style) = match (filled, band) {
             (true, _) => (theme.pick('█', '#'), theme.normal()),
@@ -43,6 +52,12 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, tag: TagId, selec
     for (x, y) in limits(cx, tag).filter_map(|(limit, _)| place(limit)).map(cell) {
         let glyph = if upright { theme.pick('─', '-') } else { theme.pick('╎', '|') };
         canvas.run(x, y, across, glyph, theme.normal());
+    }
+    let faceplates = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref());
+    let controller = faceplates.into_iter().find(|faceplate| faceplate.pv == tag && !upright);
+    let sv = controller.and_then(|faceplate| cx.snapshot.sample(faceplate.sv_to_show()).good_value());
+    if let Some((x, y)) = sv.and_then(place).map(cell) {
+        canvas.glyph(x, y, theme.pick('▽', 'v'), theme.set_value());
     }
     if let Some((x, y)) = value.map(cell) {
         let style = alarm_mark(cx, tag).map_or(theme.strong(), |(_, style)| style.remove_modifier(Modifier::REVERSED));

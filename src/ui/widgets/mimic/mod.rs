@@ -174,12 +174,16 @@ pub(crate) fn limits(cx: &ViewContext, tag: TagId) -> impl Iterator<Item = (f64,
 
 /// Cuts words out of the liquid that they stand in: a number is read on the ground, not on a fill.
 pub(super) fn cut(canvas: &mut Canvas, x: u16, y: u16, length: u16) {
-    const LIQUID: &str = "█▁▂▃▄▅▆▇▒░";
     for column in x.saturating_sub(1)..x.saturating_add(length + 1).min(canvas.width()) {
-        if canvas.symbol(column, y).is_some_and(|symbol| LIQUID.contains(symbol)) {
+        if canvas.symbol(column, y).is_some_and(is_liquid) {
             canvas.glyph(column, y, ' ', Style::reset());
         }
     }
+}
+
+/// Is it a part of the liquid in a vessel?
+pub(super) fn is_liquid(symbol: &str) -> bool {
+    "█▁▂▃▄▅▆▇▒░".contains(symbol)
 }
 
 /// The mark of the most urgent alarm of a tag.
@@ -191,7 +195,7 @@ pub(super) fn alarm_mark(cx: &ViewContext, tag: TagId) -> Option<(&'static str, 
 
 /// Writes a value with unit, doubt and alarm mark; returns the column after it. What does not fit into the room or on
 /// the screen goes in this order: the mark, the unit, the number itself (`##`).
-pub(super) fn put_value(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
+pub(crate) fn put_value(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, tag: TagId, room: u16) -> u16 {
     let room = room.min(canvas.width().saturating_sub(x));
     let mark = alarm_mark(cx, tag);
     let taken = mark.map_or(0, |(mark, _)| super::text::width(mark) + 1);

@@ -1,12 +1,14 @@
 //! A vessel: its liquid follows the level, and is unknown without a good value; and what stands in it.
 
+use std::collections::BTreeMap;
+
 use crate::t;
 use ratatui::style::Style;
 
-use super::{Bounds, cut, label_style, limits, put_value};
+use super::{Bounds, cut, is_liquid, label_style, limits, put_value};
 use crate::{
     plant::{
-        def::TagId,
+        def::{Level, TagId},
         number::{to_u16, to_u32},
     },
     ui::{
@@ -33,12 +35,47 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, leve
     if let Some(eighths) = eighths(cx, level, rows) {
         liquid(cx, &mut canvas.part(1, 1, columns, rows), eighths);
     }
-    let Some((min, max)) = cx.snapshot.range(level) else { return };
-    for (limit, _) in limits(cx, level) {
+    for (row, _) in limit_rows(cx, level, rows) {
+        canvas.glyph(at.width.saturating_sub(1), 1 + row, '┤', cx.theme.normal());
+    }
+}
+
+/// The rows of the limits, in a vessel with so many inside, each with its letters.
+fn limit_rows(cx: &ViewContext, level: TagId, rows: u16) -> BTreeMap<u16, String> {
+    let mut marks: BTreeMap<u16, String> = BTreeMap::new();
+    let Some((min, max)) = cx.snapshot.range(level) else { return marks };
+    for (limit, kind) in limits(cx, level) {
         let share = (limit - min) / (max - min);
         if (0.0..=1.0).contains(&share) {
             let row = to_u16((f64::from(rows.saturating_sub(1)) * (1.0 - share)).round());
-            canvas.glyph(at.width.saturating_sub(1), 1 + row, '┤', cx.theme.normal());
+            let letters = match kind {
+                Level::HighHigh => "HH",
+                Level::High => "H",
+                Level::Low => "L",
+                Level::LowLow => "LL",
+            };
+            let mark = marks.entry(row).or_default();
+            *mark = if mark.is_empty() { letters.to_owned() } else { format!("{mark}/{letters}") };
+        }
+    }
+    marks
+}
+
+/// The letters of the limits, inside the right edge or else behind it. They are drawn when all else is, and never over it.
+pub fn limit_marks(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, level: TagId) {
+    for (row, letters) in limit_rows(cx, level, at.height.saturating_sub(2)) {
+        let (y, wide) = (at.y + 1 + row, width(&letters));
+        let edge = at.x + at.width.saturating_sub(1);
+        let inside = edge.saturating_sub(wide);
+        let is_free = |canvas: &Canvas, x: u16| {
+            let is_ground = |symbol: &str| symbol == " " || is_liquid(symbol);
+            (x.saturating_sub(1)..x + wide).all(|x| canvas.symbol(x, y).is_some_and(is_ground))
+        };
+        if at.width > wide + 3 && is_free(canvas, inside) {
+            cut(canvas, inside, y, wide);
+            canvas.text(inside, y, &letters, cx.theme.normal());
+        } else if canvas.is_blank(edge + 1, y, wide + 1) {
+            canvas.text(edge + 1, y, &letters, cx.theme.normal());
         }
     }
 }
