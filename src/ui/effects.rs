@@ -37,6 +37,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 effects.extend(show(model, Tab::Trends));
             }
             UiAction::Replay(at) => effects.push(model.replay.go_to(at)),
+            UiAction::EventPage(at) => effects.push(model.replay.open_page(at)),
             UiAction::ReplayStep(by) => effects.extend(model.replay.step(by, model.present_cx().now)),
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
             UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
@@ -78,6 +79,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     if !tab.has_past() {
         model.replay.leave();
     }
+    model.replay.close_page();
     model.visited.note(model.tabs.shown, tab);
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));

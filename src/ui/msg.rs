@@ -146,6 +146,8 @@ pub enum UiAction {
     ReplayStep(SignedDuration),
     /// Show the plant as it was at an instant.
     Replay(Timestamp),
+    /// The same on the event page.
+    EventPage(Timestamp),
     /// Give a command and watch its outcome.
     Command(CommandKind),
     /// The same with the confirmed value and the credentials.
@@ -212,6 +214,7 @@ impl UiAction {
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
             | UiAction::Replay(_)
+            | UiAction::EventPage(_)
             | UiAction::ReplayStep(_)
             | UiAction::SetLocale(_)
             | UiAction::Leave => Scope::View,

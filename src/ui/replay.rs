@@ -2,6 +2,8 @@
 //!
 //! What stands above the tab, header and banner, stays that of the present.
 
+mod instant;
+mod page;
 mod search;
 
 use std::{collections::VecDeque, sync::Arc};
@@ -11,9 +13,8 @@ use jiff::{SignedDuration, Timestamp};
 use super::{
     Effect, Model, QueryId, UiAction, ViewContext,
     keys::{Key, char, code},
-    modal::{Modal, Prompt},
+    modal::Modal,
     msg::Scope,
-    tabs::TabView,
 };
 use crate::{
     history::{Answer, HistoryError, Query},
@@ -22,11 +23,11 @@ use crate::{
         record::{ActionRecord, AlarmRecord},
         snapshot::Snapshot,
     },
-    report::period_parser::{self, PeriodError},
     t,
-    text::date,
 };
 use crossterm::event::KeyCode;
+pub use instant::{Asked, Place, ask_instant, instant, stamp, typed};
+pub use page::EventPage;
 use search::Search;
 
 /// Half a second of playing is so many times as long in the plant; 0 is paused.
@@ -116,6 +117,8 @@ pub struct Replay {
     ends: bool,
     /// Instants that will be played, each with its query and its answer.
     prefetched: VecDeque<(Timestamp, u32, Option<Shown>)>,
+    /// The page that is shown instead of a tab.
+    page: Option<EventPage>,
     /// Why the last query led nowhere.
     trouble: Option<String>,
     /// Queries asked so far.
@@ -149,6 +152,47 @@ impl Replay {
         self.requested.is_some_and(|(requested, _)| requested == number)
             || self.search.as_ref().is_some_and(|search| search.queries.contains(&number))
             || self.prefetched.iter().any(|(_, query, shown)| *query == number && shown.is_none())
+            || self.page.as_ref().is_some_and(|page| page.awaits(number))
+    }
+
+    /// The event page, if it is shown.
+    pub fn page(&self) -> Option<&EventPage> {
+        self.page.as_ref().filter(|_| self.shown.is_some())
+    }
+
+    /// The same, to scroll it.
+    pub fn page_mut(&mut self) -> Option<&mut EventPage> {
+        self.page.as_mut().filter(|_| self.shown.is_some())
+    }
+
+    /// Asks for an instant, which is shown on the event page.
+    pub fn open_page(&mut self, at: Timestamp) -> Effect {
+        self.page.get_or_insert_default();
+        self.go_to(at)
+    }
+
+    /// The event page instead of the tab, or the tab again; does nothing in the present.
+    pub fn toggle_page(&mut self, present: &ViewContext) -> Vec<Effect> {
+        if self.page.take().is_none() && self.shown.is_some() {
+            self.page = Some(EventPage::default());
+        }
+        self.ask_page(present)
+    }
+
+    /// A tab was chosen: it is shown.
+    pub fn close_page(&mut self) {
+        self.page = None;
+    }
+
+    /// Asks for what the event page shows around the instant, if it lacks that.
+    fn ask_page(&mut self, present: &ViewContext) -> Vec<Effect> {
+        let (Some(page), Some(shown)) = (&mut self.page, &self.shown) else { return Vec::new() };
+        let asked = &mut self.asked;
+        let ask = |query| {
+            *asked = asked.wrapping_add(1);
+            (*asked, Effect::Query(QueryId { tab: None, number: *asked }, query))
+        };
+        page.follow(shown, present, ask)
     }
 
     /// Back to the present.
@@ -229,7 +273,8 @@ impl Replay {
     }
 
     /// Half a second has passed: the next instant is shown if it has come. At the present the playing stops.
-    pub fn on_tick(&mut self, present: Timestamp) -> Vec<Effect> {
+    pub fn on_tick(&mut self, cx: &ViewContext) -> Vec<Effect> {
+        let present = cx.present();
         if let Some((.., shown @ Some(_))) = self.prefetched.front_mut() {
             self.shown = shown.take();
             self.prefetched.pop_front();
@@ -238,7 +283,7 @@ impl Replay {
         if self.prefetched.is_empty() {
             self.speed = 0;
         }
-        effects
+        effects.into_iter().chain(self.ask_page(cx)).collect()
     }
 
     fn prefetch(&mut self, present: Timestamp) -> Vec<Effect> {
@@ -266,6 +311,10 @@ impl Replay {
         if !self.awaits(number) {
             return Vec::new();
         }
+        if let Some(page) = self.page.as_mut().filter(|page| page.awaits(number)) {
+            page.on_answer(number, answer);
+            return Vec::new();
+        }
         match answer {
             Err(error) => {
                 let why = match error {
@@ -276,8 +325,9 @@ impl Replay {
                 };
                 self.pause();
                 (self.requested, self.search, self.trouble) = (None, None, Some(why));
+                self.page.take_if(|_| self.shown.is_none());
             }
-            Ok(Answer::Past(past)) => return self.on_past(number, &past, present).into_iter().collect(),
+            Ok(Answer::Past(past)) => return self.on_past(number, &past, present),
             Ok(Answer::Journal(rows)) => {
                 if let Some(search) = &mut self.search {
                     search.alarms = Some(rows);
@@ -295,60 +345,20 @@ impl Replay {
         Vec::new()
     }
 
-    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) -> Option<Effect> {
+    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) -> Vec<Effect> {
         let mut snapshot = past.snapshot(present.snapshot.def.clone());
         // Waiting and refreshing go by the time of the present.
         (snapshot.speed, snapshot.stepped) = (present.snapshot.speed, present.snapshot.stepped);
         let shown = Shown { at: past.at, snapshot: Arc::new(snapshot) };
         if self.requested.is_some_and(|(requested, _)| requested == number) {
             (self.requested, self.shown) = (None, Some(shown));
-            return self.next.take().map(|at| self.go_to(at));
+            let next = self.next.take().map(|at| self.go_to(at));
+            return self.ask_page(present).into_iter().chain(next).collect();
         } else if let Some((.., place)) = self.prefetched.iter_mut().find(|(_, query, _)| *query == number) {
             *place = Some(shown);
         }
-        None
+        Vec::new()
     }
-}
-
-/// Asks for an instant; Enter alone takes that of what is selected on the tab.
-pub fn ask_instant(cx: &ViewContext, tab: &dyn TabView) -> Modal {
-    let selected = tab.moment(cx);
-    let hint = t!("03:12   2026-11-20 22:15   -10m   -2h   -3d");
-    let hint = match selected {
-        Some(at) => t!("{hint}   Enter alone: {at}", hint, at = stamp(cx, at)),
-        None => hint.to_owned(),
-    };
-    Modal::Prompt(Prompt::new(t!("Replay: go to a past time"), hint, "").for_replay(selected))
-}
-
-/// `2026-11-20 03:12:07`, with milliseconds where it has some.
-pub fn stamp(cx: &ViewContext, at: Timestamp) -> String {
-    let form = if at.subsec_millisecond() == 0 { "%H:%M:%S" } else { "%H:%M:%S%.3f" };
-    let local = at.to_zoned(cx.def().time_zone.clone());
-    format!("{} {}", date(local.date()), local.strftime(form))
-}
-
-/// The instant that was typed: a time, a date with a time, or how long ago; nothing is the one that was selected.
-pub fn typed(cx: &ViewContext, text: &str, selected: Option<Timestamp>) -> Result<Vec<UiAction>, String> {
-    let at = selected.filter(|_| text.trim().is_empty()).map_or_else(|| instant(cx, text), Ok)?;
-    Ok(vec![UiAction::Replay(at)])
-}
-
-/// The same without what was selected.
-pub fn instant(cx: &ViewContext, text: &str) -> Result<Timestamp, String> {
-    let (present, text) = (cx.present(), text.trim());
-    let wrong =
-        || t!("`{text}` is not a past time: expected 03:12, 2026-11-20 22:15, or how long ago: -10m -2h -3d", text);
-    let Some(ago) = text.strip_prefix('-') else {
-        return period_parser::past_instant(cx.def(), text, present).map_err(|error| match error {
-            PeriodError::InFuture(text) => t!("{text} lies in the future", text),
-            _ => wrong(),
-        });
-    };
-    let span: jiff::Span = ago.trim().parse().map_err(|_| wrong())?;
-    let then = present.to_zoned(cx.def().time_zone.clone()).checked_sub(span.abs());
-    let then = then.and_then(|then| then.round(jiff::Unit::Second)).map_err(|_| wrong())?;
-    Ok(then.timestamp().min(present))
 }
 
 /// While the past is shown no command is given, and no form for one is opened.

@@ -50,7 +50,10 @@ pub(super) fn words(model: &Model, cx: &ViewContext) -> Option<String> {
 
 /// The keys of the replay, then those of the tab that only look; where Esc leads back on the tab it does not end the past.
 pub(super) fn hints(model: &Model, cx: &ViewContext) -> Vec<Hint> {
-    let own: Vec<Hint> = model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none()).collect();
+    let own: Vec<Hint> = match model.replay.page() {
+        Some(_) => vec![Hint::new("!", t!("tab"), ""), Hint::new("↑↓", t!("scroll"), "")],
+        None => model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none()).collect(),
+    };
     let is_escape = |hint: &Hint| hint.chord.is_some_and(|chord| chord == code(KeyCode::Esc));
     let (escape, own): (Vec<Hint>, Vec<Hint>) = own.into_iter().partition(is_escape);
     let replay = keys::hints(replay::KEYS).into_iter().filter(|hint| escape.is_empty() || !is_escape(hint));

@@ -1,9 +1,11 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
+mod commands;
 mod companions;
 mod point;
 mod preview;
 
+pub use commands::command_of;
 use companions::{Companions, Parts, parts};
 pub use preview::preview;
 
@@ -185,6 +187,16 @@ impl Mimic {
         (picture, parts(picture.size, area))
     }
 
+    /// The picture for a room, and its size.
+    pub fn size(&self, cx: &ViewContext, room: Rect) -> (u16, u16) {
+        self.shown(cx, room).0.size
+    }
+
+    /// Draws the shown page without what belongs to the tab: selection, small trends and companions.
+    pub fn draw_page(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        Mimic { page: self.page, ..Mimic::default() }.view(cx, frame, area);
+    }
+
     /// The selection and the trends are those of one picture: another page or another size begins with its own.
     fn follow(&mut self, picture: &Picture) {
         if std::mem::replace(&mut self.picture, (self.page, picture.size)) != (self.page, picture.size) {
@@ -300,8 +312,9 @@ impl Mimic {
                 sequence.view(cx, canvas, scale.place(*place), selected);
             }
             MimicItem::Trend { place, tag, window } => {
-                let trend = self.trends.iter().find(|(item, _)| *item == n);
-                let series = trend.and_then(|(_, trend)| trend.value.as_ref()?.first());
+                // The event page has curves of its own.
+                let Some((_, trend)) = self.trends.iter().find(|(item, _)| *item == n) else { return };
+                let series = trend.value.as_ref().and_then(|series| series.first());
                 trend::view(cx, canvas, scale.place(*place), *tag, *window, series, selected);
             }
             MimicItem::Text { place, text } => {
@@ -321,36 +334,6 @@ fn placed(picture: &Picture, area: Rect) -> (CanvasScale, u16) {
     let scale = scale(picture, area);
     let spare = area.width.saturating_sub(scale.column(picture.size.0));
     (scale, spare / 2)
-}
-
-/// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
-pub fn command_of(cx: &ViewContext, event: KeyEvent) -> Option<Modal> {
-    let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event))?;
-    command_window(cx, command)
-}
-
-/// The window of a plant command, or why it cannot be given: a fixed value, or the other of two known states, is confirmed;
-/// of two states the present one of which is unknown one is chosen from a list; any other value is entered.
-fn command_window(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
-    let tag = command.tag;
-    let def = cx.def().tag(tag);
-    if let Some(notice) = Notice::unreachable(cx, def.device) {
-        return Some(Modal::Notice(notice));
-    }
-    if let Some(value) = command.value {
-        return Some(Modal::Confirm(Confirm::write(cx, tag, value)));
-    }
-    if let Some(new) = interlock::other_state(cx, tag) {
-        return Some(Modal::Confirm(Confirm::write(cx, tag, new)));
-    }
-    // Unknown whether it runs: offer the stop, which never takes more than two keys.
-    if cx.def().logic.sequences.iter().any(|sequence| sequence.run == tag) {
-        return Some(Modal::Confirm(Confirm::write(cx, tag, 0.0)));
-    }
-    match def.enum_labels.as_slice() {
-        [_, _] => Some(Modal::Choice(Choice::values(cx, tag))),
-        _ => Modal::write(cx, tag),
-    }
 }
 
 /// The nearest item in a direction; the first one when none is selected; the same when there is none further on.

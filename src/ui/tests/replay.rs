@@ -1,6 +1,7 @@
 //! Replay: what an operator sees of a past instant, and that nothing is done there.
 
 mod forms;
+mod event_page;
 mod pages;
 
 use std::time::Duration;
