@@ -23,7 +23,7 @@ pub(crate) mod replay;
 pub(crate) mod screen_dump;
 pub(crate) mod rights;
 pub(crate) mod tabs;
-pub(crate) mod theme;
+pub mod theme;
 mod tour;
 mod visited;
 pub(crate) mod last_command;
