@@ -81,10 +81,25 @@ fn on_replay_key(model: &mut Model, action: replay::Action) -> Vec<UiAction> {
         Vec::new()
     } else if action == replay::Action::GoTo {
         on_global(model, Global::Replay)
+    } else if action == replay::Action::Bookmark {
+        vec![UiAction::Open(replay::ask_name(&model.cx()))]
     } else {
         model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect()
     };
     actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
+}
+
+/// Lists the bookmarks.
+fn on_bookmarks(model: &mut Model) -> Vec<UiAction> {
+    if session_lock::is_closed(&model.session) {
+        return Vec::new();
+    }
+    if model.bookmarks().is_empty() {
+        model.note = Some(t!("No bookmarks. In a replay # keeps its time under a name").into());
+        return Vec::new();
+    }
+    let palette = Palette::of_bookmarks(&model.cx(), model.bookmarks());
+    vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
 }
 
 /// Keys that mean the same in every window and while something is typed.
@@ -129,7 +144,7 @@ fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
     match target {
         Target::Key(chord) => return on_key(model, chord.event()),
         // It is typed again as fast as it is found.
-        Target::Instant(_) => {}
+        Target::Instant(_) | Target::Bookmark(_) => {}
         Target::Tab(_) | Target::Device(_) | Target::Tag(_) | Target::Trend(_) | Target::Alarm(_) => {
             model.recent.retain(|earlier| *earlier != target);
             model.recent.insert(0, target);
@@ -162,9 +177,10 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
         Global::Replay | Global::EventPage => on_past(model, global == Global::EventPage),
         Global::Palette if session_lock::is_closed(&model.session) => Vec::new(),
         Global::Palette => {
-            let palette = Palette::new(&model.cx(), model.tabs.shown(), &model.recent);
+            let palette = Palette::new(&model.cx(), model.tabs.shown(), model.bookmarks(), &model.recent);
             vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
         }
+        Global::Bookmarks => on_bookmarks(model),
         Global::Back | Global::Forward => {
             let (offered, shown) = (Tab::offered(&model.cx()), model.tabs.shown);
             let tab = model.visited.step(shown, &offered, global == Global::Forward);

@@ -4,6 +4,7 @@
 
 mod instant;
 mod page;
+mod refusal;
 mod search;
 
 use std::{collections::VecDeque, sync::Arc};
@@ -11,14 +12,13 @@ use std::{collections::VecDeque, sync::Arc};
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    Effect, Model, QueryId, UiAction, ViewContext,
+    Effect, QueryId, ViewContext,
     keys::{Key, char, code},
-    modal::Modal,
-    msg::Scope,
 };
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
+        def::Pen,
         past::Past,
         record::{ActionRecord, AlarmRecord},
         snapshot::Snapshot,
@@ -26,9 +26,10 @@ use crate::{
     t,
 };
 use crossterm::event::KeyCode;
-pub use instant::{Asked, Place, ask_instant, instant, stamp, typed};
+pub use instant::{Asked, Place, ask_instant, ask_name, instant, stamp, typed};
 pub use page::EventPage;
-use search::Search;
+pub(super) use refusal::{gives_command, refuse_commands, refused};
+use search::{Search, Searched};
 
 /// Half a second of playing is so many times as long in the plant; 0 is paused.
 const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
@@ -44,6 +45,12 @@ pub enum Action {
     Step(i64),
     /// Play, faster with each press, then pause.
     Play,
+    /// The next begin or end of a batch, or the previous one.
+    Batch(Direction),
+    /// The next stored value of a curve, or the previous one.
+    Sample(Direction),
+    /// Keep the instant under a name.
+    Bookmark,
     /// Ask for an instant.
     GoTo,
     /// Back to the present.
@@ -70,6 +77,11 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('.'), "second", "a second later; pauses", Action::Step(1)),
     Key::new(char('*'), "play", "play ×1, ×10, ×60, ×600, then pause", Action::Play),
     Key::new(char('@'), "time", "go to a past time", Action::GoTo),
+    Key::new(char('('), "", "previous stored value of what is drawn", Action::Sample(Direction::Earlier)),
+    Key::new(char(')'), "sample", "next stored value of what is drawn", Action::Sample(Direction::Later)),
+    Key::new(char('{'), "", "previous begin or end of a batch", Action::Batch(Direction::Earlier)),
+    Key::new(char('}'), "batch", "next begin or end of a batch", Action::Batch(Direction::Later)),
+    Key::new(char('#'), "bookmark", "keep this instant under a name", Action::Bookmark),
 ];
 
 /// A past instant of the plant.
@@ -88,6 +100,17 @@ pub enum Event {
     Alarm(AlarmRecord),
     /// An action of an operator.
     Action(ActionRecord),
+    /// A batch began, or it ended.
+    Batch {
+        /// When.
+        at: Timestamp,
+        /// Its name and number.
+        label: String,
+        /// It ended.
+        ended: bool,
+    },
+    /// A value was stored.
+    Sample(Timestamp),
 }
 
 impl Event {
@@ -96,6 +119,7 @@ impl Event {
         match self {
             Event::Alarm(record) => record.at,
             Event::Action(record) => record.at,
+            Event::Batch { at, .. } | Event::Sample(at) => *at,
         }
     }
 }
@@ -109,6 +133,8 @@ pub struct Replay {
     /// Where steps lead that were made meanwhile.
     next: Option<Timestamp>,
     search: Option<Search>,
+    /// The query for the time of a stored value.
+    sample: Option<u32>,
     /// The event that was gone to.
     event: Option<Event>,
     /// Place in [`SPEEDS`].
@@ -143,13 +169,14 @@ impl Replay {
 
     /// What it waits for, or why it did not get there.
     pub fn words(&self) -> Option<String> {
-        let waits = self.requested.is_some() || self.search.is_some();
+        let waits = self.requested.is_some() || self.search.is_some() || self.sample.is_some();
         self.trouble.clone().or_else(|| waits.then(|| t!("reading the history …").to_owned()))
     }
 
     /// Does it wait for this answer?
     pub fn awaits(&self, number: u32) -> bool {
         self.requested.is_some_and(|(requested, _)| requested == number)
+            || self.sample == Some(number)
             || self.search.as_ref().is_some_and(|search| search.queries.contains(&number))
             || self.prefetched.iter().any(|(_, query, shown)| *query == number && shown.is_none())
             || self.page.as_ref().is_some_and(|page| page.awaits(number))
@@ -179,6 +206,12 @@ impl Replay {
         self.ask_page(present)
     }
 
+    /// What is drawn of the instant.
+    fn drawn(&self) -> Vec<Pen> {
+        let of_page = self.page().map(|page| page.pens().to_vec());
+        of_page.or_else(|| self.shown().map(|shown| page::pens(&shown.snapshot, shown.at))).unwrap_or_default()
+    }
+
     /// A tab was chosen: it is shown.
     pub fn close_page(&mut self) {
         self.page = None;
@@ -203,7 +236,7 @@ impl Replay {
     /// Asks for an instant, which is shown when the answer comes; what is played stops.
     pub fn go_to(&mut self, at: Timestamp) -> Effect {
         self.pause();
-        (self.search, self.trouble, self.next) = (None, None, None);
+        (self.search, self.sample, self.trouble, self.next) = (None, None, None, None);
         let effect = self.ask(Query::Past { at });
         self.requested = Some((self.asked, at));
         effect
@@ -256,15 +289,17 @@ impl Replay {
         let Some(at) = self.shown().map(|shown| shown.at) else { return Vec::new() };
         match action {
             Action::Step(seconds) => self.step(SignedDuration::from_secs(seconds), present).into_iter().collect(),
-            Action::Event(direction) => self.search(direction, at, present),
+            Action::Event(direction) => self.search(Searched::Events, direction, at, present),
+            Action::Batch(direction) => self.search(Searched::Batches, direction, at, present),
+            Action::Sample(direction) => self.search_sample(direction, at, present),
             Action::Play => {
                 self.speed = (self.speed + 1) % SPEEDS.len();
-                (self.requested, self.search, self.trouble) = (None, None, None);
+                (self.requested, self.search, self.sample, self.trouble) = (None, None, None, None);
                 self.forget_prefetched();
                 self.prefetch(present)
             }
             // A window asks for it.
-            Action::GoTo => Vec::new(),
+            Action::GoTo | Action::Bookmark => Vec::new(),
             Action::Leave => {
                 self.leave();
                 Vec::new()
@@ -324,23 +359,11 @@ impl Replay {
                     other => other.to_string(),
                 };
                 self.pause();
-                (self.requested, self.search, self.trouble) = (None, None, Some(why));
+                (self.requested, self.search, self.sample, self.trouble) = (None, None, None, Some(why));
                 self.page.take_if(|_| self.shown.is_none());
             }
             Ok(Answer::Past(past)) => return self.on_past(number, &past, present),
-            Ok(Answer::Journal(rows)) => {
-                if let Some(search) = &mut self.search {
-                    search.alarms = Some(rows);
-                }
-                return self.on_found();
-            }
-            Ok(Answer::Actions(rows)) => {
-                if let Some(search) = &mut self.search {
-                    search.actions = Some(rows);
-                }
-                return self.on_found();
-            }
-            Ok(_) => {}
+            Ok(answer) => return self.on_found(number, answer),
         }
         Vec::new()
     }
@@ -359,32 +382,4 @@ impl Replay {
         }
         Vec::new()
     }
-}
-
-/// While the past is shown no command is given, and no form for one is opened.
-pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiAction> {
-    if model.replay.shown().is_none() {
-        return actions;
-    }
-    let count = actions.len();
-    let is_command = |action: &UiAction| match action.scope() {
-        Scope::Plant => true,
-        Scope::Window(modal) => gives_command(modal),
-        Scope::View | Scope::Files | Scope::Station => false,
-    };
-    let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();
-    if rest.len() < count {
-        model.note = Some(refused().into());
-    }
-    rest
-}
-
-/// Does a command come of this window? A form about users, as the password of a locked terminal, is not about the plant.
-pub(super) fn gives_command(modal: &Modal) -> bool {
-    !modal.only_looks() && !matches!(modal, Modal::UserForm(_))
-}
-
-/// Said of a key that would give a command.
-pub(super) fn refused() -> &'static str {
-    t!("This is the past: no commands. Esc returns to the present")
 }

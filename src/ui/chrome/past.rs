@@ -42,6 +42,9 @@ pub(super) fn words(model: &Model, cx: &ViewContext) -> Option<String> {
         let event = model.replay.event()?;
         let text = match event {
             Event::Alarm(record) => event_text(cx, record),
+            Event::Batch { label, ended: false, .. } => t!("batch {label} begins", label),
+            Event::Batch { label, ended: true, .. } => t!("batch {label} ends", label),
+            Event::Sample(_) => t!("a value was stored").to_owned(),
             Event::Action(record) => action_text(cx, record).split_whitespace().collect::<Vec<_>>().join(" "),
         };
         Some(text)

@@ -13,6 +13,9 @@ use crate::{
     },
 };
 
+/// Characters of the name of a bookmark.
+const NAME_MAX: usize = 60;
+
 /// What a typed instant is for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asked {
@@ -29,6 +32,8 @@ pub enum Place {
     Tab,
     /// On the event page.
     Page,
+    /// Nowhere: the text is the name of the instant that is shown.
+    Bookmark,
     /// On the tab, that of an alarm on the event page: what an alarm is about is never on one tab alone.
     TabOrPage,
 }
@@ -43,7 +48,7 @@ pub fn ask_instant(cx: &ViewContext, tab: &dyn TabView, place: Place) -> Modal {
     };
     let title = match place {
         Place::Page => t!("Event page: everything at a past time"),
-        Place::Tab | Place::TabOrPage => t!("Replay: go to a past time"),
+        Place::Tab | Place::TabOrPage | Place::Bookmark => t!("Replay: go to a past time"),
     };
     Modal::Prompt(Prompt::new(title, hint, "").for_replay(Asked { selected, place }))
 }
@@ -58,13 +63,29 @@ pub fn stamp(cx: &ViewContext, at: Timestamp) -> String {
 /// The instant that was typed: a time, a date with a time, or how long ago; nothing is the one that was selected.
 pub fn typed(cx: &ViewContext, text: &str, asked: Asked) -> Result<Vec<UiAction>, String> {
     let selected = asked.selected.filter(|_| text.trim().is_empty());
-    let at = selected.map_or_else(|| instant(cx, text), Ok)?;
+    let instant = || selected.map_or_else(|| instant(cx, text), Ok);
     let page = match asked.place {
         Place::Tab => false,
         Place::Page => true,
+        Place::Bookmark => return name(cx, text),
         Place::TabOrPage => selected.is_some(),
     };
+    let at = instant()?;
     Ok(vec![if page { UiAction::EventPage(at) } else { UiAction::Replay(at) }])
+}
+
+/// Keeps the instant under this name.
+fn name(cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+    match text.trim() {
+        "" => Err(t!("expected a name").to_owned()),
+        name => Ok(vec![UiAction::Bookmark(cx.now, Some(name.chars().take(NAME_MAX).collect()))]),
+    }
+}
+
+/// Asks for the name of the instant that is shown.
+pub fn ask_name(cx: &ViewContext) -> Modal {
+    let asked = Asked { selected: None, place: Place::Bookmark };
+    Modal::Prompt(Prompt::new(t!("Bookmark: a name for this time"), stamp(cx, cx.now), "").for_replay(asked))
 }
 
 /// The same without what was selected.

@@ -140,6 +140,11 @@ impl EventPage {
         }
     }
 
+    /// Its curves.
+    pub fn pens(&self) -> &[Pen] {
+        &self.pens
+    }
+
     /// Scrolls the journal away from the instant; the first and the last row are those at the instant again.
     pub fn scroll(&mut self, motion: Motion) {
         let most = self.alarms.as_ref().map_or(0, Vec::len) + self.actions.as_ref().map_or(0, Vec::len);
@@ -223,7 +228,7 @@ impl EventPage {
 }
 
 /// The curves of an instant: what the alarm is about that was raised last, and its group; else the first group.
-fn pens(snapshot: &Snapshot, at: Timestamp) -> Vec<Pen> {
+pub(super) fn pens(snapshot: &Snapshot, at: Timestamp) -> Vec<Pen> {
     let since = at.checked_sub(CAUSE).unwrap_or(at);
     let raised = snapshot.alarms.iter().filter(|alarm| since <= alarm.raised_at && alarm.state != AlarmState::Shelved);
     let about = raised.max_by_key(|alarm| alarm.raised_at).map(|alarm| snapshot.def.alarm(alarm.id).subject);

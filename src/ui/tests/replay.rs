@@ -3,6 +3,7 @@
 mod forms;
 mod event_page;
 mod pages;
+mod steps;
 
 use std::time::Duration;
 
