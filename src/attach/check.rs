@@ -26,6 +26,8 @@ const SETTINGS_BYTES_MAX: usize = 4 << 10;
 pub const BUCKETS_MAX: usize = 4_096;
 /// Most columns of all curves of one query.
 pub const COLUMNS_MAX: usize = 65_536;
+/// The longest span in which the time of a value is searched.
+const SAMPLE_SPAN_MAX: SignedDuration = SignedDuration::from_hours(2);
 /// Most curves of one query.
 pub const SERIES_MAX: usize = 64;
 /// Most rows of one answer.
@@ -113,6 +115,12 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
             let columns = tags.len() * buckets;
             if COLUMNS_MAX < columns {
                 return Err(format!("{columns} columns of all curves, expected at most {COLUMNS_MAX}"));
+            }
+            tags.iter().try_for_each(|id| tag(def, *id))
+        }
+        Query::SampleTime { tags, from, to, .. } => {
+            if SERIES_MAX < tags.len() || SAMPLE_SPAN_MAX < to.duration_since(*from) {
+                return Err(format!("a search of {} curves, expected at most {SERIES_MAX} and 2 h", tags.len()));
             }
             tags.iter().try_for_each(|id| tag(def, *id))
         }

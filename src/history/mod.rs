@@ -131,6 +131,17 @@ pub enum Query {
         /// At most so many.
         limit: usize,
     },
+    /// When the first value of some tags was stored in a span, or the latest.
+    SampleTime {
+        /// Which tags.
+        tags: Vec<TagId>,
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// The latest one.
+        latest: bool,
+    },
     /// The plant as it was at an instant.
     Past {
         /// The instant.
@@ -168,6 +179,8 @@ pub enum Answer {
     Values(Vec<Vec<Option<HeldValue>>>),
     /// The batches.
     Batches(Vec<BatchReport>),
+    /// The time; `None` where nothing is stored in the span.
+    SampleTime(Option<Timestamp>),
     /// What is known of the instant.
     Past(Box<Past>),
     /// Samples in order of time.

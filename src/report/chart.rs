@@ -164,7 +164,7 @@ impl Chart {
             }
         }
         let mut at = left;
-        page.text((left - 4.0, top - TEXT.0 * 0.6), Anchor::End, panel.unit, Ink::Text);
+        page.text((left - 4.0, top - TEXT.0 * 0.9), Anchor::End, panel.unit, Ink::Text);
         for (n, curve) in &panel.curves {
             page.line(vec![(at, top - TEXT.0 * 0.6), (at + 16.0, top - TEXT.0 * 0.6)], Ink::Pen(*n), 2.0, false);
             page.text((at + 20.0, top - TEXT.0 * 0.6), Anchor::Start, curve.name.as_str(), Ink::Text);

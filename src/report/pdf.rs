@@ -20,8 +20,8 @@ use super::{ReportFormat, Style, document::Document, drawing::Ink};
 use crate::plant::number::{to_u8, to_u16};
 
 /// Letters of all texts.
-const REGULAR: &[u8] = include_bytes!("../../vendor/fonts/Sarabun-Regular.ttf");
-const BOLD: &[u8] = include_bytes!("../../vendor/fonts/Sarabun-Bold.ttf");
+const REGULAR: &[u8] = include_bytes!("pdf/fonts/Sarabun-Regular.ttf");
+const BOLD: &[u8] = include_bytes!("pdf/fonts/Sarabun-Bold.ttf");
 
 /// The format `pdf`.
 #[derive(Debug)]

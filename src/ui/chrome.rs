@@ -43,7 +43,10 @@ pub fn view(model: &Model, frame: &mut Frame) {
     let cx = &super::context::context(model, frame.area());
     tab_bar(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.tabs));
     past::rule(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.rule));
-    model.tabs.shown().view(cx, frame, parts.body);
+    match model.replay.page() {
+        Some(page) => page.view(cx, present, &model.tabs, frame, parts.body),
+        None => model.tabs.shown().view(cx, frame, parts.body),
+    }
     status(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.status));
     if let Some(tour) = &model.tour {
         // The line above the tab says which past is shown; the smallest screen has none.

@@ -124,6 +124,12 @@ pub(super) fn view_context<'a>(
     ViewContext { snapshot, theme, preferences, now, present: None, phase: clock.phase, area, size, extension, session }
 }
 
+/// Lets the replay change while it reads the present.
+pub(super) fn with_replay<T>(model: &mut Model, change: impl FnOnce(&mut Replay, &ViewContext) -> T) -> T {
+    let Model { snapshot, theme, preferences, clock, extension, session, screen, replay, .. } = model;
+    change(replay, &view_context(snapshot, (theme, preferences), *clock, *screen, extension, session))
+}
+
 /// Lets the tabs change while they read the rest of the model.
 pub(super) fn with_tabs(
     model: &mut Model,

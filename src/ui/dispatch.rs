@@ -2,6 +2,7 @@
 
 use super::*;
 use modal::{Next, TerminalSettings};
+use widgets::list::Motion;
 
 /// Choices of the palette that are remembered.
 const RECENT_MAX: usize = 8;
@@ -65,6 +66,7 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         // No command goes to what is not visible.
         Some(_) | None if model.small() => Vec::new(),
         Some(global) => on_global(model, global),
+        None if model.replay.page().is_some() => on_page_key(model, event),
         None if !model.may_act(event) => Vec::new(),
         None => on_tab_key(model, event),
     }
@@ -73,15 +75,31 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
 /// A key of the past that is shown; what lies on top of the tab closes before the past does.
 fn on_replay_key(model: &mut Model, action: replay::Action) -> Vec<UiAction> {
     let present = model.present_cx().now;
-    let closed = action == replay::Action::Leave && !model.small() && step_back(model);
+    let on_tab = model.replay.page().is_none() && !model.small();
+    let closed = action == replay::Action::Leave && on_tab && step_back(model);
     let actions = if closed {
         Vec::new()
     } else if action == replay::Action::GoTo {
         on_global(model, Global::Replay)
+    } else if action == replay::Action::Bookmark {
+        vec![UiAction::Open(replay::ask_name(&model.cx()))]
     } else {
         model.replay.on_key(action, present).into_iter().map(UiAction::Do).collect()
     };
     actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
+}
+
+/// Lists the bookmarks.
+fn on_bookmarks(model: &mut Model) -> Vec<UiAction> {
+    if session_lock::is_closed(&model.session) {
+        return Vec::new();
+    }
+    if model.bookmarks().is_empty() {
+        model.note = Some(t!("No bookmarks. In a replay # keeps its time under a name").into());
+        return Vec::new();
+    }
+    let palette = Palette::of_bookmarks(&model.cx(), model.bookmarks());
+    vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
 }
 
 /// Keys that mean the same in every window and while something is typed.
@@ -97,6 +115,17 @@ fn on_key_of_every_window(model: &mut Model, event: KeyEvent) -> Option<Vec<UiAc
 fn dump_window(model: &mut Model, event: KeyEvent) -> Option<Vec<UiAction>> {
     let shows = model.modal.as_ref().is_some_and(|modal| modal.only_looks() && !modal.takes_text());
     (shows && keys::find(&keys::global(), event) == Some(Global::Dump)).then(|| on_global(model, Global::Dump))
+}
+
+/// A key of the event page, which has the place of the tab.
+fn on_page_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
+    match (Motion::from_key(event), model.replay.page_mut()) {
+        (Some(motion), Some(page)) => page.scroll(motion),
+        (None, _) | (_, None) => {
+            model.note = Some(t!("This is the event page: a digit or ! leads to the tabs, Esc to the present").into());
+        }
+    }
+    Vec::new()
 }
 
 /// A key of the shown tab; one that is none is answered with where they are listed.
@@ -115,7 +144,7 @@ fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
     match target {
         Target::Key(chord) => return on_key(model, chord.event()),
         // It is typed again as fast as it is found.
-        Target::Instant(_) => {}
+        Target::Instant(_) | Target::Bookmark(_) => {}
         Target::Tab(_)
         | Target::Overview
         | Target::Device(_)
@@ -150,14 +179,13 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             model.note = Some(replay::refused().into());
             Vec::new()
         }
-        // A bench has no history.
-        Global::Replay if model.snapshot.def.is_bench() || session_lock::is_closed(&model.session) => Vec::new(),
-        Global::Replay => vec![UiAction::Open(replay::ask_instant(&model.cx(), model.tabs.shown()))],
+        Global::Replay | Global::EventPage => on_past(model, global == Global::EventPage),
         Global::Palette if session_lock::is_closed(&model.session) => Vec::new(),
         Global::Palette => {
-            let palette = Palette::new(&model.cx(), model.tabs.shown(), &model.recent);
+            let palette = Palette::new(&model.cx(), model.tabs.shown(), model.bookmarks(), &model.recent);
             vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
         }
+        Global::Bookmarks => on_bookmarks(model),
         Global::Back | Global::Forward => {
             let (offered, shown) = (Tab::offered(&model.cx()), model.tabs.shown);
             let tab = model.visited.step(shown, &offered, global == Global::Forward);
@@ -205,6 +233,32 @@ fn step_back(model: &mut Model) -> bool {
     closed
 }
 
+/// A past instant is wanted, on the event page or on the tab: that of what is selected, or one that is typed.
+fn on_past(model: &mut Model, page: bool) -> Vec<UiAction> {
+    // A bench has no history.
+    if model.snapshot.def.is_bench() || session_lock::is_closed(&model.session) {
+        return Vec::new();
+    }
+    if page && model.replay.shown().is_some() {
+        return with_replay(model, Replay::toggle_page).into_iter().map(UiAction::Do).collect();
+    }
+    let (cx, tab) = (model.cx(), model.tabs.shown());
+    match tab.moment(&cx).filter(|_| page) {
+        Some(at) => vec![UiAction::EventPage(at)],
+        None => {
+            let of_alarms = model.tabs.shown == Tab::Alarms;
+            let place = if page {
+                replay::Place::Page
+            } else if of_alarms {
+                replay::Place::TabOrPage
+            } else {
+                replay::Place::Tab
+            };
+            vec![UiAction::Open(replay::ask_instant(&cx, tab, place))]
+        }
+    }
+}
+
 /// The screen has another size: a tab that it has no room for gives way to the values, as long as these are offered.
 pub(super) fn fit_screen(model: &mut Model) {
     if Size::of(model.screen) == Size::Compact && !model.tabs.shown.is_compact() {
@@ -230,7 +284,10 @@ pub(super) fn close_unseen(model: &mut Model) {
 
 /// Copies what is selected, and says so.
 fn copy(model: &mut Model) -> Vec<UiAction> {
-    let lines = model.tabs.shown().copied(&model.cx());
+    let lines = match model.replay.page() {
+        Some(page) => page.copied(&model.cx()),
+        None => model.tabs.shown().copied(&model.cx()),
+    };
     let Some(first) = lines.first() else {
         model.note = Some(t!("Nothing is selected that can be copied").into());
         return Vec::new();

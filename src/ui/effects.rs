@@ -1,6 +1,12 @@
 //! What the actions of tabs and windows become: changes of the model, and effects.
 
+use jiff::Timestamp;
+
 use super::*;
+use preferences::{Bookmark, Kept};
+
+/// Bookmarks of one user; the oldest make room for new ones.
+const BOOKMARKS_MAX: usize = 100;
 
 pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> {
     let mut effects = Vec::new();
@@ -41,6 +47,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 effects.extend(show(model, Tab::Trends));
             }
             UiAction::Replay(at) => effects.push(model.replay.go_to(at)),
+            UiAction::EventPage(at) => effects.push(model.replay.open_page(at)),
             UiAction::ReplayStep(by) => effects.extend(model.replay.step(by, model.present_cx().now)),
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
             UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
@@ -56,15 +63,35 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             UiAction::KeepPreferences(chosen) => {
                 model.modal.take_if(|modal| matches!(modal, Modal::TerminalSettings(_)));
                 let user = model.user().map(str::to_owned);
-                model.preferences_file.set(user.as_deref(), chosen);
+                let chosen = Kept::Preferences(chosen);
+                model.preferences_file.set(user.as_deref(), chosen.clone());
                 effects.push(Effect::KeepPreferences(user, chosen));
             }
+            UiAction::Bookmark(at, name) => effects.push(bookmark(model, at, name)),
             UiAction::SetLocale(locale) => model.set_locale(locale),
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
         }
     }
     effects
+}
+
+/// Keeps an instant under a name, in order of time, or forgets it.
+fn bookmark(model: &mut Model, at: Timestamp, name: Option<String>) -> Effect {
+    let user = model.user().map(str::to_owned);
+    let mut all = model.preferences_file.bookmarks(user.as_deref()).to_vec();
+    all.retain(|mark| mark.at != at);
+    model.note = Some(match &name {
+        Some(name) => t!("Bookmark kept: {name}", name).into(),
+        None => t!("Bookmark removed").into(),
+    });
+    all.extend(name.map(|name| Bookmark { at, name }));
+    all.sort_by_key(|mark| mark.at);
+    let surplus = all.len().saturating_sub(BOOKMARKS_MAX);
+    all.drain(..surplus);
+    let kept = Kept::Bookmarks(all);
+    model.preferences_file.set(user.as_deref(), kept.clone());
+    Effect::KeepPreferences(user, kept)
 }
 
 /// Shown where a small screen cannot show what a key leads to.
@@ -82,6 +109,7 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     if !tab.has_past() {
         model.replay.leave();
     }
+    model.replay.close_page();
     model.visited.note(model.tabs.shown, tab);
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));

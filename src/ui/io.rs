@@ -27,7 +27,7 @@ use super::{
     Effect, Leaving, Model, Msg, QueryId,
     extension::{Extension, ExtensionMessage},
     mouse::Pointer,
-    preferences::{Preferences, PreferencesFile},
+    preferences::{Kept, PreferencesFile},
     tabs::{Tab, registers::Start},
     theme::Theme,
     update, view,
@@ -328,11 +328,11 @@ impl Loop {
         });
     }
 
-    fn keep_preferences(&self, user: Option<String>, chosen: Preferences) {
+    fn keep_preferences(&self, user: Option<String>, kept: Kept) {
         let outbox = self.outbox.clone();
         let plants = self.model.plants;
         tokio::task::spawn_blocking(move || {
-            let kept = preferences::keep(user.as_deref(), chosen);
+            let kept = preferences::keep(user.as_deref(), kept);
             let _ = outbox.blocking_send((plants, Msg::Preferences(kept)));
         });
     }

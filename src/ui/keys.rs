@@ -193,6 +193,10 @@ pub enum Global {
     Dismiss,
     /// Show a past instant of the plant.
     Replay,
+    /// Show a past instant on one page.
+    EventPage,
+    /// List the bookmarks.
+    Bookmarks,
     /// Go to anything by its name.
     Palette,
     /// The tab before.
@@ -225,6 +229,8 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(char('['), "", "back to the tab before", Global::Back),
     Key::new(char(']'), "", "forward again", Global::Forward),
     Key::new(char('@'), "", "replay: the plant as it was at a past time", Global::Replay),
+    Key::new(char('!'), "", "event page: mimic, curves, journal, frames, people at one past time", Global::EventPage),
+    Key::new(char('\''), "", "bookmarks: past times that were kept under a name", Global::Bookmarks),
     Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
     Key::new(char('L'), "", "change the language of the screens", Global::Language),
     Key::new(ctrl('t'), "", "change the language, in every window too", Global::Language),

@@ -23,7 +23,7 @@ pub(crate) mod replay;
 pub(crate) mod screen_dump;
 pub(crate) mod rights;
 pub(crate) mod tabs;
-pub(crate) mod theme;
+pub mod theme;
 mod tour;
 mod visited;
 pub(crate) mod last_command;
@@ -35,7 +35,7 @@ pub(crate) mod fixture;
 mod tests;
 
 pub use context::ViewContext;
-use context::{past_context, view_context, with_tabs};
+use context::{past_context, view_context, with_replay, with_tabs};
 use dispatch::on_key;
 use effects::perform;
 use std::{borrow::Cow, sync::Arc, time::Duration};
@@ -347,8 +347,7 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     let rings = model.preferences.bell == Bell::Repeated
         && bell::rings_again(&model.snapshot, phase.wrapping_sub(model.rang_at));
     let bell = rings.then(|| ring(model));
-    let present = model.present_cx().now;
-    let played = model.replay.on_tick(present).into_iter().map(UiAction::Do);
+    let played = with_replay(model, Replay::on_tick).into_iter().map(UiAction::Do).collect::<Vec<_>>();
     bell.into_iter().chain(played).chain(with_tabs(model, |tabs, cx| tabs.on_tick(cx))).collect()
 }
 
@@ -358,9 +357,8 @@ fn on_replayed(model: &mut Model, number: u32, answer: Result<Answer, HistoryErr
         // What is being filled in is of the present.
         model.replay.cancel();
     }
-    let Model { snapshot, theme, preferences, clock, extension, session, screen, replay, tabs, visited, .. } = model;
-    let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, session);
-    let asked = replay.on_answer(number, answer, &present);
+    let asked = with_replay(model, |replay, present| replay.on_answer(number, answer, present));
+    let Model { snapshot, replay, tabs, visited, .. } = model;
     if replay.shown().is_some() && !tabs.shown.has_past() {
         let home = Tab::home(&snapshot.def);
         visited.note(tabs.shown, home);

@@ -54,9 +54,9 @@ fn press(model: &mut Model, code: KeyCode) -> Vec<UiAction> {
 
 /// Selects what the shown tab has at this place; `None` where that is a matter of rows.
 fn point(model: &mut Model, at: Position) -> Option<Vec<UiAction>> {
-    let mut taken = false;
+    let (mut taken, is_page) = (false, model.replay.page().is_some());
     let actions = with_tabs(model, |tabs, cx| {
-        taken = cx.area.contains(at) && tabs.shown_mut().on_point(cx, at);
+        taken = !is_page && cx.area.contains(at) && tabs.shown_mut().on_point(cx, at);
         if taken { tabs.shown_mut().on_snapshot(cx) } else { Vec::new() }
     });
     taken.then_some(actions)
@@ -64,6 +64,9 @@ fn point(model: &mut Model, at: Position) -> Option<Vec<UiAction>> {
 
 /// Moves the selection of the window or tab to the row at this place, as the arrow keys would.
 fn select(model: &mut Model, at: Position) -> Vec<UiAction> {
+    if model.modal.is_none() && model.replay.page().is_some() {
+        return Vec::new();
+    }
     if model.modal.is_none()
         && let Some(actions) = point(model, at)
     {

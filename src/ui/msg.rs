@@ -9,7 +9,7 @@ use super::{
     extension::{Extension, ExtensionMessage},
     modal::Modal,
     mouse::Pointer,
-    preferences::{Preferences, PreferencesFile},
+    preferences::{Kept, Preferences, PreferencesFile},
     tabs::{Tab, registers::Start},
 };
 use crate::{
@@ -107,7 +107,7 @@ pub enum Effect {
         new: bool,
     },
     /// Keep what this user has chosen; answered by [`Msg::Preferences`].
-    KeepPreferences(Option<String>, Preferences),
+    KeepPreferences(Option<String>, Kept),
     /// Put a text into the clipboard of the terminal.
     Copy(String),
     /// Ring the bell of the terminal once.
@@ -148,6 +148,10 @@ pub enum UiAction {
     ReplayStep(SignedDuration),
     /// Show the plant as it was at an instant.
     Replay(Timestamp),
+    /// The same on the event page.
+    EventPage(Timestamp),
+    /// Keep a past instant under a name; without one its bookmark is removed.
+    Bookmark(Timestamp, Option<String>),
     /// Give a command and watch its outcome.
     Command(CommandKind),
     /// The same with the confirmed value and the credentials.
@@ -204,6 +208,7 @@ impl UiAction {
             | UiAction::SendCommand(..)
             | UiAction::Do(Effect::Command(..) | Effect::Extension(_)) => Scope::Plant,
             UiAction::KeepPreferences(_)
+            | UiAction::Bookmark(..)
             | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
             | UiAction::Do(Effect::SaveReport { .. } | Effect::Append { new: true, .. } | Effect::Load { .. }) => {
                 Scope::Files
@@ -215,6 +220,7 @@ impl UiAction {
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)
             | UiAction::Replay(_)
+            | UiAction::EventPage(_)
             | UiAction::ReplayStep(_)
             | UiAction::SetLocale(_)
             | UiAction::Leave => Scope::View,

@@ -5,6 +5,8 @@ mod tests;
 
 use std::collections::BTreeMap;
 
+use jiff::Timestamp;
+
 use super::{
     Model,
     modal::Modal,
@@ -14,7 +16,7 @@ use crate::{
     plant::keyword::keyword_enum,
     profile::{
         diagnostic::{Problems, Span},
-        reader::{self, At, Node, OptionalKey, Raw, Value, toml_tables},
+        reader::{self, At, Node, OptionalKey, Raw, Texts, Value, toml_tables},
     },
     t,
     text::{Language, Locale},
@@ -90,6 +92,37 @@ impl Preferences {
     }
 }
 
+/// A past instant with a name, to go to again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Bookmark {
+    /// The instant.
+    pub at: Timestamp,
+    /// What its user calls it.
+    pub name: String,
+}
+
+impl Bookmark {
+    fn parse(text: &str) -> Option<Bookmark> {
+        let (at, name) = text.split_once(' ').unwrap_or((text, ""));
+        Some(Bookmark { at: at.parse().ok()?, name: name.to_owned() })
+    }
+}
+
+/// What a user wants kept.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kept {
+    /// Looks and sounds.
+    Preferences(Preferences),
+    /// All bookmarks.
+    Bookmarks(Vec<Bookmark>),
+}
+
+impl From<Preferences> for Kept {
+    fn from(chosen: Preferences) -> Kept {
+        Kept::Preferences(chosen)
+    }
+}
+
 /// The preferences of all users of an account.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PreferencesFile {
@@ -100,6 +133,8 @@ pub struct PreferencesFile {
     /// For a terminal without a login, and for users without a section.
     default: Preferences,
     users: BTreeMap<String, Preferences>,
+    /// Bookmarks of each user; those of a terminal without a login are of the empty name.
+    bookmarks: BTreeMap<String, Vec<Bookmark>>,
 }
 
 toml_tables! {
@@ -107,6 +142,7 @@ toml_tables! {
     FileTable, "the preferences" {
         opt "default" default: SectionTable,
         opt "users" users: Raw,
+        opt "bookmarks" bookmarks: Raw,
     }
     /// What one user has chosen.
     SectionTable, "the preferences of a user" {
@@ -144,11 +180,19 @@ impl PreferencesFile {
         user.and_then(|user| self.users.get(user)).copied().unwrap_or(self.default)
     }
 
-    /// Takes in what this user has chosen.
-    pub fn set(&mut self, user: Option<&str>, chosen: Preferences) {
-        match user {
-            Some(user) => drop(self.users.insert(user.to_owned(), chosen)),
-            None => self.default = chosen,
+    /// The bookmarks of this user.
+    pub fn bookmarks(&self, user: Option<&str>) -> &[Bookmark] {
+        self.bookmarks.get(user.unwrap_or_default()).map_or(&[], Vec::as_slice)
+    }
+
+    /// Takes in what this user wants kept.
+    pub fn set(&mut self, user: Option<&str>, kept: impl Into<Kept>) {
+        match (kept.into(), user) {
+            (Kept::Preferences(chosen), Some(user)) => drop(self.users.insert(user.to_owned(), chosen)),
+            (Kept::Preferences(chosen), None) => self.default = chosen,
+            (Kept::Bookmarks(all), user) => {
+                drop(self.bookmarks.insert(user.unwrap_or_default().to_owned(), all));
+            }
         }
     }
 
@@ -168,6 +212,10 @@ impl PreferencesFile {
                 let section = SectionTable::read(&value, at, &mut problems);
                 file.users.extend(section.map(|section| (user, of_section(&section))));
             }
+            let bookmarks = table.bookmarks.map(|all| all.value.table).unwrap_or_default();
+            for (user, (_, At { value, at })) in bookmarks {
+                file.bookmarks.extend(of_bookmarks(&value, at, &mut problems).map(|all| (user, all)));
+            }
         }
         if let Err(errors) = problems.finish(()) {
             let first = errors.full_lines().next().unwrap_or_default();
@@ -182,10 +230,33 @@ impl PreferencesFile {
     /// Its text.
     pub fn text(&self) -> String {
         let users: toml::Table = self.users.iter().map(|(user, chosen)| (user.clone(), section(chosen))).collect();
-        let tables = [("default".to_owned(), section(&self.default)), ("users".to_owned(), users.into())];
-        let body: toml::Table = tables.into_iter().collect();
+        let mut body = toml::Table::new();
+        body.insert("default".to_owned(), section(&self.default));
+        body.insert("users".to_owned(), users.into());
+        let line = |mark: &Bookmark| toml::Value::from(format!("{} {}", mark.at, mark.name));
+        let all = |marks: &Vec<Bookmark>| marks.iter().map(line).collect::<Vec<_>>().into();
+        let kept = self.bookmarks.iter().filter(|(_, marks)| !marks.is_empty());
+        let kept: toml::Table = kept.map(|(user, marks)| (user.clone(), all(marks))).collect();
+        if !kept.is_empty() {
+            body.insert("bookmarks".to_owned(), kept.into());
+        }
         format!("# What users have chosen about the terminals of sightglass; written by its settings (F2).\n\n{body}")
     }
+}
+
+fn of_bookmarks(value: &Node, at: Span, problems: &mut Problems) -> Option<Vec<Bookmark>> {
+    let mut texts = Vec::new();
+    for text in Texts::read(value, at, problems)?.0 {
+        match Bookmark::parse(&text.value) {
+            Some(bookmark) => texts.push(bookmark),
+            None => {
+                problems
+                    .add(text.at, format!("`{}` is no bookmark", text.value))
+                    .label("expected an instant and a name: `2026-11-21T13:52:31Z pump tripped`");
+            }
+        }
+    }
+    Some(texts)
 }
 
 fn of_section(section: &SectionTable) -> Preferences {
@@ -217,6 +288,11 @@ impl Model {
     /// The name of who is logged in.
     pub(super) fn user(&self) -> Option<&str> {
         self.session.who.as_ref().map(|who| who.user.as_ref())
+    }
+
+    /// The bookmarks of who is logged in.
+    pub(super) fn bookmarks(&self) -> &[Bookmark] {
+        self.preferences_file.bookmarks(self.user())
     }
 
     /// The language of the texts: as preferred, if the terminal has its letters.

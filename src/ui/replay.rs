@@ -2,6 +2,9 @@
 //!
 //! What stands above the tab, header and banner, stays that of the present.
 
+mod instant;
+mod page;
+mod refusal;
 mod search;
 
 use std::{collections::VecDeque, sync::Arc};
@@ -9,25 +12,24 @@ use std::{collections::VecDeque, sync::Arc};
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    Effect, Model, QueryId, UiAction, ViewContext,
+    Effect, QueryId, ViewContext,
     keys::{Key, char, code},
-    modal::{Modal, Prompt},
-    msg::Scope,
-    tabs::TabView,
 };
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
+        def::Pen,
         past::Past,
         record::{ActionRecord, AlarmRecord},
         snapshot::Snapshot,
     },
-    report::period_parser::{self, PeriodError},
     t,
-    text::date,
 };
 use crossterm::event::KeyCode;
-use search::Search;
+pub use instant::{Asked, Place, ask_instant, ask_name, instant, stamp, typed};
+pub use page::EventPage;
+pub(super) use refusal::{gives_command, refuse_commands, refused};
+use search::{Search, Searched};
 
 /// Half a second of playing is so many times as long in the plant; 0 is paused.
 const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
@@ -43,6 +45,12 @@ pub enum Action {
     Step(i64),
     /// Play, faster with each press, then pause.
     Play,
+    /// The next begin or end of a batch, or the previous one.
+    Batch(Direction),
+    /// The next stored value of a curve, or the previous one.
+    Sample(Direction),
+    /// Keep the instant under a name.
+    Bookmark,
     /// Ask for an instant.
     GoTo,
     /// Back to the present.
@@ -69,6 +77,11 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('.'), "second", "a second later; pauses", Action::Step(1)),
     Key::new(char('*'), "play", "play ×1, ×10, ×60, ×600, then pause", Action::Play),
     Key::new(char('@'), "time", "go to a past time", Action::GoTo),
+    Key::new(char('('), "", "previous stored value of what is drawn", Action::Sample(Direction::Earlier)),
+    Key::new(char(')'), "sample", "next stored value of what is drawn", Action::Sample(Direction::Later)),
+    Key::new(char('{'), "", "previous begin or end of a batch", Action::Batch(Direction::Earlier)),
+    Key::new(char('}'), "batch", "next begin or end of a batch", Action::Batch(Direction::Later)),
+    Key::new(char('#'), "bookmark", "keep this instant under a name", Action::Bookmark),
 ];
 
 /// A past instant of the plant.
@@ -87,6 +100,17 @@ pub enum Event {
     Alarm(AlarmRecord),
     /// An action of an operator.
     Action(ActionRecord),
+    /// A batch began, or it ended.
+    Batch {
+        /// When.
+        at: Timestamp,
+        /// Its name and number.
+        label: String,
+        /// It ended.
+        ended: bool,
+    },
+    /// A value was stored.
+    Sample(Timestamp),
 }
 
 impl Event {
@@ -95,6 +119,7 @@ impl Event {
         match self {
             Event::Alarm(record) => record.at,
             Event::Action(record) => record.at,
+            Event::Batch { at, .. } | Event::Sample(at) => *at,
         }
     }
 }
@@ -108,6 +133,8 @@ pub struct Replay {
     /// Where steps lead that were made meanwhile.
     next: Option<Timestamp>,
     search: Option<Search>,
+    /// The query for the time of a stored value.
+    sample: Option<u32>,
     /// The event that was gone to.
     event: Option<Event>,
     /// Place in [`SPEEDS`].
@@ -116,6 +143,8 @@ pub struct Replay {
     ends: bool,
     /// Instants that will be played, each with its query and its answer.
     prefetched: VecDeque<(Timestamp, u32, Option<Shown>)>,
+    /// The page that is shown instead of a tab.
+    page: Option<EventPage>,
     /// Why the last query led nowhere.
     trouble: Option<String>,
     /// Queries asked so far.
@@ -140,15 +169,63 @@ impl Replay {
 
     /// What it waits for, or why it did not get there.
     pub fn words(&self) -> Option<String> {
-        let waits = self.requested.is_some() || self.search.is_some();
+        let waits = self.requested.is_some() || self.search.is_some() || self.sample.is_some();
         self.trouble.clone().or_else(|| waits.then(|| t!("reading the history …").to_owned()))
     }
 
     /// Does it wait for this answer?
     pub fn awaits(&self, number: u32) -> bool {
         self.requested.is_some_and(|(requested, _)| requested == number)
+            || self.sample == Some(number)
             || self.search.as_ref().is_some_and(|search| search.queries.contains(&number))
             || self.prefetched.iter().any(|(_, query, shown)| *query == number && shown.is_none())
+            || self.page.as_ref().is_some_and(|page| page.awaits(number))
+    }
+
+    /// The event page, if it is shown.
+    pub fn page(&self) -> Option<&EventPage> {
+        self.page.as_ref().filter(|_| self.shown.is_some())
+    }
+
+    /// The same, to scroll it.
+    pub fn page_mut(&mut self) -> Option<&mut EventPage> {
+        self.page.as_mut().filter(|_| self.shown.is_some())
+    }
+
+    /// Asks for an instant, which is shown on the event page.
+    pub fn open_page(&mut self, at: Timestamp) -> Effect {
+        self.page.get_or_insert_default();
+        self.go_to(at)
+    }
+
+    /// The event page instead of the tab, or the tab again; does nothing in the present.
+    pub fn toggle_page(&mut self, present: &ViewContext) -> Vec<Effect> {
+        if self.page.take().is_none() && self.shown.is_some() {
+            self.page = Some(EventPage::default());
+        }
+        self.ask_page(present)
+    }
+
+    /// What is drawn of the instant.
+    fn drawn(&self) -> Vec<Pen> {
+        let of_page = self.page().map(|page| page.pens().to_vec());
+        of_page.or_else(|| self.shown().map(|shown| page::pens(&shown.snapshot, shown.at))).unwrap_or_default()
+    }
+
+    /// A tab was chosen: it is shown.
+    pub fn close_page(&mut self) {
+        self.page = None;
+    }
+
+    /// Asks for what the event page shows around the instant, if it lacks that.
+    fn ask_page(&mut self, present: &ViewContext) -> Vec<Effect> {
+        let (Some(page), Some(shown)) = (&mut self.page, &self.shown) else { return Vec::new() };
+        let asked = &mut self.asked;
+        let ask = |query| {
+            *asked = asked.wrapping_add(1);
+            (*asked, Effect::Query(QueryId { tab: None, number: *asked }, query))
+        };
+        page.follow(shown, present, ask)
     }
 
     /// Back to the present.
@@ -159,7 +236,7 @@ impl Replay {
     /// Asks for an instant, which is shown when the answer comes; what is played stops.
     pub fn go_to(&mut self, at: Timestamp) -> Effect {
         self.pause();
-        (self.search, self.trouble, self.next) = (None, None, None);
+        (self.search, self.sample, self.trouble, self.next) = (None, None, None, None);
         let effect = self.ask(Query::Past { at });
         self.requested = Some((self.asked, at));
         effect
@@ -212,15 +289,17 @@ impl Replay {
         let Some(at) = self.shown().map(|shown| shown.at) else { return Vec::new() };
         match action {
             Action::Step(seconds) => self.step(SignedDuration::from_secs(seconds), present).into_iter().collect(),
-            Action::Event(direction) => self.search(direction, at, present),
+            Action::Event(direction) => self.search(Searched::Events, direction, at, present),
+            Action::Batch(direction) => self.search(Searched::Batches, direction, at, present),
+            Action::Sample(direction) => self.search_sample(direction, at, present),
             Action::Play => {
                 self.speed = (self.speed + 1) % SPEEDS.len();
-                (self.requested, self.search, self.trouble) = (None, None, None);
+                (self.requested, self.search, self.sample, self.trouble) = (None, None, None, None);
                 self.forget_prefetched();
                 self.prefetch(present)
             }
             // A window asks for it.
-            Action::GoTo => Vec::new(),
+            Action::GoTo | Action::Bookmark => Vec::new(),
             Action::Leave => {
                 self.leave();
                 Vec::new()
@@ -229,7 +308,8 @@ impl Replay {
     }
 
     /// Half a second has passed: the next instant is shown if it has come. At the present the playing stops.
-    pub fn on_tick(&mut self, present: Timestamp) -> Vec<Effect> {
+    pub fn on_tick(&mut self, cx: &ViewContext) -> Vec<Effect> {
+        let present = cx.present();
         if let Some((.., shown @ Some(_))) = self.prefetched.front_mut() {
             self.shown = shown.take();
             self.prefetched.pop_front();
@@ -238,7 +318,7 @@ impl Replay {
         if self.prefetched.is_empty() {
             self.speed = 0;
         }
-        effects
+        effects.into_iter().chain(self.ask_page(cx)).collect()
     }
 
     fn prefetch(&mut self, present: Timestamp) -> Vec<Effect> {
@@ -266,6 +346,10 @@ impl Replay {
         if !self.awaits(number) {
             return Vec::new();
         }
+        if let Some(page) = self.page.as_mut().filter(|page| page.awaits(number)) {
+            page.on_answer(number, answer);
+            return Vec::new();
+        }
         match answer {
             Err(error) => {
                 let why = match error {
@@ -275,106 +359,27 @@ impl Replay {
                     other => other.to_string(),
                 };
                 self.pause();
-                (self.requested, self.search, self.trouble) = (None, None, Some(why));
+                (self.requested, self.search, self.sample, self.trouble) = (None, None, None, Some(why));
+                self.page.take_if(|_| self.shown.is_none());
             }
-            Ok(Answer::Past(past)) => return self.on_past(number, &past, present).into_iter().collect(),
-            Ok(Answer::Journal(rows)) => {
-                if let Some(search) = &mut self.search {
-                    search.alarms = Some(rows);
-                }
-                return self.on_found();
-            }
-            Ok(Answer::Actions(rows)) => {
-                if let Some(search) = &mut self.search {
-                    search.actions = Some(rows);
-                }
-                return self.on_found();
-            }
-            Ok(_) => {}
+            Ok(Answer::Past(past)) => return self.on_past(number, &past, present),
+            Ok(answer) => return self.on_found(number, answer),
         }
         Vec::new()
     }
 
-    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) -> Option<Effect> {
+    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) -> Vec<Effect> {
         let mut snapshot = past.snapshot(present.snapshot.def.clone());
         // Waiting and refreshing go by the time of the present.
         (snapshot.speed, snapshot.stepped) = (present.snapshot.speed, present.snapshot.stepped);
         let shown = Shown { at: past.at, snapshot: Arc::new(snapshot) };
         if self.requested.is_some_and(|(requested, _)| requested == number) {
             (self.requested, self.shown) = (None, Some(shown));
-            return self.next.take().map(|at| self.go_to(at));
+            let next = self.next.take().map(|at| self.go_to(at));
+            return self.ask_page(present).into_iter().chain(next).collect();
         } else if let Some((.., place)) = self.prefetched.iter_mut().find(|(_, query, _)| *query == number) {
             *place = Some(shown);
         }
-        None
+        Vec::new()
     }
-}
-
-/// Asks for an instant; Enter alone takes that of what is selected on the tab.
-pub fn ask_instant(cx: &ViewContext, tab: &dyn TabView) -> Modal {
-    let selected = tab.moment(cx);
-    let hint = t!("03:12   2026-11-20 22:15   -10m   -2h   -3d");
-    let hint = match selected {
-        Some(at) => t!("{hint}   Enter alone: {at}", hint, at = stamp(cx, at)),
-        None => hint.to_owned(),
-    };
-    Modal::Prompt(Prompt::new(t!("Replay: go to a past time"), hint, "").for_replay(selected))
-}
-
-/// `2026-11-20 03:12:07`, with milliseconds where it has some.
-pub fn stamp(cx: &ViewContext, at: Timestamp) -> String {
-    let form = if at.subsec_millisecond() == 0 { "%H:%M:%S" } else { "%H:%M:%S%.3f" };
-    let local = at.to_zoned(cx.def().time_zone.clone());
-    format!("{} {}", date(local.date()), local.strftime(form))
-}
-
-/// The instant that was typed: a time, a date with a time, or how long ago; nothing is the one that was selected.
-pub fn typed(cx: &ViewContext, text: &str, selected: Option<Timestamp>) -> Result<Vec<UiAction>, String> {
-    let at = selected.filter(|_| text.trim().is_empty()).map_or_else(|| instant(cx, text), Ok)?;
-    Ok(vec![UiAction::Replay(at)])
-}
-
-/// The same without what was selected.
-pub fn instant(cx: &ViewContext, text: &str) -> Result<Timestamp, String> {
-    let (present, text) = (cx.present(), text.trim());
-    let wrong =
-        || t!("`{text}` is not a past time: expected 03:12, 2026-11-20 22:15, or how long ago: -10m -2h -3d", text);
-    let Some(ago) = text.strip_prefix('-') else {
-        return period_parser::past_instant(cx.def(), text, present).map_err(|error| match error {
-            PeriodError::InFuture(text) => t!("{text} lies in the future", text),
-            _ => wrong(),
-        });
-    };
-    let span: jiff::Span = ago.trim().parse().map_err(|_| wrong())?;
-    let then = present.to_zoned(cx.def().time_zone.clone()).checked_sub(span.abs());
-    let then = then.and_then(|then| then.round(jiff::Unit::Second)).map_err(|_| wrong())?;
-    Ok(then.timestamp().min(present))
-}
-
-/// While the past is shown no command is given, and no form for one is opened.
-pub(super) fn refuse_commands(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiAction> {
-    if model.replay.shown().is_none() {
-        return actions;
-    }
-    let count = actions.len();
-    let is_command = |action: &UiAction| match action.scope() {
-        Scope::Plant => true,
-        Scope::Window(modal) => gives_command(modal),
-        Scope::View | Scope::Files | Scope::Station => false,
-    };
-    let rest: Vec<UiAction> = actions.into_iter().filter(|action| !is_command(action)).collect();
-    if rest.len() < count {
-        model.note = Some(refused().into());
-    }
-    rest
-}
-
-/// Does a command come of this window? A form about users, as the password of a locked terminal, is not about the plant.
-pub(super) fn gives_command(modal: &Modal) -> bool {
-    !modal.only_looks() && !matches!(modal, Modal::UserForm(_))
-}
-
-/// Said of a key that would give a command.
-pub(super) fn refused() -> &'static str {
-    t!("This is the past: no commands. Esc returns to the present")
 }

@@ -5,6 +5,9 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
+#[path = "support/many.rs"]
+mod many;
+
 use std::{
     fs,
     io::{Read, Write},
@@ -16,6 +19,7 @@ use std::{
 };
 
 use jiff::Timestamp;
+use many::{TAGS_EACH, plant, tags_of};
 use rustix::time::{ClockId, clock_gettime};
 use sightglass::{
     access::{Durability, SessionRequest, SessionStatus},
@@ -25,19 +29,17 @@ use sightglass::{
     },
     plant::{
         Plant, PlantDef,
-        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, TagId},
+        def::{DeviceId, Framing},
         event::{Event, LineState},
         line_report::{LineReport, PollReport},
         request_stats::RequestStats,
-        tag::{ByteOrder, DataType, Point, Poll, PollClass, Table, TagDef},
+        tag::{Poll, PollClass, Table},
         traffic::{Exchange, Frame, FrameResult},
     },
-    profile::{self, Search},
     station::{Request, SessionAcceptor},
 };
 use tokio::{sync::watch, time::interval};
 
-const TAGS_EACH: u16 = 100;
 const TERMINALS: usize = 20;
 /// Seconds of each part.
 const PART: u64 = 10;
@@ -229,10 +231,6 @@ fn resident_mib() -> u64 {
     pages.split(' ').nth(1).and_then(|pages| pages.parse::<u64>().ok()).unwrap() * 4 / 1_024
 }
 
-fn tags_of(device: u16) -> impl Iterator<Item = TagId> {
-    (device * TAGS_EACH..(device + 1) * TAGS_EACH).map(TagId)
-}
-
 fn poll(device: DeviceId) -> PollReport {
     PollReport {
         device,
@@ -249,43 +247,4 @@ fn poll(device: DeviceId) -> PollReport {
         next: None,
         stats: RequestStats::default(),
     }
-}
-
-fn plant(devices: u16, lines: u16) -> Arc<PlantDef> {
-    let base = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
-    let mut def = PlantDef::clone(&base);
-    let (device, line) = (def.devices[0].clone(), def.lines[0].clone());
-    def.lines = (0..lines).map(|id| LineDef { id: LineId(id), name: format!("L{id}"), ..line.clone() }).collect();
-    def.alarms.clear();
-    def.devices.clear();
-    def.tags.clear();
-    def.trends.clear();
-    (def.logic, def.mimic) = (Default::default(), Default::default());
-    for id in 0..devices {
-        let name = format!("D{id}");
-        let (id, unit) = (DeviceId(id), id as u8 + 1);
-        def.devices.push(DeviceDef {
-            id,
-            line: LineId(id.0 % lines),
-            name: name.clone(),
-            unit,
-            faceplate: None,
-            actions: Vec::new(),
-            program: None,
-            signature: Vec::new(),
-            ..device.clone()
-        });
-        for (address, tag) in tags_of(id.0).enumerate() {
-            let point = Point {
-                table: Table::Holding,
-                address: address as u16,
-                kind: DataType::U16,
-                order: ByteOrder::Abcd,
-                field: None,
-            };
-            let poll = Poll::Every(Duration::from_secs(1));
-            def.tags.push(TagDef { poll, ..TagDef::new(tag, id, &format!("{name}.R{address}"), point) });
-        }
-    }
-    Arc::new(def)
 }

@@ -330,15 +330,14 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
     }
     drop(stranger);
     guarded.end().await;
-    let expected = ["reload", "reload", "stop", "stop"];
-    assert_eq!(heard.await.unwrap(), expected, "the Supervisor and whoever has started the station, once each");
+    assert_eq!(heard.await.unwrap(), ["reload", "reload", "stop", "stop"], "once by a Supervisor, once by its starter");
 }
 
 /// A new query does not compile until it has a row here; put it into [`queries`] as well.
 fn of_query(query: &Query) -> Row {
     match query {
         Query::Series { .. } | Query::Journal { .. } | Query::Actions { .. } => look("", "-VTSL-"),
-        Query::LineMinutes { .. } | Query::Values { .. } => look("", "-VTSL-"),
+        Query::LineMinutes { .. } | Query::Values { .. } | Query::SampleTime { .. } => look("", "-VTSL-"),
         Query::AlarmMetrics { .. } | Query::Report { .. } => look("", "-VTSL-"),
         Query::Past { .. } | Query::Batches { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
@@ -363,6 +362,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::Values { tags: vec![def.tags[0].id], from, every: std::time::Duration::from_secs(10), count: 6 },
         Query::AlarmMetrics { from, to },
         Query::Report { period: Period::free(from, to) },
+        Query::SampleTime { tags: vec![def.tags[0].id], from, to, latest: true },
         Query::Past { at: to },
         Query::Batches { from, to, limit },
         Query::Unarchived { from, to },

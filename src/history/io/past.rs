@@ -60,6 +60,23 @@ impl Store {
         Ok(Past { at, samples, events: self.events_until(after)?, minutes: self.minutes_at(at)? })
     }
 
+    /// When the first or the latest value of these tags was stored in a span.
+    pub(super) fn sample_time(
+        &self,
+        tags: &[TagId],
+        (from, to): (Timestamp, Timestamp),
+        latest: bool,
+    ) -> Result<Option<Timestamp>, HistoryError> {
+        let mut found: Option<Timestamp> = None;
+        self.each_sample(tags, from, to, |_, sample| {
+            if (from..to).contains(&sample.at) {
+                let at = found.get_or_insert(sample.at);
+                *at = if latest { sample.at.max(*at) } else { sample.at.min(*at) };
+            }
+        })?;
+        Ok(found)
+    }
+
     /// An instant that the samples do not reach.
     fn refuse_unknown(&self, at: Timestamp, now: Timestamp) -> Result<(), HistoryError> {
         self.read_last_commit().map_err(engine)?;

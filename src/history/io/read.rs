@@ -59,6 +59,9 @@ impl Store {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
             Query::Batches { from, to, limit } => self.batches((*from, *to, *limit as u64), now).map(Answer::Batches),
+            Query::SampleTime { tags, from, to, latest } => {
+                self.sample_time(tags, (*from, *to), *latest).map(Answer::SampleTime)
+            }
             Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
             Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),

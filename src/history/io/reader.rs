@@ -181,6 +181,7 @@ fn counts_a_period(query: &Query) -> bool {
         | Query::Actions { .. }
         | Query::Audit { .. }
         | Query::LineMinutes { .. }
+        | Query::SampleTime { .. }
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview

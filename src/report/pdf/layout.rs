@@ -3,7 +3,7 @@
 use unicode_segmentation::UnicodeSegmentation;
 
 use crate::{
-    plant::def::Paper,
+    plant::{def::Paper, number::to_usize},
     report::{
         document::{ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
         drawing::{Drawing, Ink, Shape, TEXT},
@@ -168,9 +168,10 @@ impl<M: Metrics> Layout<'_, M> {
         for fact in facts {
             let words = self.document.fact(&fact.cell);
             let lines = wrapped(self.metrics, &words, size, false, self.room() - names);
-            self.need(lines.len() as f32 * size * LINE);
-            self.text((MARGIN, self.y + size), size, false, fact.name.clone());
-            for line in lines {
+            let begins = std::iter::once(fact.name.clone()).chain(std::iter::repeat(String::new()));
+            for (line, name) in lines.into_iter().zip(begins) {
+                self.need(size * LINE);
+                self.text((MARGIN, self.y + size), size, false, name);
                 self.text((MARGIN + names, self.y + size), size, false, line);
                 self.y += size * LINE;
             }
@@ -202,14 +203,32 @@ impl<M: Metrics> Layout<'_, M> {
         let fits = fitted.iter().find(|(_, widths)| widths.iter().sum::<f32>() <= room + 0.1);
         let (size, widths) = fits.unwrap_or(&fitted[SIZES.len() - 1]).clone();
         self.row(&heads, &kinds, &widths, size, true);
-        for row in &rows {
+        let rows: Vec<Vec<String>> = rows.iter().flat_map(|row| self.parts(row, &widths, size)).collect();
+        for row in rows {
             let page = self.pages.len();
-            self.need(height(self.metrics, row, &widths, size, false));
+            self.need(height(self.metrics, &row, &widths, size, false));
             if page < self.pages.len() {
                 self.row(&heads, &kinds, &widths, size, true);
             }
-            self.row(row, &kinds, &widths, size, false);
+            self.row(&row, &kinds, &widths, size, false);
         }
+    }
+
+    /// A row; one that is higher than a page in parts that are not.
+    fn parts(&self, row: &[String], widths: &[f32], size: f32) -> Vec<Vec<String>> {
+        let most = to_usize(f64::from((self.bottom - MARGIN - HEAD - 60.0) / (size * LINE))).max(1);
+        if height(self.metrics, row, widths, size, false) <= most as f32 * size * LINE {
+            return vec![row.to_vec()];
+        }
+        let cells: Vec<Vec<String>> = row
+            .iter()
+            .zip(widths)
+            .map(|(cell, width)| wrapped(self.metrics, cell, size, false, width - 2.0 * PADDING.0))
+            .map(|lines| lines.chunks(most).map(|lines| lines.join(" ")).collect())
+            .collect();
+        let count = cells.iter().map(Vec::len).max().unwrap_or(0);
+        let part = |n: usize| cells.iter().map(|parts| parts.get(n).cloned().unwrap_or_default()).collect();
+        (0..count).map(part).collect()
     }
 
     fn row(&mut self, cells: &[String], kinds: &[ColumnKind], widths: &[f32], size: f32, head: bool) {
@@ -298,7 +317,15 @@ fn widths(
         let least = least.max(longest(&heads[n], true));
         (least + 2.0 * PADDING.0, cells.max(width(&heads[n], true)).max(least) + 2.0 * PADDING.0)
     };
-    let columns: Vec<(f32, f32)> = (0..heads.len()).map(column).collect();
+    let mut columns: Vec<(f32, f32)> = (0..heads.len()).map(column).collect();
+    // On the smallest letters the widest words are broken rather than left outside of the page.
+    if size <= SIZES[SIZES.len() - 1] {
+        let capped =
+            |cap: f32, n: usize| if kinds[n] == ColumnKind::Text { columns[n].0.min(cap) } else { columns[n].0 };
+        let fits = |cap: &u8| (0..columns.len()).map(|n| capped(f32::from(*cap), n)).sum::<f32>() <= room;
+        let cap = f32::from((15..=96).rev().find(fits).unwrap_or(15));
+        columns = (0..columns.len()).map(|n| (capped(cap, n), columns[n].1)).collect();
+    }
     let (least, best): (f32, f32) = columns.iter().fold((0.0, 0.0), |(a, b), (least, best)| (a + least, b + best));
     // What is left beyond the least is shared by how much each column lacks.
     let share = if best <= least { 0.0 } else { ((room - least) / (best - least)).clamp(0.0, 1.0) };

@@ -99,7 +99,7 @@ impl Footer {
 
 /// Two keys that belong together as one: `↑↓ select`.
 fn pair(before: &Hint, hint: &Hint) -> Option<Hint> {
-    const PAIRS: &str = "←→←↑↓↑[]<>,.";
+    const PAIRS: &str = "←→←↑↓↑[]<>,.(){}";
     let together = before.label.is_empty() && PAIRS.contains(&format!("{}{}", before.key, hint.key));
     together.then(|| Hint { key: format!("{}{}", before.key, hint.key), ..hint.clone() })
 }

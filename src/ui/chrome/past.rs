@@ -42,6 +42,9 @@ pub(super) fn words(model: &Model, cx: &ViewContext) -> Option<String> {
         let event = model.replay.event()?;
         let text = match event {
             Event::Alarm(record) => event_text(cx, record),
+            Event::Batch { label, ended: false, .. } => t!("batch {label} begins", label),
+            Event::Batch { label, ended: true, .. } => t!("batch {label} ends", label),
+            Event::Sample(_) => t!("a value was stored").to_owned(),
             Event::Action(record) => action_text(cx, record).split_whitespace().collect::<Vec<_>>().join(" "),
         };
         Some(text)
@@ -50,7 +53,10 @@ pub(super) fn words(model: &Model, cx: &ViewContext) -> Option<String> {
 
 /// The keys of the replay, then those of the tab that only look; where Esc leads back on the tab it does not end the past.
 pub(super) fn hints(model: &Model, cx: &ViewContext) -> Vec<Hint> {
-    let own: Vec<Hint> = model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none()).collect();
+    let own: Vec<Hint> = match model.replay.page() {
+        Some(_) => vec![Hint::new("!", t!("tab"), ""), Hint::new("↑↓", t!("scroll"), "")],
+        None => model.tabs.shown().hints(cx).into_iter().filter(|hint| hint.needs.is_none()).collect(),
+    };
     let is_escape = |hint: &Hint| hint.chord.is_some_and(|chord| chord == code(KeyCode::Esc));
     let (escape, own): (Vec<Hint>, Vec<Hint>) = own.into_iter().partition(is_escape);
     let replay = keys::hints(replay::KEYS).into_iter().filter(|hint| escape.is_empty() || !is_escape(hint));

@@ -10,7 +10,7 @@ use std::{
 use crate::{
     profile::io::{atomic::write_for_user, config_folder},
     t,
-    ui::preferences::{Preferences, PreferencesFile},
+    ui::preferences::{Kept, PreferencesFile},
 };
 
 /// A section has some hundred bytes; whatever is larger than this is something else.
@@ -22,7 +22,7 @@ pub fn load() -> PreferencesFile {
 }
 
 /// Puts a choice into the file as it is now; another program may have written it meanwhile. Blocks while the disk works.
-pub fn keep(user: Option<&str>, chosen: Preferences) -> Result<PreferencesFile, String> {
+pub fn keep(user: Option<&str>, chosen: Kept) -> Result<PreferencesFile, String> {
     // Two of this program share the name of the file that is written beside.
     static ONE: Mutex<()> = Mutex::new(());
     let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -57,7 +57,7 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// A file with a problem is never written over: what is wrong in it was meant to be something.
-fn keep_in(path: &Path, user: Option<&str>, chosen: Preferences) -> Result<PreferencesFile, String> {
+fn keep_in(path: &Path, user: Option<&str>, chosen: Kept) -> Result<PreferencesFile, String> {
     let mut file = load_from(path);
     if let Some(problem) = file.problem {
         return Err(problem);
@@ -73,7 +73,10 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::ui::{preferences::Bell, theme::ThemeName};
+    use crate::ui::{
+        preferences::{Bell, Preferences},
+        theme::ThemeName,
+    };
 
     #[test]
     fn choices_are_kept_beside_those_of_others() {
@@ -81,8 +84,8 @@ mod tests {
         let path = folder.path().join("new/preferences.toml");
         let [light, mono] =
             [ThemeName::Light, ThemeName::Mono].map(|theme| Preferences { theme, ..Default::default() });
-        keep_in(&path, Some("anna"), light).unwrap();
-        keep_in(&path, None, mono).unwrap();
+        keep_in(&path, Some("anna"), Kept::Preferences(light)).unwrap();
+        keep_in(&path, None, Kept::Preferences(mono)).unwrap();
         let file = load_from(&path);
         assert_eq!((file.of(Some("anna")), file.of(Some("somchai")), file.problem), (light, mono, None));
     }
@@ -95,7 +98,7 @@ mod tests {
         let file = load_from(&path);
         assert_eq!(file.of(None).bell, Bell::Once, "what is right is used");
         assert!(file.problem.is_some_and(|problem| problem.contains("preferences.toml:2:9")));
-        assert!(keep_in(&path, None, Preferences::default()).unwrap_err().contains("preferences.toml:2:9"));
+        assert!(keep_in(&path, None, Preferences::default().into()).unwrap_err().contains("preferences.toml:2:9"));
         assert!(fs::read_to_string(&path).unwrap().contains("pink"));
     }
 }

@@ -254,11 +254,11 @@ impl Modal {
                     Hint::in_window(t!("Esc"), t!("cancel")),
                 ]
             }
-            Modal::Palette(_) => vec![
-                Hint::in_window("↑↓", t!("select")),
-                Hint::in_window("⏎", t!("go")),
-                Hint::in_window(t!("Esc"), t!("cancel")),
-            ],
+            Modal::Palette(palette) => {
+                let remove = palette.is_on_bookmark().then(|| Hint::in_window(t!("Del"), t!("remove bookmark")));
+                let hints = [Hint::in_window("↑↓", t!("select")), Hint::in_window("⏎", t!("go"))];
+                hints.into_iter().chain(remove).chain([Hint::in_window(t!("Esc"), t!("cancel"))]).collect()
+            }
             Modal::Prompt(_) => vec![Hint::in_window("⏎", t!("OK")), Hint::in_window(t!("Esc"), t!("cancel"))],
             Modal::Reason(reason) => reason.hints(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),

@@ -20,6 +20,7 @@ use crate::{
         keys::{self, Chord, Global},
         layout::Size,
         modal::confirm::subject,
+        preferences::Bookmark,
         replay,
         tabs::{Tab, TabView, alarms},
         widgets::{
@@ -56,6 +57,8 @@ pub enum Target {
     Key(Chord),
     /// A past instant.
     Instant(Timestamp),
+    /// One that was kept under a name.
+    Bookmark(Timestamp),
 }
 
 impl Target {
@@ -67,6 +70,7 @@ impl Target {
             Target::Trend(_) => 3,
             Target::Alarm(_) => 4,
             Target::Key(_) => 5,
+            Target::Bookmark(_) => 3,
         }
     }
 }
@@ -108,13 +112,39 @@ pub struct Palette {
 
 impl Palette {
     /// Everything that there is, what was chosen before at first.
-    pub fn new(cx: &ViewContext, tab: &dyn TabView, recent: &[Target]) -> Palette {
+    pub fn new(cx: &ViewContext, tab: &dyn TabView, bookmarks: &[Bookmark], recent: &[Target]) -> Palette {
         let mut rows = rows(cx, tab);
+        rows.extend(bookmark_rows(cx, bookmarks));
         let place = |row: &Row| recent.iter().position(|target| *target == row.target).unwrap_or(recent.len());
         rows.sort_by_key(place);
         let mut palette = Palette { line: Line::default(), rows, found: Vec::new(), instant: None, selected: 0 };
         palette.find(cx);
         palette
+    }
+
+    /// The bookmarks alone, the latest first.
+    pub fn of_bookmarks(cx: &ViewContext, bookmarks: &[Bookmark]) -> Palette {
+        let rows = bookmark_rows(cx, bookmarks).rev().collect();
+        let mut palette = Palette { line: Line::default(), rows, found: Vec::new(), instant: None, selected: 0 };
+        palette.find(cx);
+        palette
+    }
+
+    /// Takes the selected bookmark off the list.
+    fn remove(mut self, cx: &ViewContext) -> Next {
+        let Some(Target::Bookmark(at)) = self.listed().get(self.selected).map(|row| row.target) else {
+            return Next::Stay(Modal::Palette(Box::new(self)));
+        };
+        self.rows.retain(|row| row.target != Target::Bookmark(at));
+        let selected = self.selected;
+        self.find(cx);
+        self.selected = selected.min(self.listed().len().saturating_sub(1));
+        Next::Both(Modal::Palette(Box::new(self)), vec![UiAction::Bookmark(at, None)])
+    }
+
+    /// Is a bookmark selected, which can be removed?
+    pub(super) fn is_on_bookmark(&self) -> bool {
+        matches!(self.listed().get(self.selected).map(|row| row.target), Some(Target::Bookmark(_)))
     }
 
     fn find(&mut self, cx: &ViewContext) {
@@ -153,6 +183,9 @@ impl Palette {
                 Some(row) => Next::Go(row.target),
                 None => Next::Stay(Modal::Palette(Box::new(self))),
             };
+        }
+        if keys::code(KeyCode::Delete).is(event) {
+            return self.remove(cx);
         }
         let motion = Motion::from_key(event).filter(|motion| !matches!(motion, Motion::First | Motion::Last));
         if let Some(motion) = motion {
@@ -211,6 +244,12 @@ fn instant(cx: &ViewContext, text: &str) -> Option<Row> {
     Some(Row::new(Target::Instant(at), t!("time"), &replay::stamp(cx, at), t!("replay")))
 }
 
+fn bookmark_rows<'a>(cx: &'a ViewContext, bookmarks: &'a [Bookmark]) -> impl DoubleEndedIterator<Item = Row> + 'a {
+    let row =
+        |mark: &Bookmark| Row::new(Target::Bookmark(mark.at), t!("bookmark"), &mark.name, &replay::stamp(cx, mark.at));
+    bookmarks.iter().map(row)
+}
+
 fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let def = cx.def();
     let tabs = Tab::offered(cx).into_iter();
@@ -257,5 +296,6 @@ pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
         }
         Target::Key(_) => Vec::new(),
         Target::Instant(at) => vec![UiAction::Replay(at)],
+        Target::Bookmark(at) => vec![UiAction::EventPage(at)],
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
-use jiff::Timestamp;
 use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, line::Line, window};
@@ -19,8 +18,8 @@ pub struct Prompt {
     pub line: Line,
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
-    /// The answer is an instant for the replay, not for the tab; that of what was selected is meant by none.
-    replay: Option<Option<Timestamp>>,
+    /// The answer is an instant for the replay, not for the tab.
+    replay: Option<replay::Asked>,
 }
 
 impl Prompt {
@@ -30,15 +29,15 @@ impl Prompt {
     }
 
     /// The answer is an instant to replay.
-    pub fn for_replay(self, selected: Option<Timestamp>) -> Prompt {
-        Prompt { replay: Some(selected), ..self }
+    pub fn for_replay(self, asked: replay::Asked) -> Prompt {
+        Prompt { replay: Some(asked), ..self }
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
             let text = self.line.text();
             let taken = match self.replay {
-                Some(selected) => replay::typed(cx, &text, selected),
+                Some(asked) => replay::typed(cx, &text, asked),
                 None => tabs.shown_mut().on_text(cx, &text),
             };
             match taken {

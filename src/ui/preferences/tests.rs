@@ -64,3 +64,16 @@ fn a_terminal_shows_no_more_than_it_can() {
     assert_eq!(glyphs(Characters::Ascii, Glyphs::Braille), Glyphs::Ascii);
     assert_eq!(light().theme(&Theme::PLAIN).colours, Colours::None, "NO_COLOR holds in every theme");
 }
+
+#[test]
+fn bookmarks_are_kept_beside_the_choices() {
+    let mut file = PreferencesFile { path: "p.toml".to_owned(), ..PreferencesFile::default() };
+    let mark = Bookmark { at: crate::ui::fixture::now(), name: "pump \"P-1\" tripped".to_owned() };
+    file.set(Some("som chai"), Kept::Bookmarks(vec![mark.clone()]));
+    file.set(None, Kept::Bookmarks(vec![mark.clone(), mark.clone()]));
+    let read = PreferencesFile::read("p.toml", file.text().as_bytes());
+    assert_eq!(read, file, "{}", file.text());
+    assert_eq!((read.bookmarks(Some("som chai")).len(), read.bookmarks(None).len()), (1, 2));
+    let file = PreferencesFile::read("p.toml", b"[bookmarks]\nanna = [\"yesterday\"]\n");
+    assert!(file.problem.is_some_and(|line| line.contains("p.toml:2:9: `yesterday` is no bookmark")));
+}

@@ -4,16 +4,16 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{Direction, Event, Replay};
 use crate::{
-    history::Query,
-    plant::record::{ActionRecord, AlarmRecord},
+    history::{Answer, Query},
+    plant::{batch::Batch, def::TagId},
     t,
     ui::Effect,
 };
 
 /// An event is searched for in spans that grow: 1 h, a day, a month, a year.
 const SEARCHED_H: [i64; 4] = [1, 24, 24 * 31, 24 * 366];
-/// Rows of one search; where a span has more, a shorter one is searched.
-const SEARCHED_ROWS: usize = 200;
+/// A stored value is searched for within this: each tag has one an hour.
+const SAMPLES: SignedDuration = SignedDuration::from_mins(61);
 
 /// Where the next event is searched for.
 #[derive(Debug, Clone, Copy)]
@@ -29,14 +29,37 @@ struct Span {
     present: Timestamp,
 }
 
+/// What is searched for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Searched {
+    /// Alarm events and actions of operators.
+    Events,
+    /// Begins and ends of batches.
+    Batches,
+}
+
+impl Searched {
+    /// Rows of one search; where a span has more, a shorter one is searched.
+    fn rows(self) -> usize {
+        match self {
+            Searched::Events => 200,
+            // Each is as much work as a small report.
+            Searched::Batches => 10,
+        }
+    }
+}
+
 /// A search for the next event.
 #[derive(Debug)]
 pub(super) struct Search {
+    what: Searched,
     span: Span,
-    /// The queries, and what came.
-    pub(super) queries: [u32; 2],
-    pub(super) alarms: Option<Vec<AlarmRecord>>,
-    pub(super) actions: Option<Vec<ActionRecord>>,
+    /// The queries whose answers have not come.
+    pub(super) queries: Vec<u32>,
+    /// What came.
+    found: Vec<Event>,
+    /// There is more than came.
+    cut: bool,
 }
 
 impl Span {
@@ -79,54 +102,127 @@ impl Span {
 
 impl Replay {
     /// Asks for the next event in a direction.
-    pub(super) fn search(&mut self, direction: Direction, at: Timestamp, present: Timestamp) -> Vec<Effect> {
+    pub(super) fn search(
+        &mut self,
+        what: Searched,
+        direction: Direction,
+        at: Timestamp,
+        present: Timestamp,
+    ) -> Vec<Effect> {
         self.pause();
         (self.requested, self.trouble) = (None, None);
         let span = Span::new(direction, at, 0, present);
-        self.search_in(Some(span).filter(|span| span.from < span.to), direction)
+        self.search_in(what, Some(span).filter(|span| span.from < span.to), direction)
     }
 
-    fn search_in(&mut self, span: Option<Span>, direction: Direction) -> Vec<Effect> {
+    fn search_in(&mut self, what: Searched, span: Option<Span>, direction: Direction) -> Vec<Effect> {
         let Some(span @ Span { from, to, .. }) = span else {
-            self.trouble = Some(match direction {
-                Direction::Earlier => t!("no earlier event within a year").to_owned(),
-                Direction::Later => t!("no later event").to_owned(),
+            self.trouble = Some(match (what, direction) {
+                (Searched::Events, Direction::Earlier) => t!("no earlier event within a year").to_owned(),
+                (Searched::Events, Direction::Later) => t!("no later event").to_owned(),
+                (Searched::Batches, Direction::Earlier) => t!("no earlier batch within a year").to_owned(),
+                (Searched::Batches, Direction::Later) => t!("no later batch").to_owned(),
             });
             return Vec::new();
         };
-        let limit = SEARCHED_ROWS;
-        let alarms = self.ask(Query::Journal { from, to, limit });
-        let first = self.asked;
-        let actions = self.ask(Query::Actions { from, to, limit });
-        let queries = [first, self.asked];
-        self.search = Some(Search { span, queries, alarms: None, actions: None });
-        vec![alarms, actions]
+        let limit = what.rows();
+        let asked = match what {
+            Searched::Events => vec![Query::Journal { from, to, limit }, Query::Actions { from, to, limit }],
+            Searched::Batches => vec![Query::Batches { from, to, limit }],
+        };
+        let mut queries = Vec::new();
+        let ask = |query| {
+            let effect = self.ask(query);
+            queries.push(self.asked);
+            effect
+        };
+        let effects = asked.into_iter().map(ask).collect();
+        self.search = Some(Search { what, span, queries, found: Vec::new(), cut: false });
+        effects
     }
 
-    /// Both answers of a search: goes to the nearest event, or searches on.
-    pub(super) fn on_found(&mut self) -> Vec<Effect> {
-        let both = |search: &mut Search| search.alarms.is_some() && search.actions.is_some();
-        let Some(Search { span, alarms, actions, .. }) = self.search.take_if(both) else { return Vec::new() };
-        let (alarms, actions) = (alarms.unwrap_or_default(), actions.unwrap_or_default());
+    /// Asks when the next value of what is drawn was stored, or the previous one.
+    pub(super) fn search_sample(&mut self, direction: Direction, at: Timestamp, present: Timestamp) -> Vec<Effect> {
+        self.pause();
+        (self.requested, self.search, self.trouble) = (None, None, None);
+        let tags: Vec<TagId> = self.drawn().iter().map(|pen| pen.tag).collect();
+        let (from, to) = match direction {
+            Direction::Earlier => (at.checked_sub(SAMPLES).unwrap_or(Timestamp::MIN), at),
+            Direction::Later => (after(at), at.checked_add(SAMPLES).unwrap_or(present).min(after(present))),
+        };
+        if tags.is_empty() || to <= from {
+            return Vec::new();
+        }
+        let effect = self.ask(Query::SampleTime { tags, from, to, latest: direction == Direction::Earlier });
+        self.sample = Some(self.asked);
+        vec![effect]
+    }
+
+    /// An answer of a search: goes to the nearest event once all have come, or searches on.
+    pub(super) fn on_found(&mut self, number: u32, answer: Answer) -> Vec<Effect> {
+        if self.sample.take_if(|sample| *sample == number).is_some() {
+            return self.on_sample(answer);
+        }
+        let Some(search) = &mut self.search else { return Vec::new() };
+        search.queries.retain(|query| *query != number);
         // The newest rows came: of too many, the oldest are missing.
-        let cut = SEARCHED_ROWS <= alarms.len().max(actions.len());
-        let events = alarms.into_iter().map(Event::Alarm).chain(actions.into_iter().map(Event::Action));
-        let events = events.filter(|event| (span.from..span.to).contains(&event.at()));
+        let rows = match answer {
+            Answer::Journal(rows) => rows.into_iter().map(Event::Alarm).collect(),
+            Answer::Actions(rows) => rows.into_iter().map(Event::Action).collect(),
+            Answer::Batches(rows) => {
+                search.cut |= search.what.rows() <= rows.len();
+                rows.iter().flat_map(|report| of_batch(&report.batch)).collect::<Vec<_>>()
+            }
+            Answer::Series(_)
+            | Answer::LineMinutes(_)
+            | Answer::Report(_)
+            | Answer::AlarmMetrics(_)
+            | Answer::Values(_)
+            | Answer::Past(_)
+            | Answer::SampleTime(_)
+            | Answer::Unarchived(_)
+            | Answer::Overview(_)
+            | Answer::Registers(_) => Vec::new(),
+        };
+        search.cut |= search.what == Searched::Events && search.what.rows() <= rows.len();
+        search.found.extend(rows);
+        let Some(Search { what, span, found, cut, .. }) = self.search.take_if(|search| search.queries.is_empty())
+        else {
+            return Vec::new();
+        };
+        let events = found.into_iter().filter(|event| (span.from..span.to).contains(&event.at()));
         let nearest = match span.direction {
             Direction::Earlier => events.max_by_key(Event::at),
             Direction::Later => {
                 let half = span.half(span.from, span.to);
                 if cut && half.overfull.is_some() {
-                    return self.search_in(Some(half), span.direction);
+                    return self.search_in(what, Some(half), span.direction);
                 }
                 events.min_by_key(Event::at)
             }
         };
-        let Some(event) = nearest else { return self.search_in(span.next(), span.direction) };
+        let Some(event) = nearest else { return self.search_in(what, span.next(), span.direction) };
         let effect = self.go_to(event.at());
         self.event = Some(event);
         vec![effect]
     }
+
+    fn on_sample(&mut self, answer: Answer) -> Vec<Effect> {
+        let Answer::SampleTime(found) = answer else { return Vec::new() };
+        let Some(at) = found else {
+            self.trouble = Some(t!("no other stored value within an hour").to_owned());
+            return Vec::new();
+        };
+        let effect = self.go_to(at);
+        self.event = Some(Event::Sample(at));
+        vec![effect]
+    }
+}
+
+/// Begin and end of a batch, as far as they were seen.
+fn of_batch(batch: &Batch) -> Vec<Event> {
+    let event = |at, ended| Event::Batch { at, label: batch.label(), ended };
+    [Some(event(batch.from, false)), batch.to.map(|to| event(to, true))].into_iter().flatten().collect()
 }
 
 fn after(at: Timestamp) -> Timestamp {

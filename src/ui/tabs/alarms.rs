@@ -168,7 +168,12 @@ impl TabView for Alarms {
     }
 
     fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
-        self.selected(cx).map(|alarm| alarm.raised_at)
+        match self.page {
+            Page::Journal => self.journal.moment(cx),
+            Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
+                self.selected(cx).map(|alarm| alarm.raised_at)
+            }
+        }
     }
 
     fn back(&mut self, _cx: &ViewContext) -> bool {

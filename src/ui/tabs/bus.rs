@@ -17,6 +17,7 @@ mod tests;
 
 use std::path::PathBuf;
 
+pub use frames::around as frames_around;
 pub use request::ask_sweep;
 pub use window::Window;
 

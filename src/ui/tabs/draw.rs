@@ -59,8 +59,16 @@ pub fn change(cx: &ViewContext, action: &ActionRecord) -> String {
     }
 }
 
-/// Curves of these pens with their names above, from what the history has answered of them.
-pub fn curves(cx: &ViewContext, canvas: &mut Canvas, title: &str, view: View, pens: &[Pen], series: &[Series]) {
+/// Curves of these pens with their names above, from what the history has answered of them; a cursor stands at an instant
+/// where what came after it is shown too.
+pub fn curves(
+    cx: &ViewContext,
+    canvas: &mut Canvas,
+    title: &str,
+    (view, cursor): (View, Option<Timestamp>),
+    pens: &[Pen],
+    series: &[Series],
+) {
     let theme = cx.theme;
     let mut x = canvas.text(1, 0, title, theme.dim());
     for (n, pen) in pens.iter().enumerate() {
@@ -81,7 +89,9 @@ pub fn curves(cx: &ViewContext, canvas: &mut Canvas, title: &str, view: View, pe
     };
     let curves = pens.iter().zip(&traces).enumerate().map(curve).collect();
     let zone = Some(&cx.def().time_zone);
-    let chart = Chart { zone, ..Chart::new(theme, (view.from, view.to, cx.now), curves) };
+    let now = if cursor.is_some() { cx.present() } else { cx.now };
+    let cursors = cursor.map(|at| (at, local(cx, at, "%T").into())).into_iter().collect();
+    let chart = Chart { zone, cursors, ..Chart::new(theme, (view.from, view.to, now), curves) };
     let area = canvas.part(0, 1, canvas.width(), canvas.height().saturating_sub(1)).area();
     chart.render(area, canvas.buffer());
 }

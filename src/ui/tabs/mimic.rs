@@ -8,6 +8,7 @@ mod forecast;
 mod may_change;
 mod neighbour;
 mod overview;
+mod page;
 mod point;
 mod preview;
 mod shift;
@@ -287,7 +288,7 @@ impl Mimic {
                 let pages = cx.def().mimic.pages.len();
                 return if pages > 1 { self.show_page(cx, around(self.page, by, pages)) } else { Vec::new() };
             }
-            Action::Actuators => return actuators(cx),
+            Action::Actuators => return command::actuators(cx),
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
                 let item = self.selected.and_then(|n| items.get(n));
@@ -308,7 +309,7 @@ impl Mimic {
         match action {
             Action::Move(dx, dy) => self.overview.on_move(cx, &self.shift, (dx, dy)),
             Action::Motion | Action::Page(_) => {}
-            Action::Actuators => return actuators(cx),
+            Action::Actuators => return command::actuators(cx),
             Action::Overview => {
                 self.at_a_glance = false;
                 return self.on_snapshot(cx);
@@ -378,8 +379,9 @@ impl Mimic {
                 sequence.view(cx, canvas, scale.place(*place), selected);
             }
             MimicItem::Trend { place, tag, window } => {
-                let trend = self.trends.iter().find(|(item, _)| *item == n);
-                let series = trend.and_then(|(_, trend)| trend.value.as_ref()?.first());
+                // The event page has curves of its own.
+                let Some((_, trend)) = self.trends.iter().find(|(item, _)| *item == n) else { return };
+                let series = trend.value.as_ref().and_then(|series| series.first());
                 trend::view(cx, canvas, scale.place(*place), *tag, *window, series, selected);
             }
             MimicItem::Text { place, text } => {
@@ -388,10 +390,4 @@ impl Mimic {
             }
         }
     }
-}
-
-/// The window of all actuators.
-fn actuators(cx: &ViewContext) -> Vec<UiAction> {
-    let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
-    open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate))
 }

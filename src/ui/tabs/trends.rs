@@ -15,7 +15,7 @@ mod plots;
 mod pointer;
 mod replay;
 mod response;
-pub(super) mod span;
+pub(in crate::ui) mod span;
 mod values;
 mod view;
 mod window;

@@ -1,7 +1,9 @@
 //! Replay: what an operator sees of a past instant, and that nothing is done there.
 
 mod forms;
+mod event_page;
 mod pages;
+mod steps;
 
 use std::time::Duration;
 

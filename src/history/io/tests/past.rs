@@ -161,3 +161,15 @@ fn a_past_instant_is_as_it_was_seen() {
         assert_eq!(refused, Err(expect));
     }
 }
+
+#[test]
+fn the_time_of_the_next_stored_value_is_found() {
+    let (_folder, db) = folder();
+    let store = Store::open(&db, &def(), sec(END)).unwrap().store;
+    let stored = |second| Record::Sample(TagId(0), Sample::good(second as f64, sec(second)));
+    store.append(&[stored(10), stored(20), stored(30)]).unwrap();
+    for (from, to, latest, expect) in [(11, 31, false, Some(20)), (0, 30, true, Some(20)), (31, 60, false, None)] {
+        let query = Query::SampleTime { tags: vec![TagId(0)], from: sec(from), to: sec(to), latest };
+        assert_eq!(store.answer(&query, sec(END)).unwrap(), Answer::SampleTime(expect.map(sec)), "{from} to {to}");
+    }
+}

@@ -82,3 +82,23 @@ fn a_number_is_never_broken_and_stands_to_the_right() {
             .all(|line| !line.starts_with(['\u{e31}', '\u{e34}', '\u{e48}']))
     );
 }
+
+#[test]
+fn a_text_longer_than_a_page_goes_on_and_a_wide_table_stays_inside() {
+    let mut document = made();
+    let long = "word ".repeat(3_000);
+    document.sections.truncate(2);
+    let fact = Fact { id: "note", name: "note".into(), cell: Cell::text(&long) };
+    document.sections[0].content = Content::Facts(vec![fact]);
+    let columns: Vec<Column> = (0..9).map(|_| Column::text("remark")).collect();
+    let row = (0..9).map(|n| if n == 4 { Cell::text(&long) } else { Cell::Text("x".repeat(60)) }).collect();
+    document.sections[1].content = Content::Table(Table::new(columns).with(std::iter::once(row)));
+    let (width, height) = size(Paper::A4);
+    let pages = pages(&document, Paper::A4, &Half);
+    let all: Vec<_> = pages.iter().flat_map(texts).collect();
+    let words = |text: &str| text.split(' ').filter(|word| *word == "word").count();
+    assert_eq!(all.iter().map(|(_, _, text)| words(text)).sum::<usize>(), 6_000);
+    for (x, y, text) in all {
+        assert!(x + Half.width(text, 6.0, false) <= width - MARGIN + 0.1 && y <= height - MARGIN, "{x} {y} {text}");
+    }
+}

@@ -26,7 +26,7 @@ fn a_choice_is_tried_at_once_and_kept_with_enter() {
     assert_eq!(model.theme.name, ThemeName::Light);
     let effects = type_keys(&mut model, "⏎");
     let light = Preferences { theme: ThemeName::Light, ..Preferences::default() };
-    assert_eq!(effects, [Effect::KeepPreferences(Some("tech1".to_owned()), light)]);
+    assert_eq!(effects, [Effect::KeepPreferences(Some("tech1".to_owned()), light.into())]);
     assert_eq!((model.theme.name, model.modal.is_none()), (ThemeName::Light, true));
 }
 

@@ -69,6 +69,12 @@ impl Journal {
         self.scroll.on(motion, self.rows(cx).len(), room);
     }
 
+    /// The instant of the first row on the screen: rows are not selected.
+    pub fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
+        let (rows, room) = (self.rows(cx), usize::from(cx.area.height.saturating_sub(2)));
+        rows.get(self.scroll.first(rows.len(), room)).map(|(at, ..)| *at)
+    }
+
     /// Other rows are wanted; those of before must not stand under their heading.
     fn show(&mut self, period: Option<Period>) {
         *self = Journal { words: std::mem::take(&mut self.words), period, ..Journal::default() };

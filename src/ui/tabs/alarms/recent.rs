@@ -90,7 +90,7 @@ impl Recent {
     pub fn draw_curve(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let Some(tag) = self.tag else { return };
         let series = self.curve.value.as_deref().unwrap_or_default();
-        draw::curves(cx, canvas, t!("last hour"), view(cx), &[Pen { tag, scale: None }], series);
+        draw::curves(cx, canvas, t!("last hour"), (view(cx), None), &[Pen { tag, scale: None }], series);
     }
 
     pub fn awaits(&self, number: u32) -> bool {

@@ -268,6 +268,18 @@ pub fn recent(cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
     }
 }
 
+/// The frames around an instant, as many as there is room for.
+pub fn around(cx: &ViewContext, frames: &Frames, at: Timestamp, canvas: &mut Canvas) {
+    let ring = Ring { held: frames.clone(), ..Ring::default() };
+    let (shown, room) = (ring.shown(), usize::from(canvas.height()));
+    let place = shown.partition_point(|frame| frame.at <= at);
+    let first = place.saturating_sub(room.div_ceil(2)).min(shown.len().saturating_sub(room));
+    let width = canvas.width();
+    for (y, n, frame) in on_screen(&shown, first, room) {
+        ring.row(cx, frame, n + 1 == place, &mut canvas.part(0, y, width, 1));
+    }
+}
+
 /// Without what the columns before it say: `read holding 41001–41003 (0x03E8, 3)`.
 fn short(summary: &str) -> String {
     let rest = summary.strip_prefix("unit ").and_then(|rest| rest.split_once(' ')).map_or(summary, |(_, rest)| rest);

@@ -169,7 +169,7 @@ impl Companions {
     fn trend(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let Some(group) = cx.def().trends.first() else { return };
         let (title, view) = (t!("{name}, last hour", name = group.name), view(cx, canvas.area()));
-        draw::curves(cx, canvas, &title, view, &pens(cx), self.curves.value.as_deref().unwrap_or_default());
+        draw::curves(cx, canvas, &title, (view, None), &pens(cx), self.curves.value.as_deref().unwrap_or_default());
     }
 }
 

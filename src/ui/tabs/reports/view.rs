@@ -79,7 +79,7 @@ fn draw_chart(reports: &Reports, cx: &ViewContext, canvas: &mut Canvas) {
     let (width, height) = (canvas.width().saturating_sub(1), canvas.height().min(CHART_ROWS));
     let series = reports.curve.value.as_deref().unwrap_or_default();
     let canvas = &mut canvas.part(1, 0, width, height);
-    draw::curves(cx, canvas, t!("t next tag"), view, &[pen], series);
+    draw::curves(cx, canvas, t!("t next tag"), (view, None), &[pen], series);
     if reports.curve.value.is_none() {
         let words = reports.curve.trouble.as_deref().unwrap_or(t!("collecting data"));
         canvas.text_centred(height / 2, words, cx.theme.dim());
