@@ -84,7 +84,7 @@ fn a_number_is_never_broken_and_stands_to_the_right() {
 }
 
 #[test]
-fn a_text_longer_than_a_page_goes_on_and_a_wide_table_stays_inside() {
+fn a_text_longer_than_a_page_goes_on_inside_the_page() {
     let mut document = made();
     let long = "word ".repeat(3_000);
     document.sections.truncate(2);
