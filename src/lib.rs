@@ -100,6 +100,7 @@
 //! | outstanding reply, in sync | a response that may still come after its timeout; it is never taken for another |
 //! | gap registers | registers read only because they lie between two tags of a block |
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
+//! | automatic report | a report that the station makes at the end of each shift, day, week or month; on record in the history |
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
 //! | batch, phase | what the plant makes between two conditions of its file; a value of its phase tag |
 //! | total | what an expression adds up to: an integral, hours, starts |
@@ -117,7 +118,7 @@
 //! | an alarm condition | `plant/alarm/condition.rs`, its keys in `profile/condition.rs`, one scenario |
 //! | a symbol of the mimic | its kind in `profile/picture/symbol.rs`, its item in `plant/mimic_def.rs`, its drawing in `ui/widgets/mimic` |
 //! | a theme | a column of the table in `ui/theme/palette.rs` |
-//! | a report format | its file in `report`, its row in `report/mod.rs` |
+//! | a report format | its file in `report`, its row in `report/mod.rs`, its name in `plant/report.rs` |
 //! | a tab | its file in `ui/tabs`, its row in `ui/tabs/mod.rs` |
 //! | a key of a tab | its row in the tab's table of keys, which the footer, the help and the clash check read; its action in the tab |
 //! | a renamed TOML key | its row in `profile/renamed.rs` |

@@ -98,6 +98,7 @@ pub fn needs_for_query(query: &Query) -> Role {
         | Query::Values { .. }
         | Query::Batches { .. }
         | Query::SampleTime { .. }
+        | Query::Reports { .. }
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview

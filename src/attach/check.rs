@@ -131,7 +131,8 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
         Query::Journal { limit, .. }
         | Query::Actions { limit, .. }
         | Query::Audit { limit, .. }
-        | Query::Batches { limit, .. } => rows(*limit),
+        | Query::Batches { limit, .. }
+        | Query::Reports { limit } => rows(*limit),
         Query::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
             let days = |time: SignedDuration| time.as_hours() / 24;
             let (asked, most) = (days(period.to.duration_since(period.from)), days(REPORT_MAX));

@@ -61,7 +61,8 @@ Exit codes:
   2  wrong arguments, errors in a profile, or bytes that cannot be read
   3  the history is in use by another process, or a station of this plant runs already
   4  no station runs here
-  5  the audit log is sound, but could not be compared with the history or with its sealing key";
+  5  the audit log is sound, but could not be compared with the history or with its sealing key;
+     or a report agrees with all that is there, but its checksum or the audit log could not be read";
 
 /// The control room of a small plant in a terminal: process mimic, trends, alarms, controllers and shift reports over
 /// Modbus RTU and TCP.
@@ -181,6 +182,8 @@ enum CliError {
     NotRunning(String),
     #[error("the audit log is intact, but {0}")]
     NotCompared(String),
+    #[error("{0}")]
+    NotVerified(String),
     #[error("the station stopped unexpectedly, see the log")]
     StationGone,
     #[error("{what}: {error}")]
@@ -200,7 +203,7 @@ impl CliError {
             CliError::History(HistoryError::Locked { .. }) | CliError::InUse(_) => 3,
             CliError::Listen(serve::ListenError::Running { .. }) => 3,
             CliError::NotRunning(_) => 4,
-            CliError::NotCompared(_) => 5,
+            CliError::NotCompared(_) | CliError::NotVerified(_) => 5,
             CliError::History(_)
             | CliError::Listen(_)
             | CliError::Users(_)

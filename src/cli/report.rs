@@ -1,11 +1,16 @@
 //! `sightglass report`: the report of a shift or period from the history, through the station while it runs.
 
+mod verify;
+
 use std::path::{Path, PathBuf};
+
+use clap::FromArgMatches;
 
 use crate::{
     history::{Answer, Query},
     plant::PlantDef,
     report::{self, ReportFormat, ShiftReport, Style, content::document, document::Document, tables},
+    station::io::report_files::write_checksum,
     text::Language,
 };
 
@@ -14,9 +19,48 @@ use super::{
     source::{CsvArgs, HistoryArgs, unexpected},
 };
 
-/// Arguments of `report`.
+/// Arguments of `report`: those of a report to write, or `verify` with its own.
+#[derive(Debug)]
+pub enum Args {
+    /// Write a report.
+    Write(Box<WriteArgs>),
+    /// Verify a file.
+    Verify(verify::Args),
+}
+
+/// The word of the subcommand.
+const VERIFY: &str = "verify";
+
+// Derived, PLANT would be asked for beside the subcommand as well.
+impl clap::Args for Args {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        let verify = verify::Args::augment_args(clap::Command::new(VERIFY)).about(verify::ABOUT);
+        let write = WriteArgs::augment_args(command).subcommand(verify);
+        write.subcommand_negates_reqs(true).args_conflicts_with_subcommands(true).disable_help_subcommand(true)
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        Args::augment_args(command)
+    }
+}
+
+impl FromArgMatches for Args {
+    fn from_arg_matches(matches: &clap::ArgMatches) -> Result<Args, clap::Error> {
+        match matches.subcommand_matches(VERIFY) {
+            Some(matches) => verify::Args::from_arg_matches(matches).map(Args::Verify),
+            None => WriteArgs::from_arg_matches(matches).map(|args| Args::Write(Box::new(args))),
+        }
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &clap::ArgMatches) -> Result<(), clap::Error> {
+        *self = Args::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+/// Arguments of a report to write.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct WriteArgs {
     #[command(flatten)]
     history: HistoryArgs,
     /// File to write, `-` for standard output; a folder for several formats [default: the plant's report folder]
@@ -40,8 +84,15 @@ fn language(code: &str) -> Result<Language, String> {
     Language::from_code(code).ok_or_else(|| format!("expected one of {}", known()))
 }
 
-/// Writes the report.
+/// Writes the report, or verifies one.
 pub fn main(args: Args) -> Result<(), CliError> {
+    match args {
+        Args::Write(args) => write(&args),
+        Args::Verify(args) => verify::main(args),
+    }
+}
+
+fn write(args: &WriteArgs) -> Result<(), CliError> {
     let def = args.history.load()?;
     if let Some(out) = &args.out {
         args.history.refuse_own_file(&def, out)?;
@@ -58,8 +109,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
         }
         let language = args.language.unwrap_or_else(|| report::language(&def));
         let document = document(&report, &def, language.locale());
-        for (path, bytes) in files(&args, &def, &report, &document)? {
+        for (path, bytes) in files(args, &def, &report, &document)? {
             source.export(&path, &bytes).await?;
+            if path.as_os_str() != "-" {
+                write_checksum(&path, &bytes).map_err(CliError::io(format!("no checksum of {}", path.display())))?;
+            }
         }
         Ok(())
     })
@@ -67,7 +121,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 /// What is written, and where.
 fn files(
-    args: &Args,
+    args: &WriteArgs,
     def: &PlantDef,
     report: &ShiftReport,
     document: &Document,

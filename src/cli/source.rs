@@ -30,6 +30,9 @@ pub struct HistoryArgs {
     /// Which shift: last, current, NAME or NAME@YYYY-MM-DD [default: last]
     #[arg(long, value_name = "SHIFT")]
     shift: Option<String>,
+    /// Which day, week or month: the last one, or with @DATE the one of a date: week@2026-11-21, week@2026-W47, month@2026-11
+    #[arg(long, value_name = "PERIOD", conflicts_with_all = ["shift", "from", "to"])]
+    period: Option<String>,
     /// From this local time (2026-11-21T06:00) or instant with offset
     #[arg(long, value_name = "TIME")]
     from: Option<String>,
@@ -68,7 +71,10 @@ impl HistoryArgs {
     pub async fn open(&self, def: &Arc<PlantDef>) -> Result<(Source, Period), CliError> {
         let source = Source::open(def, &self.station, &self.login).await?;
         let (shift, from, to) = (self.shift.as_deref(), self.from.as_deref(), self.to.as_deref());
-        let period = period_parser::period(def, shift, from, to, source.now());
+        let period = match &self.period {
+            Some(period) => period_parser::of_calendar(def, period, source.now()),
+            None => period_parser::period(def, shift, from, to, source.now()),
+        };
         Ok((source, period.map_err(|error| CliError::Usage(error.to_string()))?))
     }
 }
@@ -76,7 +82,7 @@ impl HistoryArgs {
 impl HistoryArgs {
     /// The same, but without a period it is the time before now.
     pub async fn open_latest(&self, def: &Arc<PlantDef>, time: SignedDuration) -> Result<(Source, Period), CliError> {
-        if [&self.shift, &self.from, &self.to].iter().any(|given| given.is_some()) {
+        if [&self.shift, &self.period, &self.from, &self.to].iter().any(|given| given.is_some()) {
             return self.open(def).await;
         }
         let source = Source::open(def, &self.station, &self.login).await?;

@@ -30,6 +30,7 @@ use crate::{
         live::{LiveRead, LiveReading},
         past::Past,
         record::{ActionRecord, AlarmRecord},
+        report::ReportRecord,
         sample::Sample,
     },
     report::{Period, ShiftReport, batch::BatchReport, step_series::HeldValue},
@@ -142,6 +143,11 @@ pub enum Query {
         /// The latest one.
         latest: bool,
     },
+    /// The automatic reports on record, the newest period first.
+    Reports {
+        /// At most so many.
+        limit: usize,
+    },
     /// The plant as it was at an instant.
     Past {
         /// The instant.
@@ -181,6 +187,8 @@ pub enum Answer {
     Batches(Vec<BatchReport>),
     /// The time; `None` where nothing is stored in the span.
     SampleTime(Option<Timestamp>),
+    /// The last event of each report.
+    Reports(MadeReports),
     /// What is known of the instant.
     Past(Box<Past>),
     /// Samples in order of time.
@@ -189,6 +197,17 @@ pub enum Answer {
     Overview(Box<Overview>),
     /// What the unit holds.
     Registers(LiveReading),
+}
+
+/// The automatic reports on record.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct MadeReports {
+    /// The last event of each, the newest period first.
+    pub reports: Vec<ReportRecord>,
+    /// The first and last instant stored: reports are made from the first one on.
+    pub extent: Option<(Timestamp, Timestamp)>,
+    /// The machine on which their files lie.
+    pub host: String,
 }
 
 /// What is stored, and where.

@@ -31,6 +31,7 @@ impl Record {
             Record::Action(action) => move_by(&mut action.at, by),
             Record::Line(minute) => move_by(&mut minute.at, by),
             Record::Batch(batch) => move_by(&mut batch.at, by),
+            Record::Report(report) => move_by(&mut report.at, by),
             Record::ClockSet => {}
         }
     }

@@ -41,6 +41,7 @@ pub mod live;
 pub mod command;
 pub(crate) mod energy;
 pub mod batch;
+pub mod report;
 pub mod record;
 pub(crate) mod interlock;
 pub mod alarm;

@@ -10,6 +10,7 @@ use super::{
     def::{Priority, TagId},
     keyword::keyword_enum,
     line_minute::LineMinute,
+    report::ReportRecord,
     sample::Sample,
 };
 
@@ -26,6 +27,8 @@ pub enum Record {
     Line(LineMinute),
     /// A change of a batch.
     Batch(BatchRecord),
+    /// An event of an automatic report.
+    Report(ReportRecord),
     /// The system clock was set: what follows is of the next epoch, whatever its times say.
     ClockSet,
 }

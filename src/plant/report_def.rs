@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     id::{DeviceId, TagId},
     keyword::keyword_enum,
+    report::AutomaticReport,
 };
 
 /// What reports contain and how they are written.
@@ -36,6 +37,8 @@ pub struct ReportDef {
     pub language: String,
     /// The paper of its pages.
     pub paper: Paper,
+    /// Those that the station makes by itself.
+    pub automatic: Vec<AutomaticReport>,
 }
 
 impl Default for ReportDef {
@@ -54,6 +57,7 @@ impl Default for ReportDef {
             signatures: Vec::new(),
             language: String::new(),
             paper: Paper::A4,
+            automatic: Vec::new(),
         }
     }
 }

@@ -39,6 +39,8 @@ keyword_enum! {
         Clock => "clock wrong or stepped",
         /// The task of a line ended by itself and was started again.
         LineTask => "line task restarted",
+        /// A report was not made or not delivered.
+        Reports => "automatic report fault",
     }
 }
 
@@ -63,7 +65,9 @@ impl FaultState {
 impl StationFault {
     fn priority(self) -> Priority {
         match self {
-            StationFault::NotArchived | StationFault::DiskSpace | StationFault::Clock => Priority::Medium,
+            StationFault::NotArchived | StationFault::DiskSpace | StationFault::Clock | StationFault::Reports => {
+                Priority::Medium
+            }
             _ => Priority::High,
         }
     }
@@ -128,6 +132,11 @@ impl StationFault {
                 "an error in the program; the log has the details",
                 "the line was not polled for some seconds",
                 "check that its values are good again; report the error with the log",
+            ],
+            StationFault::Reports => [
+                "the folder of the reports is full, missing or read-only, or the command after a report fails",
+                "the history has all figures; a report is missing in its folder or at its recipients",
+                "read the details; free the disk or repair the command; what is missing is made automatically",
             ],
         }
     }

@@ -187,6 +187,15 @@ pub fn text_of(name: &str, search: &Search) -> Option<String> {
     Some(String::from_utf8_lossy(&text.bytes).into_owned())
 }
 
+/// Is there a program that can be run by this name, in a folder of `PATH`, or at this path?
+pub(super) fn is_program(name: &str) -> bool {
+    let runs = |path: PathBuf| path.is_file() && rustix::fs::access(&path, rustix::fs::Access::EXEC_OK).is_ok();
+    match name.contains('/') {
+        true => runs(name.into()),
+        false => std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).any(|path| runs(path.join(name))),
+    }
+}
+
 fn folder_of(kind: Kind) -> &'static str {
     match kind {
         Kind::Plant => "plants",

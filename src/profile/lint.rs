@@ -163,7 +163,7 @@ mod tests {
             let text = if name == "meter" { meter } else { PLC };
             Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
         };
-        let library = Library { find: &find, names: Vec::new() };
+        let library = Library { find: &find, names: Vec::new(), is_program: &|_| true };
         let built = build("small", &Text { file: "small.toml".into(), bytes: text.into_bytes() }, &library);
         let (_, warnings) = built.unwrap_or_else(|errors| panic!("{errors}"));
         warnings.full_lines().collect()

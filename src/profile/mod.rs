@@ -16,6 +16,7 @@ pub const FORMAT_PAGE: &str = include_str!("../../profiles/README.md");
 mod access;
 mod address;
 mod alarm;
+mod automatic_report;
 mod batch;
 mod calculated;
 mod condition;
@@ -86,7 +87,8 @@ fn load_warned(plant: &Path, search: &Search) -> Result<(Checked, Option<PlantFi
     let file = found.file();
     let search = found.path.as_deref().map_or_else(|| search.clone(), |path| search.beside(path));
     let names = io::list(&search).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name);
-    let library = plant::Library { find: &|name| io::device(name, &search), names: names.collect() };
+    let library =
+        plant::Library { find: &|name| io::device(name, &search), names: names.collect(), is_program: &io::is_program };
     plant::build(&found.name, &found.text, &library)
         .map(|(def, warnings)| (Checked { plant: Arc::new(def), warnings }, file))
 }
@@ -117,7 +119,7 @@ fn check_device(stem: &str, text: plant::Text) -> Result<Checked, Errors> {
     let plant = plant::Text { file: format!("a plant around {}", text.file), bytes: around.into_bytes() };
     let (file, bytes) = (text.file, text.bytes);
     let find = |_: &str| Ok(Some(plant::Text { file: file.clone(), bytes: bytes.clone() }));
-    plant::build(stem, &plant, &plant::Library { find: &find, names: vec![stem.to_owned()] })
+    plant::build(stem, &plant, &plant::Library { find: &find, names: vec![stem.to_owned()], is_program: &|_| true })
         .map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
 }
 

@@ -43,7 +43,7 @@ impl OwnProfiles {
 
     /// Checks the text of a plant file that is not written yet.
     pub fn check(&self, name: &str, text: &str) -> Result<Checked, Errors> {
-        let library = plant::Library { find: &|name| Ok(self.find(name)), names: self.names() };
+        let library = plant::Library { find: &|name| Ok(self.find(name)), names: self.names(), is_program: &|_| true };
         let text = plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() };
         plant::build(name, &text, &library).map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
     }

@@ -6,7 +6,9 @@ use jiff::tz::TimeZone;
 use sha2::{Digest, Sha256};
 
 use super::{
-    access, alarm, batch, calculated, device,
+    access, alarm,
+    automatic_report::Rules,
+    batch, calculated, device,
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
@@ -38,6 +40,8 @@ pub(super) struct Library<'a> {
     pub find: &'a dyn Fn(&str) -> Result<Option<Text>, String>,
     /// The names of all profiles, for suggestions.
     pub names: Vec<String>,
+    /// Is there a program of this name, or at this path?
+    pub is_program: &'a dyn Fn(&str) -> bool,
 }
 
 /// Builds the plant called `name`, with the warnings; or returns every error in its texts.
@@ -88,7 +92,8 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let trends = mimic::trends(&file.trends, &defs, problems);
     let batches = batch::batches(&file.batches, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
-    let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, problems);
+    let rules = Rules { shifts: !shifts.is_empty(), is_program: library.is_program };
+    let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, &rules, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
     let classes = poll_class::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);

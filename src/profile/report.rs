@@ -3,6 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use super::{
+    automatic_report::{self, Rules},
     diagnostic::Problems,
     names::{Defs, Unique},
     reader::{At, OptionalKey, text},
@@ -32,6 +33,7 @@ pub(super) fn report(
     table: Option<&ReportTable>,
     defs: &Defs,
     trends: &[TrendGroup],
+    rules: &Rules,
     problems: &mut Problems,
 ) -> ReportDef {
     let mut report = ReportDef::default();
@@ -58,6 +60,7 @@ pub(super) fn report(
         report.csv = dialect(&csv.value, problems);
     }
     page(table, trends, &mut report, problems);
+    report.automatic = automatic_report::automatic(&table.automatic, rules, problems);
     report
 }
 

@@ -14,7 +14,10 @@ use super::{
     condition::AlarmTable,
     reader::{Choice, Raw, Texts, toml_tables},
 };
-use crate::plant::def::{Paper, Parity, ParquetVersion, Role, Rs485, Section};
+use crate::plant::{
+    def::{Paper, Parity, ParquetVersion, Role, Rs485, Section},
+    report::PeriodKind,
+};
 
 toml_tables! {
     /// A plant file.
@@ -219,6 +222,16 @@ toml_tables! {
         list "signatures" signatures: String,
         opt "language" language: String,
         opt "paper" paper: Paper,
+        list "automatic" automatic: AutomaticReportTable,
+    }
+
+    /// A `[[report.automatic]]`.
+    AutomaticReportTable, "an automatic report" {
+        need "period" period: PeriodKind,
+        list "formats" formats: String,
+        opt "folder" folder: String,
+        opt "keep_days" keep_days: u32,
+        list "after" after: String,
     }
 
     /// What the history may take of its disk, and for how long it keeps what.

@@ -8,6 +8,7 @@ mod inline;
 mod interlocks;
 mod messages;
 mod pictures;
+mod reports;
 mod text_tags;
 
 use proptest::prelude::*;
@@ -118,6 +119,10 @@ address = "Y17"
 "#;
 
 pub(super) fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Errors> {
+    load_warned(plant, meter, plc).map(|(def, _)| def)
+}
+
+fn load_warned(plant: &[u8], meter: &str, plc: &str) -> Result<(PlantDef, Errors), Errors> {
     let find = |name: &str| {
         let text = match name {
             "meter" => meter,
@@ -126,8 +131,9 @@ pub(super) fn load(plant: &[u8], meter: &str, plc: &str) -> Result<PlantDef, Err
         };
         Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
     };
-    let library = Library { find: &find, names: vec!["meter".to_owned(), "plc".to_owned()] };
-    build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library).map(|(def, _)| def)
+    let library =
+        Library { find: &find, names: vec!["meter".to_owned(), "plc".to_owned()], is_program: &|name| name == "curl" };
+    build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library)
 }
 
 /// Replaces `from` by `to` in whichever of the three texts has it; the rendering must then contain all of `expect`,

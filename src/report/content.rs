@@ -62,6 +62,7 @@ fn name(period: &Period, zone: &TimeZone) -> String {
         }
         PeriodName::Shift { name, date: day } => format!("{name} {}", date(*day)),
         PeriodName::Day(day) => t!("day {date}", date = date(*day)),
+        PeriodName::Week(_) | PeriodName::Month(_) => period.name.to_string(),
         PeriodName::Batch(name) => name.clone(),
     }
 }

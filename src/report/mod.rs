@@ -1,6 +1,7 @@
 //! Reports: the shift calendar, the figures of a shift, and the formats of its report; pure, rows in and bytes out.
 
 pub(crate) mod shift;
+pub(crate) mod calendar;
 pub mod period_parser;
 pub mod step_series;
 pub(crate) mod figures;
@@ -18,6 +19,7 @@ pub(crate) mod export;
 pub(crate) mod value_log;
 pub(crate) mod text;
 mod html;
+pub(crate) mod automatic;
 mod json;
 mod xlsx;
 mod docx;
@@ -27,7 +29,7 @@ pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 
-use std::{fmt, sync::Arc, time::Duration};
+use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
 
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
@@ -39,6 +41,7 @@ use crate::{
         alarm::PeriodMetrics,
         def::{CsvDialect, Paper, PlantDef, Priority},
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
+        report::PeriodKind,
     },
     text::Language,
 };
@@ -59,24 +62,34 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
     /// The bytes of its file: the same for the same document. `Err` says why there is none.
     fn render(&self, document: &Document, style: &Style) -> Result<Vec<u8>, String>;
 
-    /// The name of its file: `2026-11-21-morning.csv`; for a running shift with the time up to which it has data:
+    /// The name of its file: `2026-11-21-morning.csv`, `2026-W47.csv`; for a running shift with the time up to which it has data:
     /// `2026-11-21-morning-until-0930.csv`.
     fn file_name(&self, def: &PlantDef, period: &Period, until: Timestamp) -> String {
         let local = |at: Timestamp| at.to_zoned(def.time_zone.clone());
         let (from, to) = (local(period.from), local(period.to));
         let running = until < period.to;
-        let end = if running { local(until).strftime("-until-%H%M").to_string() } else { String::new() };
+        // What is called by a date needs no other: its end is at most a day later.
+        let form = if period.name.date().is_some() { "-until-%H%M" } else { "-until-%Y-%m-%dT%H%M" };
+        let end = if running { local(until).strftime(form).to_string() } else { String::new() };
         let Some(word) = period.name.word() else {
             let to = if running { local(until) } else { to };
             let (from, to) = (from.strftime("%Y-%m-%dT%H%M"), to.strftime("%Y-%m-%dT%H%M"));
             return format!("{from}-to-{to}.{}", self.extension());
         };
         let plain = |c: char| if c.is_alphanumeric() { c } else { '-' };
-        format!("{}-{}{end}.{}", from.date(), word.chars().map(plain).collect::<String>(), self.extension())
+        let word = word.chars().map(plain).collect::<String>();
+        match period.name {
+            // These words are dates.
+            PeriodName::Week(_) | PeriodName::Month(_) => format!("{word}{end}.{}", self.extension()),
+            PeriodName::Free | PeriodName::Shift { .. } | PeriodName::Day(_) | PeriodName::Batch(_) => {
+                format!("{}-{word}{end}.{}", from.date(), self.extension())
+            }
+        }
     }
 }
 
 /// Every format of the report; the first is the default.
+/// The plant file knows their names as [`crate::plant::report::REPORT_FORMATS`].
 pub const FORMATS: [&dyn ReportFormat; 8] = [
     &shift_csv::ShiftCsv,
     &record_csv::RecordCsv,
@@ -151,8 +164,12 @@ pub enum PeriodName {
         /// The local date of its start.
         date: civil::Date,
     },
-    /// A local day of a plant without shifts.
+    /// A local day.
     Day(civil::Date),
+    /// An ISO week, by its Monday.
+    Week(civil::Date),
+    /// A month, by its first day.
+    Month(civil::Date),
     /// The time of a batch: its name and number.
     Batch(String),
 }
@@ -162,25 +179,40 @@ impl PeriodName {
     pub fn date(&self) -> Option<civil::Date> {
         match self {
             PeriodName::Shift { date, .. } | PeriodName::Day(date) => Some(*date),
+            PeriodName::Free | PeriodName::Week(_) | PeriodName::Month(_) | PeriodName::Batch(_) => None,
+        }
+    }
+
+    /// The kind of period, where it is one of those that follow each other.
+    pub fn kind(&self) -> Option<PeriodKind> {
+        match self {
+            PeriodName::Shift { .. } => Some(PeriodKind::Shift),
+            PeriodName::Day(_) => Some(PeriodKind::Day),
+            PeriodName::Week(_) => Some(PeriodKind::Week),
+            PeriodName::Month(_) => Some(PeriodKind::Month),
             PeriodName::Free | PeriodName::Batch(_) => None,
         }
     }
 
     /// The word in the name of a file; `None` for a free period, which has its times there.
-    fn word(&self) -> Option<&str> {
-        match self {
-            PeriodName::Free => None,
-            PeriodName::Shift { name, .. } | PeriodName::Batch(name) => Some(name),
-            PeriodName::Day(_) => Some("day"),
-        }
+    fn word(&self) -> Option<Cow<'_, str>> {
+        Some(match self {
+            PeriodName::Free => return None,
+            PeriodName::Shift { name, .. } | PeriodName::Batch(name) => name.into(),
+            PeriodName::Day(_) => "day".into(),
+            PeriodName::Week(monday) => {
+                let week = monday.iso_week_date();
+                format!("{}-W{:02}", week.year(), week.week()).into()
+            }
+            PeriodName::Month(first) => first.strftime("%Y-%m").to_string().into(),
+        })
     }
 }
 
-/// `morning 2026-11-21`, `day 2026-11-21`, `water-3`, `period`.
+/// `morning 2026-11-21`, `day 2026-11-21`, `2026-W47`, `2026-11`, `water-3`, `period`.
 impl fmt::Display for PeriodName {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let word = self.word().unwrap_or("period");
-        f.write_str(word)?;
+        f.write_str(&self.word().unwrap_or("period".into()))?;
         self.date().map_or(Ok(()), |date| write!(f, " {date}"))
     }
 }

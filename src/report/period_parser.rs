@@ -3,10 +3,10 @@
 use jiff::{Timestamp, civil, tz::AmbiguousOffset};
 
 use super::{
-    Period, PeriodName,
+    Period, PeriodName, calendar,
     shift::{instant, previous, recent, shift_at, shift_on},
 };
-use crate::plant::def::PlantDef;
+use crate::plant::{def::PlantDef, keyword::Keyword, report::PeriodKind};
 
 /// What is wrong with a period as it was typed: what was found, and what was expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -33,6 +33,17 @@ pub enum PeriodError {
         /// Its date.
         date: civil::Date,
     },
+    /// What stands behind the @ of a day, week or month is none.
+    #[error("`{found}` is not a date: expected {expected}")]
+    NotOfCalendar {
+        /// As typed.
+        found: String,
+        /// The forms there are.
+        expected: &'static str,
+    },
+    /// No kind of period has this name.
+    #[error("no period `{0}`: expected day, week or month, or one of these with @DATE")]
+    NoSuchPeriod(String),
     /// Not a time.
     #[error("`{0}` is not a time: expected local 2026-11-21T06:00, or with offset 2026-11-21T06:00+07:00")]
     NotATime(String),
@@ -83,6 +94,53 @@ pub fn period(
             begun(Period::free(from, to), now)
         }
     }
+}
+
+/// The period of a name: `day`, `week` or `month` as [`of_calendar`] reads it, else a shift as [`period`] does. A shift may have
+/// one of these names, too, and comes first.
+pub fn named(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, PeriodError> {
+    let name = text.split_once('@').map_or(text, |(name, _)| name);
+    let is_shift = def.shifts.iter().any(|shift| shift.name == name);
+    match calendar_kind(name).filter(|_| !is_shift) {
+        Some(_) => of_calendar(def, text, now),
+        None => period(def, Some(text), None, None, now),
+    }
+}
+
+/// A period of the calendar as it was typed: `day`, `week` or `month` for the last one that is over; with `@` and a date for the one
+/// in which that date lies, which may still run. A week may also be given as `2026-W47`, a month as `2026-11`.
+pub fn of_calendar(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, PeriodError> {
+    let (name, date) = text.split_once('@').map_or((text, None), |(name, date)| (name, Some(date)));
+    let kind = calendar_kind(name).ok_or_else(|| PeriodError::NoSuchPeriod(name.into()))?;
+    let outside = || PeriodError::NotATime(text.into());
+    let Some(date) = date else {
+        let running = calendar::period_at(def, kind, now).ok_or_else(outside)?;
+        return calendar::previous(def, kind, &running).ok_or_else(outside);
+    };
+    let date = calendar_date(kind, date)?;
+    begun(calendar::period_of(def, kind, date).ok_or_else(outside)?, now)
+}
+
+/// The kind of a name that is not a shift's.
+fn calendar_kind(name: &str) -> Option<PeriodKind> {
+    PeriodKind::from_word(name).filter(|kind| *kind != PeriodKind::Shift)
+}
+
+/// A date in a period of this kind.
+fn calendar_date(kind: PeriodKind, text: &str) -> Result<civil::Date, PeriodError> {
+    let first = |form: &str| civil::Date::strptime(form, format!("{text}-01")).ok();
+    let monday = || {
+        let (year, week) = text.split_once("-W")?;
+        let date = civil::ISOWeekDate::new(year.parse().ok()?, week.parse().ok()?, civil::Weekday::Monday);
+        Some(date.ok()?.date())
+    };
+    let (other, expected) = match kind {
+        PeriodKind::Shift | PeriodKind::Day => (None, "YYYY-MM-DD, as in 2026-11-21"),
+        PeriodKind::Week => (monday(), "YYYY-MM-DD or YYYY-Www, as in 2026-W47"),
+        PeriodKind::Month => (first("%Y-%m-%d"), "YYYY-MM-DD or YYYY-MM, as in 2026-11"),
+    };
+    let whole = civil::Date::strptime("%Y-%m-%d", text).ok();
+    whole.or(other).ok_or_else(|| PeriodError::NotOfCalendar { found: text.into(), expected })
 }
 
 /// A past instant as it was typed: like the beginning of a period, or `03:12`, the last time that it was that time of day.
@@ -199,6 +257,32 @@ mod tests {
         }
         let afternoon = ("afternoon 2026-11-20", "2026-11-20T14:00+07", "2026-11-20T22:00+07");
         check((Some("afternoon"), None, None), afternoon.0, afternoon.1, afternoon.2);
+    }
+
+    #[test]
+    fn a_day_week_or_month_is_the_last_or_that_of_a_date() {
+        let def = plant("Asia/Bangkok", &THREE);
+        let check = |text: &str, expect: &str| {
+            let got = of_calendar(&def, text, at(NOW)).map(|period| period.name.to_string());
+            assert_eq!(got.unwrap_or_else(|error| error.to_string()), expect, "{text}");
+        };
+        check("day", "day 2026-11-20");
+        check("day@2026-11-21", "day 2026-11-21");
+        check("week", "2026-W46");
+        check("week@2026-11-21", "2026-W47");
+        check("week@2026-W01", "2026-W01");
+        check("month", "2026-10");
+        check("month@2026-11", "2026-11");
+        check("month@2026-02-28", "2026-02");
+        check("month@2026-12", "2026-12 has not started yet");
+        check("week@2026-W60", "`2026-W60` is not a date: expected YYYY-MM-DD or YYYY-Www, as in 2026-W47");
+        check("day@2026-11", "`2026-11` is not a date: expected YYYY-MM-DD, as in 2026-11-21");
+        check("year", "no period `year`: expected day, week or month, or one of these with @DATE");
+        check("shift", "no period `shift`: expected day, week or month, or one of these with @DATE");
+        let other = plant("Asia/Bangkok", &[("day", 6, 0), ("night", 18, 0)]);
+        let name = |text| super::named(&other, text, at(NOW)).expect("a period").name;
+        assert_eq!(name("day"), PeriodName::Shift { name: "day".into(), date: civil::date(2026, 11, 21) });
+        assert_eq!(name("week"), PeriodName::Week(civil::date(2026, 11, 9)));
     }
 
     #[test]

@@ -31,28 +31,6 @@ pub fn previous(def: &PlantDef, period: &Period) -> Option<Period> {
     shift_at(def, period.from.checked_sub(1.nanosecond()).ok()?)
 }
 
-/// What a period is compared with: the one before it, and that of a week before.
-pub fn comparable(def: &PlantDef, period: &Period) -> Vec<Period> {
-    let week_before = match &period.name {
-        PeriodName::Shift { name, date } => date.checked_sub(7.days()).ok().and_then(|date| shift_on(def, name, date)),
-        PeriodName::Day(date) => date.checked_sub(7.days()).ok().and_then(|date| day(&def.time_zone, date)),
-        PeriodName::Free | PeriodName::Batch(_) => return Vec::new(),
-    };
-    let before = match &period.name {
-        PeriodName::Day(date) => date.yesterday().ok().and_then(|date| day(&def.time_zone, date)),
-        PeriodName::Shift { .. } | PeriodName::Free | PeriodName::Batch(_) => previous(def, period),
-    };
-    let mut periods: Vec<Period> = before.into_iter().chain(week_before).collect();
-    periods.dedup();
-    periods
-}
-
-/// A local day, from midnight to midnight.
-pub fn day(zone: &TimeZone, date: civil::Date) -> Option<Period> {
-    let midnight = |date: civil::Date| instant(zone, date.to_datetime(civil::Time::midnight()));
-    Some(Period { name: PeriodName::Day(date), from: midnight(date)?, to: midnight(date.tomorrow().ok()?)? })
-}
-
 /// The last `n` shifts, newest first, the running one included.
 pub fn recent(def: &PlantDef, now: Timestamp, n: usize) -> Vec<Period> {
     std::iter::successors(shift_at(def, now), |period| previous(def, period)).take(n).collect()

@@ -1,13 +1,13 @@
 //! Every format of the same report: the same file each time, in every language, with nothing that runs.
 
 use super::{
-    FORMATS, Style,
+    FORMATS, ReportFormat, Style,
     content::document,
     document::{Cell, Content},
     testing::{THREE, plant, shift_report},
 };
 use crate::{
-    plant::def::Section,
+    plant::{def::Section, report::REPORT_FORMATS},
     text::{Language, Locale},
 };
 
@@ -19,6 +19,11 @@ fn render(name: &str, locale: Locale) -> Vec<u8> {
 
 fn text(name: &str, locale: Locale) -> String {
     String::from_utf8(render(name, locale)).expect("it is text")
+}
+
+#[test]
+fn the_plant_file_knows_every_format() {
+    assert_eq!(FORMATS.map(ReportFormat::name), REPORT_FORMATS);
 }
 
 #[test]

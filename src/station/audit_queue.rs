@@ -31,11 +31,11 @@ const BACKLOG_MAX: usize = 1_000;
 const REPLIES_MAX: usize = 64;
 
 /// Where the result of a request goes.
-pub(super) type ReplySender = oneshot::Sender<Result<Durability, String>>;
+pub(crate) type ReplySender = oneshot::Sender<Result<Durability, String>>;
 
 /// A message of the session server. Their order matters.
 #[derive(Debug)]
-pub(super) enum AuditMessage {
+pub(crate) enum AuditMessage {
     /// Append this entry.
     Entry(ActionRecord),
     /// Send this result once everything before it is on disk, or say that it is not.

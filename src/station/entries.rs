@@ -68,6 +68,11 @@ pub(super) fn clock_step(old: Timestamp, new: Timestamp) -> ActionRecord {
     with_change(entry(new, "clock step", "system clock", "done: applied at once"), (Some(text(old)), text(new)))
 }
 
+/// The station has written a report.
+pub(super) fn report_exported(file: &str, sha256: &str, at: Timestamp) -> ActionRecord {
+    ActionRecord { new: Some(sha256.into()), ..entry(at, "export", file, "done") }
+}
+
 /// The last entry of a station.
 pub(super) fn stopped(plant: &str, at: Timestamp) -> ActionRecord {
     entry(at, "stop station", plant, "done")

@@ -1,5 +1,9 @@
 //! Starts the tasks of a station and stops them in order.
 
+mod delivery;
+pub(crate) mod report_files;
+pub mod reports;
+
 use std::{path::PathBuf, sync::Arc};
 
 use tokio::{
@@ -27,6 +31,7 @@ use crate::{
     profile::PlantFile,
 };
 
+use self::reports::ReportTask;
 use super::{
     audit_queue::AuditQueue,
     past::Past,
@@ -170,6 +175,13 @@ struct Threads {
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
 }
 
+/// A plant ends with its last line; one without any when it is stopped.
+async fn until_stopped(events: mpsc::Sender<crate::plant::event::Event>, mut stopped: watch::Receiver<bool>) {
+    // A station that is gone has stopped.
+    let _ = stopped.wait_for(|stop| *stop).await;
+    drop(events);
+}
+
 // Everything that a station is made of, each once.
 #[allow(clippy::too_many_arguments)]
 fn assemble(
@@ -206,20 +218,21 @@ fn assemble(
         )));
     }
     if def.lines.is_empty() {
-        // A plant ends with its last line; one without any when it is stopped.
-        let (events, mut stopped) = (events.clone(), stopped.clone());
-        tasks.push(tokio::spawn(async move {
-            // A station that is gone has stopped.
-            let _ = stopped.wait_for(|stop| *stop).await;
-            drop(events);
-        }));
+        tasks.push(tokio::spawn(until_stopped(events.clone(), stopped.clone())));
     }
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
+    let for_reports = persistence.records.clone().map(|records| (records, persistence.store.clone()));
     let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
+    // Without that task, the plant ends with its last line.
+    if let Some((records, status)) = for_reports.filter(|_| !def.report.automatic.is_empty()) {
+        let (def, queries, audit) = (def.clone(), queries.clone(), audit.clone());
+        let task = ReportTask { def, clock, queries, records, audit, events, status };
+        tasks.push(tokio::spawn(reports::run(task, stopped.clone())));
+    }
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
     let outputs = Outputs {
         commands: commands.clone(),

@@ -22,6 +22,7 @@
 //! | memory, CPU: too many queries | three at a time, two of one terminal, 20 s each, on connections of their own; a full queue of samples is counted as lost | the queue empties |
 //! | line: cable, port | its values become bad, the port is opened again with backoff; a line alarm | answers come |
 //! | line: too much to do | process values are stretched alike, alarm inputs keep their period; the header says so | demand falls |
+//! | folder of reports: full, missing; command after a report fails | the report is tried again after 5 s to 10 min, the command five times | it works again |
 //! | a line's task panics | started again after 1, 2, 5 s; the other lines do not notice | acknowledged |
 
 pub mod session;

@@ -331,7 +331,9 @@ impl PlantTask {
                     events.push(event.clone());
                     others.push(Record::Alarm(event));
                 }
-                Record::Sample(..) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => others.push(record),
+                Record::Sample(..) | Record::Line(_) | Record::Batch(_) | Record::Report(_) | Record::ClockSet => {
+                    others.push(record)
+                }
             }
         }
         self.send_to_audit_log(actions, events);

@@ -39,7 +39,7 @@ use crate::{
         OwnProfiles,
         io::atomic::{write_for_user, write_new},
     },
-    station::{Request, Session},
+    station::{Request, Session, io::report_files::write_checksum},
     t,
     text::Language,
 };
@@ -315,7 +315,13 @@ impl Loop {
                 io::ErrorKind::AlreadyExists => exists.to_owned(),
                 _ => error.to_string(),
             };
-            let saved = save(&path, &bytes, new).map_err(|error| format!("{}: {}", path.display(), why(error)));
+            let checksum = |saved| {
+                let wanted = tab == Some(Tab::Reports);
+                if wanted { write_checksum(&path, &bytes) } else { Ok(()) }.map(|()| saved)
+            };
+            let saved = save(&path, &bytes, new)
+                .and_then(checksum)
+                .map_err(|error| format!("{}: {}", path.display(), why(error)));
             let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
         });
     }

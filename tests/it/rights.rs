@@ -338,8 +338,8 @@ fn of_query(query: &Query) -> Row {
     match query {
         Query::Series { .. } | Query::Journal { .. } | Query::Actions { .. } => look("", "-VTSL-"),
         Query::LineMinutes { .. } | Query::Values { .. } | Query::SampleTime { .. } => look("", "-VTSL-"),
-        Query::AlarmMetrics { .. } | Query::Report { .. } => look("", "-VTSL-"),
         Query::Past { .. } | Query::Batches { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
+        Query::AlarmMetrics { .. } | Query::Report { .. } | Query::Reports { .. } => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
@@ -352,8 +352,7 @@ fn registers(def: &PlantDef) -> LiveRead {
 }
 
 fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
-    let (from, limit) = (to - jiff::SignedDuration::from_secs(60), 10);
-    let (words, by, action) = (String::new(), String::new(), String::new());
+    let (from, limit, all) = (to - jiff::SignedDuration::from_secs(60), 10, String::new);
     vec![
         Query::Series { tags: vec![def.tags[0].id], from, to, buckets: 10 },
         Query::Journal { from, to, limit },
@@ -365,9 +364,10 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::SampleTime { tags: vec![def.tags[0].id], from, to, latest: true },
         Query::Past { at: to },
         Query::Batches { from, to, limit },
+        Query::Reports { limit },
         Query::Unarchived { from, to },
         Query::Overview,
-        Query::Audit { from, to, words, by, action, limit },
+        Query::Audit { from, to, words: all(), by: all(), action: all(), limit },
         Query::Registers(registers(def)),
     ]
 }

@@ -40,7 +40,19 @@ impl Store {
         check_span(from, to)?;
         let records = self.list(BATCHES, params![utc(from), utc(to), limit], record)?;
         within(records.len() as u64, ROWS_MAX)?;
-        let batches = batches(&records, now);
+        self.with_figures(batches(&records, now), now)
+    }
+
+    /// The batches that ran in a period, as they were at its end: the same whenever it is asked.
+    pub(super) fn batches_of(&self, from: Timestamp, until: Timestamp) -> Result<Vec<BatchReport>, HistoryError> {
+        let mut records = self.list(BATCHES, params![utc(from), utc(until), ROWS_MAX], record)?;
+        within(records.len() as u64, ROWS_MAX)?;
+        // Its own end is that of its period.
+        records.retain(|record| record.at <= until);
+        self.with_figures(batches(&records, until), until)
+    }
+
+    fn with_figures(&self, batches: Vec<Batch>, now: Timestamp) -> Result<Vec<BatchReport>, HistoryError> {
         let with_figures = batches.len() <= BATCHES_MAX;
         let report = |batch: Batch| {
             let until = batch.until(now);

@@ -63,6 +63,7 @@ pub mod restore;
 pub mod import;
 pub mod compact;
 pub mod report;
+mod reports;
 pub mod alarm_metrics;
 pub mod batches;
 pub mod chain;

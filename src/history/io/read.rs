@@ -62,6 +62,7 @@ impl Store {
             Query::SampleTime { tags, from, to, latest } => {
                 self.sample_time(tags, (*from, *to), *latest).map(Answer::SampleTime)
             }
+            Query::Reports { limit } => self.made_reports(*limit).map(Answer::Reports),
             Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
             Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
@@ -284,7 +285,7 @@ pub(super) fn time(row: &Row) -> duckdb::Result<Timestamp> {
     instant(micros).ok_or(duckdb::Error::IntegralValueOutOfRange(0, i128::from(micros)))
 }
 
-fn maybe_time(row: &Row, column: usize) -> duckdb::Result<Option<Timestamp>> {
+pub(super) fn maybe_time(row: &Row, column: usize) -> duckdb::Result<Option<Timestamp>> {
     Ok(row.get::<_, Option<i64>>(column)?.and_then(instant))
 }
 

@@ -30,6 +30,9 @@ use crate::{
 pub const QUERIES_IN_WORK_MAX: usize = 3;
 /// Of these of one terminal: the others find a place at once.
 pub const QUERIES_OF_ONE_MAX: usize = QUERIES_IN_WORK_MAX - 1;
+/// The terminal of the station's own queries. One at a time, in a place of its own, and after all others: what people ask is
+/// never delayed by it.
+pub const STATION: u32 = 0;
 /// Queries that wait here; those behind them wait in the queue, which refuses when it is full.
 const WAITING_MAX: usize = 64;
 /// How long a query waits for the commit of what is pending.
@@ -157,24 +160,24 @@ impl Reader {
 }
 
 /// Takes the query that is answered next, if there is a place for one: that of the terminal with the fewest being
-/// answered, and of those the one that waits longest.
-fn next<'a, T>(
-    waiting: &mut VecDeque<(u32, T)>,
-    answered: impl ExactSizeIterator<Item = &'a u32> + Clone,
-) -> Option<(u32, T)> {
-    if answered.len() >= QUERIES_IN_WORK_MAX {
-        return None;
-    }
+/// answered, and of those the one that waits longest; of the station only where no other can be answered.
+fn next<'a, T>(waiting: &mut VecDeque<(u32, T)>, answered: impl Iterator<Item = &'a u32> + Clone) -> Option<(u32, T)> {
+    let people = answered.clone().filter(|terminal| **terminal != STATION).count();
+    let is_station = |place: &usize| waiting[*place].0 == STATION;
     let of_its_terminal = |place: &usize| answered.clone().filter(|terminal| **terminal == waiting[*place].0).count();
-    let fitting = (0..waiting.len()).filter(|place| of_its_terminal(place) < QUERIES_OF_ONE_MAX);
-    let place = fitting.min_by_key(of_its_terminal)?;
+    let fits = |place: &usize| match is_station(place) {
+        true => of_its_terminal(place) == 0,
+        false => people < QUERIES_IN_WORK_MAX && of_its_terminal(place) < QUERIES_OF_ONE_MAX,
+    };
+    let fitting = (0..waiting.len()).filter(fits);
+    let place = fitting.min_by_key(|place| (is_station(place), of_its_terminal(place)))?;
     waiting.remove(place)
 }
 
 /// Does a figure of the answer lack what is not committed yet?
 fn counts_a_period(query: &Query) -> bool {
     match query {
-        Query::Report { .. } | Query::AlarmMetrics { .. } | Query::Batches { .. } => true,
+        Query::Report { .. } | Query::AlarmMetrics { .. } | Query::Batches { .. } | Query::Reports { .. } => true,
         Query::Series { .. }
         | Query::Values { .. }
         | Query::Journal { .. }
@@ -227,6 +230,11 @@ mod tests {
             (&[7, 7, 8], &[7, 7], Some(2)),
             (&[7, 8, 8], &[7, 9], Some(1)),
             (&[7, 8], &[7, 8, 7], None),
+            (&[0, 0, 7], &[7], Some(2)),
+            (&[0, 7], &[7, 7], Some(0)),
+            (&[0, 7], &[7, 8, 9], Some(0)),
+            (&[0, 7], &[0, 7, 8], Some(1)),
+            (&[0], &[0], None),
         ] {
             assert_eq!(place(waiting, answered), expect, "{waiting:?} while {answered:?} are answered");
         }

@@ -25,14 +25,14 @@ use crate::{
         PlantDef,
         def::{Section, TagId, TrendGroup},
         record::AlarmRecord,
+        report::PeriodKind,
         tag::DataType,
         time::elapsed,
     },
     report::{
-        Compared, Gap, Outage, Period, RecordRow, RunFigures, ShiftReport, TagFigures,
+        Compared, Gap, Outage, Period, RecordRow, RunFigures, ShiftReport, TagFigures, calendar,
         chart::{Chart, ChartCurve},
         figures::{self, Figures, TagDescription},
-        shift,
         step_series::ValuesAt,
     },
 };
@@ -111,7 +111,11 @@ impl Store {
         let (from, until) = (period.from, period.to.min(now));
         check_span(from, until)?;
         let (def, reported) = (&*self.def, reported_tags(&self.def));
-        let recorded = self.recorded((from, until), now)?;
+        let recorded = match period.name.kind() {
+            // Its rows are seconds apart: too many to read for a week.
+            Some(PeriodKind::Week | PeriodKind::Month) => None,
+            Some(PeriodKind::Shift | PeriodKind::Day) | None => self.recorded((from, until), now)?,
+        };
         let active = self.active_at(from)?;
         let alarms = self.events(from, until)?;
         let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
@@ -138,7 +142,7 @@ impl Store {
         let alarm_metrics = self.alarm_metrics(from, until, now)?;
         let batches = match def.batches.as_slice() {
             [] => Vec::new(),
-            [..] => self.batches((from, until, ROWS_MAX), now)?,
+            [..] => self.batches_of(from, until)?,
         };
         let period = period.clone();
         Ok(ShiftReport {
@@ -163,7 +167,7 @@ impl Store {
 
     /// The figures of the periods that a closed one is compared with, where anything of them is kept.
     fn compared(&self, tags: &[TagId], period: &Period, until: Timestamp) -> Result<Vec<Compared>, HistoryError> {
-        let periods = if until < period.to { Vec::new() } else { shift::comparable(&self.def, period) };
+        let periods = if until < period.to { Vec::new() } else { calendar::comparable(&self.def, period) };
         let figures = |period: Period| {
             let gathered = self.gather(tags, std::iter::empty(), (period.from, period.to))?;
             Ok(Compared { tags: gathered.rows(&self.def, tags, std::iter::empty()), period })

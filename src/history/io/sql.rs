@@ -24,11 +24,13 @@ use crate::{
 ///
 /// `batch` has the changes of batches; `place` is their order within one.
 ///
+/// `report` has the events of automatic reports; the last one of a period and format is its state.
+///
 /// Samples of a file have the epoch [`IMPORTED`], and `import` has a row for each file.
 ///
 /// `archive` is the manifest of the files in the archive, see there; `watched` are windows of ten minutes, by their number
 /// since 1970, in which archived samples lie; `deleted` are the files that the rules of the plant have deleted.
-pub const MIGRATIONS: [&str; 12] = [
+pub const MIGRATIONS: [&str; 13] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -102,6 +104,12 @@ CREATE TABLE batch (
     utc TIMESTAMP NOT NULL, name VARCHAR NOT NULL, number UINTEGER NOT NULL, place UINTEGER NOT NULL,
     event VARCHAR NOT NULL, phase VARCHAR, epoch USMALLINT NOT NULL);
 ",
+    "
+CREATE TABLE report (
+    utc TIMESTAMP NOT NULL, period VARCHAR NOT NULL, name VARCHAR NOT NULL, from_utc TIMESTAMP NOT NULL,
+    to_utc TIMESTAMP NOT NULL, format VARCHAR NOT NULL, file VARCHAR NOT NULL, sha256 VARCHAR NOT NULL,
+    event VARCHAR NOT NULL, attempts UINTEGER NOT NULL, error VARCHAR, epoch USMALLINT NOT NULL);
+",
 ];
 
 /// The epoch of samples that no station recorded.
@@ -144,7 +152,8 @@ pub const SET_LAST_COMMIT: &str = "UPDATE last_commit SET number = ?, first_utc 
 
 /// Rows of all tables.
 pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT count(*) FROM alarm_journal)
-    + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute) + (SELECT count(*) FROM batch)";
+    + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute) + (SELECT count(*) FROM batch)
+    + (SELECT count(*) FROM report)";
 
 /// Ends every curve: a row (time, no value, quality, epoch) for each tag whose last row since an instant has another quality.
 pub const END_CURVES: &str = "INSERT INTO sample
@@ -381,16 +390,6 @@ pub fn count_rows_of(files: &str, span: &Range<i64>) -> String {
 /// Samples in a span that are not archived.
 pub fn count_samples(span: &Range<i64>) -> String {
     count_rows_of("sample", span)
-}
-
-/// Tags of a dictionary whose numbers mean other tags here.
-pub fn other_tags(dictionary: &str) -> String {
-    format!("SELECT count(*) FROM {dictionary} d JOIN tag USING (id) WHERE d.name <> tag.name OR d.unit <> tag.unit")
-}
-
-/// Takes over the tags of a dictionary that are not known here.
-pub fn missing_tags(dictionary: &str) -> String {
-    format!("INSERT INTO tag SELECT id, name, unit FROM {dictionary} WHERE id NOT IN (SELECT id FROM tag)")
 }
 
 /// Rows of aggregates in a span.

@@ -30,7 +30,7 @@ const KEPT_FOR_EVENTS: usize = 128;
 /// Queries that wait for their turn; a full queue refuses more.
 pub const QUERIES_MAX: usize = 64;
 /// Requests of queries on their way to the writer: each that is being answered has one at most.
-const REQUESTS_MAX: usize = 2 * QUERIES_IN_WORK_MAX;
+const REQUESTS_MAX: usize = 2 * (QUERIES_IN_WORK_MAX + 1);
 /// Jobs that wait; more are refused.
 const JOBS_MAX: usize = 2;
 /// Real time between two commits: what a power failure may cost.
@@ -146,7 +146,8 @@ fn spawn<F: Future<Output = ()>>(
 ) -> std::io::Result<JoinHandle<()>> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_time()
-        .max_blocking_threads(QUERIES_IN_WORK_MAX)
+        // One for a query of the station.
+        .max_blocking_threads(QUERIES_IN_WORK_MAX + 1)
         .build()?;
     std::thread::Builder::new().name(name.into()).spawn(move || runtime.block_on(work()))
 }

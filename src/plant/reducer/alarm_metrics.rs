@@ -34,7 +34,12 @@ impl Plant {
         for record in records {
             match record {
                 Record::Alarm(event) => self.alarm_monitor.on_event(event),
-                Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => {}
+                Record::Sample(..)
+                | Record::Action(_)
+                | Record::Line(_)
+                | Record::Batch(_)
+                | Record::Report(_)
+                | Record::ClockSet => {}
             }
         }
         self.alarm_metrics = self.alarm_monitor.metrics();
@@ -62,7 +67,12 @@ mod tests {
         let event = Event::Read { at: at(second), device, values, texts, response_time, exchange: None };
         let events = plant.on_event(event).records.into_iter().filter_map(|record| match record {
             Record::Alarm(event) => Some(event),
-            Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => None,
+            Record::Sample(..)
+            | Record::Action(_)
+            | Record::Line(_)
+            | Record::Batch(_)
+            | Record::Report(_)
+            | Record::ClockSet => None,
         });
         events.collect()
     }

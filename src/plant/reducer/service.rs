@@ -141,7 +141,12 @@ mod tests {
                 action.new.as_deref().unwrap_or("").to_owned(),
                 action.outcome.to_string(),
             )),
-            Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => None,
+            Record::Sample(..)
+            | Record::Alarm(_)
+            | Record::Line(_)
+            | Record::Batch(_)
+            | Record::Report(_)
+            | Record::ClockSet => None,
         };
         effects.records.iter().filter_map(action).collect()
     }

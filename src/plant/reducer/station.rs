@@ -61,7 +61,12 @@ mod tests {
     fn tick(plant: &mut Plant, second: i64) -> Vec<AlarmRecord> {
         let events = plant.on_tick(at(second)).records.into_iter().filter_map(|record| match record {
             Record::Alarm(event) => Some(event),
-            Record::Sample(..) | Record::Action(_) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => None,
+            Record::Sample(..)
+            | Record::Action(_)
+            | Record::Line(_)
+            | Record::Batch(_)
+            | Record::Report(_)
+            | Record::ClockSet => None,
         });
         events.collect()
     }

@@ -168,7 +168,8 @@ fn a_value_that_needs_more_room_is_warned_of() {
             let text = if name == "meter" { &meter } else { PLC };
             Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
         };
-        let (_, warnings) = build("small", &plant, &Library { find: &find, names: Vec::new() }).unwrap();
+        let (_, warnings) =
+            build("small", &plant, &Library { find: &find, names: Vec::new(), is_program: &|_| true }).unwrap();
         warnings.lines().filter(|line| line.contains("columns")).collect::<Vec<_>>()
     };
     assert_eq!(warned("{D1.T  }"), [""; 0]);

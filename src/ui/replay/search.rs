@@ -180,6 +180,7 @@ impl Replay {
             | Answer::Values(_)
             | Answer::Past(_)
             | Answer::SampleTime(_)
+            | Answer::Reports(_)
             | Answer::Unarchived(_)
             | Answer::Overview(_)
             | Answer::Registers(_) => Vec::new(),

@@ -4,7 +4,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::Tab;
 use crate::{
-    history::{Answer, HistoryError, QUERY_TIME_MAX, Query, Series},
+    history::{Answer, HistoryError, MadeReports, QUERY_TIME_MAX, Query, Series},
     plant::{
         alarm::PeriodMetrics,
         line_minute::LineMinute,
@@ -210,6 +210,7 @@ from_answer! {
     Report: Box<ShiftReport>;
     AlarmMetrics: Box<PeriodMetrics>;
     Batches: Vec<BatchReport>;
+    Reports: MadeReports;
     Values: Vec<Vec<Option<HeldValue>>>;
 }
 

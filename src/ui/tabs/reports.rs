@@ -3,6 +3,7 @@
 pub(super) mod period;
 mod batches;
 mod export;
+mod made;
 mod overlay;
 mod view;
 
@@ -11,7 +12,7 @@ mod tests;
 
 use std::path::PathBuf;
 
-use self::{batches::Batches, export::Export};
+use self::{batches::Batches, export::Export, made::Made};
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -47,6 +48,8 @@ pub enum Action {
     Why,
     /// The list of batches.
     Batches,
+    /// The list of automatic reports.
+    Made,
     /// The chart of the tag so many rows further on.
     Tag(isize),
 }
@@ -61,6 +64,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('f'), "format", "next format: CSV, text, HTML, Excel, Word, …", Action::Format),
     Key::new(char('p'), "preview", "the report as text, as it is written", Action::Preview),
     Key::new(char(';'), "", "CSV with , and . or with ; and ,", Action::Dialect),
+    Key::new(char('r'), "automatic", "the reports that the station makes by itself", Action::Made),
     Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
     Key::new(char('T'), "", "chart of the previous tag", Action::Tag(-1)),
     Key::new(char('u'), "", "refresh the figures", Action::Refresh),
@@ -93,6 +97,7 @@ pub struct Reports {
     charted: usize,
     curve: Answered<Vec<Series>>,
     batches: Batches,
+    made: Made,
     dialect: CsvDialect,
     format: &'static dyn ReportFormat,
     /// The report as text, while that is shown.
@@ -113,6 +118,7 @@ impl TabView for Reports {
             charted: 0,
             curve: Answered::default(),
             batches: Batches::default(),
+            made: Made::default(),
             dialect: snapshot.def.report.csv,
             format: report::FORMATS[0],
             preview: None,
@@ -135,7 +141,10 @@ impl TabView for Reports {
 
     fn awaits(&self, number: u32) -> bool {
         let overlay = self.batches.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number));
+        let text = self.made.open.as_ref().is_some_and(|open| open.report.query.awaits(number));
         overlay
+            || text
+            || self.made.list.query.awaits(number)
             || self.curve.query.awaits(number)
             || self.report.query.awaits(number)
             || self.batches.rows.query.awaits(number)
@@ -147,6 +156,8 @@ impl TabView for Reports {
         self.curve.on_answer(cx, number, &answer);
         self.batches.rows.on_answer(cx, number, &answer);
         self.batches.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
+        self.made.list.on_answer(cx, number, &answer);
+        self.made.open.iter_mut().for_each(|open| open.report.on_answer(cx, number, &answer));
         self.ask(cx)
     }
 
@@ -173,6 +184,9 @@ impl TabView for Reports {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        if self.made.shown {
+            return self.made.view(cx, frame, area);
+        }
         match self.batches.shown {
             true => self.batches.view(cx, frame, area, view::export_words(self, cx, &self.batches_path(cx))),
             false => view::draw(self, cx, frame, area),
@@ -181,6 +195,11 @@ impl TabView for Reports {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.dismiss();
+        if self.made.shown {
+            let Some(action) = keys::find(&self.made.keys(), event) else { return Vec::new() };
+            self.made.act(cx, action);
+            return self.ask(cx);
+        }
         match (self.batches.shown, &self.batches.overlay) {
             (true, Some(_)) => keys::find(overlay::KEYS, event).map(|action| self.act_on_overlay(cx, action)),
             (true, None) => keys::find(&batches::keys(), event).map(|action| self.act_on_batches(cx, action)),
@@ -190,6 +209,10 @@ impl TabView for Reports {
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
+        if self.made.shown {
+            self.made.shown = self.made.open.take().is_some();
+            return true;
+        }
         match self.batches.shown {
             true if self.batches.overlay.take().is_some() => true,
             true => self.batches.rows.query.cancel(cx) || std::mem::take(&mut self.batches.shown),
@@ -197,7 +220,14 @@ impl TabView for Reports {
         }
     }
 
+    fn copied(&self, _cx: &ViewContext) -> Vec<String> {
+        if self.made.shown { self.made.copied() } else { Vec::new() }
+    }
+
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        if self.made.shown {
+            return keys::hints(&self.made.keys());
+        }
         match (self.batches.shown, &self.batches.overlay) {
             (true, Some(_)) => keys::hints(overlay::KEYS),
             (true, None) => keys::hints(&batches::keys()),
@@ -209,7 +239,8 @@ impl TabView for Reports {
     fn chords() -> keys::PageChords {
         let report = [KEYS, BATCHES, &motions!("", Action::Move)].concat();
         let pages = [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(overlay::KEYS))];
-        [("reports", keys::chords_of(&report))].into_iter().chain(pages).collect()
+        let made = [("made", keys::chords_of(&made::list_keys())), ("text", keys::chords_of(&made::text_keys()))];
+        [("reports", keys::chords_of(&report))].into_iter().chain(pages).chain(made).collect()
     }
 }
 
@@ -250,6 +281,10 @@ impl Reports {
             Action::Batches => {
                 (self.batches.shown, self.export) = (true, Export::Not);
                 self.batches.rows.query.want();
+            }
+            Action::Made => {
+                (self.made.shown, self.export) = (true, Export::Not);
+                self.made.list.query.want();
             }
             Action::Why => {
                 let rows = self.report.value.iter().flat_map(|report| &report.tags);
@@ -309,7 +344,8 @@ impl Reports {
 
     /// The tag that has the chart, and the part of the period that is over, where there is room for it.
     fn chart(&self, cx: &ViewContext) -> Option<(Pen, View)> {
-        let room = view::chart_columns(cx).filter(|_| !self.batches.shown && self.preview.is_none())?;
+        let free = !self.batches.shown && !self.made.shown && self.preview.is_none();
+        let room = view::chart_columns(cx).filter(|_| free)?;
         let rows = &self.report.value.as_ref()?.tags;
         let tag = cx.def().tag_named(&rows.get(self.charted)?.tag)?;
         let period = self.period.as_ref()?;
@@ -336,6 +372,9 @@ impl Reports {
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
         let closed = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
+        if self.made.shown {
+            return self.made.ask(cx, &mut self.number);
+        }
         if self.batches.shown {
             return self.batches.ask(cx, &mut self.number);
         }

@@ -208,6 +208,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
             | Query::Values { .. }
             | Query::Batches { .. }
             | Query::SampleTime { .. }
+            | Query::Reports { .. }
             | Query::Past { .. }
             | Query::Unarchived { .. }
             | Query::Overview

@@ -39,9 +39,9 @@ impl Store {
             return Ok(None);
         }
         let from = format!("read_parquet({})", quoted(&tags));
-        let others: u64 = self.db.query_row(&sql::other_tags(&from), [], |row| row.get(0)).map_err(engine)?;
+        let others: u64 = self.db.query_row(&other_tags(&from), [], |row| row.get(0)).map_err(engine)?;
         if others == 0 {
-            self.db.execute_batch(&sql::missing_tags(&from)).map_err(engine)?;
+            self.db.execute_batch(&missing_tags(&from)).map_err(engine)?;
             return Ok(None);
         }
         let aside = with_suffix(&folder, &format!(".other-{}", now.strftime("%Y%m%dT%H%M%SZ")));
@@ -196,6 +196,16 @@ fn remove(path: &Path) {
     if let Err(error) = disk::remove(path) {
         tracing::warn!(%error, path = %path.display(), "a leftover of the archive is not removed");
     }
+}
+
+/// Tags of a dictionary whose numbers mean other tags here.
+fn other_tags(dictionary: &str) -> String {
+    format!("SELECT count(*) FROM {dictionary} d JOIN tag USING (id) WHERE d.name <> tag.name OR d.unit <> tag.unit")
+}
+
+/// Takes over the tags of a dictionary that are not known here.
+fn missing_tags(dictionary: &str) -> String {
+    format!("INSERT INTO tag SELECT id, name, unit FROM {dictionary} WHERE id NOT IN (SELECT id FROM tag)")
 }
 
 #[cfg(test)]

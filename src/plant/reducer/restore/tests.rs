@@ -123,7 +123,12 @@ fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> 
 fn actions(effects: &Effects) -> Vec<String> {
     let action = |record: &Record| match record {
         Record::Action(action) => Some(format!("{} {} {} {}", action.by, action.action, action.target, action.outcome)),
-        Record::Sample(..) | Record::Alarm(_) | Record::Line(_) | Record::Batch(_) | Record::ClockSet => None,
+        Record::Sample(..)
+        | Record::Alarm(_)
+        | Record::Line(_)
+        | Record::Batch(_)
+        | Record::Report(_)
+        | Record::ClockSet => None,
     };
     effects.records.iter().filter_map(action).collect()
 }

@@ -4,23 +4,22 @@ use jiff::{ToSpan, civil, tz::TimeZone};
 
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::def::PlantDef,
-    report::{Period, PeriodName, period_parser, shift},
+    plant::{def::PlantDef, report::PeriodKind},
+    report::{Period, PeriodName, calendar, period_parser, shift},
     text::date,
 };
 
 /// The longest free period: five years.
 const LONGEST: SignedDuration = SignedDuration::from_hours(24 * 5 * 366);
 /// What may be typed, for the entry window.
-pub const FORMS: &str = "06:00-14:00  2026-11-20  2026-11-20 22:00-06:00  night@2026-11-20";
+pub const FORMS: &str = "06:00-14:00  2026-11-20  2026-11-20 22:00-06:00  night@2026-11-20  week";
 
 /// The shift of an instant, or the local day where the plant has no shifts.
 pub fn at(def: &PlantDef, at: Timestamp) -> Option<Period> {
     if !def.shifts.is_empty() {
         return shift::shift_at(def, at);
     }
-    let date = at.to_zoned(def.time_zone.clone()).date();
-    Some(Period { name: PeriodName::Day(date), from: midnight(def, date)?, to: midnight(def, date.tomorrow().ok()?)? })
+    calendar::period_at(def, PeriodKind::Day, at)
 }
 
 /// The name of a period as it stands on a screen.
@@ -29,7 +28,7 @@ pub fn label(name: &PeriodName) -> String {
         PeriodName::Free => t!("period").to_owned(),
         PeriodName::Day(day) => t!("day {date}", date = date(*day)),
         PeriodName::Shift { name, date: day } => format!("{name} {}", date(*day)),
-        PeriodName::Batch(_) => name.to_string(),
+        PeriodName::Week(_) | PeriodName::Month(_) | PeriodName::Batch(_) => name.to_string(),
     }
 }
 
@@ -55,20 +54,27 @@ pub fn words(cx: &ViewContext, period: &Period) -> String {
     let span = span(period, &cx.def().time_zone);
     match period.name {
         PeriodName::Free => span,
-        PeriodName::Shift { .. } | PeriodName::Day(_) | PeriodName::Batch(_) => {
-            format!("{} {span}", label(&period.name))
-        }
+        PeriodName::Shift { .. }
+        | PeriodName::Day(_)
+        | PeriodName::Week(_)
+        | PeriodName::Month(_)
+        | PeriodName::Batch(_) => format!("{} {span}", label(&period.name)),
     }
 }
 
-/// The shift or day before a period.
-pub fn before(def: &PlantDef, period: &Period) -> Option<Period> {
-    at(def, period.from.checked_sub(SignedDuration::from_nanos(1)).ok()?)
+/// The period of the same kind at another instant; a shift or day where it has no kind.
+fn like(def: &PlantDef, period: &Period, instant: Timestamp) -> Option<Period> {
+    period.name.kind().map_or_else(|| at(def, instant), |kind| calendar::period_at(def, kind, instant))
 }
 
-/// The shift or day after a period, if it has begun.
+/// The shift, day, week or month before a period.
+pub fn before(def: &PlantDef, period: &Period) -> Option<Period> {
+    like(def, period, period.from.checked_sub(SignedDuration::from_nanos(1)).ok()?)
+}
+
+/// The one after a period, if it has begun.
 fn after(def: &PlantDef, period: &Period, now: Timestamp) -> Option<Period> {
-    at(def, period.to).filter(|next| next.from <= now)
+    like(def, period, period.to).filter(|next| next.from <= now)
 }
 
 /// The shift so many further on than the one shown; `None` is the present, where `by` is 0 and after the running shift.
@@ -89,7 +95,7 @@ pub fn typed(def: &PlantDef, text: &str, now: Timestamp) -> Result<Period, Strin
     let period = match split(text) {
         _ if text.is_empty() => return Err(t!("expected {FORMS}", FORMS)),
         (from, None) if from.starts_with(|c: char| c.is_alphabetic()) => {
-            return period_parser::period(def, Some(from), None, None, now).map_err(said);
+            return period_parser::named(def, from, now).map_err(said);
         }
         (from, to) => {
             let (from, to) = whole(def, from, to, now)?;
@@ -159,10 +165,6 @@ fn day_after(date: civil::Date) -> Result<civil::Date, String> {
     date.checked_add(1.day()).map_err(|error| error.to_string())
 }
 
-fn midnight(def: &PlantDef, date: civil::Date) -> Option<Timestamp> {
-    shift::instant(&def.time_zone, date.to_datetime(civil::Time::midnight()))
-}
-
 #[cfg(test)]
 mod tests {
     use crate::report::FORMATS;
@@ -194,6 +196,9 @@ mod tests {
         check("2026-11-19T22:00 to 2026-11-21T06:00", "period: 11-19 22:00 to 11-21 06:00");
         check("night@2026-11-19", "night 2026-11-19: 11-19 22:00 to 11-20 06:00");
         check("last", "morning 2026-11-21: 11-21 06:00 to 11-21 14:00");
+        check("day", "day 2026-11-20: 11-20 00:00 to 11-21 00:00");
+        check("week@2026-11-20", "2026-W47: 11-16 00:00 to 11-23 00:00");
+        check("month@2026-10", "2026-10: 10-01 00:00 to 11-01 00:00");
         check("25:00-26:00", "`25:00` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
         check("6 o'clock", "`6 o'clock` is not a time: expected 06:00, 2026-11-21 or 2026-11-21 06:00");
         check("2016-01-01 - 2026-11-01", "five years at most");
@@ -214,6 +219,18 @@ mod tests {
         let last = before(&def, &running).expect("a shift before");
         assert_eq!(words(&def, &last), "morning 2026-11-21: 11-21 06:00 to 11-21 14:00");
         assert_eq!(after(&def, &last, now()), Some(running));
+    }
+
+    #[test]
+    fn a_week_is_followed_by_a_week() {
+        let def = Fixture::normal().def;
+        let week = typed(&def, "week", now()).expect("the last week");
+        assert_eq!(words(&def, &week), "2026-W46: 11-09 00:00 to 11-16 00:00");
+        let next = after(&def, &week, now()).expect("the running one");
+        assert_eq!(
+            (words(&def, &next).as_str(), after(&def, &next, now())),
+            ("2026-W47: 11-16 00:00 to 11-23 00:00", None)
+        );
     }
 
     #[test]

@@ -76,6 +76,11 @@ fn the_curves_of_a_running_batch_reach_the_present() {
     }
 }
 
+/// The answer to a query about one curve.
+pub fn curve(tag: TagId, span: (Timestamp, Timestamp), buckets: usize) -> Answer {
+    Answer::Series(vec![rising(tag, span, buckets)])
+}
+
 /// A curve that rises by 1 in each minute.
 pub fn rising(tag: TagId, (from, to): (Timestamp, Timestamp), buckets: usize) -> Series {
     let step = to.duration_since(from).unsigned_abs() / u32::try_from(buckets).expect("a screen of columns");

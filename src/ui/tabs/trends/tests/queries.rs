@@ -16,6 +16,7 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
         | Query::SampleTime { .. }
+        | Query::Reports { .. }
         | Query::Past { .. }
         | Query::Unarchived { .. }
         | Query::Overview
