@@ -227,7 +227,6 @@ fn assemble(
     let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
-    // Without that task, the plant ends with its last line.
     if let Some((records, status)) = for_reports.filter(|_| !def.report.automatic.is_empty()) {
         let (def, queries, audit) = (def.clone(), queries.clone(), audit.clone());
         let task = ReportTask { def, clock, queries, records, audit, events, status };
