@@ -46,6 +46,7 @@
 //! The history thread only writes; a second one answers queries, each on a connection of its own and for a bounded time.
 //! Closed hours leave the database for an [archive](history::io::archive) of Parquet files, with minutes and hours as
 //! aggregates; a query is cut into [pieces](history::tiers::pieces), each answered by the widest of these that has it.
+//! A report becomes a [document](report::document) of sections once, in one language; each format only sets it.
 //! What is deleted when is a [decision](history::retention) over the list of files. A [past](plant::past) instant becomes a
 //! snapshot like a live one; SQL of others is answered by an [engine of its own](history::io::tables), never by the station.
 //!
