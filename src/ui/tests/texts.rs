@@ -19,6 +19,8 @@ use crate::{
 
 /// Words that no language changes: letters of controllers, names of protocols, standards and keys.
 const SAME: &[&str] = &[
+    // Typed as a period.
+    "week",
     "sightglass",
     "SV",
     "PV",
