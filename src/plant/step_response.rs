@@ -65,6 +65,10 @@ pub fn step_response(of: Loop) -> Option<StepResponse> {
     let changed = |n: &usize| matches!((of.sv[n - 1], of.sv[*n]), (Some(a), Some(b)) if a != b);
     let count = of.sv.len().min(of.pv.len());
     let last = (1..count).rev().find(changed)?;
+    // A step across a gap: when the setpoint changed is not known, and this step is no longer the last one.
+    if of.sv[last..count].iter().flatten().any(|sv| Some(*sv) != of.sv[last]) {
+        return None;
+    }
     // A step that fell between two columns, or took a few of them, is one.
     let first = (1..=last).rev().take_while(changed).last()?;
     let sv = (of.sv[first - 1]?, of.sv[last]?);
@@ -156,5 +160,9 @@ mod tests {
         assert_eq!(response(&[60., 60.], &[60., 61.]), None, "no step");
         assert_eq!(response(&[60., 70., 70.], &[f64::NAN, f64::NAN, 65.]), None, "PV not known at the step");
         assert_eq!(response(&[60., f64::NAN, 70.], &[60., 60., 60.]), None, "when it changed is not known");
+        let older = [50., 60., f64::NAN, 70., 70.];
+        assert_eq!(response(&older, &[50., 60., 60., 65., 70.]), None, "the step to 60 is not the last one");
+        let same = [50., 60., f64::NAN, 60., 60.];
+        assert!(response(&same, &[50., 60., 60., 60., 60.]).is_some(), "the same setpoint after a gap");
     }
 }
