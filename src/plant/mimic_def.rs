@@ -33,12 +33,19 @@ pub struct Picture {
     pub items: Vec<MimicItem>,
 }
 
+impl Picture {
+    /// What is shown where the plant file draws nothing.
+    pub fn empty() -> &'static Picture {
+        static EMPTY: Picture = Picture { size: (1, 1), items: Vec::new() };
+        &EMPTY
+    }
+}
+
 impl MimicPage {
     /// The largest picture that fits into so many columns and rows; the smallest where none does.
     pub fn picture(&self, room: (u16, u16)) -> &Picture {
-        static EMPTY: Picture = Picture { size: (1, 1), items: Vec::new() };
         let fits = |picture: &&Picture| picture.size.0 <= room.0 && picture.size.1 <= room.1;
-        self.pictures.iter().rev().find(fits).or(self.pictures.first()).unwrap_or(&EMPTY)
+        self.pictures.iter().rev().find(fits).or(self.pictures.first()).unwrap_or(Picture::empty())
     }
 }
 
@@ -117,7 +124,8 @@ pub enum MimicItem {
     Pipe {
         /// Corners of the pipe.
         points: Vec<(u16, u16)>,
-        /// It flows while all tags of one of these are not zero: of its own, or of a pipe that leads into it.
+        /// It flows while all tags of one of these are not zero: of its own, or of the pipes that lead to it. Unknown
+        /// where there are none, or no tags of one.
         flow: Vec<Vec<TagId>>,
         /// Its direction is drawn: arrows travel along it.
         directed: bool,

@@ -20,28 +20,50 @@ const USUAL_ROOM: (u16, u16) = (80, 18);
 /// The mimic of the process.
 pub(super) fn mimic(table: &MimicTable, defs: &Defs, problems: &mut Problems) -> MimicDef {
     let aliases = aliases(&table.aliases, problems);
-    let pages = table.pages.iter().map(|page| (text(&page.value.name), &page.value.pictures));
-    let pages = std::iter::once((text(&table.name), &table.pictures)).chain(pages);
-    let titled: Vec<(String, &[At<String>])> =
-        pages.filter_map(|(name, pictures)| Some((name, &pictures.as_ref()?.value.0[..]))).collect();
+    let titled = titled(table, problems);
     let names: Vec<String> = titled.iter().map(|(name, _)| name.clone()).collect();
-    let mut named = Unique::default();
-    for name in table.pages.iter().filter_map(|page| page.value.name.as_ref()) {
-        named.insert(&name.value, name.at, format!("duplicate page `{}`", name.value), problems);
-    }
     let vocabulary = Vocabulary { defs, aliases: &aliases, pages: &names };
     let pages = titled.into_iter().map(|(name, texts)| {
-        let mut pictures: Vec<Picture> = texts.iter().map(|text| picture(text, &vocabulary, problems)).collect();
-        pictures.sort_by_key(|picture| (picture.size.0, picture.size.1));
-        if let (Some(least), Some(first)) = (pictures.first(), texts.first()) {
-            check_smallest(least, first, problems);
-        }
-        MimicPage { name, pictures }
+        let drawn = texts.iter().map(|text| (picture(text, &vocabulary, problems), text));
+        let mut drawn: Vec<(Picture, &At<String>)> = drawn.collect();
+        drawn.sort_by_key(|(picture, _)| picture.size);
+        drawn.first().into_iter().for_each(|(least, text)| check_smallest(least, text, problems));
+        MimicPage { name, pictures: drawn.into_iter().map(|(picture, _)| picture).collect() }
     });
     let pages = pages.collect();
     let mut keys = Unique::default();
     let commands = table.commands.iter().filter_map(|command| self::command(&command.value, defs, &mut keys, problems));
     MimicDef { pages, commands: commands.collect() }
+}
+
+/// The pages with their pictures. Of several each has a name of its own, which is its heading and what leads to it.
+fn titled<'a>(table: &'a MimicTable, problems: &mut Problems) -> Vec<(String, &'a [At<String>])> {
+    match (&table.name, &table.pictures) {
+        (Some(name), None) => {
+            problems.add(name.at, "a page without a picture").label("expected `picture` beside it");
+        }
+        (None, Some(first)) if !table.pages.is_empty() => {
+            let problem = problems.add(first.at, "the first of several pages needs a name");
+            problem.label("expected `name` beside it: its heading, and what {page NAME} leads to");
+        }
+        (Some(_), Some(_)) | (None, _) => {}
+    }
+    let further = table.pages.iter().map(|page| (&page.value.name, &page.value.pictures));
+    let (mut named, mut titled) = (Unique::default(), Vec::new());
+    for (name, pictures) in std::iter::once((&table.name, &table.pictures)).chain(further) {
+        if let Some(name) = name {
+            named.insert(&name.value, name.at, format!("duplicate page `{}`", name.value), problems);
+            if name.value.trim().is_empty() {
+                problems.add(name.at, "a page without a name").label("expected its heading");
+            }
+        }
+        let Some(pictures) = pictures else { continue };
+        if pictures.value.0.is_empty() {
+            problems.add(pictures.at, "a page without a picture").label("expected at least one");
+        }
+        titled.push((text(name), &pictures.value.0[..]));
+    }
+    titled
 }
 
 /// A usual terminal shows no picture that is larger than its room.

@@ -137,6 +137,8 @@ fn taken(grid: &Grid, placed: &[Placed], problems: &mut Problems) -> (BTreeMap<P
                 y + 1,
                 x + 1
             ));
+            // One that is reported takes no cells: areas that do not overlap bound the work.
+            continue;
         }
         areas.extend(inside);
     }
@@ -255,20 +257,52 @@ fn own_flow(run: &PipeRun, placed: &[Placed]) -> Vec<TagId> {
     if measured.is_empty() { symbols().filter_map(Symbol::actuator).collect() } else { measured }
 }
 
+/// What each pipe carries: its own flow; without a valve or pump, what the pipes before it give it, through any number of
+/// joints. An inlet that nothing measures gives an empty list, which is an unknown flow.
+fn flows(runs: &[PipeRun], placed: &[Placed]) -> Vec<Vec<Vec<TagId>>> {
+    let own: Vec<Vec<TagId>> = runs.iter().map(|run| own_flow(run, placed)).collect();
+    let mut leading_to: BTreeMap<Point, Vec<usize>> = BTreeMap::new();
+    for (n, run) in runs.iter().enumerate() {
+        run.points.last().into_iter().for_each(|end| leading_to.entry(*end).or_default().push(n));
+    }
+    let before = |n: usize| {
+        let run: &PipeRun = &runs[n];
+        let far = run.points.last().filter(|_| !run.directed);
+        run.points
+            .first()
+            .into_iter()
+            .chain(far)
+            .filter_map(|end| leading_to.get(end))
+            .flatten()
+            .copied()
+            .filter(move |m| *m != n)
+    };
+    let flow_of = |start: usize| {
+        let (mut open, mut seen, mut flow) = (vec![start], BTreeSet::from([start]), BTreeSet::new());
+        while let Some(n) = open.pop() {
+            if !own[n].is_empty() {
+                flow.insert(own[n].clone());
+                continue;
+            }
+            // Without an arrow it may as well lead away.
+            if runs[n].directed && before(n).next().is_none() {
+                flow.insert(Vec::new());
+            }
+            open.extend(before(n).filter(|m| seen.insert(*m)));
+        }
+        flow.into_iter().collect()
+    };
+    (0..runs.len()).map(flow_of).collect()
+}
+
 /// All of the picture in the order in which it is drawn.
 fn items(placed: &[Placed], boxes: &[BoxOutline], pipes: &Pipes, words: Vec<MimicItem>) -> Vec<MimicItem> {
     let mut vessels: Vec<(usize, MimicItem)> =
         boxes.iter().enumerate().map(|(n, of)| (of.width * of.height, vessel(n, of, placed, boxes))).collect();
     // What lies inside another box is drawn after it.
     vessels.sort_by_key(|(size, _)| std::cmp::Reverse(*size));
-    let flows: Vec<Vec<TagId>> = pipes.runs.iter().map(|run| own_flow(run, placed)).collect();
-    let runs = pipes.runs.iter().zip(&flows).map(|(run, own)| {
-        let ends = [run.points.first(), run.points.last()];
-        let joins =
-            |other: &PipeRun| other != run && ends.iter().any(|end| end.is_some() && *end == other.points.last());
-        // A pipe without a valve or pump carries what its joint gives it.
-        let joined = || pipes.runs.iter().zip(&flows).filter(|(other, flow)| joins(other) && !flow.is_empty());
-        let flow = if own.is_empty() { joined().map(|(_, flow)| flow.clone()).collect() } else { vec![own.clone()] };
+    let flows = flows(&pipes.runs, placed);
+    let runs = pipes.runs.iter().zip(flows).map(|(run, flow)| {
         let points = run.points.iter().map(|(x, y)| (to_u16(*x), to_u16(*y))).collect();
         MimicItem::Pipe { points, flow, directed: run.directed }
     });

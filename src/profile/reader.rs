@@ -13,7 +13,7 @@ use toml::{
 };
 
 use self::value::wrong_type;
-pub(crate) use self::value::{Choice, Numbered, Texts};
+pub(crate) use self::value::{Choice, Numbered, Texts, duration};
 use super::{
     diagnostic::{Problems, Span},
     renamed,

@@ -151,7 +151,7 @@ toml_tables! {
     /// A further page of the mimic.
     PageTable, "a page of the mimic" {
         need "name" name: String,
-        opt "picture" pictures: Texts,
+        need "picture" pictures: Texts,
     }
 
     /// A command on the mimic.

@@ -2,17 +2,16 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use jiff::SignedDuration;
-
 use crate::{
     plant::{
         def::{DeviceId, TagId},
         keyword::{Keyword, keyword_enum},
+        tag::TagDef,
     },
     profile::{
         diagnostic::{Problems, Span},
         names::Defs,
-        reader::At,
+        reader::{self, At},
     },
 };
 
@@ -105,9 +104,12 @@ impl SymbolKind {
             | SymbolKind::Page => None,
         }
     }
-}
 
-impl SymbolKind {
+    /// Does the picture give its size? Others take the columns between their braces.
+    fn has_size(self) -> bool {
+        self == SymbolKind::Bar || self.usual_size().is_some()
+    }
+
     /// The options that have a name.
     fn options(self) -> &'static [&'static str] {
         match self {
@@ -165,20 +167,12 @@ pub(super) fn read(
     };
     if kind == SymbolKind::Page {
         // The name of a page may have several words.
-        let page = rest.iter().map(|word| word.value.as_str()).collect::<Vec<_>>().join(" ");
-        let found = vocabulary.pages.iter().position(|known| *known == page);
-        if found.is_none() {
-            problems.unknown(
-                "page",
-                &At { value: page, at },
-                vocabulary.pages.iter().filter(|page| !page.is_empty()).map(String::as_str),
-            );
-        }
-        return Some((Symbol::Page(found?), None));
+        let value = rest.iter().map(|word| word.value.as_str()).collect::<Vec<_>>().join(" ");
+        return Some((symbol(kind, &At { value, at }, Options::default(), vocabulary, problems)?, None));
     }
     let options = read_options(kind, options, vocabulary.defs, problems);
     let size = options.size.or(kind.usual_size());
-    Some((symbol(kind, name, options, vocabulary.defs, problems)?, size))
+    Some((symbol(kind, name, options, vocabulary, problems)?, size))
 }
 
 /// The words of a symbol, each with its place.
@@ -199,19 +193,23 @@ fn read_options(kind: SymbolKind, words: &[At<String>], defs: &Defs, problems: &
             defs.tag(&At { value: name.to_owned(), at: word.at }, problems).map(|tag| tag.id)
         };
         let size = word.value.split_once('x').and_then(|(columns, rows)| columns.parse().ok().zip(rows.parse().ok()));
-        let window = word.value.parse::<SignedDuration>().ok().and_then(|window| Duration::try_from(window).ok());
-        let window = window.filter(|window| *window >= Duration::from_secs(60));
+        let window = reader::duration(&word.value).filter(|window| *window >= Duration::from_secs(60));
         match (named, size, window.filter(|_| kind == SymbolKind::Trend)) {
             (Some(("left", name)), _, _) => options.remaining = tag(name, problems),
             (Some(("flow", name)), _, _) => options.flow = tag(name, problems),
             (Some((_, names)), _, _) => {
                 options.states = names.split(',').filter_map(|name| tag(name, problems)).collect();
             }
-            (_, Some(size), _) => options.size = Some(size),
+            (_, Some(size), _) if kind.has_size() => options.size = Some(size),
             (_, None, Some(window)) => options.window = Some(window),
-            (_, None, None) => match kind {
-                SymbolKind::Valve | SymbolKind::Pump | SymbolKind::Sequence => options.label.push(word.value.clone()),
+            _ => match kind {
+                SymbolKind::Valve | SymbolKind::Pump | SymbolKind::Sequence if size.is_none() => {
+                    options.label.push(word.value.clone());
+                }
                 SymbolKind::Value
+                | SymbolKind::Valve
+                | SymbolKind::Pump
+                | SymbolKind::Sequence
                 | SymbolKind::Level
                 | SymbolKind::Agitator
                 | SymbolKind::Heater
@@ -231,7 +229,7 @@ fn read_options(kind: SymbolKind, words: &[At<String>], defs: &Defs, problems: &
 
 fn expected_options(kind: SymbolKind) -> &'static str {
     match kind {
-        SymbolKind::Trend => "expected a size as 30x5 or a window as 1h, at least 1min",
+        SymbolKind::Trend => "expected a size as 30x5 or a window as 1h, from 1min to 100 days",
         SymbolKind::Bar | SymbolKind::Controller => "expected a size as 26x6",
         SymbolKind::Sequence => "expected a size as 26x5, left=TAG, states=TAG,TAG or a label",
         SymbolKind::Valve | SymbolKind::Pump => "expected a label or flow=TAG",
@@ -248,38 +246,54 @@ fn symbol(
     kind: SymbolKind,
     name: &At<String>,
     options: Options,
-    defs: &Defs,
+    vocabulary: &Vocabulary,
     problems: &mut Problems,
 ) -> Option<Symbol> {
-    let label = options.label.join(" ");
-    if kind == SymbolKind::Controller {
-        let device = defs.device(name, problems)?;
-        if defs.devices[device.index()].faceplate.is_none() {
-            problems.add(name.at, format!("{} is no controller", name.value)).label("its profile has no [faceplate]");
-        }
-        return Some(Symbol::Controller(device));
-    }
-    if kind == SymbolKind::Value {
-        // The one symbol that can show words as well as a number.
-        return defs.names.full(name, problems).map(Symbol::Value);
-    }
-    let tag = defs.tag(name, problems)?;
-    let (id, label_or_name) = (tag.id, if label.is_empty() { tag.short.clone() } else { label.clone() });
+    let defs = vocabulary.defs;
+    let label = |tag: &TagDef| match options.label.as_slice() {
+        [] => tag.short.clone(),
+        words => words.join(" "),
+    };
     Some(match kind {
-        SymbolKind::Level => Symbol::Level(id),
-        SymbolKind::Valve => Symbol::Valve { tag: id, label: label_or_name, flow: options.flow },
-        SymbolKind::Pump => Symbol::Pump { tag: id, label: label_or_name, flow: options.flow },
-        SymbolKind::Agitator => Symbol::Agitator(id),
-        SymbolKind::Heater => Symbol::Heater(id),
-        SymbolKind::Flow => Symbol::Flow(id),
-        SymbolKind::Bar => Symbol::Bar(id),
-        SymbolKind::Trend => Symbol::Trend(id, options.window.unwrap_or(WINDOW)),
+        // The one symbol that can show words as well as a number.
+        SymbolKind::Value => Symbol::Value(defs.names.full(name, problems)?),
+        SymbolKind::Level => Symbol::Level(defs.tag(name, problems)?.id),
+        SymbolKind::Valve => {
+            let tag = defs.tag(name, problems)?;
+            Symbol::Valve { tag: tag.id, label: label(tag), flow: options.flow }
+        }
+        SymbolKind::Pump => {
+            let tag = defs.tag(name, problems)?;
+            Symbol::Pump { tag: tag.id, label: label(tag), flow: options.flow }
+        }
+        SymbolKind::Agitator => Symbol::Agitator(defs.tag(name, problems)?.id),
+        SymbolKind::Heater => Symbol::Heater(defs.tag(name, problems)?.id),
+        SymbolKind::Flow => Symbol::Flow(defs.tag(name, problems)?.id),
+        SymbolKind::Bar => Symbol::Bar(defs.tag(name, problems)?.id),
+        SymbolKind::Trend => Symbol::Trend(defs.tag(name, problems)?.id, options.window.unwrap_or(WINDOW)),
+        SymbolKind::Controller => {
+            let device = defs.device(name, problems)?;
+            if defs.devices[device.index()].faceplate.is_none() {
+                let problem = problems.add(name.at, format!("{} is no controller", name.value));
+                problem.label("its profile has no [faceplate]");
+            }
+            Symbol::Controller(device)
+        }
         SymbolKind::Sequence => {
+            let tag = defs.tag(name, problems)?;
             if tag.enum_labels.is_empty() {
                 problems.add(name.at, format!("{} has no steps", tag.name)).label("expected a tag with an `enum`");
             }
-            Symbol::Sequence { step: id, label: label_or_name, remaining: options.remaining, states: options.states }
+            let (step, label) = (tag.id, label(tag));
+            Symbol::Sequence { step, label, remaining: options.remaining, states: options.states }
         }
-        SymbolKind::Value | SymbolKind::Controller | SymbolKind::Page => Symbol::Value(id),
+        SymbolKind::Page => {
+            let found = vocabulary.pages.iter().position(|known| *known == name.value);
+            if found.is_none() {
+                let named = vocabulary.pages.iter().filter(|page| !page.is_empty());
+                problems.unknown("page", name, named.map(String::as_str));
+            }
+            Symbol::Page(found?)
+        }
     })
 }

@@ -72,9 +72,7 @@ impl Value for Duration {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
         const FORM: &str = "a duration such as \"500ms\", \"10s\", \"5 min\" or \"1h 30m\"";
         let Node::Text(text) = value else { return wrong_type(value, at, FORM, problems) };
-        let duration = text.parse::<SignedDuration>().ok().and_then(|signed| Duration::try_from(signed).ok());
-        // A hundred days is beyond every use, and keeps sums of times far from overflow.
-        let usable = duration.filter(|duration| *duration <= Duration::from_secs(100 * 86_400));
+        let usable = duration(text);
         if usable.is_none() {
             problems
                 .add(at, format!("`{text}` is not a duration"))
@@ -83,6 +81,12 @@ impl Value for Duration {
         }
         usable
     }
+}
+
+/// A time from its text. A hundred days is beyond every use, and keeps sums of times far from overflow.
+pub(crate) fn duration(text: &str) -> Option<Duration> {
+    let duration = Duration::try_from(text.parse::<SignedDuration>().ok()?).ok()?;
+    (duration <= Duration::from_secs(100 * 86_400)).then_some(duration)
 }
 
 impl Value for Time {

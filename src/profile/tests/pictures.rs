@@ -113,6 +113,52 @@ fn an_arrow_decides_the_direction_and_a_joint_gives_the_flow() {
     assert_eq!(pipes_of(&back), [(vec![(19, 0), (2, 0)], 1, true)]);
 }
 
+/// In how many ways the pipe that begins here flows, and whether one of them is unknown.
+fn flow_from(picture: &Picture, start: (u16, u16)) -> (usize, bool) {
+    let pipe = picture.items.iter().find_map(|item| match item {
+        MimicItem::Pipe { points, flow, .. } if points.first() == Some(&start) => Some(flow),
+        _ => None,
+    });
+    let flow = pipe.unwrap_or_else(|| panic!("no pipe from {start:?}: {picture:?}"));
+    (flow.len(), flow.iter().any(Vec::is_empty))
+}
+
+#[test]
+fn an_inlet_does_not_take_the_flow_of_its_neighbour() {
+    let picture = drawn(
+        "
+        a ═►════════════════╗
+                            ╠═► c
+        b ═{pump PLC.OUT}═►═╝",
+        "",
+    );
+    assert_eq!(flow_from(&picture, (2, 0)), (1, true), "nothing measures a: {picture:?}");
+    assert_eq!(flow_from(&picture, (2, 2)), (1, false));
+    assert_eq!(flow_from(&picture, (20, 1)), (2, true), "c flows while the pump runs, else it may");
+}
+
+#[test]
+fn a_flow_passes_any_number_of_joints() {
+    let picture = drawn(
+        "
+        a ═{pump PLC.OUT}═►═╦═►═╦═►═╦═► b
+                            ▼   ▼   ▼
+                            c   d   e",
+        "",
+    );
+    for start in [(20, 0), (24, 0), (28, 0)] {
+        assert_eq!(flow_from(&picture, start), (1, false), "{start:?}: {picture:?}");
+    }
+    let circle = drawn(
+        "
+        ╔═►═╦═► b
+        ║   ║
+        ╚═══╝",
+        "",
+    );
+    assert_eq!(flow_from(&circle, (4, 0)), (1, true), "a loop without a pump is unknown: {circle:?}");
+}
+
 #[test]
 fn a_circle_of_pipe_has_no_end() {
     let picture = drawn(
@@ -134,9 +180,12 @@ fn what_cannot_be_drawn_is_shown_in_the_picture() {
     check_wrong("\n        {vlve D1.MODE}", &["unknown symbol `vlve`", "did you mean `valve`?"]);
     check_wrong(
         "\n        {trend D1.T 30}",
-        &["`30` means nothing here", "expected a size as 30x5 or a window as 1h, at least 1min"],
+        &["`30` means nothing here", "expected a size as 30x5 or a window as 1h, from 1min to 100 days"],
     );
     check_wrong("\n        {trend D1.T 0s}", &["`0s` means nothing here"]);
+    check_wrong("\n        {trend D1.T 200000000h}", &["`200000000h` means nothing here", "to 100 days"]);
+    check_wrong("\n        a ═{valve D1.MODE 30x5}═ b", &["`30x5` means nothing here", "a label or flow=TAG"]);
+    check_wrong("\n        {D1.T 30x5}", &["`30x5` means nothing here", "expected }"]);
     check_wrong("\n        {bar D1.T 9999x9999}", &["9999 by 9999 cells cannot be drawn", "expected 1x1 to 500x200"]);
     check_wrong("\n        {bar D1.T 0x1}", &["0 by 1 cells cannot be drawn"]);
     check_wrong("\n        {level D1.T}", &["a level outside of a box"]);
@@ -158,21 +207,26 @@ fn what_cannot_be_drawn_is_shown_in_the_picture() {
     );
 }
 
+/// The warnings of a plant file, whose meters have this profile.
+fn warnings(plant: &str, meter: &str) -> Vec<String> {
+    let plant = Text { file: "small.toml".to_owned(), bytes: plant.as_bytes().to_vec() };
+    let find = |name: &str| {
+        let text = if name == "meter" { meter } else { PLC };
+        Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
+    };
+    let library = Library { find: &find, names: Vec::new(), is_program: &|_| true };
+    let (_, warnings) = build("small", &plant, &library).unwrap();
+    warnings.lines().collect()
+}
+
 #[test]
 fn a_value_that_needs_more_room_is_warned_of() {
     let warned = |picture: &str| {
         let plant = PLANT.replace(" {D1.T  }", picture).replace("decimals_from = \"DP\"\n", "");
-        let plant = Text { file: "small.toml".to_owned(), bytes: plant.into_bytes() };
-        let meter = METER.replace("decimals_from = \"DP\"", "decimals = 1");
-        let find = |name: &str| {
-            let text = if name == "meter" { &meter } else { PLC };
-            Ok(Some(Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() }))
-        };
-        let (_, warnings) =
-            build("small", &plant, &Library { find: &find, names: Vec::new(), is_program: &|_| true }).unwrap();
-        warnings.lines().filter(|line| line.contains("columns")).collect::<Vec<_>>()
+        let lines = warnings(&plant, &METER.replace("decimals_from = \"DP\"", "decimals = 1"));
+        lines.into_iter().filter(|line| line.contains("columns")).collect::<Vec<_>>()
     };
-    assert_eq!(warned("{D1.T  }"), [""; 0]);
+    assert!(warned("{D1.T  }").is_empty());
     assert_eq!(warned("{D1.T}x"), ["small.toml:33:1: D1.T needs 8 columns, here are 6"]);
 }
 
@@ -191,6 +245,40 @@ fn pages_have_names_and_link_to_each_other() {
     assert_eq!(cold.pictures.len(), 2);
     assert_eq!(cold.picture((80, 2)).size.1, 1, "the largest that fits");
     assert_eq!(cold.picture((5, 1)).size, cold.pictures[0].size, "the smallest where none fits");
+}
+
+#[test]
+fn pages_without_a_name_or_a_picture_are_reported() {
+    let check = |mimic: &str, expect: &str| {
+        let text = PLANT.replace("picture = '''\n {D1.T  }\n'''", mimic);
+        let text = load(text.as_bytes(), METER, PLC).expect_err("the pages are wrong").to_string();
+        assert!(text.contains(expect) && text.ends_with("1 problem\n"), "no `{expect}` in\n{text}");
+    };
+    let page = |keys: &str| format!("name = \"Hot\"\npicture = 'x'\n[[mimic.page]]\n{keys}");
+    check(&page("name = \"Cold\""), "a page of the mimic needs `picture`");
+    check(&page("name = \"Cold\"\npicture = []"), "a page without a picture");
+    check(&page("name = \"Hot\"\npicture = 'x'"), "duplicate page `Hot`");
+    check(&page("name = \" \"\npicture = 'x'"), "a page without a name");
+    check("name = \"Hot\"", "a page without a picture");
+    let unnamed = "picture = 'x'\n[[mimic.page]]\nname = \"Cold\"\npicture = 'x'";
+    check(unnamed, "the first of several pages needs a name");
+}
+
+#[test]
+fn a_warning_of_size_is_about_the_smallest_picture() {
+    let wide = |columns: usize| format!("'''\n {}\n'''", "x".repeat(columns));
+    let plant = PLANT.replace("'''\n {D1.T  }\n'''", &format!("[{},\n{}]", wide(120), wide(90)));
+    let size: Vec<String> = warnings(&plant, METER).into_iter().filter(|line| line.contains("80 by 24")).collect();
+    assert_eq!(size.len(), 1, "{size:?}");
+    assert!(size[0].starts_with("small.toml:35:") && size[0].contains("91 by 1"), "{size:?}");
+}
+
+#[test]
+fn areas_that_cover_each_other_take_no_cells() {
+    let many = vec!["{bar D1.T 500x200}".repeat(20); 150].join("\n");
+    let plant = PLANT.replace(" {D1.T  }", &many);
+    let text = load(plant.as_bytes(), METER, PLC).expect_err("they cover each other").to_string();
+    assert!(text.contains("this covers something else"), "{text}");
 }
 
 #[test]

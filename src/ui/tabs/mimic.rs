@@ -142,7 +142,7 @@ impl TabView for Mimic {
         let beside = self.companions.ask(cx, &parts, &mut self.asked);
         let asks = self.trends.iter_mut().filter_map(|(item, trend)| {
             let MimicItem::Trend { tag, window, place } = picture.items.get(*item)? else { return None };
-            let from = cx.now - SignedDuration::try_from(*window).ok()?;
+            let from = cx.now.checked_sub(*window).ok()?;
             let buckets = usize::from(scale(picture, parts.picture).place(*place).width.max(1)) * 2;
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
             trend.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
@@ -233,11 +233,10 @@ impl Mimic {
 
     /// The picture for the room there is, and the parts of the tab; a row above is left for the names of several pages.
     fn shown<'a>(&self, cx: &ViewContext<'a>, area: Rect) -> (&'a Picture, Parts) {
-        static NONE: Picture = Picture { size: (1, 1), items: Vec::new() };
         let pages = &cx.snapshot.def.mimic.pages;
         let headings = if pages.len() > 1 { 1.min(area.height) } else { 0 };
         let area = Rect { y: area.y + headings, height: area.height - headings, ..area };
-        let picture = pages.get(self.page).map_or(&NONE, |page| page.picture((area.width, area.height)));
+        let picture = pages.get(self.page).map_or(Picture::empty(), |page| page.picture((area.width, area.height)));
         (picture, parts(picture.size, area))
     }
 

@@ -20,7 +20,8 @@ pub(super) fn item_at(picture: &Picture, area: Rect, at: Position) -> Option<usi
     let outside = |at: u16, from: u16, length: u16| {
         from.saturating_sub(at) + at.saturating_sub(from.saturating_add(length.saturating_sub(1)))
     };
-    let distance = |at: Bounds| (outside(x, at.x, at.width), outside(y, at.y, at.height), at.width * at.height);
+    let size = |at: Bounds| u32::from(at.width) * u32::from(at.height);
+    let distance = |at: Bounds| (outside(x, at.x, at.width), outside(y, at.y, at.height), size(at));
     let items = picture.items.iter().enumerate();
     let near = items.filter_map(|(n, item)| Some((distance(scale.place(place(item)?)), n)));
     let near = near.filter(|((x, y, _), _)| *x <= NEAR.0 && *y <= NEAR.1);

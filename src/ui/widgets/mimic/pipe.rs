@@ -39,12 +39,15 @@ pub fn view(
     (arrows, motion): (bool, bool),
     joints: &[(u16, u16)],
 ) {
-    let all_on = |tags: &Vec<TagId>| tags.iter().try_fold(true, |all, tag| value::is_on(cx, *tag).map(|on| all && on));
+    let all_on = |tags: &Vec<TagId>| {
+        let on = tags.iter().map(|tag| value::is_on(cx, *tag));
+        on.reduce(|all, on| Some(all? & on?)).flatten()
+    };
     let states: Vec<Option<bool>> = flow.iter().map(all_on).collect();
     // One that flows is enough; else one that is unknown could.
     let flowing = match states.contains(&Some(true)) {
         true => Some(true),
-        false if states.contains(&None) => None,
+        false if states.is_empty() || states.contains(&None) => None,
         false => Some(false),
     };
     let style = match flowing {
@@ -177,20 +180,16 @@ mod tests {
     const POINTS: [(u16, u16); 3] = [(0, 0), (9, 0), (9, 2)];
 
     fn drawn(fixture: &Fixture, phase: u32) -> Vec<String> {
+        drawn_with(fixture, phase, &[vec![fixture.tag("PLC-1.SV-1")]])
+    }
+
+    fn drawn_with(fixture: &Fixture, phase: u32, flow: &[Vec<TagId>]) -> Vec<String> {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 10, 3));
         let area = buffer.area;
         with_cx(&fixture.snapshot(), |cx| {
             let cx = ViewContext { phase, theme: &Theme::FULL, ..*cx };
             let mut canvas = Canvas::new(&mut buffer, area);
-            view(
-                &cx,
-                &mut canvas,
-                &POINTS,
-                &[vec![fixture.tag("PLC-1.SV-1")]],
-                CanvasScale::new((10, 3), (10, 3)),
-                (true, true),
-                &[],
-            );
+            view(&cx, &mut canvas, &POINTS, flow, CanvasScale::new((10, 3), (10, 3)), (true, true), &[]);
         });
         buffer.content.chunks(10).map(|row| row.iter().map(|cell| cell.symbol()).collect()).collect()
     }
@@ -212,6 +211,11 @@ mod tests {
         let unknown = ["╌╌╌╌╌╌╌╌╌┐", "         ┆", "         ┆"];
         assert_eq!(drawn(&Fixture::line_down(), 0), unknown);
         assert_eq!(drawn(&Fixture::line_down(), 7), unknown);
+        let normal = Fixture::normal();
+        assert_eq!(drawn_with(&normal, 0, &[]), unknown, "no tag says whether it flows");
+        let shut = vec![fixture.tag("PLC-1.SV-1")];
+        assert_eq!(drawn_with(&fixture, 0, &[shut.clone(), Vec::new()]), unknown, "the other way may flow");
+        assert_eq!(drawn_with(&normal, 0, &[shut, Vec::new()])[0], "━━►━━━━►━┓", "one that flows is enough");
     }
 
     #[test]
