@@ -18,8 +18,9 @@ const PENS_MAX: usize = 4;
 const REPORTED_MAX: usize = 12;
 /// Tags that are of interest where a profile reads none often.
 const INTEREST_MAX: usize = 34;
-/// Values of a column of the mimic.
+/// Values of a column of the mimic, and cells of the first column at least.
 const ROWS: usize = 17;
+const LEFT_COLUMNS: usize = 47;
 
 /// What a new plant is made of.
 #[derive(Debug, Clone)]
@@ -196,7 +197,11 @@ impl NewPlant {
         let controllers: Vec<&NewDevice> = self.devices.iter().filter(|device| device.controller).take(2).collect();
         let columns = if controllers.is_empty() { 2 } else { 1 };
         let shown: Vec<(String, &TagDef)> = self.shown().filter(|(_, tag)| !tag.is_text()).collect();
-        writeln!(out, "{}", picture(&shown[..shown.len().min(SHOWN_MAX.min(columns * ROWS))], &controllers))?;
+        let drawn = &shown[..shown.len().min(SHOWN_MAX.min(columns * ROWS))];
+        // A picture without a cell is an error.
+        if !drawn.is_empty() || !controllers.is_empty() {
+            writeln!(out, "{}", picture(drawn, &controllers))?;
+        }
         let pens = shown.iter().filter(|(_, tag)| is_number(tag)).take(PENS_MAX);
         let pens: Vec<String> = pens.map(|(name, _)| format!("    {{ tag = {} }},", quoted(name))).collect();
         if pens.is_empty() {
@@ -220,13 +225,15 @@ fn picture(shown: &[(String, &TagDef)], controllers: &[&NewDevice]) -> String {
         let (name, tag) = shown.get(column * ROWS + row)?;
         Some(format!("{:.12} {{{name}}}", tag.short))
     };
+    let wide = |row| cell(row, 0).map(|text| text.chars().count());
+    let width = (0..ROWS).filter_map(wide).max().unwrap_or(0).max(LEFT_COLUMNS);
     let mut rows: Vec<String> = Vec::new();
     for row in 0..ROWS {
         let right = match controllers.get(row / 7).filter(|_| row % 7 == 0) {
             Some(device) => Some(format!("{{controller {} 30x6}}", device.name)),
             None => cell(row, 1),
         };
-        let text = format!(" {:<47} {}", cell(row, 0).unwrap_or_default(), right.unwrap_or_default());
+        let text = format!(" {:<width$} {}", cell(row, 0).unwrap_or_default(), right.unwrap_or_default());
         rows.push(text.trim_end().to_owned());
     }
     let text = rows.join("\n");

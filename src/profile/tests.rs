@@ -7,6 +7,7 @@ mod calculated;
 mod inline;
 mod interlocks;
 mod messages;
+mod new_plants;
 mod pictures;
 mod reports;
 mod text_tags;
