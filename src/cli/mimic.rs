@@ -22,7 +22,7 @@ use crate::{
 
 /// Rows that a terminal has beside the mimic.
 const CHROME_ROWS: u16 = 6;
-/// Between two looks at the file, and two frames.
+/// Between two frames, each of the files as they are then.
 const EVERY: Duration = Duration::from_millis(500);
 
 /// Arguments of `mimic`.
@@ -76,26 +76,24 @@ fn draw(plant: &Arc<PlantDef>, page: usize, (columns, rows): (u16, u16), phase: 
     preview(plant, page, (columns, rows.saturating_sub(CHROME_ROWS)), phase, &theme)
 }
 
-/// Looks at the file twice a second; what is wrong in it is shown instead of the picture.
+/// Loads the plant file and its device profiles twice a second; what is wrong in them is shown instead of the picture.
 fn watch(args: &Args, size: impl Fn() -> (u16, u16)) -> Result<(), CliError> {
     let failed = CliError::io("the terminal");
-    let (mut text, mut loaded) = (Vec::new(), None);
+    let mut shown = None;
     for phase in 0.. {
-        // A shipped plant has no file that could change.
-        let now = std::fs::read(&args.plant).unwrap_or_default();
-        let changed = loaded.is_none() || now != text;
-        if changed {
-            (text, loaded) = (now, Some(load(&args.plant).and_then(|plant| Ok((page_of(&plant, args.page)?, plant)))));
-        }
+        let loaded = load(&args.plant).and_then(|plant| Ok((page_of(&plant, args.page)?, plant)));
+        let now = (size(), loaded.map_err(|error| error.to_string()));
+        let changed = shown.as_ref() != Some(&now);
         let mut out = Vec::new();
-        match &loaded {
-            Some(Ok((page, plant))) => frame(&mut out, &draw(plant, *page, size(), phase)).map_err(&failed)?,
-            Some(Err(error)) if changed => {
-                queue!(out, terminal::Clear(terminal::ClearType::All), cursor::MoveTo(0, 0)).map_err(&failed)?;
-                out.extend(error.to_string().replace('\n', "\r\n").into_bytes());
-            }
-            Some(Err(_)) | None => {}
+        if changed {
+            queue!(out, terminal::Clear(terminal::ClearType::All), cursor::MoveTo(0, 0)).map_err(&failed)?;
         }
+        match &now.1 {
+            Ok((page, plant)) => frame(&mut out, &draw(plant, *page, now.0, phase)).map_err(&failed)?,
+            Err(error) if changed => out.extend(error.replace('\n', "\r\n").into_bytes()),
+            Err(_) => {}
+        }
+        shown = Some(now);
         std::io::stdout().write_all(&out).and_then(|()| std::io::stdout().flush()).map_err(&failed)?;
         std::thread::sleep(EVERY);
     }
@@ -104,7 +102,6 @@ fn watch(args: &Args, size: impl Fn() -> (u16, u16)) -> Result<(), CliError> {
 
 /// The whole picture with its colours, and the cursor below it.
 fn frame(out: &mut Vec<u8>, drawn: &Buffer) -> std::io::Result<()> {
-    queue!(out, terminal::Clear(terminal::ClearType::FromCursorDown))?;
     let mut backend = CrosstermBackend::new(&mut *out);
     let cells = drawn.content.iter().enumerate().map(|(n, cell)| {
         let (x, y) = drawn.pos_of(n);
