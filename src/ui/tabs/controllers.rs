@@ -82,6 +82,8 @@ pub struct Controllers {
     asked_for: Asked,
     /// The small trend, of which tag, and the query for it.
     trend: Answered<Vec<Series>>,
+    /// The tags that it was asked for last.
+    curves: Vec<TagId>,
     asked: u32,
 }
 
@@ -231,11 +233,15 @@ impl TabView for Controllers {
         let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
         let tags = match &self.page {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
-            Page::List if self.is_wall(cx) => wall::tags(cx),
+            Page::List if self.is_wall(cx) => wall::tags(cx, self.device.index()),
             Page::List | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => Vec::new(),
         };
         if tags.is_empty() {
             return Vec::new();
+        }
+        if tags != self.curves {
+            self.curves.clone_from(&tags);
+            self.trend.query.want();
         }
         let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
         let query = Query::Series { tags, from, to: cx.now, buckets: TREND_BUCKETS };
@@ -284,7 +290,7 @@ impl TabView for Controllers {
         };
         match (&self.page, &device.program) {
             (Page::List, _) if self.is_wall(cx) => {
-                wall::view(cx, &mut canvas, self.device.index(), self.trend.value.as_deref().unwrap_or_default());
+                wall::view(cx, &mut canvas, self.device.index(), &self.trend);
             }
             (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
@@ -310,7 +316,7 @@ impl TabView for Controllers {
 impl Controllers {
     fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
         let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
-        Controllers { page, device, table, cell, wall: None, set: 0, asked_for, trend, asked: 0 }
+        Controllers { page, device, table, cell, wall: None, set: 0, asked_for, trend, curves: Vec::new(), asked: 0 }
     }
 
     /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.

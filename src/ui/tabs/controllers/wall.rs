@@ -6,6 +6,7 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
+    attach::check::SERIES_MAX,
     history::Series,
     plant::{def, tag::TagDef},
     ui::{
@@ -48,7 +49,14 @@ impl Grid {
         let free = area.height.saturating_sub(AROUND);
         let needed = to_u16(devices.max(1).div_ceil(columns));
         let height = (free / needed).clamp(HEIGHT.0, HEIGHT.1);
-        Grid { columns, rows: usize::from(free / height).max(1), width, height }
+        let rows = usize::from(free / height).min(SERIES_MAX / columns).max(1);
+        Grid { columns, rows, width, height }
+    }
+
+    /// Those on the screen while this one of so many devices is selected: the first, and how many at most.
+    fn seen(self, selected: usize, devices: usize) -> (usize, usize) {
+        let first = first(selected / self.columns, devices.div_ceil(self.columns), self.rows);
+        (first * self.columns, self.rows * self.columns)
     }
 
     /// The faceplate so many rows below this one of so many; the same where there is none.
@@ -58,20 +66,28 @@ impl Grid {
     }
 }
 
-/// The tags whose curves it shows.
-pub fn tags(cx: &ViewContext) -> Vec<TagId> {
-    cx.def().devices.iter().filter_map(|device| Some(device.faceplate.as_ref()?.pv)).collect()
+/// The tags whose curves it shows with this device selected.
+pub fn tags(cx: &ViewContext, selected: usize) -> Vec<TagId> {
+    let devices = &cx.def().devices;
+    let (first, count) = Grid::new(cx.size, cx.area, devices.len()).seen(selected, devices.len());
+    let seen = devices.iter().skip(first).take(count);
+    seen.filter_map(|device| Some(device.faceplate.as_ref()?.pv)).collect()
 }
 
 /// Draws it with this device selected.
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize, series: &[Series]) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize, curves: &Answered<Vec<Series>>) {
+    let series = curves.value.as_deref().unwrap_or_default();
     let devices = &cx.def().devices;
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     let area = canvas.area();
     let grid = Grid::new(cx.size, area, devices.len());
-    canvas.text(1, 0, &fit_words(&list::summary(cx), end), cx.theme.normal());
+    let x = canvas.text(1, 0, &fit_words(&list::summary(cx), end), cx.theme.normal());
+    if let Some(trouble) = &curves.trouble {
+        let words = t!("no curves: {trouble}", trouble);
+        canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 14)), cx.theme.trouble());
+    }
     let rows: Vec<&[DeviceDef]> = devices.chunks(grid.columns).collect();
-    let first = first(selected / grid.columns, rows.len(), grid.rows);
+    let first = grid.seen(selected, devices.len()).0 / grid.columns;
     for (y, row, devices) in on_screen(&rows, first, grid.rows) {
         for (column, device) in devices.iter().enumerate() {
             let mut card = canvas.part(to_u16(column) * grid.width, 1 + y * grid.height, grid.width, grid.height);

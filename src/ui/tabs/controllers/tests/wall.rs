@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    history::{Answer, Bucket, Query, Series},
+    history::{Answer, Bucket, HistoryError, Query, Series},
     ui::fixture::now,
 };
 
@@ -59,4 +59,21 @@ fn each_faceplate_has_the_curve_of_its_own_value() {
     let shown = screen(&mut model, 160, 50);
     let row = shown.lines().find(|line| line.contains("109.0")).unwrap_or_default();
     assert!(row.contains("9.0 ││"), "each has its own scale: {shown}");
+}
+
+#[test]
+fn only_the_curves_on_the_screen_are_asked_for() {
+    let mut model = model(&many(80), Theme::FULL);
+    screen(&mut model, 160, 50);
+    let asked = |effects: &[Effect]| match effects.last() {
+        Some(Effect::Query(id, Query::Series { tags, .. })) => (*id, tags.clone()),
+        _ => panic!("{effects:?}"),
+    };
+    let (id, first) = asked(&type_keys(&mut model, "4"));
+    assert!((1..=64).contains(&first.len()), "{} curves", first.len());
+    update(&mut model, Msg::Answer(id, Err(HistoryError::Engine("disk is full".to_owned()))));
+    let shown = screen(&mut model, 160, 50);
+    assert!(shown.contains("no curves: history: "), "{shown}");
+    let (_, next) = asked(&type_keys(&mut model, &"↓".repeat(8)));
+    assert_ne!(first, next, "others have come onto the screen");
 }
