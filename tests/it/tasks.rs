@@ -13,8 +13,10 @@ enum Step {
     Text(&'static str),
     /// Reads this on the screen.
     Sees(&'static str),
+    /// Sees it go: a window closes.
+    Gone(&'static str),
 }
-use Step::{Key, Sees, Text};
+use Step::{Gone, Key, Sees, Text};
 
 const ENTER: &str = "\r";
 const TAB: &str = "\t";
@@ -31,6 +33,7 @@ fn perform(terminal: &mut Terminal, steps: &[Step]) -> usize {
         match step {
             Key(keys) | Text(keys) => terminal.keys(keys),
             Sees(text) => terminal.wait_for(text),
+            Gone(text) => terminal.wait_gone(text),
         }
     }
     steps.iter().filter(|step| matches!(step, Key(_))).count()
@@ -74,7 +77,7 @@ const OPERATING: [Task; 9] = [
     ("last shift as CSV", &[Key("5"), Sees("RUNNING"), Key(LEFT), Sees("closed"), Key("e"), Sees("written")]),
     ("acknowledge the most urgent alarm", &[Sees("UNACK"), Key("a"), Sees("acked")]),
     ("find its cause", &[Key("3"), Sees("not responding"), Key(ENTER), Sees("cause")]),
-    ("unit that does not answer, and since when", &[Key("6"), Sees("DOWN")]),
+    ("unit that does not answer, and since when", &[Key("6"), Sees("DOWN 00:")]),
     (
         "shelve for 30 minutes with a reason",
         &[
@@ -104,7 +107,9 @@ const ADDING: Task = (
         Key(ENTER),
         Text("correct horse battery"),
         Key(ENTER),
+        Gone("repeat password"),
         Sees("jane"),
+        Sees("Technician"),
     ],
 );
 
