@@ -75,7 +75,7 @@ impl Language {
     /// For tests: the language with the most marks.
     #[cfg(test)]
     pub const THAI: Language = Language(1);
-    /// For tests: every catalogued text with other and more letters, so that a text without the door is seen.
+    /// For tests: every catalogued text with other and more letters, so that a text outside of `t!` is seen.
     #[cfg(test)]
     pub const PSEUDO: Language = Language(LANGUAGES.len() - 1);
 

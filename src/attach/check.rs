@@ -82,20 +82,26 @@ fn short(what: &str, text: &str, max: usize) -> Result<(), String> {
     if chars <= max { Ok(()) } else { Err(format!("{what} of {chars} characters, expected at most {max}")) }
 }
 
+/// No more alarms than the plant has.
+fn as_many(def: &PlantDef, many: usize) -> Result<(), String> {
+    let count = def.alarms.len();
+    if many <= count { Ok(()) } else { Err(format!("{many} alarms, this plant has {count}")) }
+}
+
 fn of_alarms(def: &PlantDef, alarm_command: &AlarmCommand) -> Result<(), String> {
     match alarm_command {
         AlarmCommand::AcknowledgeAll { alarms } => {
-            let (many, count) = (alarms.len(), def.alarms.len());
-            if count < many {
-                return Err(format!("{many} alarms, this plant has {count}"));
-            }
+            as_many(def, alarms.len())?;
             alarms.iter().try_for_each(|(id, _)| alarm(def, *id))
+        }
+        AlarmCommand::Shelve { alarms, .. } => {
+            as_many(def, alarms.len())?;
+            alarms.iter().try_for_each(|id| alarm(def, *id))
         }
         AlarmCommand::Silence => Ok(()),
         AlarmCommand::Acknowledge { alarm: id, .. }
         | AlarmCommand::Tick { alarm: id, .. }
         | AlarmCommand::Reset(id)
-        | AlarmCommand::Shelve { alarm: id, .. }
         | AlarmCommand::Unshelve(id)
         | AlarmCommand::OutOfService(id)
         | AlarmCommand::InService(id) => alarm(def, *id),

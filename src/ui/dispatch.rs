@@ -199,8 +199,8 @@ pub(super) fn on_global(model: &mut Model, global: Global) -> Vec<UiAction> {
             let cx = model.cx();
             let listed = (model.tabs.shown == Tab::Alarms).then(|| model.tabs.alarms.listed(&cx)).flatten();
             match listed {
-                Some(listed) => actions::acknowledge_all(&cx, listed.into_iter()),
-                None => actions::acknowledge_all(&cx, cx.snapshot.alarms.iter()),
+                Some(listed) => actions::acknowledge_all(&cx, listed.into_iter(), false),
+                None => actions::acknowledge_all(&cx, cx.snapshot.alarms.iter(), false),
             }
         }
         // Where nothing sounds there is nothing to silence.

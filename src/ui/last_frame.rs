@@ -150,7 +150,7 @@ pub(super) fn acknowledge(model: &mut Model) -> Vec<UiAction> {
     let marked = if model.lists() { model.tabs.alarms.marked(&cx) } else { Vec::new() };
     if !marked.is_empty() && !cx.is_past() {
         // The window names those that it is about.
-        return actions::acknowledge_all(&cx, marked.into_iter());
+        return actions::acknowledge_all(&cx, marked.into_iter(), false);
     }
     let (actions, note) = match model.alarm_seen() {
         Ok(Some(alarm)) if alarm.state.needs_acknowledgement() => (actions::acknowledge(&model.cx(), alarm), None),

@@ -209,7 +209,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
         let note = format!("action {number} of round {round}");
         let value = (VALUES[writes % 2] + (round * 37 + u64::from(number)) % SPREAD) as f64 / 10.0;
         let id = CommandId { terminal: session.terminal, number };
-        let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(1_800) };
+        let shelve = AlarmCommand::Shelve { alarms: [AlarmId(0)].into(), lasts: Duration::from_secs(1_800) };
         let kind = match to_acknowledge(&session.snapshots.borrow()) {
             Some(acknowledge) => acknowledge,
             None if number % 2 == 0 => CommandKind::Alarm(shelve),

@@ -124,7 +124,7 @@ fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
         CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Arc::from([(alarm, at)]) }),
         CommandKind::Alarm(AlarmCommand::Silence),
         CommandKind::Alarm(AlarmCommand::Reset(alarm)),
-        CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: Duration::from_secs(60) }),
+        CommandKind::Alarm(AlarmCommand::Shelve { alarms: [alarm].into(), lasts: Duration::from_secs(60) }),
         CommandKind::Alarm(AlarmCommand::Unshelve(alarm)),
         CommandKind::Alarm(AlarmCommand::Tick { alarm, raised_at: at, step: 0, done: true }),
         CommandKind::Alarm(AlarmCommand::OutOfService(alarm)),

@@ -292,7 +292,7 @@ fn every_language_has_every_text() {
         let missing: Vec<_> = used.iter().filter(|text| !translated.contains_key(*text)).collect();
         assert!(missing.is_empty(), "{name} lacks {} texts: {missing:#?}", missing.len());
         let written = fs::read_to_string(entry.path()).unwrap();
-        assert!(written == document, "{name} has unused texts or another order: SIGHTGLASS_WRITE=1 puts it right");
+        assert!(written == document, "{name} has unused texts or another order: SIGHTGLASS_WRITE=1 rewrites it");
         let wrong: Vec<_> = translated.iter().flat_map(|(text, value)| faults(text, value)).collect();
         assert!(wrong.is_empty(), "{name}:\n{}", wrong.join("\n"));
     }

@@ -39,10 +39,10 @@ pub enum AlarmCommand {
     Silence,
     /// Reset a latched alarm whose condition has cleared.
     Reset(AlarmId),
-    /// Shelve an alarm.
+    /// Shelve all of these.
     Shelve {
         /// Which.
-        alarm: AlarmId,
+        alarms: Arc<[AlarmId]>,
         /// For how long, at most `shelve_max` of the plant file.
         lasts: Duration,
     },

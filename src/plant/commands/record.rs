@@ -62,16 +62,20 @@ pub fn alarm_action(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static s
         Some(alarm) => format!("{} {}", subject_name(def, alarm.subject), alarm.message),
         None => format!("alarm {}", alarm.0),
     };
+    let names = |alarms: &[AlarmId]| match alarms {
+        [one] => name(one),
+        several => format!("{} alarms", several.len()),
+    };
     match alarm_command {
         AlarmCommand::Acknowledge { alarm, .. } => ("acknowledge", name(alarm), None),
         AlarmCommand::AcknowledgeAll { alarms } => {
-            let target = if let [(one, _)] = &**alarms { name(one) } else { format!("{} alarms", alarms.len()) };
-            ("acknowledge", target, None)
+            let ids: Vec<AlarmId> = alarms.iter().map(|(id, _)| *id).collect();
+            ("acknowledge", names(&ids), None)
         }
         AlarmCommand::Silence => ("silence", "alarms".into(), None),
         AlarmCommand::Reset(alarm) => ("reset", name(alarm), None),
-        AlarmCommand::Shelve { alarm, lasts } => {
-            ("shelve", name(alarm), Some(format!("for {} min", lasts.as_secs().div_ceil(60))))
+        AlarmCommand::Shelve { alarms, lasts } => {
+            ("shelve", names(alarms), Some(format!("for {} min", lasts.as_secs().div_ceil(60))))
         }
         AlarmCommand::Unshelve(alarm) => ("unshelve", name(alarm), None),
         AlarmCommand::OutOfService(alarm) => ("out of service", name(alarm), None),

@@ -41,13 +41,14 @@ impl Plant {
             }
             AlarmCommand::AcknowledgeAll { alarms } => {
                 let each = alarms.iter().map(|(alarm, since)| manager.acknowledge(*alarm, *since, &note));
-                let (events, outcome) = together(each);
-                effects.records.extend(events.into_iter().map(Record::Alarm));
-                return outcome;
+                return together(each, AlarmRefusal::NothingToAcknowledge, effects);
             }
             AlarmCommand::Silence => manager.silence().then(Vec::new).ok_or(AlarmRefusal::NothingSounds),
             AlarmCommand::Reset(alarm) => one(manager.reset(alarm, &note)),
-            AlarmCommand::Shelve { alarm, lasts } => one(manager.shelve(alarm, lasts, &note)),
+            AlarmCommand::Shelve { alarms, lasts } => {
+                let each = alarms.iter().map(|alarm| manager.shelve(*alarm, lasts, &note));
+                return together(each, AlarmRefusal::NoSuchAlarm, effects);
+            }
             AlarmCommand::Unshelve(alarm) => manager.reinstate(alarm, AlarmEvent::Unshelved, value(alarm), &note),
             AlarmCommand::OutOfService(alarm) => one(manager.out_of_service(alarm, &note)),
             AlarmCommand::Tick { alarm, raised_at, step, done } => {
@@ -146,20 +147,26 @@ fn is_overloaded(line: &LineStatus) -> Option<bool> {
     report.map(|report| report.strain.is_some())
 }
 
-/// The events and the common outcome of several acknowledgements; a refusal is not hidden.
-fn together(each: impl Iterator<Item = Result<AlarmRecord, AlarmRefusal>>) -> (Vec<AlarmRecord>, Outcome) {
-    let (mut events, mut refused, mut count) = (Vec::new(), Vec::new(), 0);
-    for done in each {
+/// Records what is done with several alarms; the common outcome, which hides no refusal. `of_none`: what an empty list is.
+fn together(
+    each: impl Iterator<Item = Result<AlarmRecord, AlarmRefusal>>,
+    of_none: AlarmRefusal,
+    effects: &mut Effects,
+) -> Outcome {
+    let (mut done, mut count, mut first) = (0, 0, None);
+    for result in each {
         count += 1;
-        match done {
-            Ok(event) => events.push(event),
-            Err(refusal) => refused.push(refusal),
+        match result {
+            Ok(event) => {
+                done += 1;
+                effects.records.push(Record::Alarm(event));
+            }
+            Err(refusal) => first = first.or(Some(refusal)),
         }
     }
-    let outcome = match (events.len(), refused.first()) {
-        (0, first) => Outcome::Refused(Refusal::Alarm(first.cloned().unwrap_or(AlarmRefusal::NothingToAcknowledge))),
+    match (done, first) {
+        (0, first) => Outcome::Refused(Refusal::Alarm(first.unwrap_or(of_none))),
         (_, None) => Outcome::Verified,
-        (done, Some(first)) => Outcome::NotConfirmed(NotConfirmed::Partly(format!("{done} of {count}; {first}"))),
-    };
-    (events, outcome)
+        (_, Some(first)) => Outcome::NotConfirmed(NotConfirmed::Partly(format!("{done} of {count}; {first}"))),
+    }
 }

@@ -1,5 +1,6 @@
 //! The reducer of facts: what an operator would notice.
 
+mod alarms;
 mod writes;
 
 use std::time::Duration;
@@ -306,24 +307,6 @@ fn an_overloaded_line_is_said_once_and_no_device_is_at_fault() {
     fast.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
     (1..60).for_each(|second| assert_eq!(report(&mut fast, second, strained), [], "only the machine is busy"));
     assert_eq!(raised, 1);
-}
-
-#[test]
-fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
-    let mut plant = running();
-    plant.on_event(read(1, &[(PV, 760.0)]));
-    plant.on_event(read(3, &[(PV, 761.0)]));
-    assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Unacknowledged);
-    let seen = plant.snapshot();
-    let effects = plant.on_command(command(1, seen.alarms[0].acknowledge()), at(4));
-    assert!(matches!(&effects.records[0], Record::Alarm(event) if event.by.as_deref() == Some("anna")));
-    let all = seen.acknowledge_all().expect("one waited when it was seen");
-    let effects = plant.on_command(command(2, all), at(4));
-    assert!(!effects.records.iter().any(|record| matches!(record, Record::Alarm(_))), "it was acknowledged already");
-    plant.on_event(fail(5, &[PV], Fault::Timeout));
-    assert_eq!(plant.snapshot().alarms[0].state, AlarmState::Acknowledged, "no answer is no return");
-    plant.on_event(read(6, &[(PV, 700.0)]));
-    assert!(plant.snapshot().alarms.is_empty());
 }
 
 #[test]

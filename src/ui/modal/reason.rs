@@ -51,11 +51,11 @@ impl Reason {
 
     /// Shelve alarms for one of these times, each with its words, or for any other up to `max`.
     pub fn shelve(notes: Vec<String>, alarms: &[AlarmId], times: Vec<(String, Duration)>, max: Duration) -> Reason {
-        let (alarm, also) = (alarms[0], alarms[1..].to_vec());
-        let kind = |lasts| CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts });
+        let alarms: Arc<[AlarmId]> = alarms.into();
+        let kind = |lasts| CommandKind::Alarm(AlarmCommand::Shelve { alarms: alarms.clone(), lasts });
         let mut choices: Vec<_> = times.into_iter().map(|(words, lasts)| (words, kind(lasts))).collect();
         choices.push((t!("other:").to_owned(), kind(max)));
-        let time = Some(Time { alarm, also, max, line: Line::default(), typing: choices.len() == 1 });
+        let time = Some(Time { alarms: alarms.clone(), max, line: Line::default(), typing: choices.len() == 1 });
         let first = choices[0].1.clone();
         Reason { choices, time, ..Reason::new(t!("shelve an alarm"), t!("shelve"), notes, first, true) }
     }
@@ -87,7 +87,7 @@ impl Reason {
         match self.other() {
             Some(time) => {
                 let lasts = typed_time(&time.line.text(), time.max)?;
-                Ok(CommandKind::Alarm(AlarmCommand::Shelve { alarm: time.alarm, lasts }))
+                Ok(CommandKind::Alarm(AlarmCommand::Shelve { alarms: time.alarms.clone(), lasts }))
             }
             None => Ok(self.choices[self.chosen].1.clone()),
         }
@@ -152,15 +152,7 @@ impl Reason {
             return Next::Stay(Modal::Reason(Box::new(self)));
         }
         let note = (!words.is_empty()).then(|| Arc::from(words));
-        // Each alarm is shelved by a command of its own: refused, recorded and returned by itself.
-        let also = self.time.iter().flat_map(|time| &time.also).filter_map(|alarm| match kind {
-            CommandKind::Alarm(AlarmCommand::Shelve { lasts, .. }) => {
-                Some(CommandKind::Alarm(AlarmCommand::Shelve { alarm: *alarm, lasts }))
-            }
-            _ => None,
-        });
-        let kinds = also.collect::<Vec<_>>().into_iter().chain([kind]);
-        Next::Do(kinds.map(|kind| UiAction::SendCommand(Command { note: note.clone(), ..kind.into() }, None)).collect())
+        Next::Do(vec![UiAction::SendCommand(Command { note, ..kind.into() }, None)])
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
@@ -205,9 +197,7 @@ impl Reason {
 /// A time that is typed.
 #[derive(Debug, Clone, PartialEq)]
 struct Time {
-    alarm: AlarmId,
-    /// Others that are shelved with it.
-    also: Vec<AlarmId>,
+    alarms: Arc<[AlarmId]>,
     /// The longest that the plant allows.
     max: Duration,
     line: Line,

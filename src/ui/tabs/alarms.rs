@@ -122,9 +122,11 @@ impl TabView for Alarms {
             Action::Shift(by) => self.shift(cx, by),
             Action::Now => self.shift(cx, 0),
             Action::Journal => self.turn_to_journal(cx),
-            Action::Note if !self.marked.is_empty() => return actions::note_all(cx, self.marked(cx).into_iter()),
+            Action::Note if !self.marked(cx).is_empty() => {
+                return actions::acknowledge_all(cx, self.marked(cx).into_iter(), true);
+            }
             Action::Note => return alarm.map_or_else(Vec::new, |alarm| actions::note(cx, alarm)),
-            Action::AcknowledgePage => return actions::acknowledge_all(cx, self.seen(cx).into_iter()),
+            Action::AcknowledgePage => return actions::acknowledge_all(cx, self.seen(cx).into_iter(), false),
             Action::Shelve => return actions::shelve(cx, &self.meant(cx)),
             Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| actions::out_of_service(cx, alarm.id)),
             Action::PutBack => return self.suppressed(cx).map_or_else(Vec::new, |alarm| actions::put_back(cx, alarm)),

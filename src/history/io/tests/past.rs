@@ -79,9 +79,10 @@ fn live(def: &Arc<PlantDef>, mut each: impl FnMut(i64, Vec<Record>, Snapshot)) {
         let snapshot = plant.snapshot();
         let kind = match random(40) {
             0 => snapshot.acknowledge_all(),
-            1 if random(20) == 0 => {
-                Some(CommandKind::Alarm(AlarmCommand::Shelve { alarm: HIGH, lasts: Duration::from_secs(300) }))
-            }
+            1 if random(20) == 0 => Some(CommandKind::Alarm(AlarmCommand::Shelve {
+                alarms: [HIGH].into(),
+                lasts: Duration::from_secs(300),
+            })),
             _ => None,
         };
         if let Some(kind) = kind {

@@ -47,41 +47,30 @@ pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     open(Modal::Reason(Box::new(reason)))
 }
 
-/// Acknowledges all of these with one note.
-pub fn note_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<UiAction> {
+/// Asks whether to acknowledge all of these, exactly as they are seen now; for one note where one of them needs it, or
+/// where it is wanted.
+pub fn acknowledge_all<'a>(
+    cx: &ViewContext,
+    alarms: impl Iterator<Item = &'a ActiveAlarm>,
+    with_note: bool,
+) -> Vec<UiAction> {
     let waiting: Vec<_> = alarms.filter(|alarm| alarm.state.needs_acknowledgement()).collect();
-    if waiting.is_empty() {
-        return Vec::new();
-    }
-    let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).ack_comment);
-    let notes = names(cx, waiting.iter().map(|alarm| alarm.id));
-    let alarms = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
-    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms });
-    let reason = Reason::new(t!("acknowledge with a note"), t!("acknowledge"), notes, kind, needed);
-    open(Modal::Reason(Box::new(reason)))
-}
-
-/// Asks whether to acknowledge all of these, exactly as they are seen now; where one of them needs a note it is asked for.
-pub fn acknowledge_all<'a>(cx: &ViewContext, alarms: impl Iterator<Item = &'a ActiveAlarm>) -> Vec<UiAction> {
-    let waiting: Vec<_> = alarms.filter(|alarm| alarm.state.needs_acknowledgement()).collect();
-    let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).ack_comment);
-    if waiting.is_empty() {
-        return Vec::new();
-    }
     let asked = match waiting.len() {
+        0 => return Vec::new(),
         1 => t!("Acknowledge 1 alarm?").to_owned(),
         n => t!("Acknowledge {n} alarms?", n),
     };
+    let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).ack_comment);
     let mut notes = names(cx, waiting.iter().map(|alarm| alarm.id));
     let alarms = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
     let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms });
-    let title = t!("acknowledge all");
-    if needed {
-        notes.insert(0, asked);
-        notes.push(t!("At least one of them needs a note.").to_owned());
-        return open(Modal::Reason(Box::new(Reason::new(title, t!("acknowledge"), notes, kind, true))));
+    if !needed && !with_note {
+        return open(Modal::Confirm(Confirm::command(t!("acknowledge all"), asked, kind).with_notes(notes)));
     }
-    open(Modal::Confirm(Confirm::command(title, asked, kind).with_notes(notes)))
+    notes.insert(0, asked);
+    notes.extend(needed.then(|| t!("At least one of them needs a note.").to_owned()));
+    let title = if with_note { t!("acknowledge with a note") } else { t!("acknowledge all") };
+    open(Modal::Reason(Box::new(Reason::new(title, t!("acknowledge"), notes, kind, needed))))
 }
 
 /// Asks for how long these alarms are shelved, and why.
@@ -97,7 +86,7 @@ pub fn shelve(cx: &ViewContext, alarms: &[AlarmId]) -> Vec<UiAction> {
     }
     let mut notes = if alarms.len() == 1 { vec![name(cx, alarm)] } else { names(cx, alarms.iter().copied()) };
     notes.push(t!("Not annunciated for this time, then unshelved automatically:").to_owned());
-    let kind = CommandKind::Alarm(AlarmCommand::Shelve { alarm, lasts: max });
+    let kind = CommandKind::Alarm(AlarmCommand::Shelve { alarms: alarms.into(), lasts: max });
     let window = Modal::Reason(Box::new(Reason::shelve(notes, alarms, times, max)));
     vec![Notice::or(cx, t!("shelve an alarm"), &kind, window)]
 }

@@ -38,6 +38,7 @@ pub struct Recent {
 /// How an alarm stood in a cell of its ribbon, the most urgent last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Stood {
+    Unknown,
     Normal,
     Acknowledged,
     Unacknowledged,
@@ -106,9 +107,15 @@ impl Recent {
         self.curve.on_answer(cx, number, answer);
     }
 
-    /// The last hour of an alarm in so many cells: `··▄▄██`. What the snapshot says of it is never late.
+    /// The last hour of an alarm in so many cells: `··▄▄██`, blank where it is not known. What the snapshot says of it is never late.
     pub fn ribbon(&self, cx: &ViewContext, alarm: &ActiveAlarm, cells: u16) -> String {
         let records = self.hour.value.as_deref().unwrap_or_default();
+        let hour_ago = cx.now.checked_sub(RIBBON).unwrap_or(cx.now);
+        // What the journal has not said, or what its limit cut off, is not known.
+        let known_from = match &self.hour.value {
+            Some(records) => cut_at(records.iter().map(|record| record.at), EVENTS_MAX).unwrap_or(hour_ago),
+            None => cx.now,
+        };
         let def = cx.def().alarm(alarm.id);
         let name = subject_name(cx.def(), def.subject);
         let is_of = |record: &&AlarmRecord| *record.subject == *name && *record.message == *def.message;
@@ -119,8 +126,9 @@ impl Recent {
         let mut steps: Vec<(Timestamp, AlarmEvent)> = earlier.map(|record| (record.at, record.event)).collect();
         steps.extend(now.into_iter().flatten());
         steps.sort_by_key(|(at, _)| *at);
-        let signs = cx.theme.pick(['·', '▄', '█'], ['.', '_', '#']);
-        let stood = ribbon(&steps, alarm.state, cx.now, usize::from(cells));
+        let signs = cx.theme.pick([' ', '·', '▄', '█'], [' ', '.', '_', '#']);
+        let known_from = known_from.min(alarm.raised_at).max(hour_ago);
+        let stood = ribbon(&steps, alarm.state, (known_from, cx.now), usize::from(cells));
         stood.into_iter().map(|stood| signs[stood as usize]).collect()
     }
 
@@ -129,15 +137,11 @@ impl Recent {
         self.alarms.value.as_deref()
     }
 
-    /// What was looked through, where the journal holds more.
-    pub fn searched(&self) -> Option<String> {
-        let alarms = self.alarms.value.as_ref().filter(|records| EVENTS_MAX <= records.len());
-        let actions = self.actions.value.as_ref().filter(|records| ACTIONS_MAX <= records.len());
-        let words = [
-            alarms.map(|_| t!("only the last {count} alarm events are searched", count = EVENTS_MAX)),
-            actions.map(|_| t!("only the last {count} actions are searched", count = ACTIONS_MAX)),
-        ];
-        words.into_iter().flatten().reduce(|first, second| format!("{first}; {second}"))
+    /// Since when alarm events and actions are known, where the journal holds more than was looked through.
+    pub fn searched_since(&self) -> [Option<Timestamp>; 2] {
+        let alarms = self.alarms.value.iter().flatten().map(|record| record.at);
+        let actions = self.actions.value.iter().flatten().map(|action| action.at);
+        [cut_at(alarms, EVENTS_MAX), cut_at(actions, ACTIONS_MAX)]
     }
 
     /// How often an alarm was raised before this time, and the last times; `None` until the history has answered.
@@ -148,7 +152,9 @@ impl Recent {
         // What was set on the device of the alarm while it was active.
         let device = super::guidance::journal_of(cx, def.subject);
         let is_process = |action: &&ActionRecord| {
-            !NOT_PROCESS_ACTIONS.contains(&&*action.action) && action.new.is_some() && action.target.starts_with(device)
+            let rest = action.target.strip_prefix(device);
+            let is_of_device = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+            !NOT_PROCESS_ACTIONS.contains(&&*action.action) && action.new.is_some() && is_of_device
         };
         let of_device: Vec<&ActionRecord> = actions.iter().filter(is_process).collect();
         Some(occurrences(&of_alarm.collect::<Vec<_>>(), &of_device, just_before(now)))
@@ -160,13 +166,24 @@ fn view(cx: &ViewContext) -> View {
     View::live(cx.now, RIBBON.as_secs(), chart::dots(cx.theme, side::columns(cx.area.width), 1))
 }
 
+/// The oldest of these times, where a limit cut off those before it.
+fn cut_at(times: impl Iterator<Item = Timestamp>, limit: usize) -> Option<Timestamp> {
+    let times: Vec<Timestamp> = times.collect();
+    times.iter().min().copied().filter(|_| limit <= times.len())
+}
+
 /// The journal holds microseconds, a snapshot more digits: what was at this time is not before it.
 fn just_before(at: Timestamp) -> Timestamp {
     at.checked_sub(SignedDuration::from_millis(1)).unwrap_or(at)
 }
 
 /// How an alarm stood in each cell of the hour before `now`, from its events, oldest first, and its state now.
-fn ribbon(steps: &[(Timestamp, AlarmEvent)], state: AlarmState, now: Timestamp, cells: usize) -> Vec<Stood> {
+fn ribbon(
+    steps: &[(Timestamp, AlarmEvent)],
+    state: AlarmState,
+    (known_from, now): (Timestamp, Timestamp),
+    cells: usize,
+) -> Vec<Stood> {
     let mut ends = match state {
         AlarmState::Unacknowledged => Stood::Unacknowledged,
         AlarmState::Acknowledged => Stood::Acknowledged,
@@ -183,10 +200,10 @@ fn ribbon(steps: &[(Timestamp, AlarmEvent)], state: AlarmState, now: Timestamp, 
         let share = at.duration_since(from).as_secs_f64() / RIBBON.as_secs_f64();
         crate::plant::number::to_usize((share.clamp(0.0, 1.0) * cells as f64).floor()).min(cells.saturating_sub(1))
     };
-    let mut stood = vec![Stood::Normal; cells];
+    let mut stood = vec![Stood::Unknown; cells];
     let mut end = now;
     // Backwards from now: what it is now it has been since the last event.
-    for (at, event) in steps.iter().rev().map(|(at, event)| (*at, Some(*event))).chain([(from, None)]) {
+    for (at, event) in steps.iter().rev().map(|(at, event)| (*at, Some(*event))).chain([(known_from, None)]) {
         for stood in stood.iter_mut().take(cell(end) + 1).skip(cell(at)) {
             *stood = (*stood).max(ends);
         }
@@ -258,7 +275,10 @@ fn occurrences(records: &[&AlarmRecord], actions: &[&ActionRecord], now: Timesta
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{plant::def::Priority, ui::fixture::now};
+    use crate::{
+        plant::def::Priority,
+        ui::fixture::{Fixture, now, with_cx},
+    };
 
     fn ago(minutes: i64) -> Timestamp {
         now() - SignedDuration::from_mins(minutes)
@@ -267,12 +287,14 @@ mod tests {
     #[test]
     fn a_ribbon_shows_how_an_alarm_came_and_went() {
         use AlarmEvent::{Acknowledged, Raised, ReturnedToNormal};
-        let check = |steps: &[(i64, AlarmEvent)], state, expect: &str| {
+        let check_from = |known_from, steps: &[(i64, AlarmEvent)], state, expect: &str| {
             let steps: Vec<_> = steps.iter().map(|(minutes, event)| (ago(*minutes), *event)).collect();
-            let signs = ['.', '_', '#'];
-            let shown: String = ribbon(&steps, state, now(), 6).iter().map(|stood| signs[*stood as usize]).collect();
+            let signs = ['?', '.', '_', '#'];
+            let shown: String =
+                ribbon(&steps, state, (known_from, now()), 6).iter().map(|stood| signs[*stood as usize]).collect();
             assert_eq!(shown, expect, "{steps:?}");
         };
+        let check = |steps: &[_], state, expect: &str| check_from(ago(60), steps, state, expect);
         check(&[], AlarmState::Acknowledged, "______");
         check(&[(15, Raised)], AlarmState::Unacknowledged, "....##");
         check(&[(55, Raised), (25, Acknowledged)], AlarmState::Acknowledged, "####__");
@@ -283,6 +305,9 @@ mod tests {
         // Chattering.
         let steps = [(55, Raised), (54, ReturnedToNormal), (5, Raised), (4, ReturnedToNormal)];
         check(&steps, AlarmState::ReturnedToNormal, "#....#");
+        // The journal was read from twenty minutes ago on.
+        check_from(ago(20), &[(15, Raised)], AlarmState::Unacknowledged, "????##");
+        check_from(ago(25), &[(15, Raised)], AlarmState::Unacknowledged, "???.##");
     }
 
     #[test]
@@ -316,8 +341,33 @@ mod tests {
         let mut recent = Recent::default();
         let event = AlarmRecord::new(now(), "TIC-1.PV", "high", Priority::High, AlarmEvent::Raised);
         recent.alarms.value = Some(vec![event; EVENTS_MAX - 1]);
-        assert_eq!(recent.searched(), None);
-        recent.alarms.value.iter_mut().for_each(|events| events.push(events[0].clone()));
-        assert_eq!(recent.searched().as_deref(), Some("only the last 2000 alarm events are searched"));
+        assert_eq!(recent.searched_since(), [None; 2]);
+        let oldest = AlarmRecord { at: ago(90), ..recent.alarms.value.iter().flatten().next().unwrap().clone() };
+        recent.alarms.value.iter_mut().for_each(|events| events.push(oldest.clone()));
+        assert_eq!(recent.searched_since(), [Some(ago(90)), None]);
+        recent.actions.value =
+            Some(vec![ActionRecord::new(ago(70), "tom", "write", "TIC-1.SV", "verified"); ACTIONS_MAX]);
+        assert_eq!(recent.searched_since(), [Some(ago(90)), Some(ago(70))]);
+    }
+
+    #[test]
+    fn only_actions_on_the_device_of_the_alarm_are_named() {
+        let fixture = Fixture::alarm();
+        let def = &fixture.def.alarms[fixture.alarms[0].id.index()];
+        let event = |minutes, event| AlarmRecord::new(ago(minutes), "TIC-1.PV", &*def.message, def.priority, event);
+        let write = |target: &str| ActionRecord {
+            new: Some("65.0".into()),
+            ..ActionRecord::new(ago(55), "tom", "write", target, "verified")
+        };
+        let mut recent = Recent::default();
+        recent.alarms.value = Some(vec![event(50, AlarmEvent::ReturnedToNormal), event(60, AlarmEvent::Raised)]);
+        recent.actions.value = Some(["TIC-10.SV", "TIC-1.SV", "TIC-1", "TIC-1-B.SV"].map(write).to_vec());
+        with_cx(&fixture.snapshot(), |cx| {
+            let (times, all) = recent.before(cx, def, now()).expect("both have answered");
+            assert_eq!(
+                (times, &*all[0].done),
+                (1, ["tom: TIC-1 65.0", "tom: TIC-1.SV 65.0"].map(str::to_owned).as_slice())
+            );
+        });
     }
 }

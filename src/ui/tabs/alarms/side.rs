@@ -94,19 +94,25 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
 /// How often it was raised before, and what was done the last times.
 fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Row> {
     let (def, normal) = (cx.def().alarm(alarm.id), cx.theme.normal());
-    let days = recent::DAYS;
+    let since = |at| draw::local(cx, at, "%m-%d %H:%M");
+    let [searched, actions] = tab.recent.searched_since();
     let Some((times, all)) = tab.recent.before(cx, def, alarm.raised_at) else {
         return vec![(t!("before"), t!("collecting data").to_owned(), cx.theme.dim())];
     };
-    let head = match times {
-        0 => t!("none recorded in the last {days} days", days),
-        1 => t!("once in {days} days", days),
-        times => t!("{times} times in {days} days", times, days),
+    let days = recent::DAYS;
+    let head = match (searched.map(since), times) {
+        (None, 0) => t!("none recorded in the last {days} days", days),
+        (None, 1) => t!("once in {days} days", days),
+        (None, times) => t!("{times} times in {days} days", times, days),
+        (Some(time), 0) => t!("none recorded since {time}", time),
+        (Some(time), 1) => t!("once since {time}", time),
+        (Some(time), times) => t!("{times} times since {time}", times, time),
     };
     let mut rows = vec![(t!("before"), head, normal)];
-    rows.extend(tab.recent.searched().map(|words| ("", words, cx.theme.strong())));
+    let words = actions.map(|at| t!("actions are known since {time}", time = since(at)));
+    rows.extend(words.map(|words| ("", words, cx.theme.strong())));
     for occurrence in all.iter().take(TIMES_MAX) {
-        let at = draw::local(cx, occurrence.raised_at, "%m-%d %H:%M");
+        let at = since(occurrence.raised_at);
         let lasted = occurrence.lasted.map(|lasted| t!("  for {lasted}", lasted = running(lasted)));
         rows.push(("", format!("{at}{}", lasted.unwrap_or_default()), normal));
         rows.extend(occurrence.done.iter().map(|done| ("", format!("· {done}"), cx.theme.strong())));

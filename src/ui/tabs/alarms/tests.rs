@@ -373,7 +373,7 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
     assert!(screen(&mut model, 80, 24).contains("reason required"), "nothing is shelved without a reason");
     let effects = type_keys(&mut model, "↓↓sensor is cleaned⏎");
     let Some(Effect::Command(command, _)) = effects.last() else { panic!("{effects:?}") };
-    let shelve = AlarmCommand::Shelve { alarm: AlarmId(0), lasts: Duration::from_secs(3_600) };
+    let shelve = AlarmCommand::Shelve { alarms: [AlarmId(0)].into(), lasts: Duration::from_secs(3_600) };
     assert_eq!((&command.kind, command.note.as_deref()), (&CommandKind::Alarm(shelve), Some("sensor is cleaned")));
     // No time is offered that the plant does not allow.
     let mut short = Fixture::alarm();

@@ -22,7 +22,7 @@ pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rec
     let least = if height < 14 { 2 } else { ALARM_ROWS_MIN };
     let above = height.saturating_sub(least);
     if least > 2 && cx.theme.has_all_letters() {
-        // Whoever cannot read this page finds the way to another language in its own name.
+        // A user who does not read this language recognises the name of another one.
         let other = Locale::current().language.next().name();
         canvas.text_right(width.saturating_sub(1), 0, &format!("Ctrl-T {other}"), cx.theme.dim());
     }
