@@ -137,8 +137,7 @@ fn load_warned(plant: &[u8], meter: &str, plc: &str) -> Result<(PlantDef, Errors
     build("small", &Text { file: "small.toml".to_owned(), bytes: plant.to_vec() }, &library)
 }
 
-/// Replaces `from` by `to` in whichever of the three texts has it; the rendering must then contain all of `expect`,
-/// and hold exactly one problem.
+/// Replaces `from` by `to` in the text that has it; the rendering must contain all of `expect`, and exactly one problem.
 pub(super) fn check(from: &str, to: &str, expect: &[&str]) {
     let errors = changed(&[(from, to)]);
     let text = errors.to_string();
