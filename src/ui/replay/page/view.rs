@@ -78,16 +78,16 @@ impl EventPage {
     /// Draws it; what is compared with now is of the present.
     pub fn view(&self, cx: &ViewContext, present: &ViewContext, tabs: &Tabs, frame: &mut Frame, area: Rect) {
         let room = Rect { width: area.width.saturating_sub(SIDE + 1), height: area.height.saturating_sub(15), ..area };
-        let size = tabs.mimic.size(cx, room);
+        let size = if cx.def().mimic.pages.is_empty() { (0, 0) } else { tabs.mimic.size(cx, room) };
         let parts = parts(area, cx.size, size, rows(self.pens.len() + 2));
         if parts.mimic.height > 0 {
             tabs.mimic.draw_page(cx, frame, parts.mimic);
         }
         let buffer = frame.buffer_mut();
-        for y in area.y..area.bottom() {
-            if parts.mimic.height > 0 {
-                let x = parts.mimic.right();
-                Canvas::new(buffer, area).text(x - area.x, y - area.y, cx.theme.pick("┊", "|"), cx.theme.dim());
+        if parts.journal.width < area.width {
+            let mut canvas = Canvas::new(buffer, area);
+            for y in 0..area.height {
+                canvas.text(parts.journal.width, y, cx.theme.pick("┊", "|"), cx.theme.dim());
             }
         }
         self.curves(cx, &mut Canvas::new(buffer, parts.curves));

@@ -178,3 +178,15 @@ fn only_a_supervisor_asks_for_logins() {
     answer_page(&mut model, &next, ago(600));
     assert!(screen(&mut model, 80, 24).contains("the audit log is for a Supervisor"));
 }
+
+#[test]
+fn a_plant_without_a_mimic_has_an_event_page() {
+    let mut fixture = Fixture::traffic();
+    fixture.def.mimic.pages.clear();
+    let mut model = paged(&fixture, "!-10m⏎", ago(600));
+    for (width, height) in [(80, 24), (120, 40), (160, 50)] {
+        let shown = screen(&mut model, width, height);
+        let there = ["curves", "journal", "frames", "logged in"].iter().all(|words| shown.contains(words));
+        assert!(there && !shown.contains("TK-1"), "{width}x{height}: {shown}");
+    }
+}
