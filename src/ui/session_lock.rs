@@ -27,10 +27,12 @@ const ACTIVE_TICKS: u32 = 60;
 const WARNED_TICKS: u32 = 4;
 
 /// Times of the session and the lock, in ticks, and the number of the last request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SessionLock {
-    /// Number of the last request; only its answer counts.
+    /// Number of the last request; only its answer counts, and those of exports.
     pub last_request: u32,
+    /// Requests to record a file, which waits for its own answer, whatever was requested since.
+    pub exports: Vec<u32>,
     /// When the present session status came.
     status_at: u32,
     /// When the last activity message was sent.
@@ -79,6 +81,11 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
         model.last_command = model.last_command.take_if(|_| user(&before) == user(&now));
         model.kept = None;
         (model.visited, model.recent) = (Visited::default(), Vec::new());
+    }
+    if user(&before) != user(&now) || now.locked && !before.locked {
+        // What one user has begun is not recorded as done by another.
+        model.session_lock.exports.clear();
+        model.tabs.each_mut().for_each(TabView::cancel_export);
     }
     let back = keep_work(model, &before, &now);
     with_tabs(model, |tabs, cx| {
@@ -177,6 +184,9 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
         } else if let UiAction::Open(modal) = action {
             held = Some(Some(modal));
         } else {
+            if let UiAction::SessionRequest(tab, _) | UiAction::Do(Effect::SaveReport { tab: Some(tab), .. }) = action {
+                model.tabs.of_mut(tab).cancel_export();
+            }
             held = held.or(Some(None));
         }
     }
@@ -215,8 +225,9 @@ pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Dur
     }
     let answer = answer.map(drop);
     let Some(tab) = id.tab else { return screen_dump::on_request_done(model, id.number, answer) };
-    if matches!(tab, Tab::Reports | Tab::Bus) {
-        // A file that waits to be written waits for its own answer, whatever was requested since.
+    let exports = &mut model.session_lock.exports;
+    if let Some(place) = exports.iter().position(|number| *number == id.number) {
+        exports.remove(place);
         return with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_request_done(cx, answer));
     }
     let waits = |modal: &Modal| matches!(modal, Modal::UserForm(form) if form.waits_for(id.number));

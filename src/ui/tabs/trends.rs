@@ -209,6 +209,10 @@ impl TabView for Trends {
         self.recorded(answer)
     }
 
+    fn cancel_export(&mut self) {
+        self.export.cancel();
+    }
+
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
         self.written(result)
     }

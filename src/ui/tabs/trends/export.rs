@@ -38,6 +38,13 @@ impl Export {
         self.wanted.is_some() || !self.files.is_empty()
     }
 
+    /// Gives up what is on its way.
+    pub(super) fn cancel(&mut self) {
+        if self.is_busy() {
+            *self = Export { said: Some(Err(Outgoing::cancelled())), ..Export::default() };
+        }
+    }
+
     /// Asks the station to record the first file.
     fn next(&self) -> Vec<UiAction> {
         self.files.front().map(Outgoing::export_request).into_iter().collect()

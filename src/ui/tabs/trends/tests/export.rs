@@ -1,7 +1,10 @@
 //! Export of the view: on record first, then written.
 
 use super::*;
-use crate::access::{Durability, SessionRequest};
+use crate::{
+    access::{Durability, LoggedInUser, SessionRequest, SessionStatus},
+    ui::fixture,
+};
 
 /// The effects of a message that are no queries, and the answers to these.
 fn effects(stand: &mut Stand, msg: Msg) -> Vec<Effect> {
@@ -66,4 +69,53 @@ fn the_chart_is_written_as_svg_and_then_as_png() {
     assert!(file.ends_with(".png"), "{file}");
     effects(&mut stand, Msg::RequestDone(id, Err("audit log full".to_owned())));
     assert!(stand.screen().contains("not exported: audit log full"));
+}
+
+fn change_session(stand: &mut Stand, change: impl FnOnce(&mut SessionStatus)) -> Vec<Effect> {
+    let mut session = (*stand.model.session).clone();
+    change(&mut session);
+    update(&mut stand.model, Msg::SessionStatus(Arc::new(session)))
+}
+
+#[test]
+fn another_request_does_not_take_the_answer_of_an_export() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    let (id, _) = requested(&effects(&mut stand, key('E'))).expect("the SVG is recorded");
+    let lock = Msg::Key(KeyEvent::new(KeyCode::Char('k'), KeyModifiers::CONTROL));
+    effects(&mut stand, lock);
+    let written = effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Recorded)));
+    assert!(saved(&written).is_some(), "{written:?}");
+}
+
+#[test]
+fn a_lock_or_another_user_ends_an_export() {
+    type Change = fn(&mut SessionStatus);
+    let lock: Change = |session| session.locked = true;
+    let change: Change = |session| {
+        let who = fixture::session().who.clone();
+        session.who = who.map(|who| LoggedInUser { user: "boris".into(), ..who });
+    };
+    for (letter, end) in [('e', lock), ('E', lock), ('e', change), ('E', change)] {
+        let mut stand = Stand::new(Theme::FULL, 120, 40);
+        stand.answer();
+        // The values of a CSV are still read, the SVG is before the station.
+        let begun = update(&mut stand.model, key(letter));
+        let id = requested(&begun).map(|(id, _)| id);
+        change_session(&mut stand, end);
+        assert!(!stand.model.tabs.trends.export.is_busy());
+        let number = |effect: &Effect| match effect {
+            Effect::Query(id, query) => Some((*id, query.clone())),
+            _ => None,
+        };
+        for (id, query) in begun.iter().filter_map(number) {
+            let answer = stand.history(&query);
+            let late = update(&mut stand.model, Msg::Answer(id, Ok(answer)));
+            assert_eq!(requested(&late), None, "{letter}: not on record under another user");
+        }
+        let late = id.map(|id| update(&mut stand.model, Msg::RequestDone(id, Ok(Durability::Recorded))));
+        assert_eq!(saved(&late.unwrap_or_default()), None, "{letter}");
+        change_session(&mut stand, |session| session.locked = false);
+        assert!(requested(&effects(&mut stand, key(letter))).is_some(), "{letter}: exported again");
+    }
 }
