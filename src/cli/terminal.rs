@@ -16,7 +16,8 @@ impl TerminalArgs {
     /// What can be chosen about a terminal.
     pub fn options(&self, leaving: ui::Leaving) -> ui::io::Options {
         let detected = ui::io::Options::new(leaving);
-        ui::io::Options { language: self.language.unwrap_or(detected.language), ..detected }
+        let language = self.language.unwrap_or(detected.language);
+        ui::io::Options { language, language_is_chosen: self.language.is_some(), ..detected }
     }
 }
 

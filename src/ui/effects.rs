@@ -66,6 +66,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             }
             UiAction::KeepPreferences(chosen) => {
                 model.modal.take_if(|modal| matches!(modal, Modal::TerminalSettings(_)));
+                model.chosen_locale = None;
                 let user = model.user().map(str::to_owned);
                 let chosen = Kept::Preferences(chosen);
                 model.preferences_file.set(user.as_deref(), chosen.clone());

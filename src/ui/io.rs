@@ -46,7 +46,7 @@ use crate::{
 use screen::{Screen, own};
 
 /// Time between two ticks: flashing, motion, clock.
-const TICK: Duration = Duration::from_millis(500);
+pub(super) const TICK: Duration = Duration::from_millis(500);
 /// Least time between two frames without a key.
 const FRAME: Duration = Duration::from_millis(250);
 /// Least time between two frames while keys come in.
@@ -62,6 +62,8 @@ pub struct Options {
     pub preferences: PreferencesFile,
     /// The language that it begins with, if the terminal has its letters.
     pub language: Language,
+    /// The command line says so: it goes before what the user has kept.
+    pub language_is_chosen: bool,
     /// What ends with it.
     pub leaving: Leaving,
     /// It begins with the tour of a demonstration.
@@ -89,7 +91,8 @@ impl Options {
         let (theme, language) = (Theme::detect(env), Language::detect(env));
         let preferences = preferences::load();
         let (extension, start, profiles) = Default::default();
-        Options { theme, preferences, language, leaving, tour: false, extension, start, profiles }
+        let language_is_chosen = false;
+        Options { theme, preferences, language, language_is_chosen, leaving, tour: false, extension, start, profiles }
     }
 }
 
@@ -121,7 +124,8 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     let snapshot = session.snapshots.borrow_and_update().clone();
     let status = session.status.borrow_and_update().clone();
     let mut model = Model::new(snapshot, options.theme, session.terminal, status);
-    model.set_locale(options.language.locale());
+    model.locale = options.language.locale();
+    model.chosen_locale = Some(model.locale).filter(|_| options.language_is_chosen);
     model.leaving = options.leaving;
     model.tour = options.tour.then(super::Tour::default);
     let why = options.preferences.problem.as_ref();

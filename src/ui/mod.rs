@@ -48,7 +48,7 @@ use crate::{
     history::{Answer, HistoryError},
     plant::{alarm::AlarmCommand, command::CommandKind, sample::Cause, snapshot::Snapshot},
     t,
-    text::{Language, Locale},
+    text::Locale,
 };
 use extension::Extension;
 use keys::Global;
@@ -87,8 +87,10 @@ pub struct Model {
     pub theme: Theme,
     /// What the terminal can show.
     pub limits: Theme,
-    /// The language of its texts and how it writes dates, where its user has chosen none.
+    /// The language of its texts and how it writes dates, where its user has kept none.
     pub locale: Locale,
+    /// That which a key or the command line has chosen: goes before what is kept, until the user changes.
+    pub chosen_locale: Option<Locale>,
     /// What the user has chosen, or tries.
     pub preferences: Preferences,
     /// What all users have chosen.
@@ -152,6 +154,7 @@ impl Model {
             theme,
             limits: theme,
             locale: Locale::ENGLISH,
+            chosen_locale: None,
             preferences: Preferences::default(),
             preferences_file: PreferencesFile::default(),
             rang_at: 0,
@@ -195,11 +198,12 @@ impl Model {
 
     /// Shows all texts in this language, if the terminal has its letters.
     pub fn set_locale(&mut self, locale: Locale) {
-        if locale.language == Language::ENGLISH || self.theme.has_all_letters() {
-            // It goes before what is preferred, until the terminal ends or another user logs in.
-            (self.locale, self.preferences.language) = (locale, None);
-        } else {
+        if !self.can_show(locale) {
             self.note = Some(t!("This terminal does not have the letters of that language").into());
+        } else if let Some(Modal::TerminalSettings(window)) = &mut self.modal {
+            window.chosen.language = Some(locale.language);
+        } else {
+            self.chosen_locale = Some(locale);
         }
     }
 

@@ -295,10 +295,21 @@ impl Model {
         self.preferences_file.bookmarks(self.user())
     }
 
-    /// The language of the texts: as preferred, if the terminal has its letters.
+    /// Has the terminal the letters of this language?
+    pub(super) fn can_show(&self, locale: Locale) -> bool {
+        locale.language == Language::ENGLISH || self.theme.has_all_letters()
+    }
+
+    /// The language of the texts: as chosen, else as kept; one whose letters the terminal has. The window of the settings
+    /// shows what is chosen in it.
     pub(super) fn locale(&self) -> Locale {
-        let preferred = self.preferences.language.filter(|_| self.theme.has_all_letters());
-        preferred.map_or(self.locale, Language::locale)
+        let is_tried = matches!(self.modal, Some(Modal::TerminalSettings(_)));
+        let ways = [
+            self.chosen_locale.filter(|_| !is_tried),
+            self.preferences.language.map(Language::locale),
+            Some(self.locale),
+        ];
+        ways.into_iter().flatten().find(|locale| self.can_show(*locale)).unwrap_or(Locale::ENGLISH)
     }
 
     /// The preferences were kept, or not: that is said.

@@ -82,6 +82,9 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
         model.kept = None;
         (model.visited, model.recent) = (Visited::default(), Vec::new());
     }
+    if user(&before) != user(&now) {
+        model.locale = model.chosen_locale.take().unwrap_or(model.locale);
+    }
     if user(&before) != user(&now) || now.locked && !before.locked {
         // What one user has begun is not recorded as done by another.
         model.session_lock.exports.clear();

@@ -1,4 +1,4 @@
-//! The settings of a terminal: tried while they are chosen, kept with Enter, as before with Esc.
+//! The settings of a terminal: tried while they are chosen, saved with Enter, cancelled with Esc.
 
 #[cfg(test)]
 mod tests;
@@ -53,18 +53,20 @@ impl TerminalSettings {
         let file = &model.preferences_file;
         let kept = match (&file.problem, model.user()) {
             (Some(problem), _) => Err(t!("Not kept: {problem}", problem)),
-            (None, Some(user)) => Ok(t!("Kept for {user} in {path}", user, path = file.path)),
-            (None, None) => Ok(t!("Kept for everyone who is not logged in, in {path}", path = file.path)),
+            (None, Some(user)) => Ok(t!("Enter saves for {user} in {path}", user, path = file.path)),
+            (None, None) => Ok(t!("Enter saves for everyone who is not logged in, in {path}", path = file.path)),
         };
-        TerminalSettings { chosen: model.preferences, kept, row: 0 }
+        let shown = model.chosen_locale.map(|locale| locale.language);
+        let language = shown.or(model.preferences.language);
+        TerminalSettings { chosen: Preferences { language, ..model.preferences }, kept, row: 0 }
     }
 
     pub(super) fn hints(&self) -> Vec<Hint> {
         vec![
             Hint::in_window("↑↓", t!("select")),
             Hint::in_window("←→", t!("change")),
-            Hint::in_window("⏎", t!("keep")),
-            Hint::in_window(t!("Esc"), t!("as before")),
+            Hint::in_window("⏎", t!("OK")),
+            Hint::in_window(t!("Esc"), t!("cancel")),
         ]
     }
 
@@ -122,15 +124,15 @@ impl TerminalSettings {
                 ThemeName::Grey => t!("colour for what is abnormal (ISA-101)"),
                 ThemeName::Dark => t!("more colour on near black"),
                 ThemeName::Light => t!("for bright rooms"),
-                ThemeName::HighContrast => t!("for tired eyes and poor screens"),
+                ThemeName::HighContrast => t!("strong contrast, bright text"),
                 ThemeName::Mono => t!("without hue"),
             },
             Field::Characters => match cx.theme.glyphs {
                 Glyphs::Braille => t!("shown with braille dots"),
                 Glyphs::Block => t!("shown with blocks"),
-                Glyphs::Ascii => t!("shown in seven bits"),
+                Glyphs::Ascii => t!("shown with ASCII characters"),
             },
-            Field::Motion => t!("agitators turn, flow travels"),
+            Field::Motion => t!("moving agitators and flow arrows"),
             Field::Bell => match self.chosen.bell {
                 Bell::Off => t!("alarms make no sound here"),
                 Bell::Once | Bell::Repeated => t!("Ctrl-S silences"),

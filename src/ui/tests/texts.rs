@@ -10,6 +10,7 @@ use crate::{
         fixture::Fixture,
         glyph_filter::cells,
         keys,
+        preferences::Preferences,
         tabs::Tab,
         theme::{Glyphs, Theme},
         update,
@@ -177,9 +178,33 @@ fn a_key_changes_the_language_and_back() {
     // In a form a letter is typed; Ctrl-T works there too.
     model.tabs.shown = Tab::Login;
     type_keys(&mut model, "pL");
-    assert_eq!(model.locale, Locale::ENGLISH);
+    assert_eq!(model.locale(), Locale::ENGLISH);
     update(&mut model, Msg::Key(keys::ctrl('t').event()));
-    assert_eq!(model.locale, Language::THAI.locale());
+    assert_eq!(model.locale(), Language::THAI.locale());
+}
+
+#[test]
+fn a_key_goes_before_the_language_that_was_kept() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    let thai = Preferences { language: Some(Language::THAI), ..Preferences::default() };
+    model.preferences_file.set(Some("tech1"), thai);
+    update(&mut model, Msg::Tick { silent: std::time::Duration::ZERO });
+    assert_eq!(model.locale(), Language::THAI.locale());
+    type_keys(&mut model, "L");
+    assert_eq!(model.locale(), Locale::ENGLISH);
+    // The settings begin with what is shown; there the key changes the choice.
+    update(&mut model, Msg::Key(keys::code(crossterm::event::KeyCode::F(2)).event()));
+    assert_eq!(model.locale(), Locale::ENGLISH);
+    update(&mut model, Msg::Key(keys::ctrl('t').event()));
+    assert_eq!(model.locale(), Language::THAI.locale());
+    type_keys(&mut model, "⎋");
+    assert_eq!(model.locale(), Locale::ENGLISH, "cancelled");
+    let mut session = (*model.session).clone();
+    session.who = None;
+    update(&mut model, Msg::SessionStatus(std::sync::Arc::new(session)));
+    assert_eq!(model.locale(), Locale::ENGLISH, "what was chosen stays for a user without a choice");
+    update(&mut model, Msg::SessionStatus(crate::ui::fixture::session()));
+    assert_eq!(model.locale(), Language::THAI.locale(), "the user finds what was kept");
 }
 
 #[test]
@@ -187,7 +212,7 @@ fn a_terminal_without_thai_letters_stays_english() {
     for theme in [Theme::PLAIN, Theme { glyphs: Glyphs::Block, ..Theme::FULL }] {
         let mut model = model(&Fixture::normal(), theme);
         type_keys(&mut model, "L");
-        assert_eq!(model.locale, Locale::ENGLISH);
+        assert_eq!(model.locale(), Locale::ENGLISH);
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains("does not have the letters of that language"), "{shown}");
     }
