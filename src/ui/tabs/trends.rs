@@ -67,6 +67,8 @@ pub struct Trends {
     /// Groups of the plant, and behind them the tags that were picked in the list of values.
     group: usize,
     picked: Vec<TagId>,
+    /// A tag without a group that was opened alone; the marked ones stay.
+    opened: Vec<TagId>,
     /// Scales that were typed, instead of those of the plant file.
     scales: BTreeMap<TagId, PenScale>,
     /// How pens are drawn that were given another look.
@@ -181,7 +183,8 @@ impl TabView for Trends {
 
     fn on_point(&mut self, cx: &ViewContext, at: Position) -> bool {
         let moment = pointer::moment_at(self, cx, at);
-        self.cursor = moment.or(self.cursor);
+        // In a replay cursor A is its instant.
+        self.cursor = moment.filter(|_| !cx.is_past()).or(self.cursor);
         moment.is_some()
     }
 

@@ -340,7 +340,10 @@ fn the_cursor_of_the_trends_goes_with_the_replay() {
     let to = instants(&effects);
     assert!(to[0] < ago(600) && ago(630) < to[0], "a cell earlier: {to:?}");
     answer_instants(&mut model, &effects);
+    type_keys(&mut model, "b");
+    assert!(model.tabs.trends.both().is_some());
     type_keys(&mut model, "⎋");
+    assert_eq!(model.tabs.trends.both(), None, "no cursor is left that arrows would move unseen");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("live ●") && !shown.contains("at 13:5"), "{shown}");
 }

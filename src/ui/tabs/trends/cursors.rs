@@ -86,7 +86,7 @@ impl Trends {
     }
 
     /// Both cursors.
-    pub(super) fn both(&self) -> Option<(Timestamp, Timestamp)> {
+    pub(crate) fn both(&self) -> Option<(Timestamp, Timestamp)> {
         self.cursor.zip(self.between.b)
     }
 

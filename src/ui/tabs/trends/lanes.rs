@@ -73,16 +73,11 @@ pub(super) fn draw_lane(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, 
         let begins = place > 0 && end(&runs[place - 1]) == run.first && runs[place - 1].state.is_some();
         let stroke = if begins { theme.pick("│", "|") } else { line };
         let rest = run.cells - 1;
-        let label = fit(&state_text(cx, pen.tag, state), to_u16(rest));
+        let label = fit(&cx.snapshot.format(pen.tag, state), to_u16(rest));
         let label = if usize::from(width(&label)) + 1 < rest { label } else { String::new() };
         let fill = line.repeat(rest - usize::from(width(&label)));
         canvas.text(x, 0, &format!("{stroke}{label}{fill}"), style);
     }
-}
-
-/// A state in words: its label, or its number.
-fn state_text(cx: &ViewContext, tag: TagId, state: f64) -> String {
-    cx.snapshot.format(tag, state)
 }
 
 #[cfg(test)]

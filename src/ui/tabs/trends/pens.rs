@@ -44,14 +44,24 @@ impl std::fmt::Display for PenScale {
 impl Trends {
     /// The pens of the shown group, at most eight; behind the plant's groups come the tags picked from the list.
     pub(super) fn pens(&self, cx: &ViewContext) -> Vec<Pen> {
-        let picked = || self.picked.iter().map(|tag| Pen { tag: *tag, scale: None }).collect();
+        let picked = || self.behind().iter().map(|tag| Pen { tag: *tag, scale: None }).collect();
         let group = cx.def().trends.get(self.group);
         group.map_or_else(picked, |group| group.pens.iter().take(PENS_MAX).copied().collect())
     }
 
+    /// The tags of the group behind those of the plant: the one that was opened alone, or those that are marked.
+    pub(super) fn behind(&self) -> &[TagId] {
+        if self.opened.is_empty() { &self.picked } else { &self.opened }
+    }
+
+    /// The number of groups.
+    pub(super) fn groups(&self, cx: &ViewContext) -> usize {
+        cx.def().trends.len() + usize::from(!self.behind().is_empty())
+    }
+
     /// The name of the shown group.
     pub(super) fn name(&self, cx: &ViewContext) -> String {
-        match (cx.def().trends.get(self.group), self.picked.as_slice()) {
+        match (cx.def().trends.get(self.group), self.behind()) {
             (Some(group), _) => group.name.clone(),
             (None, [tag]) => cx.def().tag(*tag).name.clone(),
             (None, _) => t!("marked").to_owned(),
@@ -73,8 +83,11 @@ impl Trends {
     }
 
     pub(super) fn next_group(&mut self, cx: &ViewContext) {
-        let count = cx.def().trends.len() + usize::from(!self.picked.is_empty());
-        self.show_group(cx, (self.group + 1) % count.max(1), 0);
+        let next = (self.group + 1) % self.groups(cx).max(1);
+        if !self.picked.is_empty() {
+            self.opened.clear();
+        }
+        self.show_group(cx, next, 0);
     }
 
     pub(super) fn show_group(&mut self, cx: &ViewContext, group: usize, selected: usize) {
@@ -92,7 +105,7 @@ impl Trends {
         let place = |group: &TrendGroup| group.pens.iter().take(PENS_MAX).position(|pen| pen.tag == tag);
         let found = groups.iter().enumerate().find_map(|(n, group)| Some((n, place(group)?)));
         if found.is_none() {
-            self.picked = vec![tag];
+            self.opened = vec![tag];
         }
         self.values = None;
         self.off.retain(|off| *off != tag);
@@ -105,6 +118,7 @@ impl Trends {
         match self.picked.iter().position(|picked| *picked == tag) {
             Some(place) => {
                 self.values = None;
+                self.opened.clear();
                 self.show_group(cx, cx.def().trends.len(), place);
             }
             None => self.open_tag(cx, tag),
@@ -119,8 +133,8 @@ impl Trends {
             None if self.picked.len() < PENS_MAX => self.picked.push(tag),
             None => {}
         }
-        let last = cx.def().trends.len() + usize::from(!self.picked.is_empty());
-        self.group = self.group.min(last.saturating_sub(1));
+        self.opened.clear();
+        self.group = self.group.min(self.groups(cx).saturating_sub(1));
         self.moved();
     }
 

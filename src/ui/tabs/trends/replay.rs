@@ -16,6 +16,7 @@ impl Trends {
             Some(at) => self.go_to_moment(cx, at),
             None => {
                 (self.end, self.cursor) = (None, None);
+                self.between.clear();
                 self.moved();
             }
         }

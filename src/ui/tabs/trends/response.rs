@@ -2,11 +2,10 @@
 
 use ratatui::{text::Line, widgets::Widget};
 
-use super::{legend::signed_time, view::resolution, *};
+use super::{legend::signed_time, view::share, *};
 use crate::{
     plant::{
         def::Faceplate,
-        number::to_usize,
         step_response::{Loop, SETTLED, StepResponse, step_response},
     },
     ui::widgets::chart::{Chart, Curve, Limit},
@@ -23,6 +22,8 @@ pub(super) struct Response {
     /// View and tags that the answer is about.
     about: Option<(View, [TagId; 2])>,
     curves: Answered<Vec<Series>>,
+    /// SV and PV of the last answer, and their last step; the step is `None` where there was none.
+    found: Option<([Trace; 2], Option<StepResponse>, Duration)>,
 }
 
 impl Response {
@@ -31,18 +32,27 @@ impl Response {
     }
 
     pub(super) fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.curves.on_answer(cx, number, answer);
-        if self.curves.query.is_wanted() {
-            self.curves.value = None;
+        if !self.curves.query.awaits(number) {
+            return;
         }
+        self.curves.on_answer(cx, number, answer);
+        let curves = self.curves.value.take().filter(|_| !self.curves.query.is_wanted());
+        self.found = curves.and_then(|curves| <[Series; 2]>::try_from(curves).ok()).map(|curves| {
+            let (found, step) = (last_step(&curves), curves[1].step);
+            let trace = |series| {
+                let mut trace = Trace::default();
+                trace.set_past(series, Timestamp::MAX);
+                trace
+            };
+            (curves.map(trace), found, step)
+        });
     }
+}
 
-    /// The answer to the last step; `None` where there was none.
-    fn figures(&self) -> Option<StepResponse> {
-        let [sv, pv] = self.curves.value.as_deref()? else { return None };
-        let lasts = |series: &Series| series.buckets.iter().map(|bucket| bucket.map(|b| b.last)).collect::<Vec<_>>();
-        step_response(Loop { from: pv.from, step: pv.step, sv: &lasts(sv), pv: &lasts(pv) })
-    }
+/// The last step of SV and the answer of PV.
+fn last_step([sv, pv]: &[Series; 2]) -> Option<StepResponse> {
+    let lasts = |series: &Series| series.buckets.iter().map(|bucket| bucket.map(|b| b.last)).collect::<Vec<_>>();
+    step_response(Loop { from: pv.from, step: pv.step, sv: &lasts(sv), pv: &lasts(pv) })
 }
 
 impl Trends {
@@ -61,7 +71,7 @@ impl Trends {
         let view = self.span(cx);
         let asked = self.response.about.replace((view, tags));
         if asked.is_none_or(|(_, asked)| asked != tags) {
-            self.response.curves.value = None;
+            self.response.found = None;
         }
         if asked != self.response.about {
             self.response.curves.query.want();
@@ -80,20 +90,12 @@ pub(super) fn draw_response(trends: &Trends, cx: &ViewContext, canvas: &mut Canv
         return centred(canvas, t!("select a pen of a controller"));
     };
     let Some((_, tags)) = trends.response.about else { return };
-    let Some(curves) = &trends.response.curves.value else {
+    let Some((traces, found, step)) = &trends.response.found else {
         return centred(canvas, trends.response.curves.trouble.as_deref().unwrap_or(t!("reading the history")));
     };
-    let Some(found) = trends.response.figures() else {
+    let Some(found) = found else {
         return centred(canvas, t!("no step of the setpoint in this window: choose a longer one"));
     };
-    let traces: Vec<Trace> = curves
-        .iter()
-        .map(|series| {
-            let mut trace = Trace::default();
-            trace.set_past(series.clone(), Timestamp::MAX);
-            trace
-        })
-        .collect();
     let unit = cx.snapshot.unit(tags[1]);
     let curve = |n: usize, pen| Curve::new(&traces[n], pen, unit, cx.snapshot.decimals[tags[1].index()]);
     let before = found.until.duration_since(found.at) / 10;
@@ -115,8 +117,7 @@ pub(super) fn draw_response(trends: &Trends, cx: &ViewContext, canvas: &mut Canv
     };
     let area = canvas.part(0, 0, canvas.width(), height.saturating_sub(ROWS)).area();
     chart.render(area, canvas.buffer());
-    let step = curves.first().map_or(Duration::ZERO, |series| series.step);
-    for (y, line) in (0..).zip(figures(cx, device, tags[1], &found, step)) {
+    for (y, line) in (0..).zip(figures(cx, device, tags[1], found, *step)) {
         let y = height.saturating_sub(ROWS) + y;
         canvas.text(
             1,
@@ -133,7 +134,7 @@ fn figures(cx: &ViewContext, device: &DeviceDef, pv: TagId, found: &StepResponse
     let number = |value: f64| cx.snapshot.format(pv, value);
     let since = |at: Timestamp| signed_time(at.duration_since(found.at));
     let none = || t!("not yet").to_owned();
-    let decimals = to_usize((-resolution(cx, pv).log10()).max(0.0)) + 1;
+    let decimals = usize::from(cx.snapshot.decimals[pv.index()]) + 1;
     let peak = found.peak.map(|(at, value)| {
         t!(
             "{percent} %: {value} {unit} after {time}",
@@ -158,16 +159,16 @@ fn figures(cx: &ViewContext, device: &DeviceDef, pv: TagId, found: &StepResponse
         ),
         t!("overshoot {peak}", peak = peak.unwrap_or_else(|| t!("none").to_owned())),
         t!(
-            "rise time 10–90 % {rise}   settling time 2 % {settled}   to {step}",
+            "rise time 10–90 % {rise}   settling time 2 % {settled}   resolution {step}",
             rise = rise.unwrap_or_else(none),
             settled = found.settled.map_or_else(none, since),
             step = format!("{:.1} s", step.as_secs_f64())
         ),
         t!(
-            "IAE {iae} {unit} min   good {good} %",
+            "IAE {iae} {unit} min   good {good}",
             iae = format!("{:.decimals$}", found.iae),
             unit,
-            good = format!("{:.1}", (found.good * 1_000.0).floor() / 10.0)
+            good = share(found.good)
         ),
     ]
 }

@@ -149,7 +149,7 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let trouble = trouble(trends, cx);
     let brief = trouble.is_some() && canvas.width() < 120;
     let mut x = canvas.text(1, 0, &name, theme.strong());
-    let groups = def.trends.len() + usize::from(!trends.picked.is_empty());
+    let groups = trends.groups(cx);
     if groups > 1 && !brief {
         x = canvas.text(x + 1, 0, &t!("group {group}/{groups}", group = trends.group + 1, groups), theme.dim());
     }

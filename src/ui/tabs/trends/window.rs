@@ -144,11 +144,12 @@ impl Trends {
         self.moved();
     }
 
-    /// The picture stands still, or is live again.
+    /// Pauses the chart, or goes on live.
     pub(super) fn hold(&mut self, cx: &ViewContext) {
+        let width = self.span(cx).width();
         self.end = if self.end.is_some() { None } else { Some(cx.now) };
         if std::mem::take(&mut self.accumulate) {
-            self.window = nearest(self.span(cx).width());
+            self.window = nearest(width);
         }
         self.moved();
     }

@@ -77,3 +77,28 @@ fn large_numbers_are_good_numbers() {
     stand.press("B");
     insta::assert_snapshot!(stand.screen());
 }
+
+#[test]
+fn a_trend_that_is_opened_leaves_the_marked_pens() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    stand.press("v ↓ ");
+    let marked = stand.model.tabs.trends.picked.clone();
+    let of_group = |tag: &TagId| {
+        let groups = &stand.model.snapshot.def.trends;
+        groups.iter().any(|group| group.pens.iter().any(|pen| pen.tag == *tag))
+    };
+    let other = stand.model.snapshot.def.tags.iter().map(|tag| tag.id).find(|tag| !of_group(tag)).expect("a tag");
+    let model = &mut stand.model;
+    crate::ui::context::with_tabs(model, |tabs, cx| {
+        tabs.trends.open_tag(cx, other);
+        Vec::new()
+    });
+    let pens = |stand: &Stand| {
+        let pens = stand.model.tabs.trends.pens(&stand.model.cx());
+        pens.into_iter().map(|pen| pen.tag).collect::<Vec<_>>()
+    };
+    assert_eq!((pens(&stand), &stand.model.tabs.trends.picked), (vec![other], &marked));
+    stand.press("ggg");
+    assert_eq!(pens(&stand), marked, "the marked ones are a group again");
+}

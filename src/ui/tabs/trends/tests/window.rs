@@ -65,3 +65,16 @@ fn no_window_bridges_a_gap() {
         assert!((45..65).contains(&past), "{seconds} s: {past} empty columns");
     }
 }
+
+#[test]
+fn a_pause_keeps_the_window() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.answer();
+    stand.press("m");
+    stand.answer();
+    let width = stand.model.tabs.trends.span(&stand.model.cx()).width();
+    stand.press("p");
+    let trends = &stand.model.tabs.trends;
+    assert_eq!(trends.window, nearest(width));
+    assert_eq!(trends.end, Some(now()));
+}
