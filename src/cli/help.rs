@@ -41,10 +41,9 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         say(text.trim_end());
         return Ok(());
     }
-    let mut program = super::Args::command();
-    match program.find_subcommand_mut(topic) {
-        Some(command) => {
-            say(&command.render_long_help().to_string());
+    match options(topic) {
+        Some(options) => {
+            say(&options);
             Ok(())
         }
         None => {
@@ -52,6 +51,14 @@ pub fn main(args: &Args) -> Result<(), CliError> {
             Err(CliError::Usage(format!("no page and no command `{topic}`; pages: {}", names.join(", "))))
         }
     }
+}
+
+/// The options of a command.
+fn options(command: &str) -> Option<String> {
+    let mut program = super::Args::command();
+    // Only a built command knows the names that stand before its own.
+    program.build();
+    program.find_subcommand_mut(command).map(|command| command.render_long_help().to_string())
 }
 
 #[cfg(test)]
@@ -69,6 +76,12 @@ mod tests {
     #[test]
     fn the_arguments_are_well_formed() {
         super::super::Args::command().debug_assert();
+    }
+
+    #[test]
+    fn the_usage_of_a_command_begins_with_the_program() {
+        let help = options("attach").unwrap_or_default();
+        assert!(help.contains("Usage: sightglass attach"), "{help}");
     }
 
     #[test]
