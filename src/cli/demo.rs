@@ -39,7 +39,7 @@ pub struct Args {
     /// Run the plant, its line and its clock so many times faster
     #[arg(long, value_name = "N", default_value = "1", value_parser = speed)]
     speed: f64,
-    /// Begin with a tour: eight small tasks in five minutes
+    /// Begin with a tour: eight small tasks
     #[arg(long, conflicts_with_all = ["headless", "scenario", "plant"])]
     tour: bool,
     /// Without a terminal: do the whole job and print what was done

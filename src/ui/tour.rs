@@ -7,6 +7,7 @@ use std::time::Duration;
 use super::{
     Effect, Model, Msg, UiAction, ViewContext,
     extension::ExtensionMessage,
+    io::TICK,
     keys,
     layout::Size,
     modal::{Modal, Notice},
@@ -29,8 +30,6 @@ use crate::{
 
 /// Leaves a task undone.
 pub(super) const SKIP: keys::Chord = keys::ctrl('n');
-/// Ticks a second.
-const TICKS_S: u32 = 2;
 
 /// A task of the tour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,11 +55,11 @@ impl Task {
             Task::Look => "Look at a controller: select TIC-1 with the arrow keys, ⏎",
             Task::Set => "Set its temperature: Esc, s, type 60, ⏎ and ⏎ again",
             Task::Follow => "Follow it: 2 shows its curves, c a cursor that ← → move",
-            Task::Acknowledge => "A device falls silent. Acknowledge its alarm: a",
+            Task::Acknowledge => "A device stops responding. Acknowledge its alarm: a",
             Task::Guidance => "What should be done about it? 3 lists alarms, ⏎ says it",
             Task::Why => "Why is a value bad? Esc, 1, select one with arrow keys, w",
-            Task::Past => "It answers again. See it as it was: Esc, @, -20s, ⏎",
-            Task::Report => "Take the report home: Esc (the present), 5, e",
+            Task::Past => "It responds again. Show the past: Esc, @, -20s, ⏎",
+            Task::Report => "Export the report: Esc (the present), 5, e",
         }
     }
 
@@ -212,7 +211,7 @@ fn is_acknowledged(model: &Model) -> bool {
 
 /// What was done, and how long it took.
 fn certificate(tour: &Tour) -> Notice {
-    let spent = |ticks: u32| running(Duration::from_secs(u64::from(ticks / TICKS_S)));
+    let spent = |ticks: u32| running(TICK * ticks);
     let rows = Task::ALL.iter().zip(&tour.took).map(|(task, took)| {
         let message = translate(task.message());
         match took {
@@ -313,7 +312,7 @@ mod tests {
         }
         let last = screen(&mut model, 120, 40);
         assert!(last.contains("✓ 00:00 Look at a controller") && last.contains("1 of 8 tasks in"), "{last}");
-        assert!(last.contains("– left out: Take the report home"), "{last}");
+        assert!(last.contains("– left out: Export the report"), "{last}");
         type_keys(&mut model, "⎋");
         assert!(!screen(&mut model, 80, 24).contains("TOUR"), "nothing of it is left");
     }
