@@ -3,7 +3,6 @@
 use jiff::Timestamp;
 
 use super::*;
-use crate::access::SessionRequest;
 use preferences::{Bookmark, Kept};
 
 /// Bookmarks of one user; the oldest make room for new ones.
@@ -53,12 +52,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
             UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
             UiAction::SessionRequest(tab, request) => {
-                // 0 means no request: numbers start at 1.
-                model.session_lock.last_request = model.session_lock.last_request.checked_add(1).unwrap_or(1);
-                let number = model.session_lock.last_request;
-                if matches!(request, SessionRequest::Exported { .. }) {
-                    model.session_lock.exports.push(number);
-                }
+                let number = model.session_lock.next_request(tab, &request);
                 if let Some(Modal::UserForm(form)) = &mut model.modal {
                     form.sent(number);
                 }

@@ -24,7 +24,7 @@ use tokio::{
 };
 
 use super::{
-    Effect, Leaving, Model, Msg, QueryId,
+    Effect, Leaving, Model, Msg, QueryId, TICK,
     extension::{Extension, ExtensionMessage},
     mouse::Pointer,
     preferences::{Kept, PreferencesFile},
@@ -45,8 +45,6 @@ use crate::{
 };
 use screen::{Screen, own};
 
-/// Time between two ticks: flashing, motion, clock.
-pub(super) const TICK: Duration = Duration::from_millis(500);
 /// Least time between two frames without a key.
 const FRAME: Duration = Duration::from_millis(250);
 /// Least time between two frames while keys come in.

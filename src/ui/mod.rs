@@ -72,6 +72,9 @@ use visited::Visited;
 /// A station that has said nothing for so long (real time) is silent: its values are doubted.
 pub const SILENCE: Duration = Duration::from_secs(3);
 
+/// Real time between two ticks: flashing, motion, clock.
+pub(crate) const TICK: Duration = Duration::from_millis(500);
+
 /// All that a terminal knows.
 #[derive(Debug)]
 pub struct Model {

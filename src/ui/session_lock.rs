@@ -32,7 +32,7 @@ pub struct SessionLock {
     /// Number of the last request; only its answer counts, and those of exports.
     pub last_request: u32,
     /// Requests to record a file, which waits for its own answer, whatever was requested since.
-    pub exports: Vec<u32>,
+    exports: Vec<(Tab, u32)>,
     /// When the present session status came.
     status_at: u32,
     /// When the last activity message was sent.
@@ -44,6 +44,17 @@ pub struct SessionLock {
 /// Is everything but the login page closed?
 pub fn is_closed(session: &SessionStatus) -> bool {
     session.who.as_ref().map_or(!session.may_view, |who| who.must_change)
+}
+
+impl SessionLock {
+    /// The number of a request that goes out. 0 means no request: numbers start at 1.
+    pub(super) fn next_request(&mut self, tab: Tab, request: &SessionRequest) -> u32 {
+        self.last_request = self.last_request.checked_add(1).unwrap_or(1);
+        if matches!(request, SessionRequest::Exported { .. }) {
+            self.exports.push((tab, self.last_request));
+        }
+        self.last_request
+    }
 }
 
 impl Model {
@@ -86,9 +97,10 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
         model.locale = model.chosen_locale.take().unwrap_or(model.locale);
     }
     if user(&before) != user(&now) || now.locked && !before.locked {
-        // What one user has begun is not recorded as done by another.
-        model.session_lock.exports.clear();
-        model.tabs.each_mut().for_each(TabView::cancel_export);
+        // What one user has begun is not done for another.
+        for (tab, _) in mem::take(&mut model.session_lock.exports) {
+            give_up_export(model, tab);
+        }
     }
     let back = keep_work(model, &before, &now);
     with_tabs(model, |tabs, cx| {
@@ -188,7 +200,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
             held = Some(Some(modal));
         } else {
             if let UiAction::SessionRequest(tab, _) | UiAction::Do(Effect::SaveReport { tab: Some(tab), .. }) = action {
-                model.tabs.of_mut(tab).cancel_export();
+                give_up_export(model, tab);
             }
             held = held.or(Some(None));
         }
@@ -198,6 +210,12 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
         rest.extend(unlock(model, below).map(UiAction::Open));
     }
     rest
+}
+
+/// A file that waits to be recorded is not.
+fn give_up_export(model: &mut Model, tab: Tab) {
+    let why = t!("the terminal was locked, or its user changed").to_owned();
+    with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_request_done(cx, Err(why)));
 }
 
 fn unlock(model: &Model, below: Option<Modal>) -> Option<Modal> {
@@ -229,7 +247,7 @@ pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Dur
     let answer = answer.map(drop);
     let Some(tab) = id.tab else { return screen_dump::on_request_done(model, id.number, answer) };
     let exports = &mut model.session_lock.exports;
-    if let Some(place) = exports.iter().position(|number| *number == id.number) {
+    if let Some(place) = exports.iter().position(|export| *export == (tab, id.number)) {
         exports.remove(place);
         return with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_request_done(cx, answer));
     }

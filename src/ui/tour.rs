@@ -2,12 +2,9 @@
 //!
 //! A task is shown until the terminal is in the state that it asks for; nothing is checked but what the operator sees.
 
-use std::time::Duration;
-
 use super::{
-    Effect, Model, Msg, UiAction, ViewContext,
+    Effect, Model, Msg, TICK, UiAction, ViewContext,
     extension::ExtensionMessage,
-    io::TICK,
     keys,
     layout::Size,
     modal::{Modal, Notice},
@@ -72,8 +69,8 @@ impl Task {
             Task::Acknowledge => t!("A device is silent. Acknowledge: a"),
             Task::Guidance => t!("What to do? 3 lists alarms, ⏎"),
             Task::Why => t!("Why is it bad? Esc, 1, select one, w"),
-            Task::Past => t!("See it as it was: Esc, @, -20s, ⏎"),
-            Task::Report => t!("Take the report home: Esc, 5, e"),
+            Task::Past => t!("Show the past: Esc, @, -20s, ⏎"),
+            Task::Report => t!("Export the report: Esc, 5, e"),
         }
     }
 
@@ -233,6 +230,8 @@ fn certificate(tour: &Tour) -> Notice {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::ui::{
         fixture::Fixture,

@@ -215,10 +215,6 @@ impl TabView for Bus {
         self.frames.on_request_done(answer)
     }
 
-    fn cancel_export(&mut self) {
-        self.frames.cancel_export();
-    }
-
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         if self.page(cx) == Page::Registers {
             return self.registers.on_text(&below(cx), text);

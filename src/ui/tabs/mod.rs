@@ -34,7 +34,6 @@ use crate::{
     access::{SessionRequest, audit_log::sha256},
     history::{Answer, HistoryError},
     plant::{PlantDef, number::to_u32, snapshot::Snapshot},
-    t,
 };
 
 /// A file that is written once the station has put on record that it is.
@@ -46,10 +45,6 @@ struct Outgoing {
 }
 
 impl Outgoing {
-    /// Why it was given up.
-    fn cancelled() -> String {
-        t!("the terminal was locked, or its user changed").to_owned()
-    }
     /// Asks for it.
     fn export_request(&self) -> UiAction {
         let file = self.path.display().to_string();
@@ -134,9 +129,6 @@ pub trait TabView {
         Vec::new()
     }
 
-    /// The terminal was locked, or its user changed: a file that waits to be recorded or written is given up.
-    fn cancel_export(&mut self) {}
-
     /// The text that was entered in a window which the tab had opened; `Err` keeps the window open and says why.
     fn on_text(&mut self, _cx: &ViewContext, _text: &str) -> Result<Vec<UiAction>, String> {
         Ok(Vec::new())
@@ -210,11 +202,6 @@ macro_rules! tabs {
             }
             fn of(&self, tab: Tab) -> &dyn TabView {
                 match tab { $(Tab::$tab => &self.$field),+ }
-            }
-            /// Each of them.
-            pub fn each_mut(&mut self) -> impl Iterator<Item = &mut dyn TabView> {
-                let all: [&mut dyn TabView; Tab::ALL.len()] = [$(&mut self.$field),+];
-                all.into_iter()
             }
             /// The tab that a message is for.
             pub fn of_mut(&mut self, tab: Tab) -> &mut dyn TabView {

@@ -172,12 +172,6 @@ impl TabView for Reports {
         }
     }
 
-    fn cancel_export(&mut self) {
-        if self.outgoing.take().is_some() {
-            self.export = Export::Failed(Outgoing::cancelled());
-        }
-    }
-
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let typed = period::typed(cx.def(), text, cx.now)?;
         self.show(Some(typed));

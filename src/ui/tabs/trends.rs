@@ -212,12 +212,8 @@ impl TabView for Trends {
         self.recorded(answer)
     }
 
-    fn cancel_export(&mut self) {
-        self.export.cancel();
-    }
-
-    fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        self.written(result)
+    fn on_saved(&mut self, cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        self.written(cx, result)
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {

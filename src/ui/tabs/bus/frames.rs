@@ -148,13 +148,6 @@ impl Ring {
         written.into_iter().chain(next).collect()
     }
 
-    /// Gives up the files that wait to be recorded.
-    pub fn cancel_export(&mut self) {
-        if !std::mem::take(&mut self.outgoing).is_empty() {
-            self.saved.push(Err(Outgoing::cancelled()));
-        }
-    }
-
     /// A file was written, or why not.
     pub fn on_saved(&mut self, result: Result<PathBuf, String>) {
         self.saved.push(result);

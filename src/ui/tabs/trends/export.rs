@@ -1,7 +1,7 @@
 //! Export of what is seen: values with quality as CSV, the chart as SVG and PNG. Every file is on record before it is
 //! written.
 
-use std::{collections::VecDeque, path::PathBuf};
+use std::{collections::VecDeque, path::PathBuf, sync::Arc};
 
 use super::{picture::picture, *};
 use crate::{
@@ -24,8 +24,14 @@ pub(super) struct Export {
     values: Answered<Vec<Vec<Option<HeldValue>>>>,
     /// Those that wait for their turn; the first is before the station or on its way to the disk.
     files: VecDeque<Outgoing>,
+    /// Who has begun it.
+    user: Option<Arc<str>>,
     /// What became of the last one.
     pub said: Option<Result<String, String>>,
+}
+
+fn user(cx: &ViewContext) -> Option<Arc<str>> {
+    cx.session.who.as_ref().map(|who| who.user.clone())
 }
 
 impl Export {
@@ -38,10 +44,11 @@ impl Export {
         self.wanted.is_some() || !self.files.is_empty()
     }
 
-    /// Gives up what is on its way.
-    pub(super) fn cancel(&mut self) {
-        if self.is_busy() {
-            *self = Export { said: Some(Err(Outgoing::cancelled())), ..Export::default() };
+    /// Gives up what another user has begun: it is not recorded as done by the present one.
+    fn check_user(&mut self, cx: &ViewContext) {
+        if self.user != user(cx) {
+            (self.wanted, self.values) = (None, Answered::default());
+            self.files.clear();
         }
     }
 
@@ -54,6 +61,7 @@ impl Export {
 impl Trends {
     /// Begins a CSV of the values in the view.
     pub(super) fn export_csv(&mut self, cx: &ViewContext) {
+        self.export.check_user(cx);
         let view = self.span(cx);
         let tags: Vec<TagId> = self.drawn(cx).iter().map(|(_, pen)| pen.tag).collect();
         if tags.is_empty() || self.export.is_busy() {
@@ -63,12 +71,13 @@ impl Trends {
         let every = Duration::from_millis(u64::try_from(step.max(STEP_MS)).unwrap_or(u64::MAX));
         let past = view.to.min(cx.present()).duration_since(view.from).as_millis();
         let count = usize::try_from(past / step.max(STEP_MS)).unwrap_or(0);
-        (self.export.said, self.export.values) = (None, Answered::default());
+        (self.export.said, self.export.values, self.export.user) = (None, Answered::default(), user(cx));
         self.export.wanted = (count > 0).then_some((view.from, every, count, tags));
     }
 
     /// Asks for the values of a CSV.
     pub(super) fn ask_export(&mut self, cx: &ViewContext) -> Option<UiAction> {
+        self.export.check_user(cx);
         let (from, every, count, tags) = self.export.wanted.clone()?;
         let query = Query::Values { tags, from, every, count };
         let number = (Tab::Trends, &mut self.asked);
@@ -82,6 +91,7 @@ impl Trends {
         number: u32,
         answer: &Result<Answer, HistoryError>,
     ) -> Vec<UiAction> {
+        self.export.check_user(cx);
         if !self.export.values.query.awaits(number) {
             return Vec::new();
         }
@@ -104,9 +114,11 @@ impl Trends {
 
     /// Exports the chart as it is drawn, as SVG and PNG.
     pub(super) fn export_picture(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.export.check_user(cx);
         if self.export.is_busy() {
             return Vec::new();
         }
+        self.export.user = user(cx);
         let page = file(|| picture(self, cx));
         let png = page.png().map(|png| (self.path(cx, "png"), png));
         self.send([(self.path(cx, "svg"), page.svg())].into_iter().chain(png).collect())
@@ -132,12 +144,13 @@ impl Trends {
     }
 
     /// The first file was written, or why not; then the next one.
-    pub(super) fn written(&mut self, result: Result<PathBuf, String>) -> Vec<UiAction> {
+    pub(super) fn written(&mut self, cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
         self.export.files.pop_front();
         if result.is_err() {
             self.export.files.clear();
         }
         self.export.said = Some(result.map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned()));
+        self.export.check_user(cx);
         self.export.next()
     }
 
