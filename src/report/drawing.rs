@@ -2,14 +2,14 @@
 
 use std::fmt::Write;
 
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster};
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 use tiny_skia::{
     Color, LineCap, Paint, PathBuilder, Pixmap, PremultipliedColorU8, Rect, Stroke, StrokeDash, Transform,
 };
 
 use crate::plant::number::{to_u8, to_u32, to_usize};
 
-/// Height of a line of text, and width of a letter, in pixels.
+/// Height of a line of text, and width of a letter of the SVG, in pixels.
 pub const TEXT: (f32, f32) = (16.0, 8.0);
 /// The pens in print, distinguishable with any colour vision (Okabe and Ito).
 const PENS: [Rgb; 8] = [
@@ -210,11 +210,11 @@ fn whole(place: f32) -> u32 {
 
 /// Sets a text; a letter that the font lacks is a question mark.
 fn letters(page: &mut Pixmap, (x, y): (f32, f32), anchor: Anchor, text: &str, ink: Ink) {
-    let count = text.chars().count() as f32;
+    let length = (text.chars().count() * get_raster_width(FontWeight::Regular, RasterHeight::Size16)) as f32;
     let left = match anchor {
         Anchor::Start => x,
-        Anchor::Middle => x - count * TEXT.1 / 2.0,
-        Anchor::End => x - count * TEXT.1,
+        Anchor::Middle => x - length / 2.0,
+        Anchor::End => x - length,
     };
     let (mut left, top) = (whole(left), whole(y - TEXT.0 / 2.0));
     let (width, height, Rgb(r, g, b)) = (page.width(), page.height(), ink.rgb());
@@ -261,6 +261,16 @@ mod tests {
         assert!(svg.starts_with("<svg xmlns") && svg.ends_with("</svg>\n"));
         assert!(svg.contains(">20 °C &lt;&amp;&gt;</text>"), "{svg}");
         assert_eq!(svg.matches("<polyline").count(), 1, "a single point is no line");
+    }
+
+    #[test]
+    fn a_text_of_the_png_ends_at_its_anchor() {
+        let mut drawing = Drawing::new(400, 20);
+        drawing.text((390.0, 10.0), Anchor::End, "M".repeat(40), Ink::Text);
+        let page = Pixmap::decode_png(&drawing.png().expect("it has a size")).expect("a PNG");
+        let dark = |x: u32| (0..20).any(|y| page.pixel(x, y).is_some_and(|p| p.green() < 200));
+        let last = (0..400).rev().find(|x| dark(*x)).expect("letters");
+        assert!((384..=390).contains(&last), "{last}");
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Shown where a key was ignored.
-fn changed() -> &'static str {
+pub(super) fn changed() -> &'static str {
     t!("The list has changed, press again")
 }
 

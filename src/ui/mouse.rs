@@ -6,9 +6,7 @@ mod tests;
 use crossterm::event::KeyCode;
 use ratatui::{Terminal, backend::TestBackend, layout::Position, style::Modifier};
 
-use super::{
-    Model, UiAction, chrome, context::with_tabs, dispatch::on_global, dispatch::on_key, keys, keys::Global, layout,
-};
+use super::{Model, UiAction, chrome, context::with_tabs, dispatch::on_key, keys, last_frame, layout};
 
 /// What the mouse did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,13 +30,16 @@ pub(super) fn on_pointer(model: &mut Model, pointer: Pointer) -> Vec<UiAction> {
         Pointer::Wheel { down } => press(model, if down { KeyCode::Down } else { KeyCode::Up }),
         Pointer::Drag(at) if model.modal.is_none() => point(model, at).unwrap_or_default(),
         Pointer::Drag(_) => Vec::new(),
+        Pointer::Press(_) if !model.is_as_drawn() => {
+            model.note = Some(last_frame::changed().into());
+            Vec::new()
+        }
         Pointer::Press(at) => {
             if let Some(tab) = chrome::tab_at(model, at) {
                 if model.modal.as_ref().is_some_and(|modal| modal.takes_text()) {
                     return Vec::new();
                 }
-                model.modal = None;
-                return on_global(model, Global::Show(tab));
+                return on_key(model, tab.key().event());
             }
             match chrome::chord_at(model, at) {
                 Some(chord) => on_key(model, chord.event()),

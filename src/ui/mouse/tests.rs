@@ -30,6 +30,7 @@ fn place(model: &mut Model, words: &str) -> Position {
 
 fn click(model: &mut Model, words: &str) -> Vec<Effect> {
     let at = place(model, words);
+    update(model, Msg::Drawn);
     update(model, Msg::Pointer(Pointer::Press(at)))
 }
 
@@ -45,6 +46,29 @@ fn a_click_on_a_heading_shows_its_tab_from_any_window() {
     let before = model.modal.clone();
     click(&mut model, "3 Alarms");
     assert_eq!(model.modal, before, "a number that is being typed is not lost by a click");
+}
+
+#[test]
+fn a_click_that_cancels_a_confirmation_says_so() {
+    let mut model = with_mouse(&Fixture::normal());
+    type_keys(&mut model, "q");
+    assert!(matches!(model.modal, Some(Modal::Confirm(_))));
+    click(&mut model, "3 Alarms");
+    assert_eq!((model.tabs.shown, &model.modal), (Tab::Alarms, &None));
+    assert_eq!(model.note.as_deref(), Some("Cancelled: nothing was sent"));
+}
+
+#[test]
+fn a_click_on_what_has_changed_does_nothing() {
+    let mut model = with_mouse(&Fixture::normal());
+    let at = place(&mut model, "3 Alarms");
+    update(&mut model, Msg::Drawn);
+    update(&mut model, Msg::Snapshot(Fixture::alarm().snapshot()));
+    update(&mut model, Msg::Pointer(Pointer::Press(at)));
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+    update(&mut model, Msg::Drawn);
+    update(&mut model, Msg::Pointer(Pointer::Press(at)));
+    assert_eq!(model.tabs.shown, Tab::Alarms);
 }
 
 #[test]

@@ -42,6 +42,8 @@ struct Outgoing {
     tab: Tab,
     path: PathBuf,
     bytes: Vec<u8>,
+    /// Never over a file that is there.
+    new: bool,
 }
 
 impl Outgoing {
@@ -52,7 +54,7 @@ impl Outgoing {
     }
     /// Writes it.
     fn write(self) -> UiAction {
-        UiAction::Do(Effect::SaveReport { tab: Some(self.tab), path: self.path, bytes: self.bytes, new: false })
+        UiAction::Do(Effect::SaveReport { tab: Some(self.tab), path: self.path, bytes: self.bytes, new: self.new })
     }
 }
 

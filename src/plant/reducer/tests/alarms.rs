@@ -41,7 +41,7 @@ fn several_alarms_are_shelved_by_one_command() {
     assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Verified);
     let unknown = AlarmId(all.len() as u16);
     plant.on_command(with_reason(2, shelve(&[all[0], unknown])), at(2));
-    let outcome =
-        plant.snapshot().commands.iter().find(|status| status.command.id.number == 2).unwrap().outcome.clone();
-    assert_eq!(outcome, Outcome::NotConfirmed(NotConfirmed::Partly("1 of 2; no such alarm".to_owned())));
+    let snapshot = plant.snapshot();
+    let status = snapshot.commands.iter().find(|status| status.command.id.number == 2).expect("the second command");
+    assert_eq!(status.outcome, Outcome::NotConfirmed(NotConfirmed::Partly("1 of 2; no such alarm".to_owned())));
 }

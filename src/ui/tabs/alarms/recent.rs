@@ -340,9 +340,9 @@ mod tests {
     fn a_search_that_does_not_reach_back_says_so() {
         let mut recent = Recent::default();
         let event = AlarmRecord::new(now(), "TIC-1.PV", "high", Priority::High, AlarmEvent::Raised);
-        recent.alarms.value = Some(vec![event; EVENTS_MAX - 1]);
+        recent.alarms.value = Some(vec![event.clone(); EVENTS_MAX - 1]);
         assert_eq!(recent.searched_since(), [None; 2]);
-        let oldest = AlarmRecord { at: ago(90), ..recent.alarms.value.iter().flatten().next().unwrap().clone() };
+        let oldest = AlarmRecord { at: ago(90), ..event };
         recent.alarms.value.iter_mut().for_each(|events| events.push(oldest.clone()));
         assert_eq!(recent.searched_since(), [Some(ago(90)), None]);
         recent.actions.value =
@@ -354,7 +354,7 @@ mod tests {
     fn only_actions_on_the_device_of_the_alarm_are_named() {
         let fixture = Fixture::alarm();
         let def = &fixture.def.alarms[fixture.alarms[0].id.index()];
-        let event = |minutes, event| AlarmRecord::new(ago(minutes), "TIC-1.PV", &*def.message, def.priority, event);
+        let event = |minutes, event| AlarmRecord::new(ago(minutes), "TIC-1.PV", &def.message, def.priority, event);
         let write = |target: &str| ActionRecord {
             new: Some("65.0".into()),
             ..ActionRecord::new(ago(55), "tom", "write", target, "verified")

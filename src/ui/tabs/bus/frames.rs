@@ -130,7 +130,7 @@ impl Ring {
         }
         let stamp = draw::local(cx, cx.now, "%Y-%m-%d-%H%M%S");
         let name = |end: &str| cx.def().report.folder.join(format!("{}-{stamp}.{end}", at.settings.name));
-        let outgoing = |path, bytes| Outgoing { tab: Tab::Bus, path, bytes };
+        let outgoing = |path, bytes| Outgoing { tab: Tab::Bus, path, bytes, new: false };
         let text = outgoing(name("txt"), file(|| capture::text(&frames)).into_bytes());
         self.outgoing = VecDeque::from([text, outgoing(name("pcapng"), capture::pcapng(&frames))]);
         self.outgoing.front().map(Outgoing::export_request).into_iter().collect()

@@ -51,7 +51,7 @@ impl Reports {
         if self.outgoing.is_some() {
             return Vec::new();
         }
-        let outgoing = Outgoing { tab: Tab::Reports, path, bytes };
+        let outgoing = Outgoing { tab: Tab::Reports, path, bytes, new: false };
         let request = outgoing.export_request();
         (self.export, self.outgoing) = (Export::Writing, Some(outgoing));
         vec![request]

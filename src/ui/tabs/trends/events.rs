@@ -18,6 +18,8 @@ pub(super) struct Events {
     pub alarms: Answered<Vec<AlarmRecord>>,
     pub actions: Answered<Vec<ActionRecord>>,
     pub batches: Answered<Vec<BatchReport>>,
+    /// Batches are asked for: the plant has some, and the window is not too long.
+    asks_batches: bool,
 }
 
 /// What an event is; the first is shown where several happened in one column.
@@ -62,6 +64,18 @@ impl Events {
         [&self.alarms.query, &self.actions.query, &self.batches.query]
     }
 
+    /// Has the history answered all that is asked about the view?
+    pub(super) fn is_known(&self) -> bool {
+        let answered = self.alarms.value.is_some() && self.actions.value.is_some();
+        let batches = self.batches.value.is_some() || !self.asks_batches;
+        answered && batches && self.queries().iter().all(|query| !query.is_wanted())
+    }
+
+    /// Why they could not be read.
+    pub(super) fn troubles(&self) -> [&Option<String>; 3] {
+        [&self.alarms.trouble, &self.actions.trouble, &self.batches.trouble]
+    }
+
     pub(super) fn want(&mut self) {
         [&mut self.alarms.query, &mut self.actions.query, &mut self.batches.query]
             .into_iter()
@@ -87,10 +101,17 @@ impl Trends {
         let alarms = events.alarms.ask(cx, (Tab::Trends, asked), every, timeout, Query::Journal { from, to, limit });
         let query = Query::Actions { from, to, limit };
         let actions = events.actions.ask(cx, (Tab::Trends, asked), every, timeout, query);
-        let has_batches = !cx.def().batches.is_empty() && view.width() <= BATCHES_SPAN;
+        events.asks_batches = !cx.def().batches.is_empty() && view.width() <= BATCHES_SPAN;
+        if !events.asks_batches {
+            // Those of an earlier window would look like all of this one.
+            events.batches.value = None;
+        }
         let query = Query::Batches { from, to, limit };
-        let ask = || events.batches.ask(cx, (Tab::Trends, asked), every * 6, timeout, query);
-        let batches = if has_batches { ask() } else { None };
+        let batches = if events.asks_batches {
+            events.batches.ask(cx, (Tab::Trends, asked), every * 6, timeout, query)
+        } else {
+            None
+        };
         [alarms, actions, batches].into_iter().flatten().collect()
     }
 
@@ -100,16 +121,20 @@ impl Trends {
         let alarms = self.events.alarms.value.as_deref().unwrap_or_default();
         let actions = self.events.actions.value.as_deref().unwrap_or_default();
         let oldest = |len: usize, at: Option<Timestamp>| at.filter(|_| len >= EVENTS_MAX);
+        let ran = self.events.batches.value.as_deref().unwrap_or_default();
+        let first = ran.iter().map(|report| report.batch.from.max(view.from)).min();
         let more = [
             oldest(alarms.len(), alarms.last().map(|record| record.at)),
             oldest(actions.len(), actions.last().map(|record| record.at)),
+            oldest(ran.len(), first),
         ];
-        let more = more.into_iter().flatten().map(|at| Mark {
-            at,
-            kind: EventKind::More,
-            style: theme.trouble(),
-            text: t!("older events are too many to show: choose a shorter window").to_owned(),
-        });
+        let missing =
+            |at, text: &str| Mark { at, kind: EventKind::More, style: theme.trouble(), text: text.to_owned() };
+        let too_long = !cx.def().batches.is_empty() && view.width() > BATCHES_SPAN;
+        let too_long =
+            too_long.then(|| missing(view.from, t!("no batches in windows over 31 days: choose a shorter one")));
+        let older = t!("older events are too many to show: choose a shorter window");
+        let more = more.into_iter().flatten().map(|at| missing(at, older)).chain(too_long);
         let raised = alarms.iter().filter(|record| record.event == AlarmEvent::Raised).map(|record| Mark {
             at: record.at,
             kind: EventKind::Alarm,
@@ -123,7 +148,7 @@ impl Trends {
             style: theme.normal(),
             text: action_text(cx, action).split_whitespace().collect::<Vec<_>>().join(" "),
         });
-        let batches = self.events.batches.value.iter().flatten().flat_map(|report| {
+        let batches = ran.iter().flat_map(|report| {
             let (label, batch) = (report.batch.label(), &report.batch);
             let mark = |at, text| Mark { at, kind: EventKind::Batch, style: theme.normal(), text };
             let begin = mark(batch.from, t!("batch {label} begins", label));
@@ -163,22 +188,23 @@ impl Trends {
     }
 }
 
-/// Draws the row of events: the most important of each column.
+/// Draws the row of events: the most important of each column. That there are none is said once it is known.
 pub(super) fn draw_events(
-    marks: &[Mark],
+    trends: &Trends,
     cx: &ViewContext,
     canvas: &mut Canvas,
     cell: impl Fn(Timestamp) -> Option<u16>,
 ) {
     let mut last: Option<(u16, EventKind)> = None;
-    for mark in marks {
+    let marks = trends.marks(cx);
+    for mark in &marks {
         let Some(x) = cell(mark.at) else { continue };
         if last.is_none_or(|(column, kind)| column != x || mark.kind < kind) {
             canvas.text(x, 0, mark.kind.symbol(), mark.style);
             last = Some((x, mark.kind));
         }
     }
-    if marks.is_empty() {
+    if marks.is_empty() && trends.events.is_known() {
         canvas.text(0, 0, t!("no events"), cx.theme.dim());
     }
 }

@@ -108,8 +108,9 @@ impl Trends {
             values,
         };
         let columns: Vec<Column> = tags.iter().zip(values).map(column).collect();
-        let bytes = file(|| export_csv(cx.def(), from, every, &columns, cx.def().report.csv));
-        self.send(vec![(self.path(cx, "csv"), bytes)])
+        let csv = || (self.path(cx, "csv"), export_csv(cx.def(), from, every, &columns, cx.def().report.csv));
+        let file = file(csv);
+        self.send(vec![file])
     }
 
     /// Exports the chart as it is drawn, as SVG and PNG.
@@ -118,14 +119,21 @@ impl Trends {
         if self.export.is_busy() {
             return Vec::new();
         }
+        if self.plot != Plot::Time {
+            self.export.said = Some(Err(t!("only the chart over time can be exported").to_owned()));
+            return Vec::new();
+        }
         self.export.user = user(cx);
-        let page = file(|| picture(self, cx));
-        let png = page.png().map(|png| (self.path(cx, "png"), png));
-        self.send([(self.path(cx, "svg"), page.svg())].into_iter().chain(png).collect())
+        let files = file(|| {
+            let page = picture(self, cx);
+            let png = page.png().map(|png| (self.path(cx, "png"), png));
+            [(self.path(cx, "svg"), page.svg())].into_iter().chain(png).collect()
+        });
+        self.send(files)
     }
 
     fn send(&mut self, files: Vec<(PathBuf, Vec<u8>)>) -> Vec<UiAction> {
-        let outgoing = |(path, bytes)| Outgoing { tab: Tab::Trends, path, bytes };
+        let outgoing = |(path, bytes)| Outgoing { tab: Tab::Trends, path, bytes, new: true };
         self.export.files = files.into_iter().map(outgoing).collect();
         self.export.said = None;
         self.export.next()
@@ -154,11 +162,12 @@ impl Trends {
         self.export.next()
     }
 
-    /// `2026-11-25T093600-TIC-1.csv`: begin of the view and name of the group.
+    /// `2026-11-25T093600-TIC-1-2026-11-25T101503.csv`: begin of the view, name of the group and time of the export.
     fn path(&self, cx: &ViewContext, extension: &str) -> PathBuf {
         let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '-' };
         let name: String = self.name(cx).chars().map(plain).collect();
         let begin = draw::local(cx, self.span(cx).from, "%Y-%m-%dT%H%M%S");
-        cx.def().report.folder.join(format!("{begin}-{name}.{extension}"))
+        let exported = draw::local(cx, cx.present(), "%Y-%m-%dT%H%M%S");
+        cx.def().report.folder.join(format!("{begin}-{name}-{exported}.{extension}"))
     }
 }

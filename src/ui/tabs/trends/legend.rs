@@ -10,8 +10,12 @@ use crate::{
     ui::widgets::{
         chart::{Axis, Plan, mark},
         spark::spark,
+        text::whole,
     },
 };
+
+/// Columns of a figure, without the one between it and the next.
+const FIGURE: u16 = 7;
 
 /// Columns of the legend: right ends of the numbers, and where the last column begins.
 struct Columns {
@@ -27,7 +31,8 @@ struct Columns {
 impl Columns {
     fn new(width: u16) -> Columns {
         let name = 13 + width.saturating_sub(80).min(30) / 2;
-        let value = 4 + name + 13 + width.saturating_sub(80).min(40) / 4;
+        // Where the share of good time would stand outside, the value has less room.
+        let value = 4 + name + 13 + width.saturating_sub(80).min(40) / 4 - 63_u16.saturating_sub(width).min(4);
         Columns { name, value, min: value + 8, mean: value + 16, max: value + 24, good: value + 33, hour: value + 36 }
     }
 }
@@ -115,7 +120,7 @@ fn draw_measured(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, (a, b):
         let Some(measured) = trends.measured(cx, pen.1.tag) else { return };
         let cells = cells(cx, pen.1.tag, &measured, span).into_iter().take(count.into());
         for (n, (text, style)) in cells.enumerate() {
-            row.text_right(end(n), 0, &text, style);
+            row.text_right(end(n), 0, &whole(&text, column - 1), style);
         }
     });
 }
@@ -176,14 +181,19 @@ fn draw_pen(
 ) {
     let (theme, columns) = (cx.theme, Columns::new(row.width()));
     let (pen_style, off) = draw_name(trends, cx, row, (n, pen), columns.name);
+    let room = columns.value - columns.name - 5;
     let (text, style) = match cursor {
         None => {
             let shown = value::show(cx, pen.tag);
-            (shown.within(columns.value - columns.name - 5), shown.style)
+            (shown.within(room), shown.style)
         }
         Some(at) => match at_cursor(trends, cx, pen.tag, at) {
-            Some(text) => (format!("{text} {}", cx.snapshot.unit(pen.tag)), theme.normal()),
-            None => (t!("---- no data").to_owned(), theme.dim()),
+            Some(text) => {
+                let with_unit = format!("{text} {}", cx.snapshot.unit(pen.tag));
+                let shown = if width(with_unit.trim_end()) <= room { with_unit } else { whole(&text, room) };
+                (shown, theme.normal())
+            }
+            None => (fit(t!("---- no data"), room), theme.dim()),
         },
     };
     row.text_right(columns.value, 0, text.trim_end(), style);
@@ -213,7 +223,8 @@ fn draw_figures(trends: &Trends, cx: &ViewContext, row: &mut Canvas, tag: TagId)
             .into_iter()
             .zip(summary.map_or([None; 3], |s| [Some(s.0), Some(s.1), Some(s.2)]))
         {
-            row.text_right(end, 0, &value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value)), style);
+            let text = value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
+            row.text_right(end, 0, &whole(&text, FIGURE), style);
         }
     }
     row.text_right(columns.good, 0, &share(*good), if *good < 0.9995 { cx.theme.strong() } else { cx.theme.dim() });

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use super::{
     events::EventKind,
     lanes::runs,
-    view::{self, NO_TRACE, axis, share},
+    view::{self, NO_TRACE, axis, number, share},
     *,
 };
 use crate::{
@@ -14,6 +14,7 @@ use crate::{
     ui::widgets::chart::{
         Axis, Chart,
         axis::{Scale, time_ticks},
+        stroke::straight,
         trace::Span,
     },
 };
@@ -62,8 +63,13 @@ pub(super) fn picture(trends: &Trends, cx: &ViewContext) -> Drawing {
     let count = view.columns;
     for (curve, (_, scale)) in chart.curves.iter().zip(&scales) {
         let columns = curve.trace.columns(view.from, view.to, cx.present(), count);
-        for points in paths(&columns, |value| frame.y(*scale, value)) {
-            page.line(points, Ink::Pen(curve.pen), 1.5, curve.dashed);
+        let ink = Ink::Pen(curve.pen);
+        for points in paths(&inside(&columns, *scale), curve.stroke, |value| frame.y(*scale, value)) {
+            page.line(points, ink, 1.5, curve.dashed);
+        }
+        for (n, sign, y) in outside(&columns, *scale) {
+            let x = PLOT.0 + (PLOT.2 - PLOT.0) * n as f32 / columns.len() as f32;
+            page.text((x, frame.y(*scale, y) + if sign == "^" { 8.0 } else { -8.0 }), Anchor::Start, sign, ink);
         }
     }
     for (at, words) in &chart_cursors(trends, cx) {
@@ -81,7 +87,8 @@ pub(super) fn picture(trends: &Trends, cx: &ViewContext) -> Drawing {
     }
     y += TEXT.0 + 8.0;
     for pen in pens {
-        legend(&mut page, trends, cx, pen, y);
+        let own = chart.curves.iter().zip(&scales).find(|(curve, (axis, _))| curve.pen == pen.0 && *axis == Axis::Own);
+        legend(&mut page, trends, cx, pen, own.map(|(_, (_, scale))| *scale), y);
         y += TEXT.0 + 2.0;
     }
     page
@@ -127,10 +134,51 @@ fn axes(page: &mut Drawing, cx: &ViewContext, chart: &Chart, scales: &[(Axis, Sc
     }
 }
 
-/// The lines of a curve, a column of pixels each: from the value that held to the least, the greatest and the last. A gap
-/// ends a line.
-fn paths(columns: &[Option<Span>], y: impl Fn(f64) -> f32) -> Vec<Vec<(f32, f32)>> {
+/// The columns that lie on the scale, at least in part: a value beyond it is not drawn at its end.
+fn inside(columns: &[Option<Span>], scale: Scale) -> Vec<Option<Span>> {
+    columns.iter().map(|span| span.filter(|span| scale.low <= span.max && span.min <= scale.high)).collect()
+}
+
+/// Where a curve leaves its scale: the first column of each stretch, the sign that says so, and the end of the scale.
+fn outside(columns: &[Option<Span>], scale: Scale) -> Vec<(usize, &'static str, f64)> {
+    let sign = |span: &Option<Span>| match span {
+        Some(span) if span.min > scale.high => Some(("^", scale.high)),
+        Some(span) if span.max < scale.low => Some(("v", scale.low)),
+        Some(_) | None => None,
+    };
+    let mut before = None;
+    let mut found = Vec::new();
+    for (n, now) in columns.iter().map(sign).enumerate() {
+        found.extend(now.filter(|_| now != before).map(|(sign, end)| (n, sign, end)));
+        before = now;
+    }
+    found
+}
+
+/// The lines of a curve, a column of pixels each: from the value that held to the least, the greatest and the last, or as
+/// the look of the pen has it. A gap ends a line.
+fn paths(columns: &[Option<Span>], stroke: Stroke, y: impl Fn(f64) -> f32) -> Vec<Vec<(f32, f32)>> {
     let width = (PLOT.2 - PLOT.0) / columns.len().max(1) as f32;
+    let place = |n: usize| PLOT.0 + width * n as f32;
+    let known = || columns.iter().enumerate().filter_map(|(n, span)| Some((place(n), (*span)?)));
+    match stroke {
+        Stroke::Step => steps(columns, width, y),
+        Stroke::Line => {
+            let lines = straight(columns);
+            let point = |(n, span): (usize, &Option<Span>)| span.map(|span| (place(n) + width / 2.0, y(span.last)));
+            let points: Vec<_> = lines.iter().enumerate().map(point).collect();
+            points.split(Option::is_none).map(|line| line.iter().flatten().copied().collect()).collect()
+        }
+        Stroke::Dots => known().map(|(x, span)| vec![(x, y(span.last)), (x + width.min(2.0), y(span.last))]).collect(),
+        Stroke::Bars => {
+            let far = |span: Span| if span.max.abs() < span.min.abs() { span.min } else { span.max };
+            known().map(|(x, span)| vec![(x + width / 2.0, y(0.0)), (x + width / 2.0, y(far(span)))]).collect()
+        }
+    }
+}
+
+/// The lines of [`Stroke::Step`].
+fn steps(columns: &[Option<Span>], width: f32, y: impl Fn(f64) -> f32) -> Vec<Vec<(f32, f32)>> {
     let mut paths: Vec<Vec<(f32, f32)>> = vec![Vec::new()];
     for (n, span) in columns.iter().enumerate() {
         let (x, path) = (PLOT.0 + width * n as f32, paths.last_mut());
@@ -169,9 +217,10 @@ fn lane(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usize,
     }
 }
 
-/// Name, label, unit and figures of a pen.
-fn legend(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usize, Pen), y: f32) {
+/// Name, label, unit and figures of a pen, and the scale that no axis shows.
+fn legend(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usize, Pen), own: Option<Scale>, y: f32) {
     let def = cx.def().tag(pen.tag);
+    let own = own.map(|scale| t!("   scale {low} – {high}", low = number(scale.low), high = number(scale.high)));
     page.line(vec![(PLOT.0, y), (PLOT.0 + 24.0, y)], Ink::Pen(n), 3.0, false);
     let figures = trends.figures.get(&pen.tag).filter(|_| !lanes::is_state(def)).map(|(summary, good)| {
         let value = |value: f64| cx.snapshot.format(pen.tag, value);
@@ -182,6 +231,7 @@ fn legend(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usiz
     });
     let text =
         format!("{:<18} {:<10} {}   {}", def.name, axis(trends, cx, pen.tag), def.label, figures.unwrap_or_default());
+    let text = text + &own.unwrap_or_default();
     page.text((PLOT.0 + 32.0, y), Anchor::Start, text, Ink::Text);
 }
 
@@ -192,8 +242,24 @@ mod tests {
     #[test]
     fn a_line_ends_at_a_gap() {
         let at = |value: f64| Some(Span { min: value, max: value, last: value });
-        let paths = paths(&[at(1.0), at(2.0), None, None, at(3.0)], to_f32);
-        let ends: Vec<usize> = paths.iter().map(Vec::len).filter(|len| *len > 0).collect();
-        assert_eq!(ends, [5, 2]);
+        let columns = [at(1.0), at(2.0), None, None, at(3.0)];
+        let check = |stroke, expect: &[usize]| {
+            let paths = paths(&columns, stroke, to_f32);
+            let ends: Vec<usize> = paths.iter().map(Vec::len).filter(|len| *len > 0).collect();
+            assert_eq!(ends, expect, "{stroke:?}");
+        };
+        check(Stroke::Step, &[5, 2]);
+        check(Stroke::Line, &[2, 1]);
+        check(Stroke::Dots, &[2, 2, 2]);
+        check(Stroke::Bars, &[2, 2, 2]);
+    }
+
+    #[test]
+    fn a_curve_outside_its_scale_is_not_drawn_at_its_end() {
+        let at = |value: f64| Some(Span { min: value, max: value, last: value });
+        let columns = [at(1.0), at(5.0), at(6.0), None, at(-3.0), at(2.0)];
+        let scale = Scale { low: 0.0, high: 2.0, step: 1.0 };
+        assert_eq!(inside(&columns, scale), [at(1.0), None, None, None, None, at(2.0)]);
+        assert_eq!(outside(&columns, scale), [(1, "^", 2.0), (4, "v", 0.0)]);
     }
 }

@@ -138,7 +138,13 @@ pub(super) fn draw_histogram(trends: &Trends, cx: &ViewContext, canvas: &mut Can
     let name = format!("{} {} {}", mark(theme, n), cx.def().tag(pen.tag).name, axis(trends, cx, pen.tag));
     let axes = Axes { x, y, names: (&name, t!("% of time")) };
     let (left, top, across, down) = axes.draw(theme, canvas);
-    let Some((mean, deviation)) = spread(&columns) else {
+    let figures = match trends.both() {
+        Some(_) => trends.measured(cx, pen.tag).and_then(|measured| measured.figures),
+        None => trends.figures.get(&pen.tag).copied(),
+    };
+    // The mean of all samples, as in the legend: the columns know only their last value.
+    let mean = figures.and_then(|(summary, _)| summary).map(|(_, mean, _)| mean);
+    let Some((_, deviation)) = spread(&columns) else {
         return canvas.text_centred(height / 2, t!("no good value in this window"), theme.dim());
     };
     let eighths: [&str; 9] =
@@ -159,7 +165,7 @@ pub(super) fn draw_histogram(trends: &Trends, cx: &ViewContext, canvas: &mut Can
     let span = trends.both().map_or(view.width(), |(a, b)| b.duration_since(a).abs());
     let words = t!(
         "mean {mean}   standard deviation {deviation}   in {time}",
-        mean = format!("{mean:.decimals$}"),
+        mean = mean.map_or("–".to_owned(), |mean| format!("{mean:.decimals$}")),
         deviation = format!("{deviation:.decimals$}"),
         time = signed_time(span)
     );

@@ -161,7 +161,9 @@ impl Stand {
         let ahead = to.duration_since(now()).max(SignedDuration::ZERO).as_secs_f64();
         let good = 1.0 - ahead / to.duration_since(from).as_secs_f64();
         let good = if self.gap.0 < self.gap.1 { good - 0.166 } else { good };
-        let summary = (self.begin < now()).then_some((58.25, 64.0, 70.0));
+        // What lies between two cursors has figures that tell from where on.
+        let apart = if count == 1 { now().duration_since(from).as_secs_f64() / 100.0 } else { 0.0 };
+        let summary = (self.begin < now()).then_some((58.25 - apart, 64.0, 70.0));
         let good = if summary.is_some() { good } else { 0.0 };
         Series { tag, from, step, buckets: (0..count).map(bucket).collect(), summary, good }
     }
@@ -392,4 +394,19 @@ fn a_span_is_shown_whole_and_alive_while_it_lasts() {
             assert_eq!((trends.end.is_none(), trends.cursor), (alive, None), "{begin} {end}");
         }
     });
+}
+
+#[test]
+fn no_number_of_the_legend_is_cut() {
+    for width in [60, 62, 64, 80] {
+        let mut stand = Stand::new(Theme::FULL, width, 20);
+        stand.gap = (ago(300), ago(180));
+        stand.answer();
+        for figures in stand.model.tabs.trends.figures.values_mut() {
+            *figures = (Some((123_456.7, 1_234_567.8, -1_234_567.8)), 1.0);
+        }
+        let screen = stand.screen();
+        let row = screen.lines().find(|row| row.contains("TIC-1.SV")).unwrap_or_default();
+        assert!(row.contains(" ##      ##") && row.contains("100 %"), "{width}: {row}");
+    }
 }

@@ -134,7 +134,7 @@ fn draw_below(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, rows: &Row
     if rows.events > 0 {
         canvas.text(0, rows.lanes, &fit(t!("events"), left), cx.theme.dim());
         let mut row = canvas.part(left, rows.lanes, inner, 1);
-        draw_events(&trends.marks(cx), cx, &mut row, |at| chart.cell(at, inner));
+        draw_events(trends, cx, &mut row, |at| chart.cell(at, inner));
     }
     if let Some(at) = trends.moving(cx).filter(|_| rows.words > 0) {
         draw_event_words(trends, cx, &mut canvas.part(left, rows.lanes + rows.events, inner, 1), at);
@@ -201,7 +201,7 @@ pub(super) fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
     let long = |query: &&PeriodicQuery| query.waiting(cx.steady()).is_some_and(|time| time >= real(cx, 2.0));
     let mut waiting =
         [&trends.curves, &trends.hours.query].into_iter().filter(long).filter_map(|query| query.shown_waiting(cx));
-    let failed = [&trends.trouble, &trends.hours.trouble, &trends.events.alarms.trouble].into_iter().flatten().next();
+    let failed = [&trends.trouble, &trends.hours.trouble].into_iter().chain(trends.events.troubles()).flatten().next();
     failed.cloned().or_else(|| waiting.next())
 }
 

@@ -38,6 +38,20 @@ fn more_events_than_are_read_are_said_to_be_missing() {
 }
 
 #[test]
+fn no_events_is_said_only_when_it_is_known() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    assert!(!stand.screen().contains("no events"), "nothing has been read");
+    stand.answer();
+    let events = &mut stand.model.tabs.trends.events;
+    (events.alarms.value, events.actions.value) = (Some(Vec::new()), Some(Vec::new()));
+    assert!(stand.screen().contains("no events"));
+    stand.model.tabs.trends.events.actions.value = None;
+    stand.model.tabs.trends.events.actions.trouble = Some("disk full".to_owned());
+    let screen = stand.screen();
+    assert!(!screen.contains("no events") && screen.contains("disk full"), "{screen}");
+}
+
+#[test]
 fn a_state_is_a_lane_under_the_chart() {
     let mut stand = Stand::new(Theme::FULL, 120, 40);
     stand.answer();

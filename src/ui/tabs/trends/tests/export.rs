@@ -118,3 +118,12 @@ fn a_lock_or_another_user_ends_an_export() {
         assert!(requested(&effects(&mut stand, key(letter))).is_some(), "{letter}: exported again");
     }
 }
+
+#[test]
+fn another_plot_is_not_exported_as_a_time_chart() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    stand.press("x");
+    assert_eq!(requested(&effects(&mut stand, key('E'))), None);
+    assert!(stand.screen().contains("only the chart over time"), "{}", stand.screen());
+}

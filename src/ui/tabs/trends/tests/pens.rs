@@ -30,6 +30,22 @@ fn marked_values_are_drawn_together() {
 }
 
 #[test]
+fn a_value_opened_alone_leaves_the_marked_ones() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    let def = stand.model.snapshot.def.clone();
+    let drawn = |tag: TagId| def.trends.iter().any(|group| group.pens.iter().any(|pen| pen.tag == tag));
+    let free: Vec<TagId> = def.tags.iter().map(|tag| tag.id).filter(|tag| !drawn(*tag)).collect();
+    let cx = stand.model.cx();
+    let mut trends = Trends { picked: free[..2].to_vec(), ..TabView::new(&stand.model.snapshot) };
+    trends.open_tag(&cx, free[2]);
+    assert_eq!(trends.pens(&cx).iter().map(|pen| pen.tag).collect::<Vec<_>>(), free[2..3]);
+    assert_eq!(trends.picked, free[..2]);
+    trends.open_value(&cx, free[1]);
+    assert_eq!(trends.pens(&cx).len(), 2, "both marked ones");
+}
+
+#[test]
 fn a_typed_scale_says_where_the_curve_lies() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.answer();

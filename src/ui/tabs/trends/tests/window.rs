@@ -28,6 +28,18 @@ fn the_way_back_leads_through_earlier_windows() {
 }
 
 #[test]
+fn a_pause_keeps_the_width_of_the_day() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("m");
+    stand.answer();
+    let width = |stand: &Stand| stand.model.tabs.trends.span(&stand.model.cx()).width();
+    let before = width(&stand);
+    stand.press("p");
+    stand.answer();
+    assert!(before <= width(&stand) && width(&stand) < before * 2, "{before:#} {:#}", width(&stand));
+}
+
+#[test]
 fn enter_zooms_to_the_time_between_the_cursors() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     stand.answer();
