@@ -43,7 +43,7 @@ fn a_new_activation_has_no_ticks_and_takes_none_of_the_old() {
     for second in 4..30 {
         manager.evaluate(at(second), facts(20.0, true));
     }
-    assert_eq!(manager.active()[0].steps.len(), 1, "returned, but not raised anew");
+    assert_eq!(manager.active()[0].steps.len(), 1, "returned, but not raised again");
     for second in 30..40 {
         manager.evaluate(at(second), facts(81.0, true));
     }
