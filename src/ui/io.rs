@@ -1,17 +1,13 @@
 //! The terminal's loop: keys, snapshots, answers and ticks become messages; effects become commands, queries and frames.
 
 mod append;
+mod files;
 mod preferences;
 mod screen;
 #[cfg(test)]
 mod tests;
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Duration,
-};
+use std::{io, path::PathBuf, sync::Arc, time::Duration};
 
 use crossterm::event::{Event, EventStream, MouseButton, MouseEvent, MouseEventKind};
 use futures_util::{StreamExt, stream::BoxStream};
@@ -35,10 +31,7 @@ use super::{
 use crate::{
     access::SessionRequest,
     history::{HistoryError, Query, io::QueryRequest},
-    profile::{
-        OwnProfiles,
-        io::atomic::{write_for_user, write_new},
-    },
+    profile::OwnProfiles,
     station::{Request, Session, io::report_files::write_checksum},
     t,
     text::Language,
@@ -321,7 +314,7 @@ impl Loop {
                 let wanted = tab == Some(Tab::Reports);
                 if wanted { write_checksum(&path, &bytes) } else { Ok(()) }.map(|()| saved)
             };
-            let saved = save(&path, &bytes, new)
+            let saved = files::save(&path, &bytes, new)
                 .and_then(checksum)
                 .map_err(|error| format!("{}: {}", path.display(), why(error)));
             let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
@@ -331,7 +324,7 @@ impl Loop {
     fn load(&self, tab: Tab, path: PathBuf) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         tokio::task::spawn_blocking(move || {
-            let loaded = load(&path).map_err(|error| format!("{}: {error}", path.display()));
+            let loaded = files::load(&path).map_err(|error| format!("{}: {error}", path.display()));
             let _ = outbox.blocking_send((plants, Msg::Loaded(tab, loaded)));
         });
     }
@@ -374,27 +367,4 @@ async fn next_state(port: &mut Option<ExtensionPort>) -> Arc<dyn Extension> {
         return state;
     }
     std::future::pending().await
-}
-
-/// A text of the user; one of another encoding is read as well as it can be.
-fn load(path: &Path) -> io::Result<String> {
-    let mut bytes = Vec::new();
-    io::Read::read_to_end(&mut io::Read::take(std::fs::File::open(path)?, LOAD_MAX + 1), &mut bytes)?;
-    if LOAD_MAX < bytes.len() as u64 {
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "more than 4 MiB"));
-    }
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
-/// Most bytes of a file that is loaded.
-const LOAD_MAX: u64 = 4 << 20;
-
-/// A half-written report never has the name of a whole one.
-fn save(path: &Path, bytes: &[u8], new: bool) -> io::Result<PathBuf> {
-    if new {
-        write_new(path, bytes)?
-    } else {
-        write_for_user(path, bytes)?
-    }
-    std::path::absolute(path)
 }

@@ -179,8 +179,8 @@ fn a_panic_elsewhere_leaves_the_screen_alone() {
 fn a_saved_report_is_whole_and_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("reports/morning.csv");
-    assert_eq!(save(&path, b"a,b\n", true).expect("a writable folder"), path);
-    assert!(save(&path, b"c\n", true).is_err(), "it is there already");
+    assert_eq!(files::save(&path, b"a,b\n", true).expect("a writable folder"), path);
+    assert!(files::save(&path, b"c\n", true).is_err(), "it is there already");
     assert_eq!(std::fs::read(&path).expect("the report"), b"a,b\n");
     assert_eq!(std::fs::read_dir(folder.path().join("reports")).expect("the folder").count(), 1);
 }

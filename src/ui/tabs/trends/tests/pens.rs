@@ -118,3 +118,18 @@ fn a_trend_that_is_opened_leaves_the_marked_pens() {
     stand.press("ggg");
     assert_eq!(pens(&stand), marked, "the marked ones are a group again");
 }
+
+#[test]
+fn no_number_of_the_legend_is_cut() {
+    for width in [60, 62, 64, 80] {
+        let mut stand = Stand::new(Theme::FULL, width, 20);
+        stand.gap = (ago(300), ago(180));
+        stand.answer();
+        for figures in stand.model.tabs.trends.figures.values_mut() {
+            *figures = (Some((123_456.7, 1_234_567.8, -1_234_567.8)), 1.0);
+        }
+        let screen = stand.screen();
+        let row = screen.lines().find(|row| row.contains("TIC-1.SV")).unwrap_or_default();
+        assert!(row.contains(" ##      ##") && row.contains("100 %"), "{width}: {row}");
+    }
+}
