@@ -1,4 +1,4 @@
-//! The task that makes reports by itself, one step at a time: what it does next is decided by [`automatic::next_step`] from the
+//! The task that makes reports by itself, one step at a time: what it does next is decided by `automatic::next_step` from the
 //! record, which it reads again after each step. It waits for the disk and for queries, and no other task waits for it.
 //!
 //! ```text
