@@ -255,21 +255,21 @@ fn to_acknowledge(snapshot: &Snapshot) -> Option<CommandKind> {
     Some(alarm.acknowledge())
 }
 
-/// Asks for a shift report without pause until the station goes.
-async fn report_on(session: Session, asked: watch::Sender<bool>) -> u64 {
-    let mut reports = 0;
+/// Asks for a shift report without pause until the station goes. Counts those that were asked for and those that were answered.
+async fn report_on(session: Session, counts: watch::Sender<(u64, u64)>) -> u64 {
     log_in(&session, "tom").await;
     while session.status.borrow().gone.is_none() {
         let to = session.snapshots.borrow().at;
         let period = Period::free(to - jiff::SignedDuration::from_hours(8), to);
         let (reply, answer) = tokio::sync::oneshot::channel();
         if session.ask(QueryRequest { query: Query::Report { period }, reply }).is_ok() {
-            asked.send_replace(true);
-            reports += u64::from(answer.await.is_ok_and(|answer| answer.is_ok()));
+            counts.send_modify(|(asked, _)| *asked += 1);
+            let is_answered = answer.await.is_ok_and(|answer| answer.is_ok());
+            counts.send_modify(|(_, answered)| *answered += u64::from(is_answered));
         }
         tokio::task::yield_now().await;
     }
-    reports
+    counts.borrow().1
 }
 
 /// The number of an action of this round from its note; 0 for an action of another round.
@@ -287,14 +287,15 @@ fn reason_of(history: &Path, kind: AlarmEvent, text: Option<&str>) -> Option<Arc
     steps.iter().find(is_it).and_then(|step| step.reason.clone())
 }
 
-/// Logs in and out again and again until the station goes.
-async fn log_in_on(session: Session) -> Reported {
+/// Logs in and out again and again until the station goes. Counts what was granted.
+async fn log_in_on(session: Session, granted: watch::Sender<u64>) -> Reported {
     let mut reported = Reported::default();
     while session.status.borrow().gone.is_none() {
         // Refused while the password of the other terminal is looked at.
         let enter = SessionRequest::Login { user: "sue".into(), password: PASSWORD.into() };
         if let Ok(durability) = session.request(enter).await {
             reported.logins += u64::from(durability == Durability::Recorded);
+            granted.send_replace(reported.logins);
             reported.logouts += u64::from(session.request(SessionRequest::Logout).await == Ok(Durability::Recorded));
         }
         tokio::task::yield_now().await;
@@ -302,22 +303,30 @@ async fn log_in_on(session: Session) -> Reported {
     reported
 }
 
-/// One life of a station: ends with a kill after so many actions that were answered, and so long after the last of them.
-async fn live(place: &Place, round: u64, actions: u64, late: Duration) -> Reported {
+/// One life of a station: ends with a kill after so many actions that were answered, so many logins and reports, and so long
+/// after the last of them.
+async fn live(place: &Place, round: u64, actions: u64, others: u64, late: Duration) -> Reported {
     let before = reason_of(&place.history(), AlarmEvent::Shelved, None);
     let mut station = place.station();
-    let ((done, mut count), (asked, mut report)) = (watch::channel(0), watch::channel(false));
+    let ((done, mut count), (counts, mut reports)) = (watch::channel(0), watch::channel((0, 0)));
+    let (granted, mut logins) = watch::channel(0);
     let session = place.terminal().await;
     let suppressed = session.snapshots.borrow().suppressed.iter().find_map(|alarm| alarm.note.reason.clone());
     assert_eq!(suppressed, before, "round {round}: the alarms are as they were");
-    let acting = tokio::spawn(act_on(session, done, round));
-    let reporting = tokio::spawn(report_on(place.terminal().await, asked));
-    let logging = tokio::spawn(log_in_on(place.terminal().await));
+    let reporting = tokio::spawn(report_on(place.terminal().await, counts));
+    let logging = tokio::spawn(log_in_on(place.terminal().await, granted));
     let enough = async {
-        count.wait_for(|done| actions <= *done).await.is_ok() && report.wait_for(|asked| *asked).await.is_ok()
+        // Before the actions, of which a terminal may do only so many in a while.
+        let others_done = reports.wait_for(|(_, answered)| others <= *answered).await.is_ok()
+            && logins.wait_for(|granted| others <= *granted).await.is_ok();
+        let acting = tokio::spawn(act_on(session, done, round));
+        let all_done = others_done
+            && count.wait_for(|done| actions <= *done).await.is_ok()
+            && reports.wait_for(|(asked, _)| 0 < *asked).await.is_ok();
+        all_done.then_some(acting)
     };
     let enough = tokio::time::timeout(TIMEOUT, enough).await;
-    assert!(enough == Ok(true), "round {round}: nothing goes on; {:?}", station.said);
+    let Ok(Some(acting)) = enough else { panic!("round {round}: nothing goes on; {:?}", station.said) };
     // Another moment of whatever is under way each time.
     tokio::time::sleep(late).await;
     station.signal("KILL");
@@ -335,7 +344,10 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
     for round in 0..rounds {
         place.slow.store(round % SLOW_EVERY == 0, Ordering::Relaxed);
         let before = entries_or_none(&place.audit_log());
-        let reported = live(&place, round, 2 + round % 5, Duration::from_micros(round * 1_733 % 40_000)).await;
+        let late = Duration::from_micros(round * 1_733 % 40_000);
+        // The last station lives until it has done something of each kind, however slow the machine is.
+        let others = u64::from(round + 1 == rounds);
+        let reported = live(&place, round, 2 + round % 5, others, late).await;
         let verified = sealing::verify(&place.audit_log(), &[], &place.key);
         let (whole, sealed, _) = verified.unwrap_or_else(|error| panic!("round {round}: {error}"));
         assert!(round < sealed.seals, "round {round}: each start has its seal, found {}", sealed.seals);
