@@ -9,7 +9,7 @@ use clap::FromArgMatches;
 use crate::{
     history::{Answer, Query},
     plant::PlantDef,
-    report::{self, ReportFormat, ShiftReport, Style, content::document, document::Document, tables},
+    report::{self, ReportFormat, ShiftReport, Style, content::document, document::Document},
     station::io::report_files::write_checksum,
     text::Language,
 };
@@ -69,8 +69,8 @@ pub struct WriteArgs {
     #[arg(long, value_name = "FORMATS", help = report::formats_help(), value_parser = report::format,
           value_delimiter = ',', default_value = report::FORMATS[0].name())]
     format: Vec<&'static dyn ReportFormat>,
-    /// Instead: a CSV file for each table, into this folder
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "format"])]
+    /// A file for each table, into this folder: as csv or parquet
+    #[arg(long, value_name = "FOLDER", conflicts_with = "out")]
     tables: Option<PathBuf>,
     /// Language of its texts: en, th [default: that of the plant file]
     #[arg(long, value_name = "CODE", value_parser = language)]
@@ -129,11 +129,16 @@ fn files(
     let style = Style { csv: args.csv.dialect(def), ..Style::of(def) };
     let name = |format: &dyn ReportFormat| format.file_name(def, &report.period, report.until);
     if let Some(folder) = &args.tables {
-        let stem = name(report::FORMATS[0]);
-        let stem = stem.strip_suffix(".csv").unwrap_or(&stem);
-        let file =
-            |(table, bytes): (&str, Vec<u8>)| (folder.join(format!("{stem}-{}.csv", table.replace(' ', "-"))), bytes);
-        return Ok(tables(document, style.csv).into_iter().map(file).collect());
+        let tables = |format: &&'static dyn ReportFormat| {
+            let (name, ending) = (name(*format), format!(".{}", format.extension()));
+            let stem = name.strip_suffix(&ending).unwrap_or(&name).to_owned();
+            let file = move |(table, bytes): (&str, Vec<u8>)| {
+                (folder.join(format!("{stem}-{}{ending}", table.replace(' ', "-"))), bytes)
+            };
+            format.tables(document, &style).map(|tables| tables.into_iter().map(file)).map_err(CliError::Usage)
+        };
+        let tables = args.format.iter().map(tables).collect::<Result<Vec<_>, _>>()?;
+        return Ok(tables.into_iter().flatten().collect());
     }
     let folder = match &args.out {
         None => Some(def.report.folder.as_path()),

@@ -23,7 +23,7 @@ keyword_enum! {
 }
 
 /// The formats of reports, by name. A test holds that they are those of `report::FORMATS`.
-pub const REPORT_FORMATS: [&str; 8] = ["csv", "record", "text", "html", "json", "xlsx", "docx", "pdf"];
+pub const REPORT_FORMATS: [&str; 9] = ["csv", "record", "text", "html", "json", "xlsx", "docx", "pdf", "parquet"];
 
 /// What stands in braces in an argument of [`AutomaticReport::after`].
 pub const PLACEHOLDERS: [&str; 6] = ["file", "name", "period", "format", "sha256", "plant"];

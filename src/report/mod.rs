@@ -24,6 +24,7 @@ mod json;
 mod xlsx;
 mod docx;
 mod pdf;
+mod parquet;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
@@ -34,7 +35,6 @@ use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
 
-pub use self::shift_csv::tables;
 use self::{chart::Chart, document::Document};
 use crate::{
     plant::{
@@ -61,6 +61,11 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
 
     /// The bytes of its file: the same for the same document. `Err` says why there is none.
     fn render(&self, document: &Document, style: &Style) -> Result<Vec<u8>, String>;
+
+    /// A file for each table, by the word of its section, where the format has that.
+    fn tables(&self, _document: &Document, _style: &Style) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
+        Err(format!("{} is one file: a file for each table is csv or parquet", self.name()))
+    }
 
     /// The name of its file: `2026-11-21-morning.csv`, `2026-W47.csv`; for a running shift with the time up to which it has data:
     /// `2026-11-21-morning-until-0930.csv`.
@@ -90,7 +95,7 @@ pub trait ReportFormat: std::fmt::Debug + Sync {
 
 /// Every format of the report; the first is the default.
 /// The plant file knows their names as [`crate::plant::report::REPORT_FORMATS`].
-pub const FORMATS: [&dyn ReportFormat; 8] = [
+pub const FORMATS: [&dyn ReportFormat; 9] = [
     &shift_csv::ShiftCsv,
     &record_csv::RecordCsv,
     &text::Text,
@@ -99,6 +104,7 @@ pub const FORMATS: [&dyn ReportFormat; 8] = [
     &xlsx::Xlsx,
     &docx::Docx,
     &pdf::PdfFile,
+    &parquet::Parquet,
 ];
 
 /// The language of the reports of a plant.

@@ -24,6 +24,14 @@ impl ReportFormat for ShiftCsv {
     fn render(&self, document: &Document, style: &Style) -> Result<Vec<u8>, String> {
         Ok(stacked(document, style.csv))
     }
+
+    fn tables(&self, document: &Document, style: &Style) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
+        let file = |section: &Section| {
+            let rows = rows_of(document, section, style.csv)?;
+            Some((section.kind.word(), csv::write(rows.into_iter(), style.csv)))
+        };
+        Ok(document.sections.iter().filter_map(file).collect())
+    }
 }
 
 /// Every section with a title row, a header row and its rows; every row has as many cells as the widest.
@@ -40,15 +48,6 @@ fn stacked(document: &Document, dialect: CsvDialect) -> Vec<u8> {
     let width = rows.iter().map(Vec::len).max().unwrap_or(0);
     rows.iter_mut().for_each(|row| row.resize(width, String::new()));
     csv::write(rows.into_iter(), dialect)
-}
-
-/// A file for each section with rows: the word of the section, and its bytes.
-pub fn tables(document: &Document, dialect: CsvDialect) -> Vec<(&'static str, Vec<u8>)> {
-    let file = |section: &Section| {
-        let rows = rows_of(document, section, dialect)?;
-        Some((section.kind.word(), csv::write(rows.into_iter(), dialect)))
-    };
-    document.sections.iter().filter_map(file).collect()
 }
 
 /// A table with its header row. An instant takes two cells: local time as spreadsheets take it, and its offset.
