@@ -14,10 +14,11 @@ use crate::{
     },
 };
 
-/// The last event of each report, the newest period first.
+/// The last event of each report, the newest period first. With a window by `rowid` and a small limit, DuckDB 1.5 fails by an
+/// internal error, after which the file must be opened again.
 const REPORTS: &str =
     "SELECT utc, period, name, from_utc, to_utc, format, file, sha256, event, attempts, error FROM report
-    QUALIFY row_number() OVER (PARTITION BY period, from_utc, format ORDER BY rowid DESC) = 1
+    WHERE rowid IN (SELECT max(rowid) FROM report GROUP BY period, from_utc, format)
     ORDER BY to_utc DESC, from_utc, format LIMIT ?";
 
 impl Store {

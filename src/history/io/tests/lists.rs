@@ -1,6 +1,7 @@
 //! Lists and reports: order, span, search and bounds.
 
 use super::*;
+use crate::plant::report::{PeriodKind, ReportEvent, ReportRecord};
 
 #[test]
 fn lists_come_newest_first_within_their_span_and_limit() {
@@ -202,4 +203,33 @@ fn rows_behind_aggregates_do_not_count_for_the_bound() {
     let refused = curve(20, 4_000).unwrap_err();
     assert!(matches!(refused, HistoryError::TooManyRows { asked: Some(71_000..=72_000), .. }), "{refused}");
     assert!(refused.to_string().contains("choose a period of at most"), "{refused}");
+}
+
+#[test]
+fn a_short_list_of_reports_has_the_newest_with_their_state() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let made = |day: i64| ReportRecord {
+        at: sec(day * 86_400),
+        period: PeriodKind::Day,
+        name: format!("day {day}").into(),
+        from: sec((day - 1) * 86_400),
+        to: sec(day * 86_400),
+        format: "csv".into(),
+        file: format!("/srv/{day}.csv").into(),
+        sha256: "0".into(),
+        event: ReportEvent::Made,
+        attempts: 0,
+        error: None,
+    };
+    let delivered = made(3).then(sec(3 * 86_400 + 60), ReportEvent::Delivered);
+    let records = [made(1), made(2), made(3), delivered.clone()].map(Record::Report);
+    store.append(&records).unwrap();
+    for (limit, expect) in [(2, vec![delivered.clone(), made(2)]), (10_000, vec![delivered.clone(), made(2), made(1)])]
+    {
+        let Ok(Answer::Reports(found)) = store.answer(&Query::Reports { limit }, sec(400_000)) else {
+            panic!("no list of {limit}")
+        };
+        assert_eq!(found.reports, expect);
+    }
 }
