@@ -193,7 +193,7 @@ pub const IMPORT: &str = "import samples";
 
 /// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the request of a write, whose outcome is there already.
-pub const NOT_PROCESS_ACTIONS: [&str; 34] = [
+pub const NOT_PROCESS_ACTIONS: [&str; 35] = [
     BACKUP,
     RESTORE,
     IMPORT,
@@ -217,6 +217,7 @@ pub const NOT_PROCESS_ACTIONS: [&str; 34] = [
     "delete user",
     "reset password",
     "export",
+    "delete report",
     "too many requests",
     "audit log",
     "read audit log",

@@ -68,9 +68,16 @@ pub(super) fn clock_step(old: Timestamp, new: Timestamp) -> ActionRecord {
     with_change(entry(new, "clock step", "system clock", "done: applied at once"), (Some(text(old)), text(new)))
 }
 
-/// The station has written a report.
-pub(super) fn report_exported(file: &str, sha256: &str, at: Timestamp) -> ActionRecord {
-    ActionRecord { new: Some(sha256.into()), ..entry(at, "export", file, "done") }
+/// The station has written a report, or found it where a station that was killed had written it.
+pub(super) fn report_exported(file: &str, sha256: &str, is_new: bool, at: Timestamp) -> ActionRecord {
+    let outcome = if is_new { "done" } else { "done: found" };
+    ActionRecord { new: Some(sha256.into()), ..entry(at, "export", file, outcome) }
+}
+
+/// The station has deleted a report whose time is over, or left it alone because it has other bytes.
+pub(super) fn report_deleted(file: &str, sha256: &str, is_deleted: bool, at: Timestamp) -> ActionRecord {
+    let outcome = if is_deleted { "done" } else { "failed: left alone" };
+    ActionRecord { old: Some(sha256.into()), ..entry(at, "delete report", file, outcome) }
 }
 
 /// The last entry of a station.

@@ -119,7 +119,7 @@ async fn of_log(source: &Source, sha: &str) -> Compared {
                 let entry = action.chain_hash.map_or_else(String::new, |entry| format!(", entry {}", entry.number));
                 Compared::Agrees(format!("exported by {} at {:.0} as {}{entry}", action.by, action.at, action.target))
             }
-            None => Compared::Differs("NO ENTRY: no file with this content was ever exported".to_owned()),
+            None => Compared::Differs("NO ENTRY: no station has recorded a file with this content; a report made without the station has none".to_owned()),
         },
         Ok(_) => Compared::Missing("NOT READ: the station answered another query".to_owned()),
         Err(error) => Compared::Missing(format!("NOT READ: {error}")),

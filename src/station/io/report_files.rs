@@ -46,8 +46,8 @@ fn there(path: &Path, bytes: &[u8]) -> io::Result<There> {
 
 /// Writes a report and its checksum into a folder. A file that is there already with the same bytes is the report itself: a
 /// station was killed before it was on record. One with other bytes belongs to someone else and stays: the next name is taken.
-/// Blocks while the disk works.
-pub fn place(folder: &Path, stem: &str, ending: &str, bytes: &[u8]) -> io::Result<PathBuf> {
+/// Gives its path, and whether it is new. Blocks while the disk works.
+pub fn place(folder: &Path, stem: &str, ending: &str, bytes: &[u8]) -> io::Result<(PathBuf, bool)> {
     step("folder of reports")?;
     fs::create_dir_all(folder)?;
     let sha256 = sha256(bytes);
@@ -65,7 +65,7 @@ pub fn place(folder: &Path, stem: &str, ending: &str, bytes: &[u8]) -> io::Resul
         if found.1 == There::Nothing && !put(&checksum, line.as_bytes())? {
             continue;
         }
-        return Ok(path);
+        return Ok((path, found.0 == There::Nothing));
     }
     Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{stem}{ending} and {NAMES_MAX} more names are taken")))
 }
@@ -131,8 +131,10 @@ mod tests {
             let write = || place(&path, "2026-11-21-morning", ".csv", b"figures");
             let first = stopped_at(number, write);
             assert_eq!(first.is_err(), number < 3, "the fourth step does not exist");
-            assert_eq!(write().unwrap(), path.join("2026-11-21-morning.csv"));
-            assert_eq!(write().unwrap(), path.join("2026-11-21-morning.csv"), "once more changes nothing");
+            let (file, is_new) = write().unwrap();
+            assert_eq!((file, is_new), (path.join("2026-11-21-morning.csv"), number < 2), "killed at {number}");
+            let again = (path.join("2026-11-21-morning.csv"), false);
+            assert_eq!(write().unwrap(), again, "once more changes nothing");
             assert_eq!(names(&path), ["2026-11-21-morning.csv", "2026-11-21-morning.csv.sha256"]);
             let line = fs::read_to_string(path.join("2026-11-21-morning.csv.sha256")).unwrap();
             assert_eq!(line, format!("{}  2026-11-21-morning.csv\n", sha256(b"figures")));
@@ -146,7 +148,7 @@ mod tests {
         fs::write(at("day.csv"), "mine").unwrap();
         fs::write(at("day-2.csv.sha256"), "mine, too").unwrap();
         fs::create_dir(at("day-3.csv")).unwrap();
-        let made = || place(folder.path(), "day", ".csv", b"figures").unwrap();
+        let made = || place(folder.path(), "day", ".csv", b"figures").unwrap().0;
         assert_eq!((made(), made()), (at("day-4.csv"), at("day-4.csv")));
         assert_eq!(fs::read_to_string(at("day.csv")).unwrap(), "mine");
         assert_eq!(fs::read_to_string(at("day-2.csv.sha256")).unwrap(), "mine, too");
@@ -157,13 +159,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let sha = sha256(b"figures");
         for number in 0..3 {
-            let path = place(folder.path(), "day", ".csv", b"figures").unwrap();
+            let (path, _) = place(folder.path(), "day", ".csv", b"figures").unwrap();
             let first = stopped_at(number, || delete(&path, &sha));
             assert_eq!(first.is_err(), number < 2);
             assert!(delete(&path, &sha).unwrap());
             assert_eq!(names(folder.path()), [""; 0]);
         }
-        let path = place(folder.path(), "day", ".csv", b"figures").unwrap();
+        let (path, _) = place(folder.path(), "day", ".csv", b"figures").unwrap();
         fs::write(&path, "changed").unwrap();
         assert!(!delete(&path, &sha).unwrap());
         assert_eq!(names(folder.path()), ["day.csv", "day.csv.sha256"]);

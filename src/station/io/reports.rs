@@ -26,7 +26,7 @@ use crate::{
     plant::{
         PlantDef,
         event::Event,
-        record::Record,
+        record::{ActionRecord, Record},
         report::{ReportEvent, ReportRecord},
         snapshot::HistoryStatus,
         station::{FaultState, StationFault},
@@ -154,6 +154,8 @@ impl Maker {
                     }
                     Err(_) => ReportEvent::LeftAlone,
                 };
+                let is_deleted = event == ReportEvent::Deleted;
+                self.audit(entries::report_deleted(&report.file, &report.sha256, is_deleted, now)).await;
                 self.record(report.then(now, event));
             }
             Step::Wait(until) => self.wait(now, until).await,
@@ -171,9 +173,10 @@ impl Maker {
 
     async fn make(&mut self, due: Due<'_>) {
         match self.make_file(&due).await {
-            Ok(report) => {
+            Ok((report, is_new)) => {
                 tracing::info!(file = &*report.file, "report written");
-                self.export_on_record(&report).await;
+                let entry = entries::report_exported(&report.file, &report.sha256, is_new, report.at);
+                self.audit(entry).await;
                 if self.record(report) {
                     self.failures.clear(&due.sequence());
                 } else {
@@ -213,8 +216,8 @@ impl Maker {
         }
     }
 
-    /// Asks for the figures, renders them and writes the file.
-    async fn make_file(&mut self, due: &Due<'_>) -> Result<ReportRecord, NotMade> {
+    /// Asks for the figures, renders them and writes the file; also whether it is new.
+    async fn make_file(&mut self, due: &Due<'_>) -> Result<(ReportRecord, bool), NotMade> {
         let report = match self.ask(Query::Report { period: due.period.clone() }).await {
             Ok(Answer::Report(report)) => report,
             Ok(_) => return Err(NotMade::Yet("the history answered another query".to_owned())),
@@ -233,13 +236,13 @@ impl Maker {
             let failed = |error: std::io::Error| NotMade::Yet(format!("{}: {error}", folder.display()));
             // A list of reports names files for whoever reads it, wherever that is.
             let folder = std::path::absolute(&folder).map_err(failed)?;
-            let path = report_files::place(&folder, &stem, &ending, &bytes).map_err(failed)?;
-            Ok((path.display().to_string(), sha256(&bytes)))
+            let (path, is_new) = report_files::place(&folder, &stem, &ending, &bytes).map_err(failed)?;
+            Ok((path.display().to_string(), sha256(&bytes), is_new))
         };
-        let (path, sha) = spawn_blocking(write)
+        let (path, sha, is_new) = spawn_blocking(write)
             .await
             .unwrap_or_else(|_| Err(NotMade::Ever("internal error, see the log".to_owned())))?;
-        Ok(self.about(due, &path, &sha, ReportEvent::Made))
+        Ok((self.about(due, &path, &sha, ReportEvent::Made), is_new))
     }
 
     fn unanswered(&self, due: &Due, error: &HistoryError) -> NotMade {
@@ -263,15 +266,15 @@ impl Maker {
         }
     }
 
-    /// Has the file in the audit log before the history: a report on record is one that can be verified. A station that is killed
-    /// in between makes it again, with a second entry about the same bytes.
-    async fn export_on_record(&self, report: &ReportRecord) {
-        let entry = entries::report_exported(&report.file, &report.sha256, report.at);
+    /// Has a file in the audit log before the history: a report on record is one that can be verified. A station that is killed
+    /// in between finds the file, which its entry says.
+    async fn audit(&self, entry: ActionRecord) {
+        let file = entry.target.clone();
         let (reply, recorded) = oneshot::channel();
         if self.task.audit.try_send(AuditMessage::Entry(entry)).is_err()
             || self.task.audit.try_send(AuditMessage::Reply(reply, Ok(()))).is_err()
         {
-            tracing::error!(file = &*report.file, "the audit log has no room for a report");
+            tracing::error!(file = &*file, "the audit log has no room for a report");
             return;
         }
         // What is not recorded yet waits in the queue of the audit log, which has an alarm of its own.

@@ -27,7 +27,7 @@ struct Stand {
     folder: TempDir,
     def: Arc<PlantDef>,
     since: Timestamp,
-    exported: Vec<String>,
+    audited: Vec<ActionRecord>,
     made: Vec<ReportRecord>,
     alarms: Vec<FaultState>,
 }
@@ -61,8 +61,8 @@ impl Stand {
         };
         def.report.automatic = rules.iter().map(rule).collect();
         let def = Arc::new(def);
-        let (exported, made, alarms) = (Vec::new(), Vec::new(), Vec::new());
-        let stand = Stand { folder, def, since, exported, made, alarms };
+        let (audited, made, alarms) = (Vec::new(), Vec::new(), Vec::new());
+        let stand = Stand { folder, def, since, audited, made, alarms };
         let sample = |hours: i64| {
             let at = stand.since + SignedDuration::from_hours(hours);
             Record::Sample(TagId(0), Sample::good(20.0 + hours as f64, at))
@@ -112,7 +112,7 @@ impl Stand {
                 Some(message) = running.audit.recv() => {
                     if running.dies() { break }
                     match message {
-                        AuditMessage::Entry(action) => self.exported.push(action.target.to_string()),
+                        AuditMessage::Entry(action) => self.audited.push(action),
                         AuditMessage::Reply(reply, _) => drop(reply.send(Ok(Durability::Recorded))),
                         AuditMessage::Lost(_) => {}
                     }
@@ -176,7 +176,7 @@ async fn a_station_that_is_off_for_three_days_makes_up_for_it() {
     let ends: Vec<Timestamp> = stand.made.iter().map(|report| report.to).collect();
     assert!(ends.is_sorted(), "in order");
     // 21 shifts, 7 days, a week; each once on record, and once in the audit log.
-    assert_eq!((ends.len(), stand.exported.len()), (29, 29));
+    assert_eq!((ends.len(), stand.audited.len()), (29, 29));
     assert_eq!(stand.alarms, []);
     for report in &stand.made {
         assert_eq!(sha256(&fs::read(&*report.file).unwrap()), *report.sha256);
@@ -198,7 +198,27 @@ async fn a_station_killed_at_any_message_makes_each_report_once() {
         stand.live("2026-11-02T01:00+07", end, FOREVER).await;
         assert_eq!(stand.files(), stand.expected(PeriodKind::Shift, end), "killed at message {lives}");
         assert!(bytes(&stand) == bytes(&undisturbed), "the bytes are the same, whenever they are written");
+        let written = stand.audited.iter().filter(|entry| &*entry.outcome == "done").map(|entry| entry.target.clone());
+        let mut written: Vec<_> = written.collect();
+        let all = written.len();
+        written.dedup();
+        assert_eq!(written.len(), all, "killed at message {lives}: a file that was found is no second export");
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_report_deleted_at_the_end_of_its_time_is_audited() {
+    let mut stand = Stand::new(&[(PeriodKind::Shift, "csv")], "2026-11-01T06:00+07");
+    let mut def = PlantDef::clone(&stand.def);
+    def.report.automatic[0].keep = Some(Duration::from_secs(8 * 3_600));
+    stand.def = Arc::new(def);
+    stand.live("2026-11-01T06:00+07", "2026-11-01T22:10+07", FOREVER).await;
+    let made: Vec<_> = stand.made.iter().filter(|report| report.event == ReportEvent::Made).collect();
+    let [first, second] = &made[..] else { panic!("{made:?}") };
+    let deleted: Vec<&ActionRecord> = stand.audited.iter().filter(|entry| &*entry.action == "delete report").collect();
+    let [entry] = &deleted[..] else { panic!("{deleted:?}") };
+    assert_eq!((&entry.target, &*entry.outcome, &entry.old), (&first.file, "done", &Some(first.sha256.clone())));
+    assert!(!PathBuf::from(&*first.file).exists() && PathBuf::from(&*second.file).exists());
 }
 
 #[tokio::test(start_paused = true)]

@@ -20,7 +20,7 @@ const EVERY_S: f64 = 2.0;
 /// Bad or uncertain values that are named at most.
 const NAMED: usize = 8;
 /// Actions that only concern the program and change nothing in the plant.
-pub(in crate::ui) const NO_CHANGE: [&str; 10] = [
+pub(in crate::ui) const NO_CHANGE: [&str; 11] = [
     "acknowledge",
     "silence",
     "login",
@@ -28,6 +28,7 @@ pub(in crate::ui) const NO_CHANGE: [&str; 10] = [
     "lock terminal",
     "unlock terminal",
     "export",
+    "delete report",
     "read sets",
     HAND_OVER,
     TAKE_OVER,
