@@ -27,6 +27,7 @@ use crate::{
         record::{ActionRecord, AlarmRecord},
         sample::Sample,
     },
+    station::io::reports::REPORTS_MAX,
     ui::widgets::text::width as width_of,
 };
 
@@ -47,6 +48,8 @@ Views (times are UTC):
   action   utc, by_whom, from_where, action, target, old_value, new_value, outcome, note
   batch    utc (begin), until (NULL while it runs), batch, number, minutes, begin_seen, end_seen
   phase    utc (begin of the batch), batch, number, phase ('unknown' as well), minutes
+  report   automatic reports: utc (of event, the last one), period, name, begin, until, format, file, sha256, event,
+           attempts, error
 
 Other programs read the folder beside the history as it lies, Parquet, times UTC: raw/date=…/ utc, tag, value, quality
 (code: 0 good, 64 and up uncertain, 128 and up bad), epoch (how often the clock was set, 65535 imported); m1/… and h1/… as
@@ -127,6 +130,10 @@ impl HistoryTables {
             tables.add_alarms(journal(source).await?)?;
             tables.add_actions(actions(source).await?)?;
             tables.add_batches(batches(source).await?)?;
+            let Answer::Reports(made) = source.query(Query::Reports { limit: REPORTS_MAX }).await? else {
+                return Err(unexpected());
+            };
+            tables.add_reports(made.reports)?;
             unarchived(source, &overview, |samples| tables.add_samples(def, samples)).await?;
             // An hour that was archived meanwhile would be missing or double.
             if self::overview(source).await?.files == overview.files {

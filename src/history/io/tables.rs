@@ -8,6 +8,7 @@
 //! | `alarm` | `utc`, `subject`, `message`, `priority` (1–4), `event`, `value`, `limit_value`, `by_whom`, `reason` |
 //! | `batch` | `utc` (begin), `until` (NULL while it runs), `batch`, `number`, `minutes`, `begin_seen`, `end_seen` |
 //! | `phase` | `utc` (begin of the batch), `batch`, `number`, `phase` (`unknown` as well), `minutes` |
+//! | `report` | automatic reports: `utc` (of `event`, its last one), `period`, `name`, `begin`, `until`, `format`, `file`, `sha256`, `event`, `attempts`, `error` |
 //! | `action` | `utc`, `by_whom`, `from_where`, `action`, `target`, `old_value`, `new_value`, `outcome`, `note` |
 
 use std::{path::Path, sync::Arc, time::Duration};
@@ -25,6 +26,7 @@ use crate::{
         batch::Batch,
         def::{CsvDialect, TagId},
         record::{ActionRecord, AlarmRecord},
+        report::ReportRecord,
         sample::{Quality, Sample},
     },
 };
@@ -71,7 +73,9 @@ impl Tables {
                 old_value VARCHAR, new_value VARCHAR, outcome VARCHAR, note VARCHAR);
              CREATE TABLE batch (utc TIMESTAMP, until TIMESTAMP, batch VARCHAR, number UINTEGER, minutes DOUBLE,
                 begin_seen BOOLEAN, end_seen BOOLEAN);
-             CREATE TABLE phase (utc TIMESTAMP, batch VARCHAR, number UINTEGER, phase VARCHAR, minutes DOUBLE);",
+             CREATE TABLE phase (utc TIMESTAMP, batch VARCHAR, number UINTEGER, phase VARCHAR, minutes DOUBLE);
+             CREATE TABLE report (utc TIMESTAMP, period VARCHAR, name VARCHAR, begin TIMESTAMP, until TIMESTAMP,
+                format VARCHAR, file VARCHAR, sha256 VARCHAR, event VARCHAR, attempts UINTEGER, error VARCHAR);",
             folder = quoted(&folder.join("")),
             archive = quoted(Path::new(&archive)),
         ))?;
@@ -127,6 +131,15 @@ impl Tables {
         })?;
         self.fill("batch", batches.iter(), |to, Batch { name, number, from, to: end, seen, lasted, .. }| {
             to.append_row(params![utc(*from), end.map(utc), name, number, minutes(*lasted), seen.0, seen.1])
+        })
+    }
+
+    /// Adds automatic reports, each with its last event.
+    pub fn add_reports(&self, reports: Vec<ReportRecord>) -> Result<(), HistoryError> {
+        self.fill("report", reports.into_iter(), |to, report| {
+            let ReportRecord { at, period, name, from, to: end, format, file, sha256, event, attempts, error } = report;
+            let (period, event, begin, until) = (period.word(), event.word(), utc(from), utc(end));
+            to.append_row(params![utc(at), period, name, begin, until, format, file, sha256, event, attempts, error])
         })
     }
 
