@@ -71,7 +71,7 @@ fn check(zone_file: Option<&str>, from: &str, to: &str, language: &str) {
     };
     let out = folder.path().join("out/");
     let made = sightglass()
-        .args(["report", &plant, "--from", from, "--to", to, "--format", "csv,text,html,json,xlsx,docx,pdf"])
+        .args(["report", &plant, "--from", from, "--to", to, "--format", "csv,text,html,json,xlsx,docx,pdf,parquet"])
         .args(["--language", language, "--out"])
         .arg(&out)
         .arg("--history")

@@ -242,10 +242,10 @@ pub fn engines() -> Option<PathBuf> {
 }
 
 /// A virtual environment with packages of PyPI, in these very versions.
-/// Python with readers of Excel and Word files.
+/// Python with readers of Excel, Word and Parquet files.
 pub fn office() -> Option<PathBuf> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PYTHON.get_or_init(|| venv("office-venv", &["openpyxl==3.1.5", "python-docx==1.2.0"])).clone()
+    PYTHON.get_or_init(|| venv("office-venv", &["openpyxl==3.1.5", "python-docx==1.2.0", "pyarrow==26.0.1"])).clone()
 }
 
 fn venv(name: &str, packages: &[&str]) -> Option<PathBuf> {

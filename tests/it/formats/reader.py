@@ -1,7 +1,7 @@
 """Reads a report in every format and compares its figures with those of the samples."""
 import csv, datetime, glob, html.parser, json, subprocess, sys
 
-import docx, openpyxl
+import docx, openpyxl, pyarrow.parquet
 
 folder, samples, seconds = sys.argv[1], sys.argv[2], float(sys.argv[3])
 HOLD = 150.0
@@ -57,6 +57,17 @@ for tag, row in lines.items():
         found = values[tag][name]
         assert (found is None) if cell == "" else abs(found - float(cell)) < 1e-9, (tag, name, found, cell)
 
+# Parquet has the same figures under the same names, its numbers are numbers, and its period and provenance stand in the file.
+file = pyarrow.parquet.ParquetFile(the(".parquet"))
+values = {row["tag"]: row for row in file.read().to_pylist()}
+for tag, row in lines.items():
+    for name, cell in zip(names, row[2:10]):
+        found = values[tag][name]
+        assert (found is None) if cell == "" else abs(found - float(cell)) < 1e-9, (tag, name, found, cell)
+keys = file.metadata.metadata
+begin, end = (datetime.datetime.fromisoformat(keys[key].decode()) for key in (b"from", b"to"))
+assert (end - begin).total_seconds() == seconds and keys[b"program"].startswith(b"sightglass "), keys
+
 # XLSX: numbers are numbers, dates are dates, nothing is a formula; what a cell shows is what the CSV has.
 book = openpyxl.load_workbook(the(".xlsx"))
 assert not any(cell.data_type == "f" for sheet in book for row in sheet.iter_rows() for cell in row), "a formula"
@@ -108,4 +119,4 @@ for rows in (page.rows, word, text, pages):
         [of_tag] = [other for other in rows if other[:1] == [tag] and other[1] == row[1] and len(other) > 6]
         shown = [cell for cell in of_tag[2:] if cell not in ("", "–")]
         assert shown == [cell for cell in row[2:10] if cell], (tag, of_tag, row)
-print("figures agree:", sum(len(row) for row in lines.values()), "cells in seven formats")
+print("figures agree:", sum(len(row) for row in lines.values()), "cells in eight formats")
