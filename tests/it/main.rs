@@ -12,6 +12,7 @@
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
+//! | `automatic_reports` | a station killed while it makes reports: each is there once, whole, and on record |
 //! | `reports` | reports and exports as a user gets them: damaged history, suppressed alarms, a running station |
 //! | `devices` | every shipped profile and plant against its simulated devices: a minute, every fault, golden frames |
 //! | `rights` | every command, request and query through the socket, by everybody who may be at a terminal |
@@ -34,6 +35,7 @@
 
 mod architecture;
 mod archive;
+mod automatic_reports;
 mod sql;
 mod attach;
 mod backup;

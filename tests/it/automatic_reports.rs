@@ -1,0 +1,152 @@
+//! A station that is killed while it makes reports in every format: each is there once, whole, and agrees with what is on record.
+
+use std::{collections::BTreeSet, fs, path::Path, process::Command};
+
+use jiff::{SignedDuration, Timestamp};
+use sightglass::{
+    access::io::own_user,
+    history::io::store::Store,
+    plant::{record::Record, sample::Sample},
+    profile::{self, Search},
+};
+
+use crate::support::{Process, folder, sightglass, sockets};
+
+/// Formats without a record of a controller, and the endings of their files.
+const FORMATS: [(&str, &str); 8] = [
+    ("csv", "csv"),
+    ("xlsx", "xlsx"),
+    ("pdf", "pdf"),
+    ("docx", "docx"),
+    ("html", "html"),
+    ("json", "json"),
+    ("text", "txt"),
+    ("parquet", "parquet"),
+];
+/// Days that are over since the history began.
+const DAYS: i64 = 3;
+/// The station is killed so often.
+const KILLS: usize = 6;
+/// The folder is looked into so often for the next file, and a file verified until it is on record.
+const LOOKS_MAX: usize = 2_000_000;
+const VERIFIED_MAX: usize = 100;
+
+/// A plant whose station makes a report of each day in every format.
+struct Place {
+    folder: tempfile::TempDir,
+    sockets: std::path::PathBuf,
+    /// The first day of the history.
+    first: jiff::civil::Date,
+}
+
+impl Place {
+    fn new() -> Place {
+        let place = folder();
+        let text = profile::text_of("tank", &Search::shipped()).expect("a shipped plant");
+        let formats = FORMATS.map(|(format, _)| format!("\"{format}\"")).join(", ");
+        let reports = place.path().join("reports");
+        let rules = format!(
+            "\n[[report.automatic]]\nperiod = \"day\"\nformats = [{formats}]\nfolder = {reports:?}\n
+             [[access.trusted]]\nuser = \"{}\"\nrole = \"supervisor\"\n",
+            own_user()
+        );
+        fs::write(place.path().join("tank.toml"), text + &rules).expect("written");
+        let def = profile::load(&place.path().join("tank.toml"), &Search::shipped()).expect("a plant");
+        let pv = def.tag_named("TIC-1.PV").expect("a tag");
+        let today = Timestamp::now().to_zoned(def.time_zone.clone()).start_of_day().expect("a day").timestamp();
+        let begin = today - SignedDuration::from_hours(24 * DAYS);
+        let minute = |minute: i64| {
+            let at = begin + SignedDuration::from_mins(minute);
+            Record::Sample(pv, Sample::good(50.0 + (minute % 700) as f64 / 10.0, at))
+        };
+        let store = Store::open(&place.path().join("tank.duckdb"), &def, begin).expect("a new file").store;
+        store.append(&(0..DAYS * 1_440).map(minute).collect::<Vec<_>>()).expect("stored");
+        store.checkpoint().expect("written");
+        Place { folder: place, sockets: sockets(), first: begin.to_zoned(def.time_zone.clone()).date() }
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = sightglass();
+        command.args(args).env("XDG_RUNTIME_DIR", &self.sockets).env("XDG_STATE_HOME", self.folder.path());
+        command.current_dir(self.folder.path());
+        command
+    }
+
+    fn station(&self) -> Process {
+        let args = ["run", "tank.toml", "--log", "-", "--port", "L1=/dev/none", "--history", "tank.duckdb"];
+        Process::start(&mut self.command(&args))
+    }
+
+    /// Whether a report is verified, and what is said of it.
+    fn verified(&self, name: &str, args: &[&str]) -> (bool, String) {
+        let file = self.folder.path().join("reports").join(name).display().to_string();
+        let verified = self.command(&[&["report", "verify", &file, "tank.toml"], args].concat()).output();
+        let verified = verified.expect("it runs");
+        (verified.status.success(), String::from_utf8_lossy(&[verified.stdout, verified.stderr].concat()).into_owned())
+    }
+
+    fn names(&self) -> BTreeSet<String> {
+        let entries = fs::read_dir(self.folder.path().join("reports")).into_iter().flatten().flatten();
+        entries.map(|entry| entry.file_name().into_string().expect("a plain name")).collect()
+    }
+
+    /// The files that there must be, in the order in which they are made.
+    fn reports(&self) -> Vec<String> {
+        let days = (0..DAYS).map(|day| self.first + SignedDuration::from_hours(24 * day));
+        days.flat_map(|day| FORMATS.map(|(_, ending)| format!("{day}-day.{ending}"))).collect()
+    }
+}
+
+/// A file that is there under its name is whole at any instant.
+fn check_whole(folder: &Path, names: &BTreeSet<String>) {
+    for name in names.iter().filter(|name| name.ends_with(".sha256")) {
+        let checked = Command::new("sha256sum").args(["--check", "--status", name]).current_dir(folder).status();
+        assert!(checked.expect("sha256sum").success(), "{name}");
+    }
+}
+
+#[test]
+fn a_station_killed_while_it_writes_makes_each_report_once() {
+    let place = Place::new();
+    let reports = place.folder.path().join("reports");
+    for kill in 0..KILLS {
+        let mut station = place.station();
+        // Alternately after a report, and while the next is on its way to the disk.
+        station.wait_for("report written");
+        let before = place.names();
+        let next = || (0..LOOKS_MAX).any(|_| place.names() != before);
+        assert!(kill % 2 == 0 || next(), "no further report");
+        station.signal("KILL");
+        assert_eq!(station.end(), None);
+        check_whole(&reports, &place.names());
+    }
+    let expected = place.reports();
+    assert!(place.names().len() < 2 * expected.len(), "it was killed before it had made all");
+    let mut station = place.station();
+    station.wait_for(&format!("report written file=\"{}\"", reports.join(expected.last().expect("reports")).display()));
+    // What is written is on record a moment later: the station says so itself.
+    let last = expected.last().expect("reports");
+    let is_on_record = || place.verified(last, &[]).1.contains("automatic report day");
+    assert!((0..VERIFIED_MAX).any(|_| is_on_record()), "{last} does not come on record");
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0), "{:?}", station.said);
+
+    let all = expected.iter().flat_map(|name| [name.clone(), format!("{name}.sha256")]);
+    assert_eq!(place.names(), all.collect());
+    check_whole(&reports, &place.names());
+    for name in &expected {
+        let (is_verified, said) = place.verified(name, &["--history", "tank.duckdb"]);
+        assert!(is_verified, "{said}");
+        assert!(said.contains("automatic report day") && said.contains("exported by station"), "{said}");
+    }
+    let sql = "SELECT count(*) AS n FROM report WHERE event = 'made' AND period = 'day'";
+    let listed =
+        place.command(&["sql", "tank.toml", sql, "--csv", "--history", "tank.duckdb"]).output().expect("it runs");
+    assert_eq!(String::from_utf8_lossy(&listed.stdout), format!("n\n{}\n", expected.len()));
+    let db = duckdb::Connection::open(place.folder.path().join("tank.duckdb")).expect("the history");
+    let count = |query: &str| db.query_row(query, [], |row| row.get::<_, usize>(0)).expect("a count");
+    assert_eq!(count("SELECT count(*) FROM report WHERE event = 'made'"), expected.len());
+    let exports = "SELECT count(*) FROM operator_action WHERE action = 'export' AND outcome = 'done'";
+    let files = "SELECT count(DISTINCT target) FROM operator_action WHERE action = 'export' AND outcome = 'done'";
+    assert_eq!(count(exports), count(files), "what was found after a kill is no second export");
+}
