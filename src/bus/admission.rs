@@ -12,7 +12,8 @@ use super::{
 };
 use crate::plant::{
     admission::{Admission, DeadDevice, OverloadInterval, PollWords, Schedulability, Warning},
-    def::{DeviceId, Framing, LineDef, LineId, Parity, PlantDef, Transport},
+    def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Parity, PlantDef, Transport},
+    device_time::{DeviceTime, SeenTime},
     tag::{Poll, PollClass},
 };
 
@@ -112,14 +113,24 @@ struct Load {
     words: PollWords,
 }
 
-/// Tests the plan of a line, the whole of it and with each device dead.
+/// Tests the plan of a line, the whole of it and with each device dead, before any device has answered.
 pub fn admit(def: &PlantDef, line: LineId, blocks: &[Block]) -> Admission {
-    admit_as(def, def.line(line), blocks)
+    admit_as(def, def.line(line), blocks, &unseen)
 }
 
-/// The same with other settings of the line than those of the plant.
-pub fn admit_as(def: &PlantDef, line: &LineDef, blocks: &[Block]) -> Admission {
-    let loads = loads(def, line, blocks);
+/// What counts as the time of a device that has not answered yet.
+pub fn unseen(device: &DeviceDef) -> DeviceTime {
+    DeviceTime::new(device.response_time, SeenTime::default())
+}
+
+/// The same with other settings of the line than those of the plant, and the times that its devices have taken.
+pub fn admit_as(
+    def: &PlantDef,
+    line: &LineDef,
+    blocks: &[Block],
+    time_of: &dyn Fn(&DeviceDef) -> DeviceTime,
+) -> Admission {
+    let loads = loads(def, line, blocks, time_of);
     let all: Vec<&Load> = loads.iter().collect();
     let critical: Vec<&Load> = loads.iter().filter(|load| load.class == PollClass::Critical).collect();
     let utilisation = load_of(&all);
@@ -135,10 +146,11 @@ pub fn admit_as(def: &PlantDef, line: &LineDef, blocks: &[Block]) -> Admission {
     }
 }
 
-fn loads(def: &PlantDef, line: &LineDef, blocks: &[Block]) -> Vec<Load> {
+fn loads(def: &PlantDef, line: &LineDef, blocks: &[Block], time_of: &dyn Fn(&DeviceDef) -> DeviceTime) -> Vec<Load> {
     let load = |block: &Block| {
         let Poll::Every(period) = block.poll else { return None };
-        let cost = cost(block, line, def.device(block.device));
+        let device = def.device(block.device);
+        let cost = cost(block, line, device, time_of(device));
         let words = PollWords { name: name_of(def, block), period, cost };
         Some(Load { device: block.device, class: block.class, words })
     };

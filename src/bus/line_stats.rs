@@ -6,16 +6,17 @@ use jiff::Timestamp;
 
 use super::{
     admission,
-    plan::{self, Block},
+    plan::{self, Block, Wire},
     schedule::{Load, PollInfo},
 };
 use crate::plant::{
     PlantDef,
     admission::Admission,
-    def::{DeviceId, LineDef, LineId, TagId},
+    def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
+    device_time::{DeviceTime, SeenTime},
     event::{Fault, LineCounters},
     line_report::{LineReport, PollReport},
-    request_stats::RequestStats,
+    request_stats::{RequestStats, Spread},
     traffic::{Frame, Frames},
 };
 
@@ -47,6 +48,9 @@ pub struct LineStats {
     /// By block of the plan.
     polls: Vec<RequestStats>,
     devices: Vec<(DeviceId, RequestStats)>,
+    /// What each of them has taken for a response since the start.
+    seen: Vec<(DeviceId, SeenTime)>,
+    dispatch: Spread,
     busy: VecDeque<f32>,
     /// Seconds that the line was busy, of how many, since the last was closed.
     open: (f32, f32),
@@ -54,20 +58,25 @@ pub struct LineStats {
     missed: u64,
     frames: Frames,
     admission: Admission,
+    /// The times of the devices that it counts with.
+    admitted: Vec<(DeviceId, DeviceTime)>,
 }
 
 impl LineStats {
     /// Zero counters for a plan.
     pub fn new(def: &PlantDef, line: LineId, blocks: &[Block]) -> LineStats {
-        let devices = def.devices.iter().filter(|device| device.line == line);
+        let devices: Vec<_> = def.devices.iter().filter(|device| device.line == line).collect();
         LineStats {
             polls: vec![RequestStats::default(); blocks.len()],
-            devices: devices.map(|device| (device.id, RequestStats::default())).collect(),
+            devices: devices.iter().map(|device| (device.id, RequestStats::default())).collect(),
+            seen: devices.iter().map(|device| (device.id, SeenTime::default())).collect(),
+            dispatch: Spread::default(),
             busy: VecDeque::new(),
             open: (0.0, 0.0),
             missed: 0,
             frames: Frames::default(),
             admission: admission::admit(def, line, blocks),
+            admitted: devices.iter().map(|device| (device.id, admission::unseen(device))).collect(),
         }
     }
 
@@ -93,6 +102,37 @@ impl LineStats {
         for stats in index.and_then(|index| self.polls.get_mut(index)).into_iter().chain(of_device) {
             stats.count(outcome, response_time);
             stats.retries += u64::from(tries.saturating_sub(1));
+        }
+    }
+
+    /// A good read was on the wire for so long, from the first byte of the request to the last of the answer.
+    pub fn took(&mut self, index: Option<usize>, block: &Block, wire: Wire, on_wire: Duration) {
+        let frames = wire.frames(block.table, u32::from(block.count));
+        if let Some((_, seen)) = self.seen.iter_mut().find(|(id, _)| *id == block.device) {
+            seen.add(on_wire.saturating_sub(frames));
+        }
+        if let Some(stats) = index.and_then(|index| self.polls.get_mut(index)) {
+            stats.read_time.add(on_wire + wire.silent_interval);
+        }
+    }
+
+    /// The task ran so long after the moment that it waited for.
+    pub fn dispatched(&mut self, late: Duration) {
+        self.dispatch.add(late);
+    }
+
+    /// What a device takes for a response.
+    fn time_of(&self, device: &DeviceDef) -> DeviceTime {
+        let seen = self.seen.iter().find(|(id, _)| *id == device.id).map(|(_, seen)| *seen);
+        DeviceTime::new(device.response_time, seen.unwrap_or_default())
+    }
+
+    /// The admission test again, if a device has taken longer than it counts with.
+    pub fn admit_as_seen(&mut self, def: &PlantDef, settings: &LineDef, blocks: &[Block]) {
+        let counted =
+            |(device, admitted): &(DeviceId, DeviceTime)| self.time_of(def.device(*device)).bound == admitted.bound;
+        if !self.admitted.iter().all(counted) {
+            self.admit(def, settings, blocks);
         }
     }
 
@@ -124,6 +164,12 @@ impl LineStats {
         }
     }
 
+    /// The line has other settings: what reads have taken before is not measured against their worst case.
+    pub fn forget_times(&mut self) {
+        self.polls.iter_mut().for_each(|stats| stats.read_time = Spread::default());
+        self.seen.iter_mut().for_each(|(_, seen)| *seen = SeenTime::default());
+    }
+
     /// Nothing is connected: nothing is busy.
     pub fn rest(&mut self, counters: &mut LineCounters) {
         self.busy.clear();
@@ -142,7 +188,12 @@ impl LineStats {
 
     /// The plan or the settings have changed: can all polls still be in time?
     pub fn admit(&mut self, def: &PlantDef, settings: &LineDef, blocks: &[Block]) {
-        self.admission = admission::admit_as(def, settings, blocks);
+        self.admission = admission::admit_as(def, settings, blocks, &|device| self.time_of(device));
+        self.admitted = self.device_times(def);
+    }
+
+    fn device_times(&self, def: &PlantDef) -> Vec<(DeviceId, DeviceTime)> {
+        self.seen.iter().map(|(device, _)| (*device, self.time_of(def.device(*device)))).collect()
     }
 
     /// Adds the latest frames, and writes the counters that are kept here.
@@ -169,8 +220,10 @@ impl LineStats {
             count: block.count,
             tags: block.tags.clone(),
             poll: block.poll,
-            cost: plan::cost(block, settings, def.device(block.device)),
-            measured: polls.get(index).and_then(|poll| poll.measured),
+            cost: {
+                let device = def.device(block.device);
+                plan::cost(block, settings, device, self.time_of(device))
+            },
             next: polls.get(index).and_then(|poll| poll.next),
             stats: stats.clone(),
         };
@@ -183,6 +236,8 @@ impl LineStats {
             counters,
             polls: blocks.iter().zip(&self.polls).enumerate().map(poll).collect(),
             devices: self.devices.clone(),
+            device_times: self.device_times(def),
+            dispatch: self.dispatch.clone(),
             busy: self.busy.iter().copied().collect(),
             frames: self.frames.clone(),
         })

@@ -57,6 +57,11 @@ fn describe(def: &PlantDef, line: LineId) -> Vec<String> {
             .into(),
     ];
     text.extend(blocks.iter().map(|block| block_words(def, line, block)));
+    let devices = def.devices.iter().filter(|device| device.line == line.id);
+    text.extend(devices.map(|device| {
+        let time = admission::unseen(device);
+        format!("  {} takes at most {} ms for a response ({})", device.name, time.bound.as_millis(), time.source)
+    }));
     let admission = admission::admit(def, line.id, &blocks);
     let cycle = admission.cycle.as_secs_f64() * 1e3;
     // The sum of nothing is -0.
@@ -72,7 +77,7 @@ fn block_words(def: &PlantDef, line: &LineDef, block: &Block) -> String {
     let device = def.device(block.device);
     let function = block.table.read_fc();
     let last = block.address + (block.count - 1);
-    let cost = plan::cost(block, line, device).as_secs_f64();
+    let cost = plan::cost(block, line, device, admission::unseen(device)).as_secs_f64();
     let (every, share) = match block.poll {
         Poll::Every(period) => {
             let period = period.as_secs_f64();
@@ -139,6 +144,7 @@ mod tests {
             "31001–31008",
             "utilisation",
             "every poll meets its period",
+            "TIC-1 takes at most 20 ms for a response (assumed)",
             "with TIC-1 dead: a probe of 312.0 ms",
             "warning: no parity and one stop bit",
         ] {

@@ -151,6 +151,8 @@ pub struct DeviceDef {
     pub gap: Duration,
     /// Quiet time after a write before the next request.
     pub write_gap: Duration,
+    /// The longest that it takes itself for a response, as its profile states it.
+    pub response_time: Option<Duration>,
     /// Which tags play PV, SV and so on, if it is a controller.
     pub faceplate: Option<Faceplate>,
     /// Actions that are more than a write (save to non-volatile memory).
@@ -177,6 +179,7 @@ impl DeviceDef {
             functions: Vec::new(),
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
+            response_time: None,
             faceplate: None,
             actions: Vec::new(),
             program: None,

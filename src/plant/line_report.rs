@@ -7,10 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     admission::Admission,
+    device_time::DeviceTime,
     event::LineCounters,
     id::{DeviceId, TagId},
     line::LineDef,
-    request_stats::RequestStats,
+    request_stats::{RequestStats, Spread},
     tag::{Poll, PollClass, Table},
     traffic::Frames,
 };
@@ -34,6 +35,10 @@ pub struct LineReport {
     pub admission: Admission,
     /// What each device of the line has answered.
     pub devices: Vec<(DeviceId, RequestStats)>,
+    /// What each of them takes itself for a response, as the worst case of its polls counts it.
+    pub device_times: Vec<(DeviceId, DeviceTime)>,
+    /// How late the line task was where it waited for the next poll: what the program and its computer add.
+    pub dispatch: Spread,
     /// Busy share of each of the last seconds, newest last, at most 60.
     pub busy: Vec<f32>,
     /// The latest frames.
@@ -56,6 +61,8 @@ impl LineReport {
             strain: None,
             admission: Admission::of_nothing(settings.id),
             devices: Vec::new(),
+            device_times: Vec::new(),
+            dispatch: Spread::default(),
             busy: Vec::new(),
             frames: Frames::default(),
             settings,
@@ -70,6 +77,11 @@ impl LineReport {
     /// When a device that does not answer is asked next.
     pub fn retry_at(&self, id: DeviceId) -> Option<Timestamp> {
         self.retries.iter().find(|(device, _)| *device == id).map(|(_, at)| *at)
+    }
+
+    /// What a device takes itself for a response.
+    pub fn device_time(&self, id: DeviceId) -> Option<DeviceTime> {
+        self.device_times.iter().find(|(device, _)| *device == id).map(|(_, time)| *time)
     }
 
     /// What a device has answered.
@@ -93,10 +105,8 @@ pub struct PollReport {
     pub tags: Arc<[TagId]>,
     /// How often.
     pub poll: Poll,
-    /// Worst time of a good read on the wire.
+    /// Worst time of a good read: on the wire, with the device's own time and the silences.
     pub cost: Duration,
-    /// What its answered reads have really taken of late (plant time); `None` before the first.
-    pub measured: Option<Duration>,
     /// What happens to it when the line has too much to do.
     pub class: PollClass,
     /// Its period is stretched to so many now; 1 is not at all.
@@ -107,4 +117,14 @@ pub struct PollReport {
     pub next: Option<Timestamp>,
     /// Counters.
     pub stats: RequestStats,
+}
+
+impl PollReport {
+    /// What was left of the period at the worst that was seen: the longest delay and the longest read. `None` before the first
+    /// read, and for a block that has no period; zero if nothing was left.
+    pub fn margin(&self) -> Option<Duration> {
+        let Poll::Every(period) = self.poll else { return None };
+        let used = self.stats.read_time.max()? + self.stats.jitter.max().unwrap_or_default();
+        Some(period.saturating_sub(used))
+    }
 }

@@ -34,6 +34,7 @@ pub mod parameter_set;
 pub(crate) mod admission;
 pub mod event;
 pub mod request_stats;
+pub mod device_time;
 pub mod line_report;
 pub(crate) mod line_minute;
 pub mod diagnostics;

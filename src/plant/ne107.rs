@@ -6,6 +6,7 @@ use std::{fmt, time::Duration};
 use serde::{Deserialize, Serialize};
 
 use super::{
+    device_time::DeviceTime,
     event::{ExceptionCode, LineState},
     keyword::keyword_enum,
     request_stats::RequestStats,
@@ -59,6 +60,13 @@ pub enum Reason {
         /// How long is waited for an answer.
         timeout: Duration,
     },
+    /// It takes longer itself than its profile states: the worst case of its polls is no longer what it was at load.
+    AboveStated {
+        /// So long of late.
+        lately: Duration,
+        /// What the profile states.
+        stated: Duration,
+    },
     /// Too many of the latest requests failed.
     Failing {
         /// So many.
@@ -87,7 +95,7 @@ impl Reason {
         match self {
             Reason::NotConnected | Reason::Down | Reason::NoValues => Signal::Failure,
             Reason::LineClosed | Reason::LineTesting | Reason::Settling => Signal::FunctionCheck,
-            Reason::Slow { .. } | Reason::Failing { .. } => Signal::OutOfSpecification,
+            Reason::Slow { .. } | Reason::AboveStated { .. } | Reason::Failing { .. } => Signal::OutOfSpecification,
             Reason::Corrupt { .. } | Reason::Late(_) | Reason::MemoryParity(_) => Signal::Maintenance,
         }
     }
@@ -105,6 +113,11 @@ impl fmt::Display for Reason {
                 "responses take {p99} of {timeout} ms",
                 p99 = p99.as_millis(),
                 timeout = timeout.as_millis()
+            )),
+            Reason::AboveStated { lately, stated } => f.write_str(&t!(
+                "takes {lately} ms for a response, its profile states {stated} ms",
+                lately = lately.as_millis(),
+                stated = stated.as_millis()
             )),
             Reason::Failing { failed, of } => f.write_str(&t!("{failed} of {of} requests failed", failed, of)),
             Reason::NoValues => f.write_str(t!("responds without valid values")),
@@ -130,6 +143,8 @@ pub struct DiagnosisInput<'a> {
     pub lately: &'a RequestStats,
     /// How long is waited for an answer.
     pub timeout: Duration,
+    /// What it takes itself, as far as known.
+    pub time: Option<DeviceTime>,
 }
 
 /// Fewer requests than these say nothing about shares.
@@ -159,7 +174,12 @@ pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
         DeviceState::Down { .. } => Some(Reason::Down),
         DeviceState::Unknown => None,
         DeviceState::Responding | DeviceState::Failing(_) => {
-            out_of_specification(input.lately, input.timeout).or_else(|| maintenance(input.lately))
+            let above_stated = || {
+                let time = input.time?;
+                Some(Reason::AboveStated { lately: time.lately?, stated: time.broken_promise()? })
+            };
+            let out_of_specification = out_of_specification(input.lately, input.timeout).or_else(above_stated);
+            out_of_specification.or_else(|| maintenance(input.lately))
         }
     }
 }
@@ -199,7 +219,7 @@ mod tests {
     use jiff::Timestamp;
 
     use super::*;
-    use crate::plant::event::Fault;
+    use crate::plant::{device_time::SeenTime, event::Fault};
 
     const UP: DeviceState = DeviceState::Responding;
     const DOWN: DeviceState = DeviceState::Down { since: Timestamp::UNIX_EPOCH };
@@ -218,9 +238,28 @@ mod tests {
 
     fn check(line: &LineState, device: DeviceState, settling: bool, lately: &RequestStats, expect: &str) {
         let timeout = Duration::from_millis(300);
-        let reason = evaluate(DiagnosisInput { device, line, settling, lately, timeout });
+        let reason = evaluate(DiagnosisInput { device, line, settling, lately, timeout, time: None });
         let words = reason.map(|reason| format!("{} {reason}", reason.signal().word()));
         assert_eq!(words.as_deref().unwrap_or(""), expect);
+    }
+
+    #[test]
+    fn a_device_slower_than_stated_is_out_of_specification() {
+        let ms = Duration::from_millis;
+        let of = |times: [u64; 3]| {
+            let mut seen = SeenTime::default();
+            times.iter().for_each(|time| seen.add(ms(*time)));
+            evaluate(DiagnosisInput {
+                device: UP,
+                line: &LineState::Connected,
+                settling: false,
+                lately: &stats(30, 12, &[]),
+                timeout: ms(300),
+                time: Some(DeviceTime::new(Some(ms(30)), seen)),
+            })
+        };
+        assert_eq!(of([10, 90, 10]), None, "one slow response");
+        assert_eq!(of([45, 45, 45]), Some(Reason::AboveStated { lately: ms(45), stated: ms(30) }));
     }
 
     #[test]

@@ -30,6 +30,9 @@ pub struct RequestStats {
     pub late: u64,
     /// From the last byte sent to the first byte received.
     pub response_time: Spread,
+    /// What good reads of a poll have taken of the line's time, from the first byte sent to the end of the silence behind
+    /// the answer: what the worst case bounds. Empty for a device or a line.
+    pub read_time: Spread,
     /// How long after its point of the grid a poll was sent.
     pub jitter: Spread,
     /// Releases of the poll that were skipped because the line had no time.
@@ -94,6 +97,7 @@ impl RequestStats {
             retries: self.retries.saturating_sub(before.retries),
             late: self.late.saturating_sub(before.late),
             response_time: self.response_time.since(&before.response_time),
+            read_time: self.read_time.since(&before.read_time),
             jitter: self.jitter.since(&before.jitter),
             missed: self.missed.saturating_sub(before.missed),
             recent: self.recent & 1u64.checked_shl(requests.min(64) as u32).map_or(u64::MAX, |bit| bit - 1),
@@ -189,8 +193,17 @@ impl Spread {
 
     /// 99 of 100 were not longer than this (the upper end of a bucket, at most a fifth too much).
     pub fn p99(&self) -> Option<Duration> {
+        self.percentile(99)
+    }
+
+    /// Half of them were not longer than this (to a fifth, as [`Spread::p99`]).
+    pub fn median(&self) -> Option<Duration> {
+        self.percentile(50)
+    }
+
+    fn percentile(&self, percent: u64) -> Option<Duration> {
         let total: u64 = self.buckets.iter().map(|count| u64::from(*count)).sum();
-        let rank = (total * 99).div_ceil(100);
+        let rank = (total * percent).div_ceil(100);
         let mut seen = 0;
         let bucket = self.buckets.iter().position(|count| {
             seen += u64::from(*count);

@@ -110,17 +110,22 @@ fn short_name(raw: &Raw) -> (String, Span) {
     }
 }
 
+/// What a device needs of time.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Timing {
+    /// See [`crate::plant::def::DeviceDef`].
+    pub gap: Duration,
+    pub write_gap: Duration,
+    pub response_time: Option<Duration>,
+}
+
 /// What the device and its profile say about requests, over the limits of the standard.
-pub(super) fn limits(
-    device: &DeviceTable,
-    profile: &ProfileFile,
-    problems: &mut Problems,
-) -> (Limits, Duration, Duration) {
+pub(super) fn limits(device: &DeviceTable, profile: &ProfileFile, problems: &mut Problems) -> (Limits, Timing) {
     let layers: Vec<Raw> =
         [&device.limits, &profile.limits].into_iter().flatten().map(|raw| raw.value.clone()).collect();
     let standard = Limits::STANDARD;
     if layers.is_empty() {
-        return (standard, Duration::ZERO, Duration::ZERO);
+        return (standard, Timing::default());
     }
     let table = LimitsTable::of(&layers, problems);
     let mut within = |value: Option<At<u16>>, default: u16, word: &str| {
@@ -146,8 +151,17 @@ pub(super) fn limits(
     if let Some(count) = table.in_flight_max.filter(|count| !(1..=64).contains(&count.value)) {
         problems.add(count.at, format!("in_flight_max = {} is not possible", count.value)).label("expected 1 to 64");
     }
-    let millis = |value: Option<At<u16>>| Duration::from_millis(value.map_or(0, |value| u64::from(value.value)));
-    (limits, millis(table.request_gap_ms), millis(table.write_gap_ms))
+    if let Some(time) = table.response_time_ms.filter(|time| !(1..=10_000).contains(&time.value)) {
+        let problem = problems.add(time.at, format!("response_time_ms = {} is not possible", time.value));
+        problem.label("expected 1 to 10000");
+    }
+    let millis = |value: Option<At<u16>>| value.map(|value| Duration::from_millis(u64::from(value.value)));
+    let timing = Timing {
+        gap: millis(table.request_gap_ms).unwrap_or_default(),
+        write_gap: millis(table.write_gap_ms).unwrap_or_default(),
+        response_time: millis(table.response_time_ms),
+    };
+    (limits, timing)
 }
 
 /// The function codes that the profile lists, against those that its tags need.

@@ -261,7 +261,7 @@ fn define_device<'a>(
     problems: &mut Problems,
 ) -> (DeviceDef, DeviceContext<'a>) {
     let ResolvedDevice { name, table, profile } = known;
-    let (limits, gap, write_gap) = device::limits(table, profile, problems);
+    let (limits, timing) = device::limits(table, profile, problems);
     let def = DeviceDef {
         id,
         name: (*name).to_owned(),
@@ -273,8 +273,9 @@ fn define_device<'a>(
         model: format!("{} {}", text(&profile.vendor), text(&profile.model)).trim().to_owned(),
         limits,
         functions: Vec::new(),
-        gap,
-        write_gap,
+        gap: timing.gap,
+        write_gap: timing.write_gap,
+        response_time: timing.response_time,
         faceplate: None,
         actions: Vec::new(),
         program: None,

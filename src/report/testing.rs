@@ -71,6 +71,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             functions: Vec::new(),
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
+            response_time: None,
             faceplate: Some(Faceplate {
                 pv: TagId(0),
                 sv: TagId(1),

@@ -2,11 +2,15 @@
 
 use std::time::Duration;
 
-use super::{Block, DeviceDef, PlantDef, TagDef, UnreadableRanges, cost, single};
+use super::{Block, DeviceDef, PlantDef, TagDef, UnreadableRanges, Wire, single};
 
 /// Wire time of one read of each block.
 pub fn wire_time(def: &PlantDef, blocks: &[Block]) -> Duration {
-    blocks.iter().map(|block| cost(block, def.line(def.device(block.device).line), def.device(block.device))).sum()
+    let of_block = |block: &Block| {
+        let device = def.device(block.device);
+        Wire::new(def.line(device.line), device).read(block.table, u32::from(block.count))
+    };
+    blocks.iter().map(of_block).sum()
 }
 
 /// Tags of one device, table and period, by address: what is cut.

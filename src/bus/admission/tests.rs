@@ -83,6 +83,7 @@ fn a_plant_that_fits_has_its_cycle_and_its_dead_units() {
 #[test]
 fn a_long_poll_in_the_way_of_a_fast_one_is_named() {
     let mut def = fixture::plant();
+    def.devices.iter_mut().for_each(|device| device.response_time = Some(Duration::from_millis(1)));
     def.tags[fixture::RUN.index()].poll = Poll::Every(Duration::from_millis(30));
     def.tags[fixture::PV.index()].poll = Poll::Every(Duration::from_millis(200));
     let admission = admit(&def, LineId(0), &blocks(&def, LineId(0), &UnreadableRanges::default()));

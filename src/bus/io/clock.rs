@@ -105,6 +105,11 @@ impl Clock {
         plant.div_f64(self.speed)
     }
 
+    /// The plant time in which a span of real time passes.
+    pub fn plant_span(&self, real: Duration) -> Duration {
+        real.mul_f64(self.speed)
+    }
+
     /// Sleeps until a moment of plant time; returns at once if it has passed.
     pub async fn sleep_until(&self, at: Timestamp) {
         let ahead = elapsed(self.base, at);

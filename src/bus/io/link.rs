@@ -86,6 +86,8 @@ pub struct Link {
     pub last: Option<Arc<Exchange>>,
     /// Real time in which the line was busy.
     busy: Duration,
+    /// Of the last exchange on a line without transaction ids.
+    took: Duration,
 }
 
 impl Link {
@@ -106,6 +108,7 @@ impl Link {
             unanswered: 0,
             last: None,
             busy: Duration::ZERO,
+            took: Duration::ZERO,
             wire,
         }
     }
@@ -163,7 +166,9 @@ impl Link {
             received.answer = Err(Fault::OutOfSync);
         }
         self.asked = None;
-        self.busy += started.elapsed();
+        let took = started.elapsed();
+        self.busy += took;
+        self.took = self.wire.clock().plant_span(took);
         let rest = if message.first() == Some(&0) {
             sent_at.saturating_duration_since(Instant::now()) + self.turnaround
         } else {
@@ -219,6 +224,12 @@ impl Link {
     /// See [`crate::bus::late_reply::LineReplies::must_wait`].
     pub fn must_wait(&self, message: &[u8]) -> bool {
         self.wire.replies.must_wait(message)
+    }
+
+    /// Plant time of the last exchange on a line without transaction ids, from the first byte of the request to the last of
+    /// the answer.
+    pub fn took(&self) -> Duration {
+        self.took
     }
 
     /// How long an answer may take.

@@ -244,7 +244,10 @@ impl Task<'_> {
             request = self.requests.recv() => request?,
             () = live => return Ok(()),
             ended = link.listen() => return ended.map_err(LinkExit::from),
-            () = self.clock.sleep_until(until) => return Ok(()),
+            () = self.clock.sleep_until(until) => {
+                self.stats.dispatched(elapsed(until, self.clock.now()));
+                return Ok(());
+            }
         };
         self.serve_request(link, schedule, request).await
     }
@@ -305,6 +308,7 @@ impl Task<'_> {
     /// Other settings, for as long as the station runs or until they are taken back.
     fn configure(&mut self, settings: LineDef) {
         tracing::info!(line = settings.name, transport = %settings.transport, "other settings");
+        self.stats.forget_times();
         self.stats.admit(&self.def, &settings, &self.blocks);
         self.connector.retarget(&settings.transport);
         self.settings = settings;
@@ -318,6 +322,7 @@ impl Task<'_> {
         self.stats.spent(busy / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
         self.stats.late(&self.def, &link.take_late());
         self.stats.add_frames(link.take_frames(), link.counters());
+        self.stats.admit_as_seen(&self.def, &self.settings, &self.blocks);
         (self.memory, self.closed_at) = (link.memory(), now);
     }
 

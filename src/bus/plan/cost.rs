@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::Block;
 use crate::plant::{
     def::{DeviceDef, Framing, LineDef, Transport},
+    device_time::DeviceTime,
     tag::Table,
 };
 
@@ -60,9 +61,19 @@ impl Wire {
         Wire { request: frame(REQUEST), turnaround, answer: frame(ANSWER), byte: character * per_byte, silent_interval }
     }
 
+    /// The same with a device that takes its own time. The plan does not count it: it is the same for each request.
+    pub fn with_device(self, time: DeviceTime) -> Wire {
+        Wire { turnaround: self.turnaround.max(time.bound), ..self }
+    }
+
+    /// Request and answer of a read, without what lies between and behind them.
+    pub fn frames(self, table: Table, count: u32) -> Duration {
+        self.request + self.answer + self.byte * data_bytes(table, count)
+    }
+
     /// A good read of so many registers or bits.
     pub fn read(self, table: Table, count: u32) -> Duration {
-        self.request + self.turnaround + self.answer + self.byte * data_bytes(table, count) + self.silent_interval
+        self.frames(table, count) + self.turnaround + self.silent_interval
     }
 
     /// A read that is not answered, with all its retries.
@@ -76,7 +87,7 @@ pub fn data_bytes(table: Table, count: u32) -> u32 {
     if table.is_bits() { count.div_ceil(8) } else { 2 * count }
 }
 
-/// Worst time that a good read takes on its line, the silences around it and the device's own gap included.
-pub fn cost(block: &Block, line: &LineDef, device: &DeviceDef) -> Duration {
-    Wire::new(line, device).read(block.table, u32::from(block.count))
+/// Worst time that a good read takes on its line, the device's own time, its gap and the silences included.
+pub fn cost(block: &Block, line: &LineDef, device: &DeviceDef, time: DeviceTime) -> Duration {
+    Wire::new(line, device).with_device(time).read(block.table, u32::from(block.count))
 }

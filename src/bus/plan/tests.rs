@@ -41,10 +41,10 @@ fn serial_line(baud: u32, stop_bits: u8, framing: Framing) -> Transport {
 #[test]
 fn costs_are_those_of_the_wire() {
     let mut def = fixture::plant();
-    let mut block = blocks(&def, LineId(0), &UnreadableRanges::default()).remove(0);
+    let block = blocks(&def, LineId(0), &UnreadableRanges::default()).remove(0);
     let tcp = |framing| Transport::Tcp { host: "plc".into(), port: 502, framing };
     for (transport, words, ms) in [
-        (serial_line(9600, 2, Framing::Rtu), 1, 25.2),
+        (serial_line(9600, 2, Framing::Rtu), 1u16, 25.2),
         (serial_line(9600, 2, Framing::Rtu), 10, 45.8),
         (serial_line(9600, 2, Framing::Rtu), 32, 96.2),
         (serial_line(9600, 2, Framing::Rtu), 125, 309.4),
@@ -56,8 +56,8 @@ fn costs_are_those_of_the_wire() {
         (tcp(Framing::Rtu), 125, 1.0 + (8.0 + 5.0 + 250.0) * 80e-6),
     ] {
         def.lines[0].transport = transport;
-        block.count = words;
-        let cost = cost(&block, &def.lines[0], &def.devices[0]).as_secs_f64() * 1e3;
+        let wire = Wire::new(&def.lines[0], &def.devices[0]);
+        let cost = wire.read(block.table, u32::from(words)).as_secs_f64() * 1e3;
         assert!((cost - ms).abs() < 0.06, "{}, {words} words: {cost} ms, expected {ms}", def.lines[0].transport);
     }
 }

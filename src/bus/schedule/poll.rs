@@ -48,8 +48,6 @@ pub struct PollInfo {
     pub next: Option<Timestamp>,
     /// Releases that were skipped because the line had no time.
     pub missed: u64,
-    /// Measured time of an answered read, smoothed; `None` before the first.
-    pub measured: Option<Duration>,
 }
 
 /// How a poll is treated.
@@ -169,10 +167,6 @@ impl ScheduledPoll {
     pub fn spent(&mut self, time: Duration) {
         let spent = time.as_secs_f64();
         self.cost = Some(self.cost.map_or(spent, |cost| cost + (spent - cost) / 8.0));
-    }
-
-    pub fn measured(&self) -> Option<Duration> {
-        self.cost.map(Duration::from_secs_f64)
     }
 
     /// Does it come too late again and again?

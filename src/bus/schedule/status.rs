@@ -34,7 +34,6 @@ impl Schedule {
             shed: pace == Pace::Shed,
             next: poll.wanted(),
             missed: poll.missed,
-            measured: poll.measured(),
         }
     }
 

@@ -50,7 +50,9 @@ impl Plant {
             let lately = report.map(|report| tracker.lately(report, def.id)).unwrap_or_default();
             let timeout = report.map_or(self.def.line(def.line).timeout, |report| report.settings.timeout);
             let settling = self.settling(def.id);
-            let input = DiagnosisInput { device: status.state, line: &line.state, settling, lately: &lately, timeout };
+            let time = report.and_then(|report| report.device_time(def.id));
+            let input =
+                DiagnosisInput { device: status.state, line: &line.state, settling, lately: &lately, timeout, time };
             DeviceStatus { diagnosis: ne107::evaluate(input), ..*status }
         };
         self.def.devices.iter().zip(&self.devices).map(diagnosed).collect()

@@ -65,6 +65,8 @@ toml_tables! {
         opt "in_flight_max" in_flight_max: u16,
         opt "request_gap_ms" request_gap_ms: u16,
         opt "write_gap_ms" write_gap_ms: u16,
+        /// The longest that the device itself takes for a response: part of the worst case of its polls.
+        opt "response_time_ms" response_time_ms: u16,
     }
 
     /// A `[[tag]]` of a profile, or a `[[device.tag]]` of a plant file.

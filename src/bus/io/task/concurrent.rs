@@ -117,13 +117,15 @@ impl Task<'_> {
             let ended = self.clock.at(at);
             let device = self.def.device(block.device);
             // It has taken one of the places that there are.
-            let took = elapsed(began, ended) / u32::from(device.limits.in_flight_max.max(1));
+            let places = u32::from(device.limits.in_flight_max.max(1));
+            let took = elapsed(began, ended) / places;
+            let on_wire = self.clock.plant_span(exchange.response_time.unwrap_or_default()) / places;
             if let Some(index) = index {
                 let served = schedule.done(index, began, ended);
                 self.stats.served(index, served.jitter, served.missed);
                 self.keep_gap(link, schedule, &block, ended);
             }
-            let outcome = ReadResult { began, ended, took, answer, exchange: Some(exchange) };
+            let outcome = ReadResult { began, ended, took, on_wire, answer, exchange: Some(exchange) };
             self.finish_poll(link, schedule, index, &block, outcome).await?;
         }
         self.note_late(link, schedule);

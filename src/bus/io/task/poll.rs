@@ -13,7 +13,7 @@ use crate::{
     bus::{
         codec,
         io::link::{Link, LinkError},
-        plan::{self, Block},
+        plan::{self, Block, Wire},
         schedule::Schedule,
     },
     plant::{
@@ -35,6 +35,8 @@ pub(super) struct ReadResult {
     pub ended: Timestamp,
     /// The time of the line that it took.
     pub took: Duration,
+    /// The part of it from the first byte of the request to the last of the answer.
+    pub on_wire: Duration,
     pub answer: Result<ReadValues, Fault>,
     /// The exchange.
     pub exchange: Option<Arc<Exchange>>,
@@ -76,9 +78,9 @@ impl Task<'_> {
             }
         };
         let exchange = link.last.clone();
-        let took = elapsed(began, ended);
-        self.finish_poll(link, schedule, Some(index), &block, ReadResult { began, ended, took, answer, exchange })
-            .await?;
+        let (took, on_wire) = (elapsed(began, ended), link.took());
+        let result = ReadResult { began, ended, took, on_wire, answer, exchange };
+        self.finish_poll(link, schedule, Some(index), &block, result).await?;
         Ok(())
     }
 
@@ -115,13 +117,10 @@ impl Task<'_> {
         schedule: &mut Schedule,
         index: Option<usize>,
         block: &Block,
-        ReadResult { began, ended: at, took, answer, exchange }: ReadResult,
+        ReadResult { began, ended: at, took, on_wire, answer, exchange }: ReadResult,
     ) -> Result<(), LinkExit> {
         let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time);
-        if let Some(exchange) = &exchange {
-            let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
-            self.stats.polled(index, block.device, outcome, response_time, exchange.tries);
-        }
+        self.count_read(index, block, &answer, on_wire, exchange.as_deref());
         let is_answer = match &answer {
             Ok(_) => true,
             Err(Fault::Exception(code)) => !code.is_of_gateway(),
@@ -173,6 +172,24 @@ impl Task<'_> {
                 }
                 Ok(())
             }
+        }
+    }
+
+    /// Counts how a read has ended, and what a good one has taken.
+    fn count_read(
+        &mut self,
+        index: Option<usize>,
+        block: &Block,
+        answer: &Result<ReadValues, Fault>,
+        on_wire: Duration,
+        exchange: Option<&Exchange>,
+    ) {
+        let Some(exchange) = exchange else { return };
+        let outcome = answer.as_ref().map(drop).map_err(|fault| *fault);
+        self.stats.polled(index, block.device, outcome, exchange.response_time, exchange.tries);
+        if outcome.is_ok() {
+            let wire = Wire::new(&self.settings, self.def.device(block.device));
+            self.stats.took(index, block, wire, on_wire);
         }
     }
 

@@ -52,7 +52,6 @@ fn fixture() -> Fixture {
             tags: tags.into(),
             poll: Poll::Every(Duration::from_secs(1)),
             cost: Duration::from_millis(64),
-            measured: Some(Duration::from_millis(61)),
             next: Some(fixture::now() + SignedDuration::from_millis(600)),
             class: crate::plant::tag::PollClass::Normal,
             factor: 1.0,

@@ -128,6 +128,7 @@ fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
         value(cx, t!("worst-case scan time"), &t!("{ms}, measured {measured}", ms = ms(plan.round), measured)),
         value(cx, t!("worst-case load"), &format!("{:.0} %", plan.load * 100.0)),
         count(cx, t!("missed"), report.counters.missed, missed_lately(report)),
+        value(cx, t!("dispatch p99"), &report.dispatch.p99().map_or("–".to_owned(), ms)),
     ];
     flow(t!("cycle"), cx.theme.dim(), width, parts)
 }
@@ -138,7 +139,7 @@ struct Planned {
     blocks: usize,
     /// All of them once, at worst.
     round: Duration,
-    /// What they have taken of late; `None` until each was read.
+    /// What the last read of each has taken; `None` until each was read.
     measured: Option<Duration>,
     /// Share of the line's time at worst.
     load: f64,
@@ -151,7 +152,7 @@ impl Planned {
             let Poll::Every(period) = poll.poll else { continue };
             plan.blocks += 1;
             plan.round += poll.cost;
-            plan.measured = plan.measured.zip(poll.measured).map(|(sum, one)| sum + one);
+            plan.measured = plan.measured.zip(poll.stats.read_time.last()).map(|(sum, one)| sum + one);
             plan.load += poll.cost.as_secs_f64() / period.as_secs_f64();
         }
         plan

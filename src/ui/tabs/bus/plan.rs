@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Rows below the table that describe the selected block.
-const DETAIL: u16 = 5;
+const DETAIL: u16 = 7;
 
 /// Which block is selected.
 #[derive(Debug, Default)]
@@ -186,6 +186,25 @@ pub fn plural<'a>(count: usize, one: &'a str, many: &'a str) -> &'a str {
     if count == 1 { one } else { many }
 }
 
+/// What a read takes at worst, and what reads have taken.
+fn worst_case(report: &LineReport, poll: &PollReport) -> String {
+    let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
+    let device = report.device_time(poll.device);
+    let device =
+        device.map_or(String::new(), |time| t!(" (device {ms}, {source})", ms = ms(time.bound), source = time.source));
+    let read = &poll.stats.read_time;
+    t!(
+        "read at worst {worst}{device}; median {median}, p99 {p99}, max {max} ms; deadline {deadline}, margin {margin} ms",
+        worst = ms(poll.cost),
+        device,
+        median = span(read.median()),
+        p99 = span(read.p99()),
+        max = span(read.max()),
+        deadline = every(poll.poll),
+        margin = span(poll.margin())
+    )
+}
+
 /// All that the table has no room for.
 fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<String> {
     let (device, code, stats) = (cx.def().device(poll.device), poll.table.read_fc(), &poll.stats);
@@ -230,6 +249,7 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
             dead
         ),
     ];
+    lines.push(worst_case(report, poll));
     let fault = poll.tags.iter().find_map(|tag| {
         let exchange = cx.snapshot.source_frames.get(tag.index())?.as_ref()?;
         exchange.outcome.err()
