@@ -240,7 +240,6 @@ fn poll(device: DeviceId) -> PollReport {
         tags: tags_of(device.0).collect::<Vec<_>>().into(),
         poll: Poll::Every(Duration::from_secs(1)),
         cost: Duration::from_millis(50),
-        measured: None,
         class: PollClass::Normal,
         factor: 1.0,
         shed: false,

@@ -11,7 +11,7 @@ use std::{
 
 use jiff::tz::TimeZone;
 use sightglass::{
-    bus::plan::{Block, UnreadableRanges, blocks, cost, single},
+    bus::plan::{Block, UnreadableRanges, Wire, blocks, single},
     plant::{
         PlantDef,
         def::{DeviceDef, DeviceId, Limits, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport},
