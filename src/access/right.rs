@@ -100,6 +100,7 @@ pub fn needs_for_query(query: &Query) -> Role {
         | Query::SampleTime { .. }
         | Query::Reports { .. }
         | Query::Past { .. }
+        | Query::Samples { .. }
         | Query::Unarchived { .. }
         | Query::Overview
         | Query::Report { .. } => Right::View,

@@ -14,6 +14,7 @@ pub use super::{
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Serial, Transport},
     mimic_def::{MimicDef, MimicPage, Picture},
+    north_def::{MqttDef, NorthDef, PasswordSource, TlsRoots},
     report_def::{CsvDialect, Paper, ReportDef, Section},
     role::{Reauthentication, Role},
 };
@@ -62,6 +63,8 @@ pub struct PlantDef {
     pub report: ReportDef,
     /// What the history needs of its disk.
     pub history: HistoryDef,
+    /// Where values are sent to.
+    pub north: NorthDef,
     /// The simulated process that `demo` and `sim` serve for this plant, by name (`tank`).
     pub simulation: Option<String>,
     /// SHA-256 of the plant file in hexadecimal; empty for a plant without one.
@@ -88,6 +91,7 @@ impl Default for PlantDef {
             shifts: Vec::new(),
             report: ReportDef::default(),
             history: HistoryDef::default(),
+            north: NorthDef::default(),
             simulation: None,
             file_sha256: String::new(),
         }

@@ -19,6 +19,7 @@ use super::{
     interlock::ActuatorTracker,
     line_report::LineReport,
     ne107,
+    north_def::NorthStatus,
     number::to_u32,
     parameter_set::StoredSet,
     record::{ChainHash, FirstOut},
@@ -82,6 +83,8 @@ pub struct Snapshot {
     pub tunings: Vec<Option<Arc<Tuning>>>,
     /// How long the program of each device has been where it is, by [`DeviceId`], and whether its beginning was seen.
     pub programs: Vec<Option<(Duration, bool)>>,
+    /// How far the data out has come; `None` for a plant that sends nothing.
+    pub north: Option<Arc<NorthStatus>>,
     /// Plant seconds per real second; 1 except in demonstrations.
     pub speed: f64,
 }
@@ -112,6 +115,7 @@ impl Snapshot {
             restores: Vec::new(),
             tunings: vec![None; devices],
             programs: vec![None; devices],
+            north: None,
             speed: 1.0,
             def,
         }

@@ -41,6 +41,8 @@ keyword_enum! {
         LineTask => "line task restarted",
         /// A report was not made or not delivered.
         Reports => "automatic report fault",
+        /// What is stored has not reached the broker for too long, or the broker refuses it.
+        DataOut => "data out delayed",
     }
 }
 
@@ -65,9 +67,11 @@ impl FaultState {
 impl StationFault {
     fn priority(self) -> Priority {
         match self {
-            StationFault::NotArchived | StationFault::DiskSpace | StationFault::Clock | StationFault::Reports => {
-                Priority::Medium
-            }
+            StationFault::NotArchived
+            | StationFault::DiskSpace
+            | StationFault::Clock
+            | StationFault::Reports
+            | StationFault::DataOut => Priority::Medium,
             _ => Priority::High,
         }
     }
@@ -137,6 +141,11 @@ impl StationFault {
                 "the folder of the reports is full, missing or read-only, or the command after a report fails",
                 "the history has all figures; a report is missing in its folder or at its recipients",
                 "read the details; free the disk or repair the command; what is missing is made automatically",
+            ],
+            StationFault::DataOut => [
+                "the broker or the network is down, it refuses the station, or the history does not record",
+                "the receivers of the values see old ones; nothing is lost, the history has all of them",
+                "read the details; check network, broker, user and password; what is missing is sent automatically",
             ],
         }
     }

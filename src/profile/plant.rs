@@ -12,7 +12,7 @@ use super::{
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
-    program, reader,
+    north, program, reader,
     reader::{At, Node, OptionalKey, Raw, text},
     report,
     schema::{DeviceTable, PlantFile, ProfileFile},
@@ -95,6 +95,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let rules = Rules { shifts: !shifts.is_empty(), is_program: library.is_program };
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, &rules, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
+    let north = north::north(name, file.north.as_ref().map(|north| &north.value), &defs, problems);
     let classes = poll_class::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
     Some(PlantDef {
@@ -112,6 +113,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         shifts,
         report,
         history,
+        north,
         simulation: file.simulation.as_ref().map(|simulation| simulation.value.clone()),
         devices,
         tags,

@@ -39,6 +39,7 @@ toml_tables! {
         list "shift" shifts: ShiftTable,
         opt "report" report: ReportTable,
         opt "history" history: HistoryTable,
+        opt "north" north: NorthTable,
     }
 
     /// A `[[line]]` on a serial port.
@@ -243,6 +244,35 @@ toml_tables! {
         opt "keep_minutes_days" keep_minutes_days: u32,
         opt "keep_hours_days" keep_hours_days: u32,
         opt "parquet" parquet: ParquetVersion,
+    }
+
+    /// Where values are sent to.
+    NorthTable, "the data out" {
+        opt "mqtt" mqtt: MqttTable,
+    }
+
+    /// The `[north.mqtt]`.
+    MqttTable, "the MQTT broker" {
+        need "host" host: String,
+        opt "port" port: u16,
+        opt "client_id" client_id: String,
+        opt "user" user: String,
+        opt "password_file" password_file: String,
+        opt "password_env" password_env: String,
+        opt "tls" tls: bool,
+        opt "ca_file" ca_file: String,
+        opt "topic" topic: String,
+        opt "deadband_percent" deadband_percent: f64,
+        list "deadband" deadbands: DeadbandTable,
+        opt "max_interval" max_interval: Duration,
+        opt "lag_max" lag_max: Duration,
+    }
+
+    /// A `[[north.mqtt.deadband]]`.
+    DeadbandTable, "a deadband" {
+        need "tag" tag: String,
+        opt "value" value: f64,
+        opt "percent" percent: f64,
     }
 
     /// The raw record of a controller.

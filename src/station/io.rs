@@ -21,6 +21,7 @@ use crate::{
         HistoryError,
         io::{JobRequest, QueryRequest, thread as history},
     },
+    north::io::task::{self as north, NorthTask},
     plant::{
         Plant, PlantDef,
         command::CommandStatus,
@@ -223,11 +224,17 @@ fn assemble(
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
-    let for_reports = persistence.records.clone().map(|records| (records, persistence.store.clone()));
+    let store = persistence.records.clone().map(|records| (records, persistence.store.clone()));
     let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
-    if let Some((records, status)) = for_reports.filter(|_| !def.report.automatic.is_empty()) {
+    if let (Some((_, history)), Some(mqtt)) = (&store, &def.north.mqtt) {
+        let (snapshots, queries, events) = (snapshots.clone(), queries.clone(), events.clone());
+        let (def, mqtt, history, history_file) = (def.clone(), mqtt.clone(), history.clone(), history_file.clone());
+        let task = NorthTask { def, mqtt, clock, snapshots, queries, history, events, history_file };
+        tasks.push(tokio::spawn(north::run(task, stopped.clone())));
+    }
+    if let Some((records, status)) = store.filter(|_| !def.report.automatic.is_empty()) {
         let (def, queries, audit) = (def.clone(), queries.clone(), audit.clone());
         let task = ReportTask { def, clock, queries, records, audit, events, status };
         tasks.push(tokio::spawn(reports::run(task, stopped.clone())));

@@ -189,6 +189,7 @@ impl Fixture {
             programs: vec![self.into; self.def.devices.len()],
             history: HistoryStatus { rows: 5_000, committed_at: Some(now()), ..HistoryStatus::default() },
             station: Arc::new(self.station.clone()),
+            north: None,
             speed: 1.0,
             def: Arc::new(self.def.clone()),
         })
