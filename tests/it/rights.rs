@@ -340,6 +340,7 @@ fn of_query(query: &Query) -> Row {
         Query::LineMinutes { .. } | Query::Values { .. } | Query::SampleTime { .. } => look("", "-VTSL-"),
         Query::Past { .. } | Query::Batches { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
         Query::AlarmMetrics { .. } | Query::Report { .. } | Query::Reports { .. } => look("", "-VTSL-"),
+        Query::Samples { .. } => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
@@ -365,6 +366,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::Past { at: to },
         Query::Batches { from, to, limit },
         Query::Reports { limit },
+        Query::Samples { from, to },
         Query::Unarchived { from, to },
         Query::Overview,
         Query::Audit { from, to, words: all(), by: all(), action: all(), limit },
