@@ -1,7 +1,9 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
-use super::overlay::{self, Overlay};
-use crate::ui::tabs::prelude::*;
+use crate::ui::tabs::{
+    overlay::{self, Overlay},
+    prelude::*,
+};
 use crate::{
     plant::batch::Batch,
     report::{Period, TagFigures, batch::BatchReport, text::mean_or_difference},
@@ -34,6 +36,22 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char(' '), "mark", "mark the batch for the overlay", Action::Mark),
     Key::new(char('e'), "export", "write the list as CSV", Action::Export).needs(Role::Technician),
     Key::new(char('b'), "shifts", "the reports of shifts", Action::Back),
+];
+
+/// What a key means where batches lie over each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OverlayAction {
+    /// Another tag.
+    Tag(isize),
+    /// The list of batches.
+    Back,
+}
+
+/// Keys of that page.
+pub const OVERLAY_KEYS: &[Key<OverlayAction>] = &[
+    Key::new(code(KeyCode::Left), "", "previous tag", OverlayAction::Tag(-1)),
+    Key::new(code(KeyCode::Right), "tag", "next tag", OverlayAction::Tag(1)),
+    Key::new(char('o'), "list", "back to the list of batches", OverlayAction::Back),
 ];
 
 /// All keys of the list.
@@ -110,7 +128,7 @@ impl Batches {
         let alike = || self.rows().iter().map(|report| &report.batch).filter(|batch| batch.name == selected.name);
         let marked: Vec<Batch> = alike().filter(|batch| self.marked.contains(&batch.label())).cloned().collect();
         let latest = || alike().filter(|batch| batch.from <= selected.from).take(overlay::UNMARKED).cloned().collect();
-        self.overlay = Overlay::new(rule, if marked.is_empty() { latest() } else { marked });
+        self.overlay = Overlay::of_batches(rule, if marked.is_empty() { latest() } else { marked });
     }
 
     /// Asks the history when it is time to.

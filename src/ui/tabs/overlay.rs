@@ -1,0 +1,208 @@
+//! Batches or periods over each other: the curves of one tag, each from the begin of its stretch of time on.
+
+use ratatui::widgets::Widget;
+
+use crate::ui::tabs::prelude::*;
+use crate::{
+    history::Series,
+    plant::{batch::Batch, def::BatchDef, number::to_usize},
+    ui::widgets::chart::{self, Chart, Curve, mark, trace::Trace},
+};
+
+/// Curves over each other at most: a pen has one of so many marks.
+pub const CURVES_MAX: usize = 8;
+/// Batches that are shown where none is marked: the selected one and those before it.
+pub const UNMARKED: usize = 3;
+/// How often the curve of what still runs is read again, and when an answer counts as lost (real time).
+const EVERY_S: f64 = 10.0;
+const TIMEOUT_S: f64 = 20.0;
+/// The history has a period whole so long after its end (real time).
+const STORED_S: f64 = 3.0;
+
+/// A stretch of time whose curve lies over the others.
+#[derive(Debug)]
+struct Laid {
+    /// What it is called in the legend.
+    label: String,
+    from: Timestamp,
+    /// `None` while it runs.
+    to: Option<Timestamp>,
+    /// Its curve was asked for after it had ended.
+    is_whole: bool,
+}
+
+impl Laid {
+    fn new(label: String, from: Timestamp, to: Option<Timestamp>) -> Laid {
+        Laid { label, from, to, is_whole: false }
+    }
+
+    fn until(&self, now: Timestamp) -> Timestamp {
+        self.to.unwrap_or(now)
+    }
+}
+
+/// What lies over each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Batches,
+    Periods,
+}
+
+/// State of the page.
+#[derive(Debug)]
+pub struct Overlay {
+    tab: Tab,
+    kind: Kind,
+    /// Each with the curve of the tag.
+    curves: Vec<(Laid, Answered<Vec<Series>>)>,
+    tags: Vec<TagId>,
+    tag: usize,
+}
+
+impl Overlay {
+    /// Of batches of one rule; `None` where it names no tag that has a curve.
+    pub fn of_batches(rule: &BatchDef, batches: impl IntoIterator<Item = Batch>) -> Option<Overlay> {
+        let tags = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
+        let laid = |batch: Batch| Laid::new(batch.label(), batch.from, batch.to);
+        Overlay::new((Tab::Reports, Kind::Batches), batches.into_iter().map(laid), (tags, 0))
+    }
+
+    /// Of periods, named by letters; `None` where there is no tag that has a curve.
+    pub fn of_periods(spans: Vec<(Timestamp, Timestamp)>, tags: (Vec<TagId>, usize)) -> Option<Overlay> {
+        let laid = |(letter, (from, to)): (char, _)| Laid::new(letter.to_string(), from, Some(to));
+        Overlay::new((Tab::Trends, Kind::Periods), ('A'..).zip(spans).map(laid), tags)
+    }
+
+    fn new(
+        (tab, kind): (Tab, Kind),
+        laid: impl Iterator<Item = Laid>,
+        (tags, tag): (Vec<TagId>, usize),
+    ) -> Option<Overlay> {
+        let curves = laid.take(CURVES_MAX).map(|laid| (laid, Answered::default())).collect();
+        (!tags.is_empty()).then_some(Overlay { tab, kind, curves, tags, tag })
+    }
+
+    /// Shows another tag.
+    pub fn next_tag(&mut self, by: isize) {
+        self.tag = around(self.tag, by, self.tags.len());
+        for (laid, curve) in &mut self.curves {
+            (laid.is_whole, *curve) = (false, Answered::default());
+        }
+    }
+
+    /// The longest of them.
+    fn span(&self, now: Timestamp) -> SignedDuration {
+        let lasted = self.curves.iter().map(|(laid, _)| laid.until(now).duration_since(laid.from));
+        lasted.max().unwrap_or_default().max(SignedDuration::from_secs(60))
+    }
+
+    /// Asks for the curves: of what has ended once.
+    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+        let now = cx.now;
+        let (span, tag, columns) = (self.span(now), self.tags[self.tag], chart::dots(cx.theme, cx.area.width, 1));
+        let ask = |(laid, curve): &mut (Laid, Answered<Vec<Series>>)| {
+            // The past stays as it is.
+            let is_known = laid.is_whole && curve.trouble.is_none();
+            let every = if is_known { SignedDuration::MAX } else { real(cx, EVERY_S) };
+            // Its own figures, and columns as wide as those of the longest.
+            let to = laid.until(now).max(laid.from + SignedDuration::from_secs(1));
+            let share = to.duration_since(laid.from).as_secs_f64() / span.as_secs_f64();
+            let buckets = to_usize(columns as f64 * share).max(2);
+            let query = Query::Series { tags: vec![tag], from: laid.from, to, buckets };
+            let asked = curve.ask(cx, (self.tab, number), every, real(cx, TIMEOUT_S), query)?;
+            laid.is_whole = laid.to.is_some_and(|to| cx.present().duration_since(to) > real(cx, STORED_S));
+            Some(asked)
+        };
+        self.curves.iter_mut().filter_map(ask).collect()
+    }
+
+    pub fn awaits(&self, number: u32) -> bool {
+        self.curves.iter().any(|(_, curve)| curve.query.awaits(number))
+    }
+
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        self.curves.iter_mut().for_each(|(_, curve)| curve.on_answer(cx, number, answer));
+    }
+
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        let (theme, tag) = (cx.theme, self.tags[self.tag]);
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        let (width, height) = (canvas.width(), canvas.height());
+        let def = cx.def().tag(tag);
+        let (name, count) = (&def.name, self.curves.len());
+        let heading = match self.kind {
+            Kind::Batches => t!("{tag} of {count} batches", tag = name, count),
+            Kind::Periods => t!("{tag} in {count} periods", tag = name, count),
+        };
+        let x = canvas.text(1, 0, &heading, theme.strong());
+        let trouble = self.curves.iter().find_map(|(_, curve)| curve.trouble.as_deref());
+        match trouble {
+            Some(trouble) => canvas.text(x + 2, 0, &fit(trouble, width.saturating_sub(x + 3)), theme.trouble()),
+            None => canvas.text(x + 2, 0, &fit(&def.label, width.saturating_sub(x + 3)), theme.normal()),
+        };
+        let legend = to_u16(self.curves.len()) + 1;
+        self.draw_chart(cx, &mut canvas.part(0, 1, width, height.saturating_sub(legend + 1)), tag);
+        let y = height.saturating_sub(legend);
+        let first = match self.kind {
+            Kind::Batches => t!("batch"),
+            Kind::Periods => t!("period"),
+        };
+        let head = [first, t!("begin"), t!("minutes"), t!("min"), t!("mean"), t!("max"), t!("good")];
+        canvas.text(3, y, &fit(&self.columns(head), width.saturating_sub(3)), theme.dim());
+        for (n, (laid, curve)) in self.curves.iter().enumerate() {
+            let y = y + 1 + to_u16(n);
+            canvas.text(1, y, mark(theme, n), theme.pen(n));
+            canvas.text(3, y, &fit(&self.row(cx, tag, laid, curve), width.saturating_sub(3)), theme.normal());
+        }
+    }
+
+    /// The curves, from a common begin: that of the first period, by its local time, or zero.
+    fn draw_chart(&self, cx: &ViewContext, canvas: &mut Canvas, tag: TagId) {
+        let (begin, zone) = match (self.kind, self.curves.first()) {
+            (Kind::Periods, Some((first, _))) => (first.from, Some(&cx.def().time_zone)),
+            (Kind::Periods, None) | (Kind::Batches, _) => (Timestamp::UNIX_EPOCH, None),
+        };
+        let traces: Vec<Trace> = self.curves.iter().map(|(laid, curve)| moved_to(begin, laid, curve)).collect();
+        let decimals = cx.snapshot.decimals[tag.index()];
+        let curve = |(pen, trace)| Curve::new(trace, pen, cx.snapshot.unit(tag), decimals);
+        let curves = traces.iter().enumerate().map(curve).collect();
+        let end = begin.checked_add(self.span(cx.now)).unwrap_or(begin);
+        let chart = Chart { zone, ..Chart::new(cx.theme, (begin, end, end), curves) };
+        chart.render(canvas.area(), canvas.buffer());
+    }
+
+    /// A row of the legend.
+    fn columns(&self, cells: [&str; 7]) -> String {
+        // A period has a date where a batch has a number.
+        let (label, begin) = if self.kind == Kind::Batches { (15, 12) } else { (7, 20) };
+        draw::columns([label, begin, -7, -9, -9, -9, -8], cells)
+    }
+
+    /// The figures of one of them.
+    fn row(&self, cx: &ViewContext, tag: TagId, laid: &Laid, curve: &Answered<Vec<Series>>) -> String {
+        let begin = match self.kind {
+            Kind::Batches => moment(laid.from, cx.now, &cx.def().time_zone),
+            Kind::Periods => draw::local(cx, laid.from, "%Y-%m-%d %H:%M:%S"),
+        };
+        let lasted = format!("{:.1}", laid.until(cx.now).duration_since(laid.from).as_secs_f64() / 60.0);
+        let series = curve.value.iter().flatten().next();
+        let value = |value: Option<f64>| value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
+        let summary = series.and_then(|series| series.summary);
+        let good = series.map_or("–".to_owned(), |series| format!("{:.1} %", (series.good * 1_000.0).floor() / 10.0));
+        let [min, mean, max] = match summary {
+            Some((min, mean, max)) => [Some(min), Some(mean), Some(max)],
+            None => [None; 3],
+        };
+        self.columns([&laid.label, &begin, &lasted, &value(min), &value(mean), &value(max), &good])
+    }
+}
+
+/// A curve, moved to the common begin.
+fn moved_to(begin: Timestamp, laid: &Laid, curve: &Answered<Vec<Series>>) -> Trace {
+    let mut trace = Trace::default();
+    if let Some(series) = curve.value.iter().flatten().next() {
+        let from = begin.checked_add(series.from.duration_since(laid.from)).unwrap_or(begin);
+        trace.set_past(Series { from, ..series.clone() }, Timestamp::MAX);
+    }
+    trace
+}
