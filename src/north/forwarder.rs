@@ -51,15 +51,20 @@ pub struct Batch {
 }
 
 impl Forwarder {
-    /// Everything before the cursor is at the broker. `speed`: plant seconds per real second.
+    /// Everything before the cursor has been read once, and is at the broker. `speed`: plant seconds per real second.
     pub fn new(cursor: Timestamp, tags: usize, speed: f64) -> Forwarder {
         let overlap = OVERLAP.mul_f64(speed.max(1.0));
         Forwarder { cursor, span: SPAN, overlap, sent: HashSet::new(), deadband: Deadband::new(tags) }
     }
 
-    /// Everything before this instant is at the broker.
+    /// What is read next begins [`OVERLAP`] before this instant.
     pub fn cursor(&self) -> Timestamp {
         self.cursor
+    }
+
+    /// Everything before this instant is at the broker: what is later may still be committed.
+    pub fn complete_until(&self) -> Timestamp {
+        self.cursor.checked_sub(self.overlap).unwrap_or(Timestamp::MIN)
     }
 
     /// What is asked of the history: from, and to. A clock that was set back takes the cursor with it, and some samples are
@@ -69,8 +74,7 @@ impl Forwarder {
             self.cursor = now;
             self.sent.clear();
         }
-        let from = self.cursor.checked_sub(self.overlap).unwrap_or(Timestamp::MIN);
-        (from, self.cursor.checked_add(self.span).unwrap_or(now).min(now))
+        (self.complete_until(), self.cursor.checked_add(self.span).unwrap_or(now).min(now))
     }
 
     /// The history has too many samples in the window.
@@ -97,7 +101,7 @@ impl Forwarder {
             self.sent.insert(key(*tag, sample));
         }
         self.cursor = batch.until;
-        let from = self.cursor.checked_sub(self.overlap).unwrap_or(Timestamp::MIN);
+        let from = self.complete_until();
         self.sent.retain(|(at, ..)| from <= *at);
     }
 }

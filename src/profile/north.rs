@@ -20,8 +20,8 @@ const PORT_TLS: u16 = 8_883;
 /// A subscriber that has just come knows every value after so long.
 const MAX_INTERVAL: Duration = Duration::from_secs(60);
 const LAG_MAX: Duration = Duration::from_secs(120);
-/// What a longer outage of the history's own commits and of a broker that is restarted takes.
-const LAG_LEAST: Duration = Duration::from_secs(5);
+/// The last ten seconds count as on their way, and a broker that is restarted takes some more.
+const LAG_LEAST: Duration = Duration::from_secs(15);
 
 /// What is sent where; without the table, nothing.
 pub(super) fn north(plant: &str, table: Option<&NorthTable>, defs: &Defs, problems: &mut Problems) -> NorthDef {

@@ -1,4 +1,4 @@
-//! The cursor file: one line with the instant before which everything is at the broker.
+//! The cursor file: one line with the instant up to which the history was read for the broker.
 
 use std::{
     fs, io,

@@ -71,7 +71,7 @@ pub(crate) async fn run(task: NorthTask, mut stopped: watch::Receiver<bool>) {
     };
     let forwarder = Forwarder::new(cursor, task.def.tags.len(), task.clock.speed());
     let state = Deadband::new(task.def.tags.len());
-    let status = NorthStatus { sent_until: cursor, error: damaged, ..NorthStatus::default() };
+    let status = NorthStatus { sent_until: forwarder.complete_until(), error: damaged, ..NorthStatus::default() };
     let mut north = North { task, path, forwarder, state, status, broker: None, alarm: None };
     if let Some(why) = &north.status.error {
         tracing::error!(why, "samples before now are not sent");
@@ -198,7 +198,7 @@ impl North {
         self.forwarder.on_delivered(&self.task.mqtt, batch);
         self.status.sent += batch.samples.len() as u64;
         self.status.refused += refused;
-        self.status.sent_until = self.forwarder.cursor();
+        self.status.sent_until = self.forwarder.complete_until();
         let (path, cursor) = (self.path.clone(), self.forwarder.cursor());
         let written = spawn_blocking(move || cursor::write(&path, cursor)).await;
         // What was sent is sent once more after a restart; nothing is lost.

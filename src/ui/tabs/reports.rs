@@ -237,7 +237,8 @@ impl TabView for Reports {
     #[cfg(test)]
     fn chords() -> keys::PageChords {
         let report = [KEYS, BATCHES, &motions!("", Action::Move)].concat();
-        let pages = [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(batches::OVERLAY_KEYS))];
+        let pages =
+            [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(batches::OVERLAY_KEYS))];
         let made = [("made", keys::chords_of(&made::list_keys())), ("text", keys::chords_of(&made::text_keys()))];
         [("reports", keys::chords_of(&report))].into_iter().chain(pages).chain(made).collect()
     }
