@@ -380,12 +380,11 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
         (sum.logins, sum.reports) = (sum.logins + reported.logins, sum.reports + reported.reports);
     }
     let (writes, acknowledged) = (sum.writes.len(), sum.acknowledged.len());
+    let (logins, reports) = (sum.logins, sum.reports);
     println!(
-        "{rounds} kills: {writes} writes verified, {acknowledged} alarms acknowledged, {} logins granted, all of them in the \
-         audit log; {} shift reports",
-        sum.logins, sum.reports
+        "{rounds} kills; on record: {writes} writes, {acknowledged} acknowledgements, {logins} logins; {reports} reports"
     );
-    assert!(0 < writes && 0 < acknowledged && 0 < sum.logins && 0 < sum.reports, "nothing was done");
+    assert!(0 < writes && 0 < acknowledged && 0 < logins && 0 < reports, "nothing was done");
     // What a kill has left is taken up, and a clean end is a clean end.
     let mut station = place.station();
     station.signal("TERM");
