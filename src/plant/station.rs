@@ -152,12 +152,11 @@ impl StationFault {
 
     /// Its alarm.
     pub fn alarm(self, id: AlarmId) -> AlarmDef {
-        let [cause, effect, action] = self.guidance().map(str::to_owned);
         AlarmDef {
             priority: self.priority(),
             class: AlarmClass::System,
             on_delay: self.on_delay(),
-            guidance: Guidance { cause, effect, action, response_time: Some(Duration::from_secs(600)) },
+            guidance: Guidance::new(self.guidance(), Some(Duration::from_secs(600))),
             ..AlarmDef::new(id, Subject::Station, Condition::Station(self), self.word())
         }
     }

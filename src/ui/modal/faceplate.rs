@@ -208,7 +208,8 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     ]);
     for alarm in cx.snapshot.alarms_of(tag) {
         let def = cx.def().alarm(alarm.id);
-        let text = format!("{} {} {}", theme.priority_mark(def.priority), def.message, translate(alarm.state.word()));
+        let [message, state] = [&*def.message, alarm.state.word()].map(translate);
+        let text = format!("{} {message} {state}", theme.priority_mark(def.priority));
         rows.push((t!("alarm"), text, theme.alarm(def.priority, alarm.state, cx.flash())));
     }
     if !def.meaning.is_empty() {

@@ -137,7 +137,12 @@ pub fn areas(def: &PlantDef) -> Vec<String> {
 /// All that is looked through for words: what the view shows, nothing that is hidden.
 fn text_of(cx: &ViewContext, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
     let by = alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default();
-    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.message, translate(alarm.state.word()))
+    format!(
+        "{} {} {} {by}",
+        subject_name(cx.def(), def.subject),
+        translate(&def.message),
+        translate(alarm.state.word())
+    )
 }
 
 /// The one after `now`, nothing after the last one.

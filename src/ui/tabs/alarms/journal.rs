@@ -167,7 +167,7 @@ fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     format!(
         "{mark} {} {} {}{number}{by}{reason}",
         pad(&row.subject, 12),
-        pad(&row.message, message),
+        pad(translate(&row.message), message),
         pad(translate(row.event.word()), event)
     )
 }
@@ -176,7 +176,7 @@ fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
 pub fn event_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     let by = row.by.as_ref().map(|by| t!(" by {by}", by)).unwrap_or_default();
     let (mark, event) = (cx.theme.priority_mark(row.priority), translate(row.event.word()));
-    format!("{mark} {} {}  {event}{by}", row.subject, row.message)
+    format!("{mark} {} {}  {event}{by}", row.subject, translate(&row.message))
 }
 
 /// An action in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.
