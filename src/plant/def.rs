@@ -271,6 +271,8 @@ pub struct ActionDef {
     pub stop: bool,
     /// It saves the settings in the device's own memory.
     pub saves: bool,
+    /// The least role that may do it, where that is not the one of its tag.
+    pub role: Option<Role>,
 }
 
 /// What a tag must hold in a device of this kind.

@@ -184,6 +184,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
             defined.push(tag::define(TagId(to_u16(defined.len())), row.layers, &context, problems));
         }
         device::check_overlaps(&defined[first..], problems);
+        device::check_roles(&context.roles, &defined[first..], problems);
         def.functions = device::functions(&device.profile, &defined[first..], problems);
         devices.push(def);
     }
@@ -291,6 +292,7 @@ fn define_device<'a>(
         fast: period(table.fast, 1, problems),
         slow: period(table.slow, 10, problems),
         names,
+        roles: [&table.roles, &profile.roles].map(|roles| roles.as_ref().map(|roles| &roles.value)),
     };
     (def, context)
 }

@@ -7,8 +7,8 @@ use std::time::Duration;
 use jiff::civil::Time;
 
 pub(super) use self::device::{
-    ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Scheme, SignatureTable,
-    SimulateTable, StepTable, TagTable,
+    ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Roles, Scheme,
+    SignatureTable, SimulateTable, StepTable, TagTable,
 };
 use super::{
     condition::AlarmTable,
@@ -84,6 +84,8 @@ toml_tables! {
         opt "limits" limits: Raw,
         /// More tags, or other keys for the tags of the profile.
         list "tag" tags: Raw,
+        /// The least role that may write the tags of a group; what the profile says of the same group does not count.
+        opt "roles" roles: Roles,
         // What follows belongs to a device without a profile.
         opt "vendor" vendor: String,
         opt "model" model: String,

@@ -1,7 +1,9 @@
 //! Every command, request and query through the socket, by everybody who may be at a terminal: what is let through, what
 //! is refused, and that the audit log has it. The tables below are written by hand; the program has its own.
 
-use std::{sync::Arc, time::Duration};
+mod commands;
+
+use std::time::Duration;
 
 use jiff::Timestamp;
 use sightglass::{
@@ -9,16 +11,10 @@ use sightglass::{
     history::{Query, io::QueryRequest},
     plant::{
         PlantDef,
-        alarm::AlarmCommand,
-        command::{CommandKind, CommandStatus, Outcome, Refusal},
-        def::{AlarmId, DeviceId, LineId, Serial},
-        diagnostics::{Diagnostic, Scan},
+        command::{CommandStatus, Outcome, Refusal},
+        def::LineId,
         live::{AddressSpan, LiveRead},
-        parameter_set::ParameterSet,
-        restore::RestoreRequest,
         role::Role,
-        sweep::Sweep,
-        tag::Table,
     },
     report::Period,
     station::{self, Session},
@@ -26,6 +22,7 @@ use sightglass::{
 use tokio::sync::{mpsc, oneshot};
 
 use crate::guarded::{Guarded, PASSWORD, request};
+use commands::{commands, of_command};
 
 mod queries;
 
@@ -69,90 +66,6 @@ fn look(action: &'static str, by: &'static str) -> Row {
     Row { action, by, is_action: false }
 }
 
-/// A new command does not compile until it has a row here; put it into [`commands`] as well.
-fn of_command(kind: &CommandKind) -> Row {
-    match kind {
-        CommandKind::Write { .. } => row("write", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Acknowledge { .. }) => row("acknowledge", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { .. }) => row("acknowledge", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Silence) => row("silence", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Reset(_)) => row("reset", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Shelve { .. }) => row("shelve", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Unshelve(_)) => row("unshelve", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Tick { .. }) => row("step done", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::OutOfService(_)) => row("out of service", "---S--"),
-        CommandKind::Alarm(AlarmCommand::InService(_)) => row("in service", "---S--"),
-        CommandKind::Refresh(_) => look("refresh", "--TS--"),
-        CommandKind::Connect(_, false) => row("disconnect", "--TS--"),
-        CommandKind::Connect(_, true) => row("connect", "--TS--"),
-        CommandKind::Configure(_) => row("configure", "---S--"),
-        CommandKind::SaveSettings(_) => row("save settings", "---S--"),
-        CommandKind::Test(_, diagnostic) => match diagnostic {
-            Diagnostic::Scan(Scan { serials, .. }) if serials.is_empty() => row("test", "--TS--"),
-            Diagnostic::Send(_) | Diagnostic::Write(_) | Diagnostic::Scan(_) => row("test", "---S--"),
-            Diagnostic::Sweep(_)
-            | Diagnostic::Loopback { .. }
-            | Diagnostic::Identify { .. }
-            | Diagnostic::Read { .. } => row("test", "--TS--"),
-        },
-        CommandKind::StopTest(_) => row("stop test", "--TS--"),
-        CommandKind::ReadSets => look("read sets", "--TS--"),
-        CommandKind::SaveSet { .. } => row("save set", "--TS--"),
-        CommandKind::Restore(_) => row("restore set", "--TS--"),
-        CommandKind::StopRestore(_) => row("stop restore", "--TS--"),
-        CommandKind::HandOver => row("hand over", "--TS--"),
-        CommandKind::TakeOver => row("take over", "--TS--"),
-    }
-}
-
-fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
-    let (alarm, device, line, at) = (AlarmId(0), DeviceId(0), LineId(0), Timestamp::UNIX_EPOCH);
-    let scan = |serials| Diagnostic::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
-    let set = ParameterSet {
-        name: "none".into(),
-        device: "another".into(),
-        profile: "another".into(),
-        saved: at,
-        by: "tom".into(),
-        given: Vec::new(),
-        values: Vec::new(),
-        missing: Vec::new(),
-        units: Default::default(),
-    };
-    let (from, changes, table) = ("none".into(), Vec::new(), Table::Holding);
-    vec![
-        CommandKind::Write { tag: def.tag_named("TIC-1.SV").unwrap(), value: 60.0 + person as f64 },
-        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, annunciated_at: at }),
-        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Arc::from([(alarm, at)]) }),
-        CommandKind::Alarm(AlarmCommand::Silence),
-        CommandKind::Alarm(AlarmCommand::Reset(alarm)),
-        CommandKind::Alarm(AlarmCommand::Shelve { alarms: [alarm].into(), lasts: Duration::from_secs(60) }),
-        CommandKind::Alarm(AlarmCommand::Unshelve(alarm)),
-        CommandKind::Alarm(AlarmCommand::Tick { alarm, raised_at: at, step: 0, done: true }),
-        CommandKind::Alarm(AlarmCommand::OutOfService(alarm)),
-        CommandKind::Alarm(AlarmCommand::InService(alarm)),
-        CommandKind::Refresh(device),
-        CommandKind::HandOver,
-        CommandKind::TakeOver,
-        CommandKind::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
-        CommandKind::Test(line, Diagnostic::Identify { unit: 1 }),
-        CommandKind::Test(line, Diagnostic::Sweep(Sweep { unit: 1, table, first: 0, last: 9, every: 8 })),
-        CommandKind::Test(line, Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
-        CommandKind::Test(line, scan(Vec::new())),
-        CommandKind::Test(line, scan(vec![Serial::USUAL])),
-        CommandKind::Test(line, Diagnostic::Send(vec![1, 3, 0, 0, 0, 1])),
-        CommandKind::StopTest(line),
-        CommandKind::ReadSets,
-        CommandKind::SaveSet { device, name: format!("of {person}").into(), replace: false },
-        CommandKind::Restore(Box::new(RestoreRequest { device, from, set: Arc::new(set), changes })),
-        CommandKind::StopRestore(device),
-        CommandKind::Connect(line, false),
-        CommandKind::Connect(line, true),
-        CommandKind::Configure(Box::new(def.lines[0].clone())),
-        CommandKind::SaveSettings(line),
-    ]
-}
-
 /// A terminal of this person, as the column says.
 async fn sits(guarded: &Guarded, person: usize) -> Session {
     if person == 0 {
@@ -186,7 +99,7 @@ async fn every_command_is_permitted_or_refused_as_the_table_says() {
         }
         let session = sits(&guarded, person).await;
         for (number, kind) in (1..).zip(commands(&guarded.def, person)) {
-            let row = of_command(&kind);
+            let row = of_command(&guarded.def, &kind);
             let said = format!("{kind:?} by {}", USERS[person]);
             // So slow that each refusal is on record by itself.
             guarded.pass(Duration::from_secs(2)).await;

@@ -23,7 +23,7 @@ pub use keys::Action;
 use self::{
     actions::{notice, write},
     compare::Compare,
-    keys::page_keys,
+    keys::{needing, page_keys},
     program::Cell,
     sets::Source,
     table::Table,
@@ -175,6 +175,7 @@ impl TabView for Controllers {
                 (Action::SwapDirection, !copies),
             ];
             hide(&mut keys, &lacking);
+            keys = needing(keys, |action| self.role_for(cx, device, action));
         }
         let mut hints = hints(&keys);
         // On the page of a device there is no room left for a key that every operator tries anyway; in the past there is.

@@ -26,10 +26,12 @@ use shift::Shift;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
+    access::right,
     history::Series,
     plant::def::{MimicItem, Picture},
     ui::{
         layout::Size,
+        rights,
         widgets::mimic::{CanvasScale, bar, list, panel, pipe, tags, title, trend, unit, vessel},
     },
 };
@@ -101,8 +103,12 @@ impl TabView for Mimic {
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let commands = cx.def().mimic.commands.iter();
         let commands = commands.map(|command| {
-            Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label))
-                .needs(Role::Technician)
+            Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label)).needs(
+                match command.value {
+                    Some(value) => right::needs(cx.def(), &CommandKind::Write { tag: command.tag, value }),
+                    None => rights::to_write(cx, [command.tag]),
+                },
+            )
         });
         let mut table = KEYS.to_vec();
         let pages = cx.def().mimic.pages.len();

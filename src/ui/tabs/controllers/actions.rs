@@ -3,8 +3,11 @@
 use super::{Action, Controllers, Page, keys::ProgramCommand};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::event::LineState,
-    ui::modal::{Choice, Settings},
+    plant::{event::LineState, interlock::role_to_write},
+    ui::{
+        modal::{Choice, Settings},
+        rights,
+    },
 };
 
 impl Controllers {
@@ -54,6 +57,31 @@ impl Controllers {
             | Action::All
             | Action::SwapDirection => Vec::new(),
         }
+    }
+}
+
+impl Controllers {
+    /// The role that an action of a page needs because of what it writes; `None` where it writes nothing.
+    pub(super) fn role_for(&self, cx: &ViewContext, device: &DeviceDef, action: Action) -> Option<Role> {
+        let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
+        let written = match (action, &self.page) {
+            (Action::Open, Page::Device) => {
+                self.table.tag(cx, device.id).filter(|tag| tag.writable()).map(|tag| tag.id)
+            }
+            (Action::Open, Page::Program) => program.and_then(|program| self.cell.tag(program)),
+            (Action::Open, Page::Compare(compare)) => return compare.role_to_restore(cx, device),
+            (Action::Tune, _) => faceplate.and_then(|faceplate| faceplate.tune),
+            (Action::Run, _) => faceplate.and_then(|faceplate| faceplate.run),
+            (Action::Control(_), _) => program.map(|program| program.command),
+            (Action::Mode, _) => program.and_then(|program| program.mode),
+            (Action::Pattern, _) => program.and_then(|program| program.pattern),
+            (Action::Actions, _) => {
+                let roles = device.actions.iter().map(|action| role_to_write(cx.def(), action.tag, action.value));
+                return roles.min();
+            }
+            _ => None,
+        };
+        written.map(|tag| rights::to_write(cx, [tag]))
     }
 }
 

@@ -172,6 +172,12 @@ const READ: &[Key<Action>] = &[
     Key::new(code(KeyCode::Down), "", "next page", Action::Turn(1)),
 ];
 
+/// Gives the keys that write the role that what they write needs.
+pub fn needing(keys: Vec<Key<Action>>, role: impl Fn(Action) -> Option<Role>) -> Vec<Key<Action>> {
+    let needing = |key: Key<Action>| Key { needs: role(key.action).or(key.needs), ..key };
+    keys.into_iter().map(needing).collect()
+}
+
 /// The keys of a page.
 pub fn page_keys(page: &Page) -> Vec<Key<Action>> {
     match page {
