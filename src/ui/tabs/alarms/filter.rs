@@ -98,7 +98,7 @@ impl Filter {
     }
     /// The next area of the plant, and all of them after the last.
     pub fn next_area(&mut self, def: &PlantDef) {
-        self.area = after(&areas(def), self.area.as_ref());
+        self.area = area_after(def, self.area.as_ref());
     }
 
     /// Does it let this alarm through?
@@ -132,6 +132,11 @@ pub fn areas(def: &PlantDef) -> Vec<String> {
     areas.sort();
     areas.dedup();
     areas
+}
+
+/// The next area, and all of them after the last.
+pub fn area_after(def: &PlantDef, area: Option<&String>) -> Option<String> {
+    after(&areas(def), area)
 }
 
 /// All that is looked through for words: what the view shows, nothing that is hidden.
