@@ -151,6 +151,8 @@ pub struct DeviceDef {
     pub limits: Limits,
     /// The function codes that it knows; empty if its profile does not list them.
     pub functions: Vec<u8>,
+    /// Names of the states that function 07 reads, by bit; what they mean is the device's own.
+    pub exception_status: Vec<(u8, String)>,
     /// Least silence between two requests to this device (the PXR wants 10 ms).
     pub gap: Duration,
     /// Quiet time after a write before the next request.
@@ -181,6 +183,7 @@ impl DeviceDef {
             model: String::new(),
             limits: Limits { gap_registers_max: 0, ..Limits::STANDARD },
             functions: Vec::new(),
+            exception_status: Vec::new(),
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,

@@ -41,8 +41,9 @@ pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Op
         // The limits of the device itself are read with it.
         limits: None,
         default: table.default.clone(),
-        // Those of the device itself are read with it.
+        // These of the device itself are read with it.
         roles: None,
+        exception_status: None,
         tags: Vec::new(),
         actions: table.actions.clone(),
         faceplate: table.faceplate.clone(),

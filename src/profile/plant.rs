@@ -276,6 +276,11 @@ fn define_device<'a>(
         model: format!("{} {}", text(&profile.vendor), text(&profile.model)).trim().to_owned(),
         limits,
         functions: Vec::new(),
+        exception_status: tag::named_bits(
+            table.exception_status.as_ref().or(profile.exception_status.as_ref()),
+            8,
+            problems,
+        ),
         gap: timing.gap,
         write_gap: timing.write_gap,
         response_time: timing.response_time,

@@ -12,7 +12,7 @@ pub(super) use self::device::{
 };
 use super::{
     condition::AlarmTable,
-    reader::{Choice, Raw, Texts, toml_tables},
+    reader::{Choice, Numbered, Raw, Texts, toml_tables},
 };
 use crate::plant::{
     def::{Paper, Parity, ParquetVersion, Role, Rs485, Section},
@@ -86,6 +86,8 @@ toml_tables! {
         list "tag" tags: Raw,
         /// The least role that may write the tags of a group; what the profile says of the same group does not count.
         opt "roles" roles: Roles,
+        /// Names of the eight states that function 07 reads; they stand for those of the profile.
+        opt "exception_status" exception_status: Numbered,
         // What follows belongs to a device without a profile.
         opt "vendor" vendor: String,
         opt "model" model: String,

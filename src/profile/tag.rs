@@ -5,7 +5,7 @@ mod scaling;
 
 use std::time::Duration;
 
-pub(super) use self::scaling::range_of;
+pub(super) use self::{bits::named_bits, scaling::range_of};
 use self::{
     bits::{bit_field, bit_labels, enum_labels},
     scaling::check_scaling,

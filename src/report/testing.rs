@@ -69,6 +69,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
                 in_flight_max: 1,
             },
             functions: Vec::new(),
+            exception_status: Vec::new(),
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,

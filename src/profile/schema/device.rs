@@ -36,6 +36,8 @@ toml_tables! {
         opt "default" default: Raw,
         /// The least role that may write the tags of a group.
         opt "roles" roles: Roles,
+        /// Names of the eight states that function 07 reads.
+        opt "exception_status" exception_status: Numbered,
         list "tag" tags: Raw,
         list "action" actions: ActionTable,
         opt "faceplate" faceplate: FaceplateTable,

@@ -7,6 +7,7 @@ mod actions;
 mod device;
 mod guide;
 mod keys;
+mod lamps;
 pub(super) mod list;
 mod faceplate;
 pub(super) mod program;
@@ -50,6 +51,8 @@ pub enum Page {
     List,
     /// One device.
     Device,
+    /// Its bits as lamps.
+    Lamps,
     /// Its ramp/soak program.
     Program,
     /// Its parameter sets.
@@ -94,7 +97,7 @@ impl TabView for Controllers {
             Page::Device => self.table.tag(cx, device.id).map(|tag| tag.id),
             Page::List => device.faceplate.as_ref().map(|faceplate| faceplate.pv),
             Page::Program => device.program.as_ref().and_then(|program| self.cell.tag(program)),
-            Page::Sets | Page::Compare(..) | Page::Guide(..) => None,
+            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Guide(..) => None,
         });
         tag.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
@@ -117,6 +120,7 @@ impl TabView for Controllers {
                     *page = page.saturating_add_signed(by).min(guide::count() - 1);
                 }
             }
+            Action::Device(by) if self.page == Page::Lamps => self.show_lamps(cx, by),
             Action::Device(by) => self.show(DeviceId(to_u16(around(device.id.index(), by, cx.def().devices.len())))),
             Action::Move(motion) => self.move_by(cx, device, motion),
             Action::Wall => self.wall = Some(!self.is_wall(cx)),
@@ -126,6 +130,8 @@ impl TabView for Controllers {
             }
             Action::Column(by) => self.cell.column = self.cell.column.saturating_add_signed(by).min(2),
             Action::Open => return self.open_selected(cx, device),
+            Action::Lamps if lamps::has_any(cx, device) => self.page = Page::Lamps,
+            Action::Lamps => return notice(device, t!("this device has no bits to show as lamps")),
             Action::Program if device.program.is_some() => self.page = Page::Program,
             Action::Program => return notice(device, t!("this device has no ramp/soak program")),
             Action::Sets if cx.is_past() => return notice(device, t!("parameter sets are shown in the present only")),
@@ -167,6 +173,7 @@ impl TabView for Controllers {
             let lacking = [
                 (Action::Tune, faceplate.is_none_or(|faceplate| faceplate.tune.is_none())),
                 (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
+                (Action::Lamps, !lamps::has_any(cx, device)),
                 (Action::Program, program.is_none()),
                 (Action::Actions, device.actions.is_empty()),
                 (Action::Defaults, cx.def().tags_of(device.id).all(|tag| tag.default.is_none())),
@@ -182,7 +189,7 @@ impl TabView for Controllers {
         let leads_back = match self.page {
             Page::List => false,
             Page::Device => cx.is_past() && 1 < cx.def().devices.len(),
-            Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
+            Page::Lamps | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
         };
         if leads_back {
             let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
@@ -205,7 +212,7 @@ impl TabView for Controllers {
                 self.table = Table { defaults: self.table.defaults, ..Table::default() };
                 Page::List
             }
-            Page::Program | Page::Sets => Page::Device,
+            Page::Lamps | Page::Program | Page::Sets => Page::Device,
             Page::Compare(_) => Page::Sets,
             Page::Guide(_, before) => *before,
             page @ (Page::List | Page::Device) => {
@@ -221,9 +228,16 @@ impl TabView for Controllers {
             (Page::Sets, Some(device)) => {
                 Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
             }
-            (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..), _) => {
-                Rows::default()
-            }
+            (
+                Page::List
+                | Page::Device
+                | Page::Lamps
+                | Page::Program
+                | Page::Sets
+                | Page::Compare(_)
+                | Page::Guide(..),
+                _,
+            ) => Rows::default(),
         }
     }
 
@@ -235,7 +249,7 @@ impl TabView for Controllers {
         let tags = match &self.page {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
             Page::List if self.is_wall(cx) => wall::tags(cx, self.device.index()),
-            Page::List | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => Vec::new(),
+            Page::List | Page::Lamps | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => Vec::new(),
         };
         if tags.is_empty() {
             return Vec::new();
@@ -294,6 +308,7 @@ impl TabView for Controllers {
                 wall::view(cx, &mut canvas, self.device.index(), &self.trend);
             }
             (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
+            (Page::Lamps, _) => lamps::view(cx, &mut canvas, device),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
             (Page::Device | Page::Program, _) => {
                 let trend = self.trend.value.as_ref().and_then(|series| series.first());
@@ -308,8 +323,15 @@ impl TabView for Controllers {
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
         let compare = Page::Compare(Compare::new(Source::Set(String::new())));
-        let pages =
-            [Page::List, Page::Device, Page::Program, Page::Sets, compare, Page::Guide(0, Box::new(Page::List))];
+        let pages = [
+            Page::List,
+            Page::Device,
+            Page::Lamps,
+            Page::Program,
+            Page::Sets,
+            compare,
+            Page::Guide(0, Box::new(Page::List)),
+        ];
         pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).to_vec()
     }
 }
@@ -323,6 +345,19 @@ impl Controllers {
     /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.
     fn is_wall(&self, cx: &ViewContext) -> bool {
         self.wall.unwrap_or(Size::Wide <= cx.size)
+    }
+
+    /// The lamps of the next device that has any.
+    fn show_lamps(&mut self, cx: &ViewContext, by: isize) {
+        let devices = &cx.def().devices;
+        let mut place = self.device.index();
+        for _ in devices {
+            place = around(place, by, devices.len());
+            if lamps::has_any(cx, &devices[place]) {
+                self.device = devices[place].id;
+                return;
+            }
+        }
     }
 
     /// Shows a device.

@@ -3,10 +3,11 @@
 use super::{Action, Controllers, Page, keys::ProgramCommand};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{event::LineState, interlock::role_to_write},
+    plant::interlock::role_to_write,
     ui::{
         modal::{Choice, Settings},
         rights,
+        tabs::line_switch,
     },
 };
 
@@ -35,7 +36,7 @@ impl Controllers {
                 None => notice(device, t!("this device cannot be put in standby from here")),
             },
             Action::Settings => open(Modal::Settings(Box::new(Settings::new(cx, device.line)))),
-            Action::Line => open(Modal::Confirm(connect(cx, device.line))),
+            Action::Line => open(Modal::Confirm(line_switch::confirm(cx, device.line))),
             Action::Control(command) => control(cx, device, command),
             Action::Mode => write(cx, device.program.as_ref().and_then(|program| program.mode)),
             Action::Pattern => write(cx, device.program.as_ref().and_then(|program| program.pattern)),
@@ -47,6 +48,7 @@ impl Controllers {
             | Action::Column(_)
             | Action::Wall
             | Action::Open
+            | Action::Lamps
             | Action::Program
             | Action::Sets
             | Action::Find
@@ -119,24 +121,4 @@ fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
 
 pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<UiAction> {
     open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))
-}
-
-/// Closing a line is asked with what it means for everything on it.
-fn connect(cx: &ViewContext, line: LineId) -> Confirm {
-    let name = &cx.def().line(line).name;
-    if cx.snapshot.line(line).state == LineState::Disconnected {
-        return Confirm::command(
-            t!("connect {name}", name),
-            t!("Connect line {name} and poll its devices again?", name),
-            CommandKind::Connect(line, true),
-        );
-    }
-    let devices: Vec<&str> =
-        cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
-    let words = t!(
-        "Disconnect line {name}? {join} will not be polled, and their alarms not evaluated.",
-        name,
-        join = devices.join(", ")
-    );
-    Confirm::command(t!("disconnect {name}", name), words, CommandKind::Connect(line, false))
 }

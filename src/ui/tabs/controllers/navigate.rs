@@ -23,7 +23,7 @@ impl Controllers {
             }
             Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
-            Page::Guide(..) => {}
+            Page::Lamps | Page::Guide(..) => {}
         }
     }
 
@@ -49,7 +49,7 @@ impl Controllers {
                 Vec::new()
             }
             Page::Compare(compare) => open(compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm)),
-            Page::Guide(..) => Vec::new(),
+            Page::Lamps | Page::Guide(..) => Vec::new(),
         }
     }
 
