@@ -210,10 +210,11 @@ impl Dl06 {
         }
     }
 
+    /// The ladder drives what is wired; what was written to the other outputs stays.
     fn set_outputs(&mut self, outputs: Outputs) {
         let lit = [outputs.pump, outputs.agitator, outputs.drain_valve, outputs.fill_valve, outputs.heater];
-        for output in 0..16 {
-            self.memory.bank_mut(Kind::Y).set(output, lit.get(usize::from(output)).copied().unwrap_or(false));
+        for (output, on) in (0..).zip(lit) {
+            self.memory.bank_mut(Kind::Y).set(output, on);
         }
     }
 
