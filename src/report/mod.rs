@@ -13,7 +13,7 @@ pub mod document;
 pub mod content;
 mod csv;
 pub(crate) mod shift_csv;
-mod record_csv;
+pub(crate) mod record_csv;
 pub(crate) mod drawing;
 pub(crate) mod export;
 pub(crate) mod value_log;

@@ -38,7 +38,7 @@ impl ReportFormat for RecordCsv {
 }
 
 /// Decimals of the recorded controller: those of its PV, as the report has them.
-pub(super) fn record_decimals(report: &ShiftReport, def: &PlantDef) -> u8 {
+pub(crate) fn record_decimals(report: &ShiftReport, def: &PlantDef) -> u8 {
     let pv =
         def.report.record.and_then(|(device, _)| def.device(device).faceplate.as_ref()).map(|face| def.tag(face.pv));
     let Some(pv) = pv else { return DECIMALS_UNKNOWN };

@@ -4,6 +4,7 @@ pub(super) mod period;
 mod batches;
 mod export;
 mod made;
+mod rows;
 mod view;
 
 #[cfg(test)]
@@ -11,14 +12,13 @@ mod tests;
 
 use std::path::PathBuf;
 
-use self::{batches::Batches, export::Export, made::Made};
+use self::{batches::Batches, export::Export, made::Made, rows::Rows};
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::def::{CsvDialect, Pen},
     report::{self, Period, ReportFormat, ShiftReport},
-    text::file,
     ui::{tabs::trends::span::View, widgets::chart},
 };
 
@@ -49,6 +49,8 @@ pub enum Action {
     Batches,
     /// The list of automatic reports.
     Made,
+    /// The rows of the record.
+    Rows,
     /// The chart of the tag so many rows further on.
     Tag(isize),
 }
@@ -62,6 +64,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('e'), "export", "write the report to a file", Action::Export).needs(Role::Technician),
     Key::new(char('f'), "format", "next format: CSV, text, HTML, Excel, Word, …", Action::Format),
     Key::new(char('p'), "preview", "the report as text, as it is written", Action::Preview),
+    Key::new(char('n'), "rows", "date, time, SV, PV and ER, row by row", Action::Rows),
     Key::new(char(';'), "", "CSV with , and . or with ; and ,", Action::Dialect),
     Key::new(char('r'), "automatic", "the reports that the station makes by itself", Action::Made),
     Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
@@ -97,6 +100,7 @@ pub struct Reports {
     curve: Answered<Vec<Series>>,
     batches: Batches,
     made: Made,
+    rows: Rows,
     dialect: CsvDialect,
     format: &'static dyn ReportFormat,
     /// The report as text, while that is shown.
@@ -118,6 +122,7 @@ impl TabView for Reports {
             curve: Answered::default(),
             batches: Batches::default(),
             made: Made::default(),
+            rows: Rows::default(),
             dialect: snapshot.def.report.csv,
             format: report::FORMATS[0],
             preview: None,
@@ -172,6 +177,10 @@ impl TabView for Reports {
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        if self.rows.shown {
+            self.rows.on_text(cx, self.report.value.as_deref(), text)?;
+            return Ok(Vec::new());
+        }
         let typed = period::typed(cx.def(), text, cx.now)?;
         self.show(Some(typed));
         Ok(self.ask(cx))
@@ -186,6 +195,9 @@ impl TabView for Reports {
         if self.made.shown {
             return self.made.view(cx, frame, area);
         }
+        if self.rows.shown {
+            return view::draw_rows(self, cx, frame, area);
+        }
         match self.batches.shown {
             true => self.batches.view(cx, frame, area, view::export_words(self, cx, &self.batches_path(cx))),
             false => view::draw(self, cx, frame, area),
@@ -198,6 +210,10 @@ impl TabView for Reports {
             let Some(action) = keys::find(&self.made.keys(), event) else { return Vec::new() };
             self.made.act(cx, action);
             return self.ask(cx);
+        }
+        if self.rows.shown {
+            let action = keys::find(&rows::keys(), event);
+            return action.map(|action| self.act_on_rows(cx, action)).unwrap_or_default();
         }
         match (self.batches.shown, &self.batches.overlay) {
             (true, Some(_)) => keys::find(batches::OVERLAY_KEYS, event).map(|action| self.act_on_overlay(cx, action)),
@@ -215,7 +231,9 @@ impl TabView for Reports {
         match self.batches.shown {
             true if self.batches.overlay.take().is_some() => true,
             true => self.batches.rows.query.cancel(cx) || std::mem::take(&mut self.batches.shown),
-            false => self.preview.take().is_some() || self.report.query.cancel(cx),
+            false => {
+                std::mem::take(&mut self.rows.shown) || self.preview.take().is_some() || self.report.query.cancel(cx)
+            }
         }
     }
 
@@ -226,6 +244,9 @@ impl TabView for Reports {
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         if self.made.shown {
             return keys::hints(&self.made.keys());
+        }
+        if self.rows.shown {
+            return keys::hints(&rows::keys());
         }
         match (self.batches.shown, &self.batches.overlay) {
             (true, Some(_)) => keys::hints(batches::OVERLAY_KEYS),
@@ -240,7 +261,8 @@ impl TabView for Reports {
         let pages =
             [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(batches::OVERLAY_KEYS))];
         let made = [("made", keys::chords_of(&made::list_keys())), ("text", keys::chords_of(&made::text_keys()))];
-        [("reports", keys::chords_of(&report))].into_iter().chain(pages).chain(made).collect()
+        let rows = [("rows", keys::chords_of(&rows::keys()))];
+        [("reports", keys::chords_of(&report))].into_iter().chain(rows).chain(pages).chain(made).collect()
     }
 }
 
@@ -286,41 +308,11 @@ impl Reports {
                 (self.made.shown, self.export) = (true, Export::Not);
                 self.made.list.query.want();
             }
+            Action::Rows => (self.rows.shown, self.export) = (true, Export::Not),
             Action::Why => {
                 let rows = self.report.value.iter().flat_map(|report| &report.tags);
                 return Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()));
             }
-        }
-        self.ask(cx)
-    }
-
-    fn act_on_overlay(&mut self, cx: &ViewContext, action: batches::OverlayAction) -> Vec<UiAction> {
-        match (action, &mut self.batches.overlay) {
-            (batches::OverlayAction::Tag(by), Some(overlay)) => overlay.next_tag(by),
-            (batches::OverlayAction::Tag(_), None) => {}
-            (batches::OverlayAction::Back, _) => self.batches.overlay = None,
-        }
-        self.ask(cx)
-    }
-
-    fn act_on_batches(&mut self, cx: &ViewContext, action: batches::Action) -> Vec<UiAction> {
-        match action {
-            batches::Action::Move(motion) => self.batches.select(cx, motion),
-            batches::Action::Report => {
-                if let Some(period) = self.batches.period() {
-                    self.batches.shown = false;
-                    self.show(Some(period));
-                }
-            }
-            batches::Action::Mark => self.batches.mark(),
-            batches::Action::Overlay => self.batches.lay_over(cx),
-            batches::Action::Trend => return self.batches.trend(cx).into_iter().collect(),
-            batches::Action::Export => {
-                let bytes = file(|| report::batch::csv(self.batches.rows(), cx.def(), self.dialect));
-                let listed = !self.batches.rows().is_empty();
-                return self.send(listed.then(|| (self.batches_path(cx), bytes)));
-            }
-            batches::Action::Back => (self.batches.shown, self.export) = (false, Export::Not),
         }
         self.ask(cx)
     }
@@ -339,12 +331,13 @@ impl Reports {
     fn show(&mut self, period: Option<Period>) {
         self.preview.iter_mut().for_each(Vec::clear);
         (self.period, self.follow, self.scroll) = (period, false, Scroll::default());
+        self.rows.rewind();
         (self.export, self.report, self.curve) = (Export::Not, Answered::default(), Answered::default());
     }
 
     /// The tag that has the chart, and the part of the period that is over, where there is room for it.
     fn chart(&self, cx: &ViewContext) -> Option<(Pen, View)> {
-        let free = !self.batches.shown && !self.made.shown && self.preview.is_none();
+        let free = !self.batches.shown && !self.made.shown && !self.rows.shown && self.preview.is_none();
         let room = view::chart_columns(cx).filter(|_| free)?;
         let rows = &self.report.value.as_ref()?.tags;
         let tag = cx.def().tag_named(&rows.get(self.charted)?.tag)?;

@@ -1,12 +1,14 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
+use super::{Export, Reports};
 use crate::ui::tabs::{
     overlay::{self, Overlay},
     prelude::*,
 };
 use crate::{
     plant::batch::Batch,
-    report::{Period, TagFigures, batch::BatchReport, text::mean_or_difference},
+    report::{self, Period, TagFigures, batch::BatchReport, text::mean_or_difference},
+    text::file,
 };
 
 /// What a key means on the list.
@@ -248,4 +250,37 @@ fn figures(tag: &TagFigures) -> String {
 
 fn minutes(time: Duration) -> String {
     format!("{:.1}", time.as_secs_f64() / 60.0)
+}
+
+impl Reports {
+    pub(super) fn act_on_overlay(&mut self, cx: &ViewContext, action: OverlayAction) -> Vec<UiAction> {
+        match (action, &mut self.batches.overlay) {
+            (OverlayAction::Tag(by), Some(overlay)) => overlay.next_tag(by),
+            (OverlayAction::Tag(_), None) => {}
+            (OverlayAction::Back, _) => self.batches.overlay = None,
+        }
+        self.ask(cx)
+    }
+
+    pub(super) fn act_on_batches(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+        match action {
+            Action::Move(motion) => self.batches.select(cx, motion),
+            Action::Report => {
+                if let Some(period) = self.batches.period() {
+                    self.batches.shown = false;
+                    self.show(Some(period));
+                }
+            }
+            Action::Mark => self.batches.mark(),
+            Action::Overlay => self.batches.lay_over(cx),
+            Action::Trend => return self.batches.trend(cx).into_iter().collect(),
+            Action::Export => {
+                let bytes = file(|| report::batch::csv(self.batches.rows(), cx.def(), self.dialect));
+                let listed = !self.batches.rows().is_empty();
+                return self.send(listed.then(|| (self.batches_path(cx), bytes)));
+            }
+            Action::Back => (self.batches.shown, self.export) = (false, Export::Not),
+        }
+        self.ask(cx)
+    }
 }

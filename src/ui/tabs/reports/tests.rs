@@ -3,7 +3,7 @@
 mod batches;
 mod made;
 mod chart;
-
+mod rows;
 use std::sync::Arc;
 
 use crossterm::event::{KeyEvent, KeyModifiers};

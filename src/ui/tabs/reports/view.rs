@@ -64,6 +64,27 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
     }
 }
 
+/// Draws the rows of the record below the title of the report.
+pub fn draw_rows(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+    let mut canvas = Canvas::new(frame.buffer_mut(), area);
+    let (columns, height) = (canvas.width(), canvas.height());
+    let Some(period) = &reports.period else { return };
+    draw_title(reports, cx, period, &mut canvas);
+    let mut below = canvas.part(0, 1, columns, height.saturating_sub(1));
+    match (&reports.report.value, &reports.export) {
+        (Some(report), export) => {
+            reports.rows.view(cx, &mut below, report);
+            if *export != Export::Not {
+                draw_export(reports, cx, report, 0, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
+            }
+        }
+        (None, _) => {
+            let words = reports.report.trouble.as_deref().unwrap_or(t!("collecting data"));
+            below.text_centred(height / 2, words, cx.theme.dim());
+        }
+    }
+}
+
 /// Columns of the chart beside the figures, where there is room for both.
 pub fn chart_columns(cx: &ViewContext) -> Option<u16> {
     let free = cx.area.width.saturating_sub(FIGURES);
