@@ -11,6 +11,7 @@ use crate::{
     plant::{
         alarm::AlarmState,
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+        control_run::RunState,
         def::{ActionDef, AlarmId, DeviceId},
         ne107::Reason,
         parameter_set::StoredSet,
@@ -24,7 +25,7 @@ use crate::{
         Effect, Model, Msg,
         fixture::{
             self, Fixture,
-            controllers::{many, set},
+            controllers::{control_run, many, set},
         },
         tests::{model, screen, sent_kind, type_keys},
         theme::Theme,
@@ -131,6 +132,15 @@ fn a_tuning_shows_how_it_goes_and_what_it_has_found() {
     fixture.set("TIC-1.AT", 0.0);
     fixture.tunings[0] = Some(tuning(&fixture, true));
     assert_seen("tuned", &fixture, Theme::FULL, "4⏎");
+}
+
+#[test]
+fn a_run_shows_its_figures_as_they_come() {
+    let mut fixture = many(2);
+    fixture.runs[0] = Some(Arc::new(control_run(17, RunState::Running)));
+    assert_seen("run_running", &fixture, Theme::FULL, "4⏎");
+    fixture.runs[0] = Some(Arc::new(control_run(16, RunState::Ended)));
+    assert_seen("run_ended", &fixture, Theme::PLAIN, "4⏎");
 }
 
 #[test]
