@@ -37,6 +37,9 @@ Only good values count: what happened in a gap of more than ten seconds is unkno
 pub struct Args {
     #[command(flatten)]
     history: HistoryArgs,
+    /// Only the runs of this controller
+    #[arg(long, value_name = "DEVICE")]
+    controller: Option<String>,
     /// The latest so many
     #[arg(long, value_name = "NUMBER", default_value_t = 100)]
     limit: usize,
@@ -56,12 +59,19 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if def.runs.is_empty() {
         return Err(CliError::Usage(format!("{} has no controller with SV and PV", def.title)));
     }
+    if let Some(name) = &args.controller {
+        let known: Vec<&str> = def.runs.iter().map(|run| def.device(run.controller).name.as_str()).collect();
+        if !known.contains(&name.as_str()) {
+            return Err(CliError::Usage(format!("no controller `{name}`: expected one of {}", known.join(", "))));
+        }
+    }
     if let Some(out) = &args.out {
         args.history.refuse_own_file(&def, out)?;
     }
     in_runtime(async {
         let (source, period) = args.history.open_latest(&def, SPAN).await?;
-        let query = Query::ControlRuns { from: period.from, to: period.to, limit: args.limit };
+        let query =
+            Query::ControlRuns { controller: args.controller, from: period.from, to: period.to, limit: args.limit };
         let Answer::ControlRuns(runs) = source.query(query).await? else { return Err(unexpected()) };
         match &args.out {
             Some(out) => source.export(out, &control_runs::csv(&runs, &def, args.csv.dialect(&def))).await?,

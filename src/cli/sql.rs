@@ -283,7 +283,7 @@ async fn batches(source: &Source) -> Result<Vec<Batch>, CliError> {
 async fn control_runs(source: &Source) -> Result<Vec<ControlRun>, CliError> {
     let (mut all, mut to) = (Vec::new(), end(source));
     loop {
-        let query = Query::ControlRuns { from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
+        let query = Query::ControlRuns { controller: None, from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
         let Answer::ControlRuns(page) = source.query(query).await? else { return Err(unexpected()) };
         let Some(next) = add_page(&mut all, page, |run| run.from) else { return Ok(all) };
         to = next;

@@ -135,6 +135,8 @@ pub enum Query {
     },
     /// The control runs in a span, newest first.
     ControlRuns {
+        /// Of this controller only.
+        controller: Option<String>,
         /// From.
         from: Timestamp,
         /// To.

@@ -187,6 +187,10 @@ impl Snapshot {
     pub fn tuning(&self, id: DeviceId) -> Option<&Tuning> {
         self.tunings.get(id.index())?.as_deref()
     }
+    /// Does a device have control runs?
+    pub fn has_runs(&self, id: DeviceId) -> bool {
+        self.def.runs.iter().any(|def| def.controller == id)
+    }
     /// The control run of a device, at work or the last one.
     pub fn control_run(&self, id: DeviceId) -> Option<&ControlRun> {
         let place = self.def.runs.iter().position(|def| def.controller == id)?;

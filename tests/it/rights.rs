@@ -363,7 +363,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::SampleTime { tags: vec![def.tags[0].id], from, to, latest: true },
         Query::Past { at: to },
         Query::Batches { from, to, limit },
-        Query::ControlRuns { from, to, limit },
+        Query::ControlRuns { controller: None, from, to, limit },
         Query::Reports { limit },
         Query::Unarchived { from, to },
         Query::Overview,

@@ -27,17 +27,18 @@ const LATEST: &str = "rowid IN (SELECT max(rowid) FROM control_run GROUP BY cont
 const UNKNOWN: f64 = -1.0;
 
 impl Store {
-    /// The runs of a span, newest first, at most so many.
+    /// The runs of a span, of one controller or of all, newest first, at most so many.
     pub(super) fn control_runs(
         &self,
+        controller: Option<&str>,
         (from, to, limit): (Timestamp, Timestamp, u64),
     ) -> Result<Vec<ControlRun>, HistoryError> {
         check_span(from, to)?;
         let sql = format!(
-            "SELECT {COLUMNS} FROM control_run WHERE {LATEST} AND utc < ? AND until_utc >= ?
+            "SELECT {COLUMNS} FROM control_run WHERE {LATEST} AND utc < ? AND until_utc >= ? AND controller = coalesce(?, controller)
              ORDER BY utc DESC, controller, number DESC LIMIT ?"
         );
-        self.list(&sql, params![utc(to), utc(from), limit], run)
+        self.list(&sql, params![utc(to), utc(from), controller, limit], run)
     }
 
     /// The runs of a period for its report, newest first; of too many the span of those that are left out.
@@ -46,7 +47,7 @@ impl Store {
         from: Timestamp,
         until: Timestamp,
     ) -> Result<(Vec<ControlRun>, Option<Gap>), HistoryError> {
-        let mut runs = self.control_runs((from, until, RUNS_MAX as u64 + 1))?;
+        let mut runs = self.control_runs(None, (from, until, RUNS_MAX as u64 + 1))?;
         let left_out = runs.drain(RUNS_MAX.min(runs.len())..).next().map(|first| {
             let why = format!("only the latest {RUNS_MAX} control runs are listed");
             Gap { from: from.min(first.from), to: first.until, why }

@@ -4,7 +4,6 @@ pub(super) mod period;
 mod batches;
 mod export;
 mod made;
-mod overlay;
 mod view;
 
 #[cfg(test)]
@@ -20,7 +19,10 @@ use crate::{
     plant::def::{CsvDialect, Pen},
     report::{self, Period, ReportFormat, ShiftReport},
     text::file,
-    ui::{tabs::trends::span::View, widgets::chart},
+    ui::{
+        tabs::{overlay, trends::span::View},
+        widgets::chart,
+    },
 };
 
 /// What a key means here.

@@ -1,7 +1,9 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
-use super::overlay::{self, Overlay};
-use crate::ui::tabs::prelude::*;
+use crate::ui::tabs::{
+    overlay::{Item, Kind, Overlay, UNMARKED},
+    prelude::*,
+};
 use crate::{
     plant::batch::Batch,
     report::{Period, TagFigures, batch::BatchReport, text::mean_or_difference},
@@ -39,6 +41,10 @@ const KEYS: &[Key<Action>] = &[
 /// All keys of the list.
 pub fn keys() -> Vec<Key<Action>> {
     [&motions!("select", Action::Move), KEYS].concat()
+}
+
+fn item(batch: &Batch) -> Item {
+    Item { label: batch.label(), from: batch.from, to: batch.to, figures: Default::default() }
 }
 
 /// Rows of one answer; the command `batches` has all of them.
@@ -109,8 +115,10 @@ impl Batches {
         let Some(rule) = cx.def().batches.iter().find(|rule| rule.name == selected.name) else { return };
         let alike = || self.rows().iter().map(|report| &report.batch).filter(|batch| batch.name == selected.name);
         let marked: Vec<Batch> = alike().filter(|batch| self.marked.contains(&batch.label())).cloned().collect();
-        let latest = || alike().filter(|batch| batch.from <= selected.from).take(overlay::UNMARKED).cloned().collect();
-        self.overlay = Overlay::new(rule, if marked.is_empty() { latest() } else { marked });
+        let latest = || alike().filter(|batch| batch.from <= selected.from).take(UNMARKED).cloned().collect();
+        let tags = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
+        let chosen: Vec<Batch> = if marked.is_empty() { latest() } else { marked };
+        self.overlay = Overlay::new(Kind::Batches, tags, chosen.iter().map(item));
     }
 
     /// Asks the history when it is time to.
