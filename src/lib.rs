@@ -47,6 +47,7 @@
 //! Closed hours leave the database for an [archive](history::io::archive) of Parquet files, with minutes and hours as
 //! aggregates; a query is cut into [pieces](history::tiers::pieces), each answered by the widest of these that has it.
 //! A report becomes a [document](report::document) of sections once, in one language; each format only sets it.
+//! What goes out to a broker comes from the history too, so that an [outage](north) loses nothing.
 //! What is deleted when is a [decision](history::retention) over the list of files. A [past](plant::past) instant becomes a
 //! snapshot like a live one; SQL of others is answered by an [engine of its own](history::io::tables), never by the station.
 //!
@@ -102,6 +103,7 @@
 //! | gap registers | registers read only because they lie between two tags of a block |
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
 //! | automatic report | a report that the station makes at the end of each shift, day, week or month; on record in the history |
+//! | data out, cursor | values for other systems, over MQTT; the instant before which the broker has acknowledged everything |
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
 //! | batch, phase | what the plant makes between two conditions of its file; a value of its phase tag |
 //! | control run | what a control loop did after a change of its setpoint, a program step or the start of a batch |
@@ -141,6 +143,7 @@ pub mod sim;
 pub mod report;
 pub mod history;
 pub mod access;
+pub mod north;
 pub mod station;
 pub mod attach;
 pub mod ui;

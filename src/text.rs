@@ -129,7 +129,7 @@ impl Locale {
 }
 
 /// The text in the language of this thread; the English one where the catalogue has none.
-pub fn translate(english: &'static str) -> &'static str {
+pub fn translate(english: &str) -> &str {
     translation(english).unwrap_or(english)
 }
 

@@ -3,7 +3,7 @@
 use super::SessionRequest;
 use crate::{
     history::Query,
-    plant::{alarm::AlarmCommand, command::CommandKind, diagnostics::Diagnostic, role::Role},
+    plant::{PlantDef, alarm::AlarmCommand, command::CommandKind, diagnostics::Diagnostic, interlock, role::Role},
 };
 
 /// What a person may do. A role has the rights of those before it.
@@ -82,9 +82,27 @@ fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
     }
 }
 
-/// The least role that may give a command.
-pub fn needs(kind: &CommandKind) -> Role {
-    of_command(kind).role()
+/// The least role that may give a command: what it writes may need more than its right.
+pub fn needs(def: &PlantDef, kind: &CommandKind) -> Role {
+    let written = match kind {
+        CommandKind::Write { tag, value } => Some(interlock::role_to_write(def, *tag, *value)),
+        CommandKind::Restore(request) => {
+            request.changes.iter().map(|change| interlock::role_to_write(def, change.tag, change.new)).max()
+        }
+        CommandKind::Alarm(_)
+        | CommandKind::Refresh(_)
+        | CommandKind::Connect(..)
+        | CommandKind::Configure(_)
+        | CommandKind::SaveSettings(_)
+        | CommandKind::Test(..)
+        | CommandKind::StopTest(_)
+        | CommandKind::ReadSets
+        | CommandKind::SaveSet { .. }
+        | CommandKind::StopRestore(_)
+        | CommandKind::HandOver
+        | CommandKind::TakeOver => None,
+    };
+    of_command(kind).role().max(written.unwrap_or(Role::Viewer))
 }
 
 /// The least role that may ask a query.
@@ -101,6 +119,7 @@ pub fn needs_for_query(query: &Query) -> Role {
         | Query::SampleTime { .. }
         | Query::Reports { .. }
         | Query::Past { .. }
+        | Query::Samples { .. }
         | Query::Unarchived { .. }
         | Query::Overview
         | Query::Report { .. } => Right::View,
@@ -139,16 +158,87 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::plant::{
-        def::{AlarmId, DeviceId, LineId, TagId},
-        diagnostics::Scan,
-        fixture,
-        tag::Table,
+    use crate::{
+        plant::{
+            def::{ActionDef, AlarmId, DeviceId, LineId, TagId},
+            diagnostics::Scan,
+            fixture,
+            parameter_set::{ParameterSet, PlannedChange},
+            restore::RestoreRequest,
+            tag::Table,
+        },
+        profile,
     };
+
+    /// The least role for each tag of the shipped controller that can be written; programs and alarms included.
+    #[test]
+    fn tuning_and_setup_need_a_supervisor_operation_does_not() {
+        let def = profile::load(std::path::Path::new("tank"), &profile::Search::shipped()).expect("a shipped plant");
+        let operated = ["SV", "STBY", "PROG"];
+        let controller = &def.devices[0];
+        assert_eq!(controller.profile, "fuji_pxr");
+        for tag in def.tags_of(controller.id).filter(|tag| tag.writable()) {
+            let role = if operated.contains(&tag.short.as_str()) { Role::Technician } else { Role::Supervisor };
+            assert_eq!(needs(&def, &CommandKind::Write { tag: tag.id, value: 1.0 }), role, "{}", tag.name);
+        }
+    }
+
+    #[test]
+    fn a_set_needs_the_role_of_its_strictest_setting() {
+        let mut def = fixture::plant();
+        let change = |tag| PlannedChange { tag, old: 0.0, new: 1.0 };
+        let set = Arc::new(ParameterSet {
+            name: "winter".into(),
+            device: "PLC-1".into(),
+            profile: "plc".into(),
+            saved: jiff::Timestamp::UNIX_EPOCH,
+            by: "boss".into(),
+            given: Vec::new(),
+            values: Vec::new(),
+            units: std::collections::BTreeMap::new(),
+            missing: Vec::new(),
+        });
+        let restore = |tags: &[TagId]| {
+            let changes = tags.iter().copied().map(change).collect();
+            let set = Arc::clone(&set);
+            let request = RestoreRequest { device: DeviceId(0), from: Arc::from("winter"), set, changes };
+            CommandKind::Restore(Box::new(request))
+        };
+        assert_eq!(needs(&def, &restore(&[fixture::SV, fixture::RUN])), Role::Technician);
+        def.tags[fixture::SV.index()].role = Role::Supervisor;
+        assert_eq!(needs(&def, &restore(&[fixture::RUN])), Role::Technician);
+        assert_eq!(needs(&def, &restore(&[fixture::SV, fixture::RUN])), Role::Supervisor);
+    }
+
+    #[test]
+    fn an_action_has_a_role_and_a_stop_needs_only_a_technician() {
+        let mut def = fixture::plant();
+        def.tags[fixture::RUN.index()].role = Role::Supervisor;
+        let write = |value| CommandKind::Write { tag: fixture::RUN, value };
+        let role = |def: &PlantDef, value| needs(def, &write(value));
+        assert_eq!([0.0, 1.0, 2.0].map(|value| role(&def, value)), [Role::Supervisor; 3]);
+        let device = def.tag(fixture::RUN).device.index();
+        let action = ActionDef {
+            name: "GO".into(),
+            tag: fixture::RUN,
+            value: 1.0,
+            settle: std::time::Duration::ZERO,
+            confirm: String::new(),
+            stop: false,
+            saves: false,
+            role: Some(Role::Technician),
+        };
+        let stop = ActionDef { value: 0.0, stop: true, role: None, ..action.clone() };
+        def.devices[device].actions = vec![action, stop];
+        let expected = [Role::Technician, Role::Technician, Role::Supervisor];
+        assert_eq!([0.0, 1.0, 2.0].map(|value| role(&def, value)), expected);
+        assert_eq!(interlock::least_role_to_write(&def, fixture::RUN), Role::Technician);
+    }
 
     #[test]
     fn each_command_is_for_the_role_that_the_manual_names() {
-        let line = fixture::plant().lines[0].clone();
+        let def = fixture::plant();
+        let line = def.lines[0].clone();
         let scan =
             |serials| Diagnostic::Scan(Scan { first: 1, last: 9, serials, timeout: std::time::Duration::from_secs(1) });
         let serial = crate::plant::def::Serial::USUAL;
@@ -182,7 +272,7 @@ mod tests {
         ];
         for (commands, role) in [(&technician[..], Role::Technician), (&supervisor[..], Role::Supervisor)] {
             for kind in commands {
-                assert_eq!(needs(kind), role, "{kind:?}");
+                assert_eq!(needs(&def, kind), role, "{kind:?}");
             }
         }
     }

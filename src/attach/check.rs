@@ -148,6 +148,7 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
         Query::Report { .. }
         | Query::AlarmMetrics { .. }
         | Query::Past { .. }
+        | Query::Samples { .. }
         | Query::Unarchived { .. }
         | Query::Overview => Ok(()),
         Query::Registers(read) => {

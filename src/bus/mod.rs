@@ -18,6 +18,7 @@
 //! | [`line_stats`] | what is counted |
 //! | [`diagnostics`], [`live`], [`recognise`] | the steps of a diagnostic and of a live read; which device it looks like |
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
+//! | [`meaning`] | what a request means for the tags of the plant |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
 pub(crate) mod pdu;
@@ -33,6 +34,7 @@ pub mod filter;
 pub mod capture;
 pub mod codec;
 pub mod interpret;
+pub mod meaning;
 pub mod plan;
 pub mod backoff;
 pub mod schedule;

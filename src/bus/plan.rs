@@ -73,13 +73,29 @@ impl Block {
 /// The blocks of a line: every readable tag in exactly one, no value split, all within the limits of its device, in the
 /// least time on the wire. A tag that the device has [`refused`] is asked for alone and seldom.
 pub fn blocks(def: &PlantDef, line: LineId, unreadable: &UnreadableRanges) -> Vec<Block> {
-    let on_line = def.devices.iter().filter(|device| device.line == line);
-    on_line.flat_map(|device| blocks_of(def, device, unreadable)).collect()
+    blocks_with_unpolled(def, line, unreadable, &[])
 }
 
-fn blocks_of(def: &PlantDef, device: &DeviceDef, unreadable: &UnreadableRanges) -> Vec<Block> {
+/// The same, and of these devices also what is never polled: an operator has asked for it. Those blocks are read once, and
+/// again whenever everything of their device is.
+pub fn blocks_with_unpolled(
+    def: &PlantDef,
+    line: LineId,
+    unreadable: &UnreadableRanges,
+    requested: &[DeviceId],
+) -> Vec<Block> {
+    let on_line = def.devices.iter().filter(|device| device.line == line);
+    on_line.flat_map(|device| blocks_of(def, device, unreadable, requested.contains(&device.id))).collect()
+}
+
+/// Does a device have tags that are never polled?
+pub fn has_unpolled(def: &PlantDef, device: DeviceId) -> bool {
+    readable(def, def.device(device), true).any(|tag| tag.poll == Poll::Never)
+}
+
+fn blocks_of(def: &PlantDef, device: &DeviceDef, unreadable: &UnreadableRanges, unpolled: bool) -> Vec<Block> {
     let (refused, mut tags): (Vec<&TagDef>, Vec<&TagDef>) =
-        readable(def, device).partition(|tag| is_refused(device, tag, unreadable));
+        readable(def, device, unpolled).partition(|tag| is_refused(device, tag, unreadable));
     tags.sort_by_key(|tag| (tag.poll, tag.point.table, tag.point.address, tag.point.len(), tag.id));
     let wire = Wire::new(def.line(device.line), device);
     let groups = tags.chunk_by(|a, b| (a.poll, a.point.table) == (b.poll, b.point.table));
@@ -89,22 +105,25 @@ fn blocks_of(def: &PlantDef, device: &DeviceDef, unreadable: &UnreadableRanges) 
 
 /// A device may get another program: what it has refused is asked for now and then, when the line has time.
 fn asked_again(device: &DeviceDef, tag: &TagDef) -> Block {
-    let period = match tag.poll {
-        Poll::Every(period) => period.max(REFUSED_EVERY),
-        Poll::Once | Poll::Never => REFUSED_EVERY,
+    let poll = match tag.poll {
+        Poll::Every(period) => Poll::Every(period.max(REFUSED_EVERY)),
+        Poll::Once => Poll::Every(REFUSED_EVERY),
+        Poll::Never => Poll::Never,
     };
-    Block { poll: Poll::Every(period), class: PollClass::Background, ..single(device, tag) }
+    Block { poll, class: PollClass::Background, ..single(device, tag) }
 }
 
 /// The tags of a line that its devices have refused.
 pub fn refused(def: &PlantDef, line: LineId, unreadable: &UnreadableRanges) -> Vec<TagId> {
     let on_line = def.devices.iter().filter(|device| device.line == line);
-    let refused = on_line.flat_map(|device| readable(def, device).filter(|tag| is_refused(device, tag, unreadable)));
+    let refused =
+        on_line.flat_map(|device| readable(def, device, false).filter(|tag| is_refused(device, tag, unreadable)));
     refused.map(|tag| tag.id).collect()
 }
 
-fn readable<'a>(def: &'a PlantDef, device: &DeviceDef) -> impl Iterator<Item = &'a TagDef> {
-    def.tags_of(device.id).filter(|tag| tag.access != Access::Write && tag.poll != Poll::Never)
+fn readable<'a>(def: &'a PlantDef, device: &DeviceDef, unpolled: bool) -> impl Iterator<Item = &'a TagDef> {
+    let is_read = move |tag: &&TagDef| tag.poll != Poll::Never || unpolled && tag.calculation.is_none();
+    def.tags_of(device.id).filter(|tag| tag.access != Access::Write).filter(is_read)
 }
 
 fn is_refused(device: &DeviceDef, tag: &TagDef, unreadable: &UnreadableRanges) -> bool {

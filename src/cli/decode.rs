@@ -1,6 +1,11 @@
 //! `sightglass decode`: the fields of a frame and their meaning.
 
-use std::io::{BufRead, IsTerminal};
+use std::{
+    io::{BufRead, IsTerminal},
+    sync::Arc,
+};
+
+use jiff::Timestamp;
 
 use crate::{
     bus::{
@@ -8,12 +13,13 @@ use crate::{
         dissect::{self, Direction, Dissection},
         frame::{crc16, hex},
         hex_input::{self, ParsedInput},
+        meaning,
         request_lint::check_request,
     },
-    plant::line::Framing,
+    plant::{Plant, Snapshot, def::LineDef, line::Framing},
 };
 
-use super::{CliError, say, say_error};
+use super::{CliError, StationArgs, load, say, say_error};
 
 /// Arguments of `decode`.
 #[derive(Debug, clap::Args)]
@@ -31,6 +37,9 @@ pub struct Args {
     /// The bytes are a Modbus TCP frame, with its header
     #[arg(long, group = "framing")]
     tcp: bool,
+    /// A plant file, or the name of a shipped plant: what the frame means for its tags
+    #[arg(long, value_name = "PLANT")]
+    plant: Option<String>,
 }
 
 /// Columns of the table.
@@ -46,10 +55,13 @@ pub fn main(args: Args) -> Result<(), CliError> {
         (.., true) => Some(Framing::Mbap),
         (false, false, false) => None,
     };
+    let plant = args.plant.as_deref().map(|plant| load(plant, &StationArgs::default())).transpose()?;
+    let plant = plant.map(|def| Plant::new(Arc::new(def), Timestamp::UNIX_EPOCH, 1.0).snapshot());
+    let plant = plant.as_ref();
     if !args.bytes.is_empty() && args.bytes != ["-"] {
         let typed =
             hex_input::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
-        describe(&typed, framing, None).iter().for_each(|line| say(line));
+        describe(&typed, framing, None, plant).iter().for_each(|line| say(line));
         return match dissection(&typed, framing, None).wrong {
             None => Ok(()),
             Some(wrong) => Err(CliError::Failed(format!("the frame is wrong: {wrong}"))),
@@ -58,11 +70,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if std::io::stdin().is_terminal() {
         say_error("one frame per line, Ctrl-D ends");
     }
-    lines(std::io::stdin().lock(), framing)
+    lines(std::io::stdin().lock(), framing, plant)
 }
 
 /// Explains frames as their lines come. An answer behind its request gets its addresses.
-fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> {
+fn lines(input: impl BufRead, framing: Option<Framing>, plant: Option<&Snapshot>) -> Result<(), CliError> {
     let (mut frames, mut corrupt, mut wrong) = (0, 0, 0);
     let mut asked: Option<Dissection> = None;
     for (index, line) in input.split(b'\n').enumerate() {
@@ -83,7 +95,7 @@ fn lines(input: impl BufRead, framing: Option<Framing>) -> Result<(), CliError> 
             say("");
         }
         frames += 1;
-        describe(&typed, framing, asked.as_ref()).iter().for_each(|line| say(line));
+        describe(&typed, framing, asked.as_ref(), plant).iter().for_each(|line| say(line));
         wrong += usize::from(dissection(&typed, framing, asked.as_ref()).wrong.is_some());
         let dissection = dissection(&typed, framing, None);
         asked = (dissection.direction != Some(Direction::Answer)).then_some(dissection);
@@ -114,7 +126,12 @@ fn dissection(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Diss
 }
 
 /// The lines about one frame: what it is, every byte, the checks, what is wrong with it.
-fn describe(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissection>) -> Vec<String> {
+fn describe(
+    typed: &ParsedInput,
+    framing: Option<Framing>,
+    asked: Option<&Dissection>,
+    plant: Option<&Snapshot>,
+) -> Vec<String> {
     let dissection = dissection(typed, framing, asked);
     let direction = match dissection.direction {
         Some(Direction::Request) => "request",
@@ -129,6 +146,7 @@ fn describe(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissec
         None => format!("{direction} without CRC or header"),
     };
     let mut lines = wrap(&format!("{kind}: {}", dissection.summary), WIDTH, 2);
+    lines.extend(means(plant, &dissection, asked).iter().flat_map(|means| wrap(means, WIDTH, 2)));
     lines.extend(table(&dissection));
     lines.extend(checks(&dissection));
     if let Some(wrong) = &dissection.wrong {
@@ -144,6 +162,20 @@ fn describe(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissec
         }
     }
     lines
+}
+
+/// What a frame means for the tags of a plant: on whichever of its lines has the unit. Nothing is read, so what a device would
+/// say of its decimals is not known.
+fn means(plant: Option<&Snapshot>, dissection: &Dissection, asked: Option<&Dissection>) -> Vec<String> {
+    let Some(plant) = plant else { return Vec::new() };
+    let of_line = |line: &LineDef| match (dissection.direction, asked) {
+        (Some(Direction::Answer), Some(asked)) => {
+            meaning::of_answer(plant, line.id, &asked.message, &dissection.message)
+        }
+        (Some(Direction::Answer), None) => Vec::new(),
+        (Some(Direction::Request) | None, _) => meaning::of_request(plant, line.id, &dissection.message),
+    };
+    plant.def.lines.iter().flat_map(of_line).collect()
 }
 
 /// Both checks of the message, as they would be sent.

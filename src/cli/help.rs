@@ -6,11 +6,12 @@ use super::{CliError, say};
 use crate::profile::FORMAT_PAGE;
 
 /// The pages: name, what it is about, text.
-const TOPICS: [(&str, &str, &str); 8] = [
+const TOPICS: [(&str, &str, &str); 9] = [
     ("commands", "what each command does", include_str!("help/commands.md")),
     ("screen", "tabs, keys, and what the signs mean", include_str!("help/screen.md")),
     ("station", "a station on a panel PC: installation, users, rights", include_str!("help/station.md")),
     ("reports", "reports by hand and by themselves, and how to trust them", include_str!("help/reports.md")),
+    ("mqtt", "values for other systems: topics, what arrives, what an outage does", include_str!("help/mqtt.md")),
     ("audit-log", "the audit log: what it holds and what it promises", include_str!("help/audit.md")),
     ("reliability", "what you can rely on, and what happens when something fails", include_str!("help/reliability.md")),
     ("devices", "the shipped devices, and how well each is known", include_str!("help/devices.md")),

@@ -12,6 +12,7 @@ use crate::{
         alarm::manager::subject_name,
         event::LineState,
         line_minute::LineMinute,
+        north_def::NorthStatus,
         sample::{Quality, Sample},
         snapshot::{ActiveAlarm, DeviceState, SuppressedAlarm},
     },
@@ -110,6 +111,7 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
         let (rows, lost) = (snapshot.history.rows, snapshot.history.lost);
         lines.push(format!("history  {trouble}, {rows} rows, {lost} lost{epoch}"));
     }
+    lines.extend(snapshot.north.iter().map(|north| format!("data out {}", north_words(snapshot, north))));
     lines.extend(snapshot.suppressed.iter().map(|alarm| format!("suppressed {}", suppressed_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
         lines.push("tag      values are shown after a login: --user NAME".to_owned());
@@ -145,6 +147,14 @@ fn suppressed_words(snapshot: &Snapshot, alarm: &SuppressedAlarm) -> String {
     let active = if alarm.active { ", ACTIVE" } else { "" };
     let subject = subject_name(&snapshot.def, def.subject);
     format!("{} {:10} {subject} {}{until}{active}", def.priority.number(), alarm.state.word(), def.message)
+}
+
+fn north_words(snapshot: &Snapshot, north: &NorthStatus) -> String {
+    let NorthStatus { connected, sent, refused, sent_until, error } = north;
+    let state = if *connected { "connected" } else { "not connected" };
+    let why = error.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
+    let until = local(*sent_until, &snapshot.def);
+    format!("{state}{why}, {sent} samples sent, {refused} refused, complete until {until}")
 }
 
 fn line_words(state: &LineState) -> String {
@@ -228,6 +238,10 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "waiting": snapshot.history.waiting, "waiting_max": snapshot.history.waiting_max,
             "committed_at": snapshot.history.committed_at.map(|at| at.to_string()),
         },
+        "north": snapshot.north.as_ref().map(|north| json!({
+            "connected": north.connected, "sent": north.sent, "refused": north.refused,
+            "sent_until": north.sent_until.to_string(), "error": north.error,
+        })),
     })
 }
 

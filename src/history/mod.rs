@@ -167,6 +167,13 @@ pub enum Query {
     },
     /// What is stored, and where.
     Overview,
+    /// Every stored sample of a span, archived or not, in order of time.
+    Samples {
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+    },
     /// Samples that are not archived yet.
     Unarchived {
         /// From.
@@ -206,6 +213,8 @@ pub enum Answer {
     /// What is known of the instant.
     Past(Box<Past>),
     /// Samples in order of time.
+    Samples(Vec<(TagId, Sample)>),
+    /// The same of those that are not archived.
     Unarchived(Vec<(TagId, Sample)>),
     /// What is stored.
     Overview(Box<Overview>),

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::keyword::keyword_enum;
+
 /// Type of a raw value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum DataType {
@@ -127,5 +129,21 @@ impl fmt::Display for DataType {
             DataType::Text(bytes) => write!(f, "string({bytes})"),
             _ => f.write_str(self.name()),
         }
+    }
+}
+
+keyword_enum! {
+    /// Sequence of the bytes A B C D (A most significant) on the wire.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+    pub enum ByteOrder: "order" {
+        /// Big-endian, the default of the Modbus world.
+        #[default]
+        Abcd => "ABCD",
+        /// Low word first (DirectLOGIC).
+        Cdab => "CDAB",
+        /// Bytes swapped inside words.
+        Badc => "BADC",
+        /// Little-endian.
+        Dcba => "DCBA",
     }
 }

@@ -15,6 +15,7 @@ pub use super::{
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Serial, Transport},
     mimic_def::{MimicDef, MimicPage, Picture},
+    north_def::{MqttDef, NorthDef, PasswordSource, TlsRoots},
     report_def::{CsvDialect, Paper, ReportDef, Section},
     role::{Reauthentication, Role},
 };
@@ -65,6 +66,8 @@ pub struct PlantDef {
     pub report: ReportDef,
     /// What the history needs of its disk.
     pub history: HistoryDef,
+    /// Where values are sent to.
+    pub north: NorthDef,
     /// The simulated process that `demo` and `sim` serve for this plant, by name (`tank`).
     pub simulation: Option<String>,
     /// SHA-256 of the plant file in hexadecimal; empty for a plant without one.
@@ -92,6 +95,7 @@ impl Default for PlantDef {
             shifts: Vec::new(),
             report: ReportDef::default(),
             history: HistoryDef::default(),
+            north: NorthDef::default(),
             simulation: None,
             file_sha256: String::new(),
         }
@@ -151,6 +155,8 @@ pub struct DeviceDef {
     pub limits: Limits,
     /// The function codes that it knows; empty if its profile does not list them.
     pub functions: Vec<u8>,
+    /// Names of the states that function 07 reads, by bit; what they mean is the device's own.
+    pub exception_status: Vec<(u8, String)>,
     /// Least silence between two requests to this device (the PXR wants 10 ms).
     pub gap: Duration,
     /// Quiet time after a write before the next request.
@@ -181,6 +187,7 @@ impl DeviceDef {
             model: String::new(),
             limits: Limits { gap_registers_max: 0, ..Limits::STANDARD },
             functions: Vec::new(),
+            exception_status: Vec::new(),
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,
@@ -271,6 +278,8 @@ pub struct ActionDef {
     pub stop: bool,
     /// It saves the settings in the device's own memory.
     pub saves: bool,
+    /// The least role that may do it, where that is not the one of its tag.
+    pub role: Option<Role>,
 }
 
 /// What a tag must hold in a device of this kind.

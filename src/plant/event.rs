@@ -10,6 +10,7 @@ use super::{
     diagnostics::DiagnosticRun,
     id::{DeviceId, LineId, TagId, WriteId},
     line_report::LineReport,
+    north_def::NorthStatus,
     station::{FaultState, StationFault},
     traffic::Exchange,
 };
@@ -82,6 +83,13 @@ pub enum Event {
         unlock_tag: TagId,
         /// Its result: accepted, refused or without a valid response.
         result: WriteResult,
+    },
+    /// How far the data out has come, about once a second.
+    North {
+        /// When.
+        at: Timestamp,
+        /// The state.
+        status: Arc<NorthStatus>,
     },
     /// The station itself has a fault, or no longer has it.
     Station {

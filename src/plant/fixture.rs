@@ -101,6 +101,7 @@ pub fn plant() -> PlantDef {
         runs: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
+        north: Default::default(),
         report: ReportDef::default(),
         simulation: None,
         file_sha256: String::new(),

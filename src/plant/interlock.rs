@@ -9,6 +9,7 @@ use super::{
     alarm::condition::is_set,
     def::{ActionDef, PlantDef},
     id::TagId,
+    role::Role,
     sample::{Cause, Sample},
 };
 use crate::plant::time::elapsed;
@@ -154,6 +155,28 @@ pub fn stops<'a>(logic: &'a ControlLogic, actions: &'a [ActionDef], tag: TagId) 
 /// that is only rounded to a stop counts as none.
 pub fn is_stop(def: &PlantDef, tag: TagId, rounded: f64) -> bool {
     stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| off == rounded)
+}
+
+/// The least role that may write this value to a tag: that of the action that writes it, else that of the tag. A stop is for
+/// everybody who may operate.
+pub fn role_to_write(def: &PlantDef, tag: TagId, rounded: f64) -> Role {
+    if is_stop(def, tag, rounded) {
+        return Role::Technician;
+    }
+    let mut actions = actions_on(def, tag).filter(|action| action.value == rounded);
+    actions.find_map(|action| action.role).unwrap_or(def.tag(tag).role)
+}
+
+/// The least role that may write any value to a tag.
+pub fn least_role_to_write(def: &PlantDef, tag: TagId) -> Role {
+    let actions = actions_on(def, tag).filter_map(|action| action.role);
+    let mut stops = stops(&def.logic, &def.device(def.tag(tag).device).actions, tag);
+    let stop = stops.next().map(|_| Role::Technician);
+    actions.chain(stop).fold(def.tag(tag).role, Role::min)
+}
+
+fn actions_on(def: &PlantDef, tag: TagId) -> impl Iterator<Item = &ActionDef> {
+    def.device(def.tag(tag).device).actions.iter().filter(move |action| action.tag == tag)
 }
 
 /// Since when the feedback of each actuator has differed from its command, by its place in [`ControlLogic::actuators`].

@@ -25,6 +25,7 @@ use super::{
     event::{Event, LineState, WriteResult},
     interlock::ActuatorTracker,
     line_minute::LineMinuteTracker,
+    north_def::NorthStatus,
     parameter_set::StoredSet,
     process_image::ProcessImage,
     program::ProgramWatch,
@@ -101,6 +102,8 @@ pub struct Plant {
     /// Auto-tuning and program, by device.
     tunings: Vec<TuningTracker>,
     programs: Vec<ProgramWatch>,
+    /// How far the data out has come.
+    north: Option<Arc<NorthStatus>>,
 }
 
 impl Plant {
@@ -126,6 +129,7 @@ impl Plant {
             last_restore_number: 0,
             tunings: vec![TuningTracker::default(); def.devices.len()],
             programs: vec![ProgramWatch::default(); def.devices.len()],
+            north: None,
             def,
             at,
             run: at.as_microsecond().cast_unsigned(),
@@ -171,6 +175,10 @@ impl Plant {
             }
             Event::Station { at, fault, state } => {
                 self.faults.set(fault, state);
+                (at, None)
+            }
+            Event::North { at, status } => {
+                self.north = Some(status);
                 (at, None)
             }
             Event::Unlocked { at, id, unlock_tag, result } => {
@@ -319,6 +327,7 @@ impl Plant {
             tunings: self.tunings.iter().map(|tracker| tracker.tuning.clone()).collect(),
             programs: self.programs.iter().map(ProgramWatch::elapsed).collect(),
             runs: self.runs.iter().map(RunTracker::shown).collect(),
+            north: self.north.clone(),
             speed: self.speed,
         }
     }

@@ -20,6 +20,7 @@ use super::{
     interlock::ActuatorTracker,
     line_report::LineReport,
     ne107,
+    north_def::NorthStatus,
     number::to_u32,
     parameter_set::StoredSet,
     record::{ChainHash, FirstOut},
@@ -85,6 +86,8 @@ pub struct Snapshot {
     pub programs: Vec<Option<(Duration, bool)>>,
     /// The control run at work, or the last one, by place in [`PlantDef::runs`]; `None` before the first.
     pub runs: Vec<Option<Arc<ControlRun>>>,
+    /// How far the data out has come; `None` for a plant that sends nothing.
+    pub north: Option<Arc<NorthStatus>>,
     /// Plant seconds per real second; 1 except in demonstrations.
     pub speed: f64,
 }
@@ -116,6 +119,7 @@ impl Snapshot {
             tunings: vec![None; devices],
             programs: vec![None; devices],
             runs: vec![None; def.runs.len()],
+            north: None,
             speed: 1.0,
             def,
         }

@@ -41,6 +41,8 @@ keyword_enum! {
         LineTask => "line task restarted",
         /// A report was not made or not delivered.
         Reports => "automatic report fault",
+        /// What is stored has not reached the broker for too long, or the broker refuses it.
+        DataOut => "data out delayed",
     }
 }
 
@@ -65,9 +67,11 @@ impl FaultState {
 impl StationFault {
     fn priority(self) -> Priority {
         match self {
-            StationFault::NotArchived | StationFault::DiskSpace | StationFault::Clock | StationFault::Reports => {
-                Priority::Medium
-            }
+            StationFault::NotArchived
+            | StationFault::DiskSpace
+            | StationFault::Clock
+            | StationFault::Reports
+            | StationFault::DataOut => Priority::Medium,
             _ => Priority::High,
         }
     }
@@ -138,17 +142,21 @@ impl StationFault {
                 "the history has all figures; a report is missing in its folder or at its recipients",
                 "read the details; free the disk or repair the command; what is missing is made automatically",
             ],
+            StationFault::DataOut => [
+                "the broker or the network is down, it refuses the station, or the history does not record",
+                "the receivers of the values see old ones; nothing is lost, the history has all of them",
+                "read the details; check network, broker, user and password; what is missing is sent automatically",
+            ],
         }
     }
 
     /// Its alarm.
     pub fn alarm(self, id: AlarmId) -> AlarmDef {
-        let [cause, effect, action] = self.guidance().map(str::to_owned);
         AlarmDef {
             priority: self.priority(),
             class: AlarmClass::System,
             on_delay: self.on_delay(),
-            guidance: Guidance { cause, effect, action, response_time: Some(Duration::from_secs(600)) },
+            guidance: Guidance::new(self.guidance(), Some(Duration::from_secs(600))),
             ..AlarmDef::new(id, Subject::Station, Condition::Station(self), self.word())
         }
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub use super::{
     calculation::Calculation,
     confidence::Confidence,
-    data_type::{DataType, Encoding},
+    data_type::{ByteOrder, DataType, Encoding},
     poll_class::PollClass,
     store_policy::{STORE_EVERY_MAX, StorePolicy},
 };
@@ -15,7 +15,7 @@ use super::{
     id::{DeviceId, TagId},
     keyword::keyword_enum,
     number::to_u8,
-    role::Reauthentication,
+    role::{Reauthentication, Role},
     sample::Sample,
     simulate::Simulate,
 };
@@ -59,6 +59,8 @@ pub struct TagDef {
     pub confirm: Option<String>,
     /// What must be given again to write it.
     pub reauthenticate: Option<Reauthentication>,
+    /// The least role that may write it: operating is for a technician, tuning and setting up for a supervisor.
+    pub role: Role,
     /// Names of the numbers of an enumeration; empty for a quantity.
     pub enum_labels: Vec<(i64, String)>,
     /// Names of the bits of a status word.
@@ -122,6 +124,7 @@ impl TagDef {
             access: Access::Read,
             confirm: None,
             reauthenticate: None,
+            role: Role::Technician,
             enum_labels: Vec::new(),
             bit_labels: Vec::new(),
             bad_if: Vec::new(),
@@ -285,22 +288,6 @@ impl Table {
     pub fn modicon(self, address: u16) -> String {
         let number = u32::from(address) + 1;
         if number <= 9_999 { format!("{}{number:04}", self.digit()) } else { format!("{}{number:05}", self.digit()) }
-    }
-}
-
-keyword_enum! {
-    /// Sequence of the bytes A B C D (A most significant) on the wire.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-    pub enum ByteOrder: "order" {
-        /// Big-endian, the default of the Modbus world.
-        #[default]
-        Abcd => "ABCD",
-        /// Low word first (DirectLOGIC).
-        Cdab => "CDAB",
-        /// Bytes swapped inside words.
-        Badc => "BADC",
-        /// Little-endian.
-        Dcba => "DCBA",
     }
 }
 

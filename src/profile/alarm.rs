@@ -22,11 +22,6 @@ const SHELVE_MAX: Duration = Duration::from_secs(7 * 86_400);
 /// A time on the shelf that is too short to be of use.
 const SHELVE_MIN: Duration = Duration::from_secs(60);
 
-/// The name of the alarm that every device has.
-const NO_VALUES: &str = "not responding";
-/// The name of the alarm that every line has.
-const OVERLOADED: &str = "line overloaded";
-
 /// The alarms of a plant file, one for each device that does not have its own "not responding" and for each line that does
 /// not have its own "line overloaded", and those of the station.
 pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
@@ -161,36 +156,49 @@ fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
     }
 }
 
+/// The name of the alarm that every device or line has.
+fn message(condition: Condition) -> &'static str {
+    match condition {
+        Condition::Overloaded => "line overloaded",
+        _ => "not responding",
+    }
+}
+
+/// Its likely cause, effect and action.
+fn guidance(condition: Condition) -> [&'static str; 3] {
+    match condition {
+        Condition::Overloaded => [
+            "the line is polled more often than it can carry, or its devices answer more slowly",
+            "alarm inputs are polled on time, other values less often; no device is faulty",
+            "see the Bus tab; poll less often, increase the baud rate, or split the line",
+        ],
+        _ => [
+            "the device has no power, its cable is open, or its unit address or serial parameters differ",
+            "its values are unknown and it cannot be operated",
+            "check the device; then supply, cable, terminator and the Bus tab",
+        ],
+    }
+}
+
 fn not_responding(device: &DeviceDef) -> AlarmDef {
+    let condition = Condition::NotResponding;
     AlarmDef {
         class: AlarmClass::System,
         // The link has already asked more than once; the delay keeps a single lost frame quiet.
         on_delay: Duration::from_secs(3),
-        guidance: Guidance {
-            cause: format!(
-                "{} has no power, its cable is open, or its unit address or serial parameters differ",
-                device.name
-            ),
-            effect: "its values are unknown and it cannot be operated".to_owned(),
-            action: "check the device; then supply, cable, terminator and the Bus tab".to_owned(),
-            response_time: Some(Duration::from_secs(600)),
-        },
-        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), Condition::NotResponding, NO_VALUES)
+        guidance: Guidance::new(guidance(condition), Some(Duration::from_secs(600))),
+        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), condition, message(condition))
     }
 }
 
 fn overloaded(line: &LineDef) -> AlarmDef {
+    let condition = Condition::Overloaded;
     AlarmDef {
         priority: Priority::Low,
         class: AlarmClass::System,
         // The schedule has already seen more than a short peak.
         on_delay: Duration::from_secs(10),
-        guidance: Guidance {
-            cause: format!("{} is polled more often than it can carry, or its devices answer more slowly", line.name),
-            effect: "alarm inputs are polled on time, other values less often; no device is faulty".to_owned(),
-            action: "see the Bus tab; poll less often, increase the baud rate, or split the line".to_owned(),
-            response_time: None,
-        },
-        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::Overloaded, OVERLOADED)
+        guidance: Guidance::new(guidance(condition), None),
+        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), condition, message(condition))
     }
 }

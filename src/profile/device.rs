@@ -6,7 +6,7 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Names, Scope, Unique, check_number, held_number_of, number_of},
     reader::{At, Node, OptionalKey, Raw, text},
-    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, SignatureTable},
+    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, SignatureTable},
     simulate::simulate,
     tag::Defined,
     units,
@@ -41,6 +41,9 @@ pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Op
         // The limits of the device itself are read with it.
         limits: None,
         default: table.default.clone(),
+        // These of the device itself are read with it.
+        roles: None,
+        exception_status: None,
         tags: Vec::new(),
         actions: table.actions.clone(),
         faceplate: table.faceplate.clone(),
@@ -205,6 +208,15 @@ pub(super) fn check_overlaps(tags: &[Defined], problems: &mut Problems) {
     }
 }
 
+/// A role for a group that no tag is in protects nothing.
+pub(super) fn check_roles(roles: &[Option<&Roles>], tags: &[Defined], problems: &mut Problems) {
+    for (group, _) in roles.iter().flatten().flat_map(|roles| &roles.0) {
+        if !tags.iter().any(|defined| defined.tag.group == group.value) {
+            problems.unknown("group", group, tags.iter().map(|defined| defined.tag.group.as_str()));
+        }
+    }
+}
+
 /// `holding 1004 to 1005`.
 fn extent(point: Point) -> String {
     let (word, first) = (point.table.word(), point.address);
@@ -319,6 +331,7 @@ pub(super) fn actions(tables: &[At<ActionTable>], scope: &Scope, problems: &mut 
             confirm: text(&action.confirm),
             stop: action.stop.value_or(false),
             saves: action.saves.value_or(false),
+            role: action.role.map(|role| role.value.0),
         });
     }
     found

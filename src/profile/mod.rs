@@ -32,6 +32,7 @@ pub mod line;
 mod lint;
 pub(crate) mod names;
 mod mimic;
+mod north;
 mod picture;
 pub(crate) mod new_plant;
 mod plant;

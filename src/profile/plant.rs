@@ -12,7 +12,7 @@ use super::{
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
-    program, reader,
+    north, program, reader,
     reader::{At, Node, OptionalKey, Raw, text},
     report, run,
     schema::{DeviceTable, PlantFile, ProfileFile},
@@ -96,6 +96,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let rules = Rules { shifts: !shifts.is_empty(), is_program: library.is_program };
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, &rules, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
+    let north = north::north(name, file.north.as_ref().map(|north| &north.value), &defs, problems);
     let classes = poll_class::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
     Some(PlantDef {
@@ -114,6 +115,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         shifts,
         report,
         history,
+        north,
         simulation: file.simulation.as_ref().map(|simulation| simulation.value.clone()),
         devices,
         tags,
@@ -184,6 +186,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
             defined.push(tag::define(TagId(to_u16(defined.len())), row.layers, &context, problems));
         }
         device::check_overlaps(&defined[first..], problems);
+        device::check_roles(&context.roles, &defined[first..], problems);
         def.functions = device::functions(&device.profile, &defined[first..], problems);
         devices.push(def);
     }
@@ -275,6 +278,11 @@ fn define_device<'a>(
         model: format!("{} {}", text(&profile.vendor), text(&profile.model)).trim().to_owned(),
         limits,
         functions: Vec::new(),
+        exception_status: tag::named_bits(
+            table.exception_status.as_ref().or(profile.exception_status.as_ref()),
+            8,
+            problems,
+        ),
         gap: timing.gap,
         write_gap: timing.write_gap,
         response_time: timing.response_time,
@@ -291,6 +299,7 @@ fn define_device<'a>(
         fast: period(table.fast, 1, problems),
         slow: period(table.slow, 10, problems),
         names,
+        roles: [&table.roles, &profile.roles].map(|roles| roles.as_ref().map(|roles| &roles.value)),
     };
     (def, context)
 }

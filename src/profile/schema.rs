@@ -7,12 +7,12 @@ use std::time::Duration;
 use jiff::civil::Time;
 
 pub(super) use self::device::{
-    ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Scheme, SignatureTable,
-    SimulateTable, StepTable, TagTable,
+    ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Roles, Scheme,
+    SignatureTable, SimulateTable, StepTable, TagTable,
 };
 use super::{
     condition::AlarmTable,
-    reader::{Choice, Raw, Texts, toml_tables},
+    reader::{Choice, Numbered, Raw, Texts, toml_tables},
 };
 use crate::plant::{
     def::{Paper, Parity, ParquetVersion, Role, Rs485, Section},
@@ -40,6 +40,7 @@ toml_tables! {
         list "shift" shifts: ShiftTable,
         opt "report" report: ReportTable,
         opt "history" history: HistoryTable,
+        opt "north" north: NorthTable,
     }
 
     /// A `[[line]]` on a serial port.
@@ -84,6 +85,10 @@ toml_tables! {
         opt "limits" limits: Raw,
         /// More tags, or other keys for the tags of the profile.
         list "tag" tags: Raw,
+        /// The least role that may write the tags of a group; what the profile says of the same group does not count.
+        opt "roles" roles: Roles,
+        /// Names of the eight states that function 07 reads; they stand for those of the profile.
+        opt "exception_status" exception_status: Numbered,
         // What follows belongs to a device without a profile.
         opt "vendor" vendor: String,
         opt "model" model: String,
@@ -255,6 +260,35 @@ toml_tables! {
         opt "keep_minutes_days" keep_minutes_days: u32,
         opt "keep_hours_days" keep_hours_days: u32,
         opt "parquet" parquet: ParquetVersion,
+    }
+
+    /// Where values are sent to.
+    NorthTable, "the data out" {
+        opt "mqtt" mqtt: MqttTable,
+    }
+
+    /// The `[north.mqtt]`.
+    MqttTable, "the MQTT broker" {
+        need "host" host: String,
+        opt "port" port: u16,
+        opt "client_id" client_id: String,
+        opt "user" user: String,
+        opt "password_file" password_file: String,
+        opt "password_env" password_env: String,
+        opt "tls" tls: bool,
+        opt "ca_file" ca_file: String,
+        opt "topic" topic: String,
+        opt "deadband_percent" deadband_percent: f64,
+        list "deadband" deadbands: DeadbandTable,
+        opt "max_interval" max_interval: Duration,
+        opt "lag_max" lag_max: Duration,
+    }
+
+    /// A `[[north.mqtt.deadband]]`.
+    DeadbandTable, "a deadband" {
+        need "tag" tag: String,
+        opt "value" value: f64,
+        opt "percent" percent: f64,
     }
 
     /// The raw record of a controller.

@@ -5,7 +5,7 @@ mod scaling;
 
 use std::time::Duration;
 
-pub(super) use self::scaling::range_of;
+pub(super) use self::{bits::named_bits, scaling::range_of};
 use self::{
     bits::{bit_field, bit_labels, enum_labels},
     scaling::check_scaling,
@@ -15,12 +15,12 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
     reader::{At, Choice, OptionalKey, Raw, either, supersede, text},
-    schema::{PollWord, Scheme, SimulateTable, TagTable},
+    schema::{PollWord, Roles, Scheme, SimulateTable, TagTable},
     tag_keys::{check_calculated, check_text},
     units,
 };
 use crate::plant::{
-    def::{DeviceId, Limits, TagId},
+    def::{DeviceId, Limits, Role, TagId},
     tag::{
         Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, STORE_EVERY_MAX,
         StorePolicy, Table, TagDef,
@@ -36,6 +36,16 @@ pub(super) struct DeviceContext<'a> {
     pub fast: Duration,
     pub slow: Duration,
     pub names: &'a Names,
+    /// The least role that may write the tags of a group, the plant file's before the profile's.
+    pub roles: [Option<&'a Roles>; 2],
+}
+
+impl DeviceContext<'_> {
+    /// The least role that may write the tags of a group.
+    fn role_of(&self, group: &str) -> Role {
+        let mut listed = self.roles.iter().flatten().flat_map(|roles| &roles.0);
+        listed.find(|(name, _)| name.value == group).map_or(Role::Technician, |(_, role)| role.0)
+    }
 }
 
 /// A defined tag and what must still be checked when all tags are there.
@@ -93,6 +103,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         access,
         confirm: row.confirm.as_ref().map(|confirm| confirm.value.clone()),
         reauthenticate: row.reauthenticate.map(|kind| kind.value),
+        role: row.role.map_or_else(|| context.role_of(&text(&row.group)), |role| role.value.0),
         enum_labels: enum_labels(&row, kind, problems),
         bit_labels: bit_labels(&row.bits, kind, problems),
         bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),

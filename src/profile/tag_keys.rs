@@ -15,9 +15,9 @@ const FOR_NUMBERS: [&str; 16] = [
 
 /// Keys that belong to a register.
 #[rustfmt::skip]
-const FOR_REGISTERS: [&str; 25] = [
+const FOR_REGISTERS: [&str; 26] = [
     "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "unit_from", "access", "verify",
-    "confirm", "reauthenticate", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
+    "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
     "poll_class", "simulate", "default", "set",
 ];
 

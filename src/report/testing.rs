@@ -69,6 +69,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
                 in_flight_max: 1,
             },
             functions: Vec::new(),
+            exception_status: Vec::new(),
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,
@@ -99,6 +100,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             .map(|&(name, hour, minute)| ShiftDef { name: name.into(), start: time(hour, minute, 0, 0) })
             .collect(),
         history: Default::default(),
+        north: Default::default(),
         report: ReportDef { record: Some((device, Duration::from_secs(10))), ..ReportDef::default() },
         simulation: None,
         file_sha256: String::new(),

@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, time::Duration};
 use jiff::Timestamp;
 
 pub use self::{
-    syntax::{InjectedFault, Position, TargetKind, Valve},
+    syntax::{InjectedFault, PanelSwitch, Position, TargetKind, Valve},
     target::{AvailableFaults, FaultTarget, available_faults, why_not_applicable},
 };
 use super::{
@@ -127,6 +127,11 @@ impl Faults {
             (FaultTarget::Unit(line, unit), InjectedFault::SensorBurnout) if simulator.is_controller(line, unit) => {
                 if let Some(rig) = simulator.rig_mut() {
                     rig.set_sensor_open(begins);
+                }
+            }
+            (FaultTarget::Process, InjectedFault::Switch(switch)) => {
+                if let Some(rig) = simulator.rig_mut() {
+                    rig.set_switch(switch as u16, begins);
                 }
             }
             (FaultTarget::Process, _) => {

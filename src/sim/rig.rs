@@ -5,10 +5,10 @@ use std::time::Duration;
 use super::dl06::sequence::Step;
 use super::dl06::{Dl06, Outputs, SCAN};
 use super::faults::process::ProcessFaults;
-use super::pxr::{Pxr, SAMPLE, Sensor};
+use super::pxr::{DECIMALS_AT, Pxr, SAMPLE, Sensor};
 use super::slave::Slave;
 use super::tank::{AMBIENT_C, Actuators, Readings, Tank};
-use crate::plant::{PlantDef, def::DeviceId};
+use crate::plant::{PlantDef, def::DeviceId, number::to_u8};
 
 /// The name by which a plant selects the rig.
 pub const SIMULATION: &str = "tank";
@@ -39,6 +39,13 @@ pub fn part(def: &PlantDef, device: DeviceId) -> Option<RigDevice> {
         one if one == first(PLC) => Some(RigDevice::Plc),
         _ => None,
     }
+}
+
+/// The decimals that the plant file gives the rig's controller at its start.
+pub fn decimals(def: &PlantDef) -> Option<u8> {
+    let controller = def.devices.iter().find(|device| part(def, device.id) == Some(RigDevice::Controller))?;
+    let tag = def.tags_of(controller.id).find(|tag| (tag.point.table, tag.point.address) == DECIMALS_AT)?;
+    tag.simulate.as_ref()?.start.map(to_u8)
 }
 
 /// Scans of the PLC, which are the inner steps, per sample of the controller.
@@ -109,6 +116,17 @@ impl Rig {
             owed: Duration::ZERO,
             steps: 0,
         }
+    }
+
+    /// The same with a controller that shows so many decimals.
+    pub fn with_decimals(mut self, decimals: u8) -> Rig {
+        self.pxr.device.start_with_decimals(decimals);
+        self
+    }
+
+    /// The decimals that the controller shows.
+    pub fn decimals(&self) -> u8 {
+        self.pxr.device.decimals()
     }
 
     /// Lets plant time pass. What is left over below one step is kept for the next call.

@@ -47,7 +47,9 @@ impl Simulator {
     /// Simulates a plant: the rig that it names, and for every other device a model made from its profile.
     pub fn new(def: &PlantDef) -> Result<Simulator, UnknownSimulation> {
         let rig = match def.simulation.as_deref() {
-            Some(rig::SIMULATION) => Some(Rig::demo()),
+            Some(rig::SIMULATION) => {
+                Some(rig::decimals(def).map_or_else(Rig::demo, |decimals| Rig::demo().with_decimals(decimals)))
+            }
             Some(other) => return Err(UnknownSimulation(other.to_owned())),
             None => None,
         };
@@ -154,7 +156,7 @@ impl Simulator {
 
     /// The same with its process at rest; otherwise it is in the middle of work.
     pub fn at_rest(self) -> Simulator {
-        Simulator { rig: self.rig.map(|_| Rig::new()), ..self }
+        Simulator { rig: self.rig.map(|rig| Rig::new().with_decimals(rig.decimals())), ..self }
     }
 
     /// Whether a unit is the controller of the tank rig.
@@ -202,7 +204,10 @@ impl Simulator {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::plant::simulate::Simulate;
 
     const L1: LineId = LineId(0);
 
@@ -213,6 +218,25 @@ mod tests {
             assert_eq!(simulator.respond(L1, unit, &[3, 0, 0, 0, 1]), None);
         }
         assert_eq!(simulator.respond(LineId(1), 1, &[3, 0x03, 0xEA, 0, 1]), None, "the same unit of another line");
+    }
+
+    /// The frame that the thesis recorded: SV = 50 °C on a controller that shows whole degrees, 5.0 °C on one with a decimal.
+    #[test]
+    fn the_recorded_setpoint_is_50_where_p_dp_is_0() {
+        let def = crate::profile::load(std::path::Path::new("tank"), &crate::profile::Search::shipped());
+        let mut def = Arc::unwrap_or_clone(def.expect("a shipped plant"));
+        let decimals = def.tag_named("TIC-1.P-DP").expect("a tag of the controller");
+        for (start, raw, sv_c) in [(0.0, [0x00, 0x32], 50.0), (1.0, [0x00, 0x32], 5.0), (0.0, [0x00, 0x46], 70.0)] {
+            let simulate = Simulate { start: Some(start), ..Simulate::default() };
+            def.tags[decimals.index()].simulate = Some(Arc::new(simulate));
+            let simulator = Simulator::new(&def).expect("a known simulation");
+            for mut simulator in [simulator.clone(), simulator.at_rest()] {
+                let request = [6, 0x03, 0xEA, raw[0], raw[1]];
+                assert_eq!(simulator.respond(L1, 1, &request), Some(request.to_vec()));
+                simulator.advance(Duration::from_secs(1));
+                assert_eq!(simulator.rig().map(|rig| rig.state().sv_c), Some(sv_c), "P-DP {start}");
+            }
+        }
     }
 
     /// 41003 is SV of the controller and plain V memory of the PLC.

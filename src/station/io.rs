@@ -16,14 +16,16 @@ use crate::{
         AccessControl, Peer, Users,
         io::{audit_log::Opened, own_user, recorder, users, users_beside},
     },
-    bus::io::{clock::Clock, transport::Connector},
+    bus::io::{clock::Clock, live_reads::LiveRequest, transport::Connector},
     history::{
         HistoryError,
         io::{JobRequest, QueryRequest, thread as history},
     },
+    north::io::task::{self as north, NorthTask},
     plant::{
         Plant, PlantDef,
-        command::CommandStatus,
+        command::{BusRequest, CommandStatus},
+        event::Event,
         record::ChainHash,
         snapshot::HistoryStatus,
         station::{FaultState, StationFault},
@@ -176,30 +178,29 @@ struct Threads {
 }
 
 /// A plant ends with its last line; one without any when it is stopped.
-async fn until_stopped(events: mpsc::Sender<crate::plant::event::Event>, mut stopped: watch::Receiver<bool>) {
+async fn until_stopped(events: mpsc::Sender<Event>, mut stopped: watch::Receiver<bool>) {
     // A station that is gone has stopped.
     let _ = stopped.wait_for(|stop| *stop).await;
     drop(events);
 }
 
-// Everything that a station is made of, each once.
-#[allow(clippy::too_many_arguments)]
-fn assemble(
-    def: Arc<PlantDef>,
+/// The tasks of the lines, and by [`LineId`](crate::plant::def::LineId) where they take requests and live reads.
+#[derive(Default)]
+struct Lines {
+    tasks: Vec<JoinHandle<()>>,
+    links: Vec<mpsc::Sender<BusRequest>>,
+    live: Vec<mpsc::Sender<LiveRequest>>,
+}
+
+/// Starts a task for each line.
+fn start_lines(
+    def: &Arc<PlantDef>,
     clock: Clock,
     connectors: Vec<Connector>,
-    plant: Plant,
-    file: Option<PlantFile>,
-    persistence: Persistence,
-    threads: Threads,
-    guarded: Option<(AccessControl, PathBuf)>,
-) -> Station {
-    let Threads { queries, jobs: (history_jobs, history_file), history, audit_writer } = threads;
-    let (stop, stopped) = watch::channel(false);
-    let (events, event_queue) = mpsc::channel(EVENTS);
-    let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
-    let mut tasks = Vec::new();
-    let (mut links, mut live) = (Vec::new(), Vec::new());
+    events: &mpsc::Sender<Event>,
+    stopped: &watch::Receiver<bool>,
+) -> Lines {
+    let Lines { mut tasks, mut links, mut live } = Lines::default();
     for (line, connector) in def.lines.iter().zip(connectors) {
         let (requests, request_queue) = mpsc::channel(REQUESTS);
         let (live_reads, live_queue) = mpsc::channel(LIVE_MAX);
@@ -220,14 +221,40 @@ fn assemble(
     if def.lines.is_empty() {
         tasks.push(tokio::spawn(until_stopped(events.clone(), stopped.clone())));
     }
+    Lines { tasks, links, live }
+}
+
+// Everything that a station is made of, each once.
+#[allow(clippy::too_many_arguments)]
+fn assemble(
+    def: Arc<PlantDef>,
+    clock: Clock,
+    connectors: Vec<Connector>,
+    plant: Plant,
+    file: Option<PlantFile>,
+    persistence: Persistence,
+    threads: Threads,
+    guarded: Option<(AccessControl, PathBuf)>,
+) -> Station {
+    let Threads { queries, jobs: (history_jobs, history_file), history, audit_writer } = threads;
+    let (stop, stopped) = watch::channel(false);
+    let (events, event_queue) = mpsc::channel(EVENTS);
+    let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
+    let Lines { mut tasks, links, live } = start_lines(&def, clock, connectors, &events, &stopped);
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
-    let for_reports = persistence.records.clone().map(|records| (records, persistence.store.clone()));
+    let store = persistence.records.clone().map(|records| (records, persistence.store.clone()));
     let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
-    if let Some((records, status)) = for_reports.filter(|_| !def.report.automatic.is_empty()) {
+    if let (Some((_, history)), Some(mqtt)) = (&store, &def.north.mqtt) {
+        let (snapshots, queries, events) = (snapshots.clone(), queries.clone(), events.clone());
+        let (def, mqtt, history, history_file) = (def.clone(), mqtt.clone(), history.clone(), history_file.clone());
+        let task = NorthTask { def, mqtt, clock, snapshots, queries, history, events, history_file };
+        tasks.push(tokio::spawn(north::run(task, stopped.clone())));
+    }
+    if let Some((records, status)) = store.filter(|_| !def.report.automatic.is_empty()) {
         let (def, queries, audit) = (def.clone(), queries.clone(), audit.clone());
         let task = ReportTask { def, clock, queries, records, audit, events, status };
         tasks.push(tokio::spawn(reports::run(task, stopped.clone())));

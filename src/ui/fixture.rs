@@ -194,6 +194,7 @@ impl Fixture {
             runs: self.runs.clone(),
             history: HistoryStatus { rows: 5_000, committed_at: Some(now()), ..HistoryStatus::default() },
             station: Arc::new(self.station.clone()),
+            north: None,
             speed: 1.0,
             def: Arc::new(self.def.clone()),
         })

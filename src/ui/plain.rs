@@ -139,7 +139,7 @@ fn facts(cx: &ViewContext) -> BTreeMap<Fact, (String, Option<Quality>)> {
 }
 
 fn name(cx: &ViewContext, alarm: AlarmId) -> String {
-    format!("{}, {}", subject(cx, alarm), cx.def().alarm(alarm).message)
+    format!("{}, {}", subject(cx, alarm), translate(&cx.def().alarm(alarm).message))
 }
 
 /// What is said of an alarm that is in no list any more; nothing where it went from one list into the other.

@@ -4,7 +4,7 @@ use super::ViewContext;
 use crate::t;
 use crate::{
     access::right,
-    plant::{command::CommandKind, role::Role},
+    plant::{command::CommandKind, def::TagId, interlock, role::Role},
 };
 
 /// `Technician`.
@@ -27,7 +27,13 @@ pub fn words(role: Role) -> &'static str {
 
 /// Why the user may not give this command: `needs Technician; tom is Viewer`.
 pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
-    lacks(cx, right::needs(kind))
+    lacks(cx, right::needs(cx.def(), kind))
+}
+
+/// The least role that may write anything to a tag, or the least of all.
+pub fn to_write(cx: &ViewContext, tags: impl IntoIterator<Item = TagId>) -> Role {
+    let roles = tags.into_iter().map(|tag| interlock::least_role_to_write(cx.def(), tag));
+    roles.min().unwrap_or(Role::Technician)
 }
 
 /// The same for a role.

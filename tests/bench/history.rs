@@ -65,6 +65,7 @@ fn tank() -> Arc<PlantDef> {
         batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
+        north: Default::default(),
         file_sha256: String::new(),
         report: ReportDef::default(),
         simulation: None,

@@ -79,6 +79,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
         batches: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
+        north: Default::default(),
         report: ReportDef::default(),
         file_sha256: String::new(),
         simulation: None,

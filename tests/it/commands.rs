@@ -167,6 +167,9 @@ fn a_frame_is_reported_in_words() {
     }
     let (code, _, err) = run(&["frame", "01"]);
     assert_eq!((code, err.as_str()), (Some(2), "sightglass: `frame` is now `decode`\n"));
+    let (code, out, _) = run(&["decode", "--plant", "tank", "02 06 41 40 FF FF 9D A1"]);
+    assert_eq!(code, Some(0));
+    assert!(out.contains("writes PLC-1.VY0 = 65535, outputs Y0 to Y17"), "{out}");
     let (code, _, err) = run(&["decode", "01 0G"]);
     assert!(code == Some(2) && err.contains("position 5: `G` is not a hex digit"), "{err}");
 }

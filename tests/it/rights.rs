@@ -1,7 +1,9 @@
 //! Every command, request and query through the socket, by everybody who may be at a terminal: what is let through, what
 //! is refused, and that the audit log has it. The tables below are written by hand; the program has its own.
 
-use std::{sync::Arc, time::Duration};
+mod commands;
+
+use std::time::Duration;
 
 use jiff::Timestamp;
 use sightglass::{
@@ -9,16 +11,10 @@ use sightglass::{
     history::{Query, io::QueryRequest},
     plant::{
         PlantDef,
-        alarm::AlarmCommand,
-        command::{CommandKind, CommandStatus, Outcome, Refusal},
-        def::{AlarmId, DeviceId, LineId, Serial},
-        diagnostics::{Diagnostic, Scan},
+        command::{CommandStatus, Outcome, Refusal},
+        def::LineId,
         live::{AddressSpan, LiveRead},
-        parameter_set::ParameterSet,
-        restore::RestoreRequest,
         role::Role,
-        sweep::Sweep,
-        tag::Table,
     },
     report::Period,
     station::{self, Session},
@@ -26,6 +22,9 @@ use sightglass::{
 use tokio::sync::{mpsc, oneshot};
 
 use crate::guarded::{Guarded, PASSWORD, request};
+use commands::{commands, of_command};
+
+mod queries;
 
 /// Who sits at the terminal, in the order of the columns below.
 const USERS: [&str; 6] = ["nobody", "vera", "tom", "sue", "lena", "mia"];
@@ -67,90 +66,6 @@ fn look(action: &'static str, by: &'static str) -> Row {
     Row { action, by, is_action: false }
 }
 
-/// A new command does not compile until it has a row here; put it into [`commands`] as well.
-fn of_command(kind: &CommandKind) -> Row {
-    match kind {
-        CommandKind::Write { .. } => row("write", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Acknowledge { .. }) => row("acknowledge", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { .. }) => row("acknowledge", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Silence) => row("silence", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Reset(_)) => row("reset", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Shelve { .. }) => row("shelve", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Unshelve(_)) => row("unshelve", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::Tick { .. }) => row("step done", "--TS--"),
-        CommandKind::Alarm(AlarmCommand::OutOfService(_)) => row("out of service", "---S--"),
-        CommandKind::Alarm(AlarmCommand::InService(_)) => row("in service", "---S--"),
-        CommandKind::Refresh(_) => look("refresh", "--TS--"),
-        CommandKind::Connect(_, false) => row("disconnect", "--TS--"),
-        CommandKind::Connect(_, true) => row("connect", "--TS--"),
-        CommandKind::Configure(_) => row("configure", "---S--"),
-        CommandKind::SaveSettings(_) => row("save settings", "---S--"),
-        CommandKind::Test(_, diagnostic) => match diagnostic {
-            Diagnostic::Scan(Scan { serials, .. }) if serials.is_empty() => row("test", "--TS--"),
-            Diagnostic::Send(_) | Diagnostic::Write(_) | Diagnostic::Scan(_) => row("test", "---S--"),
-            Diagnostic::Sweep(_)
-            | Diagnostic::Loopback { .. }
-            | Diagnostic::Identify { .. }
-            | Diagnostic::Read { .. } => row("test", "--TS--"),
-        },
-        CommandKind::StopTest(_) => row("stop test", "--TS--"),
-        CommandKind::ReadSets => look("read sets", "--TS--"),
-        CommandKind::SaveSet { .. } => row("save set", "--TS--"),
-        CommandKind::Restore(_) => row("restore set", "--TS--"),
-        CommandKind::StopRestore(_) => row("stop restore", "--TS--"),
-        CommandKind::HandOver => row("hand over", "--TS--"),
-        CommandKind::TakeOver => row("take over", "--TS--"),
-    }
-}
-
-fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
-    let (alarm, device, line, at) = (AlarmId(0), DeviceId(0), LineId(0), Timestamp::UNIX_EPOCH);
-    let scan = |serials| Diagnostic::Scan(Scan { first: 40, last: 40, serials, timeout: Duration::from_millis(50) });
-    let set = ParameterSet {
-        name: "none".into(),
-        device: "another".into(),
-        profile: "another".into(),
-        saved: at,
-        by: "tom".into(),
-        given: Vec::new(),
-        values: Vec::new(),
-        missing: Vec::new(),
-        units: Default::default(),
-    };
-    let (from, changes, table) = ("none".into(), Vec::new(), Table::Holding);
-    vec![
-        CommandKind::Write { tag: def.tag_named("TIC-1.SV").unwrap(), value: 60.0 + person as f64 },
-        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, annunciated_at: at }),
-        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Arc::from([(alarm, at)]) }),
-        CommandKind::Alarm(AlarmCommand::Silence),
-        CommandKind::Alarm(AlarmCommand::Reset(alarm)),
-        CommandKind::Alarm(AlarmCommand::Shelve { alarms: [alarm].into(), lasts: Duration::from_secs(60) }),
-        CommandKind::Alarm(AlarmCommand::Unshelve(alarm)),
-        CommandKind::Alarm(AlarmCommand::Tick { alarm, raised_at: at, step: 0, done: true }),
-        CommandKind::Alarm(AlarmCommand::OutOfService(alarm)),
-        CommandKind::Alarm(AlarmCommand::InService(alarm)),
-        CommandKind::Refresh(device),
-        CommandKind::HandOver,
-        CommandKind::TakeOver,
-        CommandKind::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
-        CommandKind::Test(line, Diagnostic::Identify { unit: 1 }),
-        CommandKind::Test(line, Diagnostic::Sweep(Sweep { unit: 1, table, first: 0, last: 9, every: 8 })),
-        CommandKind::Test(line, Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),
-        CommandKind::Test(line, scan(Vec::new())),
-        CommandKind::Test(line, scan(vec![Serial::USUAL])),
-        CommandKind::Test(line, Diagnostic::Send(vec![1, 3, 0, 0, 0, 1])),
-        CommandKind::StopTest(line),
-        CommandKind::ReadSets,
-        CommandKind::SaveSet { device, name: format!("of {person}").into(), replace: false },
-        CommandKind::Restore(Box::new(RestoreRequest { device, from, set: Arc::new(set), changes })),
-        CommandKind::StopRestore(device),
-        CommandKind::Connect(line, false),
-        CommandKind::Connect(line, true),
-        CommandKind::Configure(Box::new(def.lines[0].clone())),
-        CommandKind::SaveSettings(line),
-    ]
-}
-
 /// A terminal of this person, as the column says.
 async fn sits(guarded: &Guarded, person: usize) -> Session {
     if person == 0 {
@@ -184,7 +99,7 @@ async fn every_command_is_permitted_or_refused_as_the_table_says() {
         }
         let session = sits(&guarded, person).await;
         for (number, kind) in (1..).zip(commands(&guarded.def, person)) {
-            let row = of_command(&kind);
+            let row = of_command(&guarded.def, &kind);
             let said = format!("{kind:?} by {}", USERS[person]);
             // So slow that each refusal is on record by itself.
             guarded.pass(Duration::from_secs(2)).await;
@@ -330,70 +245,4 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
     drop(stranger);
     guarded.end().await;
     assert_eq!(heard.await.unwrap(), ["reload", "reload", "stop", "stop"], "once by a Supervisor, once by its starter");
-}
-
-/// A new query does not compile until it has a row here; put it into [`queries`] as well.
-fn of_query(query: &Query) -> Row {
-    match query {
-        Query::Series { .. } | Query::Values { .. } | Query::Past { .. } | Query::Report { .. } => look("", "-VTSL-"),
-        Query::Journal { .. } | Query::Actions { .. } | Query::Batches { .. } | Query::Overview => look("", "-VTSL-"),
-        Query::LineMinutes { .. } | Query::Unarchived { .. } | Query::ControlRuns { .. } => look("", "-VTSL-"),
-        Query::AlarmMetrics { .. } | Query::Reports { .. } | Query::SampleTime { .. } => look("", "-VTSL-"),
-        Query::Registers(_) => look("", "--TS--"),
-        Query::Audit { .. } => look("read audit log", "---S--"),
-    }
-}
-
-fn registers(def: &PlantDef) -> LiveRead {
-    let (device, point) = (&def.devices[0], def.tags[0].point);
-    let spans = vec![AddressSpan { table: point.table, address: point.address, count: 1 }];
-    LiveRead { line: device.line, unit: device.unit, spans, not_before: None, relearn: false }
-}
-
-fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
-    let (from, limit, all) = (to - jiff::SignedDuration::from_secs(60), 10, String::new);
-    vec![
-        Query::Series { tags: vec![def.tags[0].id], from, to, buckets: 10 },
-        Query::Journal { from, to, limit },
-        Query::Actions { from, to, limit },
-        Query::LineMinutes { line: LineId(0), from, to, limit },
-        Query::Values { tags: vec![def.tags[0].id], from, every: std::time::Duration::from_secs(10), count: 6 },
-        Query::AlarmMetrics { from, to },
-        Query::Report { period: Period::free(from, to) },
-        Query::SampleTime { tags: vec![def.tags[0].id], from, to, latest: true },
-        Query::Past { at: to },
-        Query::Batches { from, to, limit },
-        Query::ControlRuns { controller: None, from, to, limit },
-        Query::Reports { limit },
-        Query::Unarchived { from, to },
-        Query::Overview,
-        Query::Audit { from, to, words: all(), by: all(), action: all(), limit },
-        Query::Registers(registers(def)),
-    ]
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn every_query_is_permitted_or_refused_as_the_table_says() {
-    let guarded = Guarded::start(|_| {}).await;
-    let at = guarded.truth.borrow().at;
-    for (person, name) in USERS.into_iter().enumerate() {
-        let session = sits(&guarded, person).await;
-        for query in queries(&guarded.def, at) {
-            let row = of_query(&query);
-            let said = format!("{query:?} by {name}");
-            let written = guarded.entries().len();
-            let (reply, answer) = oneshot::channel();
-            session.ask(QueryRequest { query, reply }).unwrap();
-            let answer = answer.await.unwrap();
-            assert_eq!(answer.is_ok(), row.lets(person), "{said}: {answer:?}");
-            let Err(error) = answer else { continue };
-            assert!(error.to_string().contains(&row.why(person)), "{said}: {error}");
-            if !row.action.is_empty() {
-                let line = guarded.written(written, &said, |entry| &*entry.action == row.action).await;
-                assert!(is_by(&line, person), "{said}: {line:?}");
-                assert_eq!(*line.outcome, format!("refused: {}", row.why(person)), "{said}");
-            }
-        }
-    }
-    guarded.end().await;
 }

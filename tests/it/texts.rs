@@ -15,13 +15,14 @@ use syn::{
 type Texts = BTreeMap<String, BTreeSet<String>>;
 
 /// Functions and fields whose texts are translated where they are drawn.
-const LABELS: [&str; 7] = ["label", "word", "words", "message", "advice", "mode", "effect"];
+const LABELS: [&str; 8] = ["label", "word", "words", "message", "advice", "mode", "effect", "guidance"];
 
 /// Texts of one file: of `t!`, of functions that label a state, and of rows of tables.
 #[derive(Default)]
 struct Found {
     texts: BTreeSet<String>,
     in_label: bool,
+    in_guidance: bool,
     /// The keywords of `profile` are only read from files.
     in_profile: bool,
 }
@@ -41,8 +42,15 @@ impl Found {
     /// A label of a state is a `&'static str` that is translated where it is drawn.
     fn within(&mut self, signature: &syn::Signature, visit: impl FnOnce(&mut Self)) {
         let is_label = LABELS.iter().any(|name| signature.ident == name);
-        let is_text = matches!(&signature.output, syn::ReturnType::Type(_, of)
-            if matches!(&**of, syn::Type::Reference(text) if text.lifetime.as_ref().is_some_and(|of| of.ident == "static")));
+        let is_static = |of: &syn::Type| matches!(of, syn::Type::Reference(text) if text.lifetime.as_ref().is_some_and(|of| of.ident == "static"));
+        let is_text = match &signature.output {
+            syn::ReturnType::Type(_, of) => match &**of {
+                syn::Type::Array(texts) => signature.ident == "guidance" && is_static(&texts.elem),
+                of => is_static(of),
+            },
+            syn::ReturnType::Default => false,
+        };
+        self.in_guidance = is_label && signature.ident == "guidance";
         let before = std::mem::replace(&mut self.in_label, is_label && is_text);
         visit(self);
         self.in_label = before;
@@ -78,8 +86,11 @@ impl<'a> Visit<'a> for Found {
         visit::visit_item_macro(self, item);
     }
     fn visit_lit_str(&mut self, text: &'a LitStr) {
-        if self.in_label {
-            self.add(text.value());
+        match (self.in_label, self.in_guidance) {
+            // Steps of an action are shown one by one.
+            (true, true) => text.value().split("; ").for_each(|step| self.add(step.to_owned())),
+            (true, false) => self.add(text.value()),
+            (false, _) => {}
         }
     }
     fn visit_expr_struct(&mut self, row: &'a ExprStruct) {

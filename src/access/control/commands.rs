@@ -49,7 +49,7 @@ impl AccessControl {
         if !session.locked {
             session.active = at;
         }
-        match self.may(terminal, Some(right::needs(&command.kind))) {
+        match self.may(terminal, Some(right::needs(&self.def, &command.kind))) {
             Err(why) => self.refuse_command(terminal, command, Refusal::NotPermitted(why), at),
             Ok(_) => self.reauthenticate(terminal, command, credentials, at),
         }

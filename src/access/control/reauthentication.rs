@@ -82,7 +82,7 @@ impl AccessControl {
             effects.extend(self.refuse_reauthentication(terminal, command, message, at));
             return effects;
         }
-        let needed = right::needs(&command.kind);
+        let needed = right::needs(&self.def, &command.kind);
         // Meanwhile the terminal may have been locked.
         if let Err(why) = self.may(terminal, Some(needed)) {
             return self.refuse_command(terminal, command, Refusal::NotPermitted(why), at);

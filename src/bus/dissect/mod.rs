@@ -135,7 +135,8 @@ pub fn in_traffic<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) ->
 /// Earlier frames among which the request of an answer is looked for.
 const BEFORE: usize = 16;
 
-fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -> Option<Vec<u8>> {
+/// The request message of an answer, among the earlier frames of its line.
+pub fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -> Option<Vec<u8>> {
     let message = message_of(&answer.bytes, answer.framing)?;
     before.take(BEFORE).filter(|frame| frame.sent && frame.framing == answer.framing).find_map(|frame| {
         let request = message_of(&frame.bytes, frame.framing)?;

@@ -63,6 +63,7 @@ pub async fn run(
         stats: LineStats::new(&def, line, &blocks),
         unreadable,
         bisection: RangeBisection::default(),
+        requested: Vec::new(),
         budget: Budget::new(WRITE_SHARE, clock.now()),
         live_budget: Budget::new(LIVE_SHARE, clock.now()),
         unconfirmed: Vec::new(),
@@ -103,6 +104,8 @@ struct Task<'a> {
     /// What the devices do not have, as far as found.
     unreadable: UnreadableRanges,
     bisection: RangeBisection,
+    /// Devices of which an operator has asked for everything: what is never polled is in the plan, and read on request.
+    requested: Vec<DeviceId>,
     /// The share of the line's time that writes may take from polls.
     budget: Budget,
     /// The same of live reads.
@@ -261,7 +264,12 @@ impl Task<'_> {
         match request {
             BusRequest::Connect(true) => Ok(()),
             BusRequest::Connect(false) => Err(LinkExit::Closed),
-            BusRequest::Refresh { device, .. } => {
+            BusRequest::Refresh { device, command } => {
+                let is_new = command.is_some() && !self.requested.contains(&device);
+                if is_new && plan::has_unpolled(&self.def, device) {
+                    self.requested.push(device);
+                    self.plan_again(link, schedule, self.clock.now());
+                }
                 schedule.refresh(device, self.clock.now());
                 Ok(())
             }

@@ -8,6 +8,7 @@ mod slow;
 mod stops;
 mod strangers;
 mod together;
+mod unpolled;
 mod worst_case;
 mod diagnostics;
 mod writes;

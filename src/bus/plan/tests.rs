@@ -25,6 +25,26 @@ fn neighbours_share_a_block_and_tables_do_not() {
 }
 
 #[test]
+fn what_is_never_polled_is_planned_for_who_asks_only() {
+    let mut def = fixture::plant();
+    def.tags[fixture::SV.index()].poll = Poll::Never;
+    let device = def.tag(fixture::SV).device;
+    let none = UnreadableRanges::default();
+    let reads = |plan: Vec<Block>| {
+        plan.into_iter().find(|block| block.tags.contains(&fixture::SV)).map(|block| (block.poll, block.address))
+    };
+    assert_eq!(reads(blocks(&def, LineId(0), &none)), None);
+    assert_eq!(reads(blocks_with_unpolled(&def, LineId(0), &none, &[])), None);
+    let asked = blocks_with_unpolled(&def, LineId(0), &none, &[device]);
+    assert_eq!(reads(asked), Some((Poll::Never, 1002)));
+    assert!(has_unpolled(&def, device) && !has_unpolled(&fixture::plant(), device));
+    // Refused once, it stays on request only.
+    let mut refused = none;
+    refused.add(device, Table::Holding, 1002, 1003);
+    assert_eq!(reads(blocks_with_unpolled(&def, LineId(0), &refused, &[device])), Some((Poll::Never, 1002)));
+}
+
+#[test]
 fn a_block_is_as_important_as_its_most_important_tag() {
     let mut def = fixture::plant();
     def.tags[fixture::PV.index()].class = PollClass::Background;

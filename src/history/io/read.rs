@@ -67,6 +67,7 @@ impl Store {
             }
             Query::Reports { limit } => self.made_reports(*limit).map(Answer::Reports),
             Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
+            Query::Samples { from, to } => self.stored(*from, *to).map(Answer::Samples),
             Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
             Query::Registers(_) => Err(HistoryError::Engine("registers are read by the line".to_owned())),

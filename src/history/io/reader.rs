@@ -190,6 +190,7 @@ fn counts_a_period(query: &Query) -> bool {
         | Query::LineMinutes { .. }
         | Query::SampleTime { .. }
         | Query::Past { .. }
+        | Query::Samples { .. }
         | Query::Unarchived { .. }
         | Query::Overview
         | Query::Registers(_) => false,

@@ -38,6 +38,8 @@ const GAP_PARTS: i64 = 500;
 const GAP_MIN: i64 = 60_000_000;
 /// Samples that are handed out at once.
 pub const UNARCHIVED_MAX: u64 = 50_000;
+/// The same, of all sources: more than a plant has tags, so that one instant is never too much.
+pub const STORED_MAX: u64 = 100_000;
 /// How a tag is asked for that the file does not know, and one that was not asked for.
 const NONE: u32 = u32::MAX;
 
@@ -104,7 +106,7 @@ impl Store {
         mut each: impl FnMut(usize, Sample),
     ) -> Result<Vec<Gap>, HistoryError> {
         let all = 0..tags.len();
-        let gaps = self.each_row(&self.wanted(tags), from, to, |read| match read {
+        let gaps = self.each_row(&self.wanted(tags), (in_force(from), to), |read| match read {
             Read::Sample(place, sample) => each(place as usize, sample),
             Read::Nothing(at) => all.clone().for_each(|place| each(place, Sample::bad(Cause::Unreadable, at))),
         })?;
@@ -142,7 +144,7 @@ impl Store {
         mut each: impl FnMut(u16, Sample),
     ) -> Result<Vec<Gap>, HistoryError> {
         let all = Wanted { places: (0..=u32::from(u16::MAX)).collect(), tags: condition };
-        self.each_row(&all, from, to, |read| {
+        self.each_row(&all, (in_force(from), to), |read| {
             if let Read::Sample(place, sample) = read {
                 each(u16::try_from(place).unwrap_or(u16::MAX), sample);
             }
@@ -152,11 +154,10 @@ impl Store {
     fn each_row(
         &self,
         wanted: &Wanted,
-        from: Timestamp,
-        to: Timestamp,
+        (from, to): (Timestamp, Timestamp),
         mut each: impl FnMut(Read),
     ) -> Result<Vec<Gap>, HistoryError> {
-        let begin = from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN).as_microsecond();
+        let begin = from.as_microsecond();
         let (mut next, end) = (begin, to.as_microsecond());
         let gap_min = ((end - next) / GAP_PARTS).max(GAP_MIN);
         let (mut span, mut span_max) = (end - next, end - next);
@@ -210,6 +211,22 @@ impl Store {
             self.changed.set(true);
         }
         Ok(gaps)
+    }
+
+    /// The samples of this plant's tags that were stored in a span, and nothing that was in force before.
+    pub(super) fn stored(&self, from: Timestamp, to: Timestamp) -> Result<Vec<(TagId, Sample)>, HistoryError> {
+        check_span(from, to)?;
+        let tags: Vec<TagId> = self.def.tags.iter().map(|tag| tag.id).collect();
+        let (mut rows, mut count) = (Vec::new(), 0);
+        self.each_row(&self.wanted(&tags), (from, to), |read| {
+            let Read::Sample(place, sample) = read else { return };
+            count += 1;
+            if count <= STORED_MAX {
+                rows.push((tags[place as usize], sample));
+            }
+        })?;
+        within(count, STORED_MAX)?;
+        Ok(rows)
     }
 
     /// The samples of this plant's tags that are not archived, in a span.
@@ -353,4 +370,9 @@ fn push(batch: &StructArray, wanted: &Wanted, rows: &mut Vec<Row>) -> Option<()>
         }
     }
     Some(())
+}
+
+/// From when on a sample may be in force at an instant.
+fn in_force(from: Timestamp) -> Timestamp {
+    from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN)
 }

@@ -142,6 +142,11 @@ pub struct Guidance {
 }
 
 impl Guidance {
+    /// Likely cause, effect, action.
+    pub fn new([cause, effect, action]: [&str; 3], response_time: Option<Duration>) -> Guidance {
+        Guidance { cause: cause.into(), effect: effect.into(), action: action.into(), response_time }
+    }
+
     /// The steps of the action, which its text separates by semicolons.
     pub fn steps(&self) -> impl Iterator<Item = &str> {
         self.action.split(';').map(str::trim).filter(|step| !step.is_empty())

@@ -103,6 +103,7 @@ mod tests {
             confirm: String::new(),
             stop: false,
             saves: true,
+            role: None,
         }];
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });

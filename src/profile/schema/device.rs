@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use crate::{
     plant::{
-        def::Reauthentication,
+        def::{Reauthentication, Role},
         keyword::keyword_enum,
         tag::{Access, ByteOrder, Confidence, DataType, PollClass, StorePolicy, Table},
     },
     profile::{
         address::{Location, Modicon},
         diagnostic::{Problems, Span},
-        reader::{Choice, Node, Numbered, Raw, Value, toml_tables},
+        reader::{At, Choice, Node, Numbered, Raw, Value, toml_tables},
         simulate::Choices,
     },
 };
@@ -34,6 +34,10 @@ toml_tables! {
         opt "limits" limits: Raw,
         /// Keys that every tag has unless it says otherwise.
         opt "default" default: Raw,
+        /// The least role that may write the tags of a group.
+        opt "roles" roles: Roles,
+        /// Names of the eight states that function 07 reads.
+        opt "exception_status" exception_status: Numbered,
         list "tag" tags: Raw,
         list "action" actions: ActionTable,
         opt "faceplate" faceplate: FaceplateTable,
@@ -99,6 +103,8 @@ toml_tables! {
         opt "confirm" confirm: String,
         /// What must be given again to write it.
         opt "reauthenticate" reauthenticate: Reauthentication,
+        /// The least role that may write it; without it that of its group in `roles`.
+        opt "role" role: WriteRole,
         opt "enum" enum_labels: Numbered,
         opt "bits" bits: Numbered,
         list "bad_if" bad_if: i64,
@@ -181,6 +187,7 @@ toml_tables! {
         opt "stop" stop: bool,
         need "confirm" confirm: String,
         opt "saves" saves: bool,
+        opt "role" role: WriteRole,
     }
 
     /// Which tags a controller is operated by.
@@ -251,6 +258,36 @@ keyword_enum! {
         Never => "never",
     }
 }
+/// The least role that may write something: one that writes at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct WriteRole(pub Role);
+
+impl Value for WriteRole {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let role = <Role as Value>::read(value, at, problems)?;
+        if role == Role::Viewer {
+            let problem = problems.add(at, "a viewer writes nothing");
+            problem.label("expected \"technician\" or \"supervisor\"");
+        }
+        Some(WriteRole(role))
+    }
+}
+
+/// A table with the names of groups for keys: `{ PID = "supervisor" }`.
+#[derive(Debug, Clone)]
+pub(crate) struct Roles(pub Vec<(At<String>, WriteRole)>);
+
+impl Value for Roles {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let raw = Raw::read(value, at, problems)?;
+        let mut of_group = |(group, (at, role)): (&String, &(Span, At<Node>))| {
+            let role = WriteRole::read(&role.value, role.at, problems)?;
+            Some((At { value: group.clone(), at: *at }, role))
+        };
+        Some(Roles(raw.table.iter().filter_map(&mut of_group).collect()))
+    }
+}
+
 /// The type of a raw value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TypeName(pub DataType);

@@ -52,8 +52,20 @@ pub(super) fn bit_labels(
     kind: Option<Raws>,
     problems: &mut Problems,
 ) -> Vec<(u8, String)> {
-    let Some(Numbered(rows)) = bits.as_ref().map(|bits| &bits.value) else { return Vec::new() };
-    let size = kind.map_or(64, |(kind, field)| field.map_or(i64::from(kind.registers()) * 16, i64::from));
+    named_bits(
+        bits.as_ref(),
+        kind.map_or(64, |(kind, field)| field.map_or(i64::from(kind.registers()) * 16, i64::from)),
+        problems,
+    )
+}
+
+/// The names of bits of a word of so many.
+pub(in crate::profile) fn named_bits(
+    bits: Option<&At<Numbered>>,
+    size: i64,
+    problems: &mut Problems,
+) -> Vec<(u8, String)> {
+    let Some(Numbered(rows)) = bits.map(|bits| &bits.value) else { return Vec::new() };
     let mut labels = Vec::new();
     for (bit, text) in rows {
         match u8::try_from(bit.value).ok().filter(|_| bit.value < size) {

@@ -76,3 +76,36 @@ fn a_probe_of_a_signature_says_what_its_tag_must_hold() {
         assert!(errors.contains(expect), "no `{expect}` in\n{errors}");
     }
 }
+
+#[test]
+fn a_tag_has_its_own_role_or_that_of_its_group() {
+    let grouped = OWN.replace("address = 1003,", "address = 1003, group = \"Tuning\",");
+    let role = |text: &str| {
+        let plant = load(text.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}"));
+        plant.tag(plant.tag_named("D1.SV").unwrap()).role
+    };
+    let roles = "unit = 1\nroles = { Tuning = \"supervisor\" }";
+    assert_eq!(role(&grouped), Role::Technician);
+    let with_roles = grouped.replace("unit = 1", roles);
+    assert_eq!(role(&with_roles), Role::Supervisor);
+    assert_eq!(
+        role(&with_roles.replace("address = 1003,", "address = 1003, role = \"technician\",")),
+        Role::Technician
+    );
+    refused("unit = 1", roles, &["small.toml:15:", "unknown group `Tuning`"]);
+    refused("access = \"rw\"", "access = \"rw\", role = \"viewer\"", &["small.toml:20:", "a viewer writes nothing"]);
+}
+
+#[test]
+fn a_plant_file_says_who_may_write_what_a_profile_has() {
+    let profile = "[roles]\nTuning = \"supervisor\"\n";
+    let meter = METER.replacen("[[tag]]", &format!("{profile}\n[[tag]]\ngroup = \"Tuning\"\naccess = \"rw\""), 1);
+    let role = |own: &str| {
+        let text = PLANT.replacen("fast = \"1s\"", &format!("fast = \"1s\"\n{own}"), 1);
+        let plant = load(text.as_bytes(), &meter, PLC).unwrap_or_else(|errors| panic!("{errors}"));
+        plant.tag(plant.tag_named("D1.T").unwrap()).role
+    };
+    assert_eq!(role(""), Role::Supervisor);
+    assert_eq!(role("roles = { Tuning = \"technician\" }"), Role::Technician);
+    assert_eq!(role("[[device.tag]]\nname = \"T\"\nrole = \"technician\""), Role::Technician);
+}

@@ -56,8 +56,8 @@ const IDENTITY: Identity = Identity {
         (0x05, "DL06"),
         (
             0x06,
-            "water tank: fills TK-1 from TK-2 with pump P-1 through valve SV-2, heats while agitator M-1 turns, holds at \
-             the setpoint of TIC-1 for three minutes, drains through valve SV-1, cools, returns the water, begins again",
+            "water tank: fills TK-1 from TK-2 through valve SV-2, heats while agitator M-1 turns, holds at the setpoint of \
+             TIC-1 for three minutes, drains to TK-3 through valve SV-1, cools, pumps back to TK-2 with P-1, begins again",
         ),
     ],
 };
@@ -210,10 +210,11 @@ impl Dl06 {
         }
     }
 
+    /// The ladder drives what is wired; what was written to the other outputs stays.
     fn set_outputs(&mut self, outputs: Outputs) {
         let lit = [outputs.pump, outputs.agitator, outputs.drain_valve, outputs.fill_valve, outputs.heater];
-        for output in 0..16 {
-            self.memory.bank_mut(Kind::Y).set(output, lit.get(usize::from(output)).copied().unwrap_or(false));
+        for (output, on) in (0..).zip(lit) {
+            self.memory.bank_mut(Kind::Y).set(output, on);
         }
     }
 

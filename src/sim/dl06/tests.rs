@@ -27,7 +27,8 @@ fn a_written_output_stays_unless_the_sequence_drives_it() {
     assert_reply(plc, &[1, 8, 0, 0, 16], &[1, 2, 0xFF, 0xFF]);
     assert_reply(plc, &[5, 0x0C, 0, 0xFF, 0], &[5, 0x0C, 0, 0xFF, 0]);
     plc.scan(false, &HALF_FULL);
-    assert_reply(plc, &[3, 0x41, 0x40, 0, 1], &[3, 2, 0, 0]);
+    // Y0 to Y4 are wired, the others no scan touches.
+    assert_reply(plc, &[3, 0x41, 0x40, 0, 1], &[3, 2, 0xFF, 0xE0]);
 }
 
 #[test]

@@ -26,6 +26,8 @@ impl ProcessFaults {
                 InjectedFault::ValveStuck(Valve::Drain, position) => process_faults.drain = Some(position),
                 InjectedFault::ValveStuck(Valve::Fill, position) => process_faults.fill = Some(position),
                 InjectedFault::Leak(ml_per_min) => process_faults.leak_l_per_min = f64::from(ml_per_min) / 1e3,
+                // The PLC sees to it.
+                InjectedFault::Switch(_) => {}
                 // Of the line or of a unit.
                 InjectedFault::Noise(_)
                 | InjectedFault::Silent

@@ -37,6 +37,21 @@ pub enum InjectedFault {
     PumpFailed,
     /// Agitator M-1 does not turn.
     AgitatorFailed,
+    /// A switch on the panel of the PLC is on, which no command knows of.
+    Switch(PanelSwitch),
+}
+
+/// A switch on the panel, by the input that it is wired to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PanelSwitch {
+    /// X0, the pump P-1.
+    Pump,
+    /// X1, the agitator M-1.
+    Agitator,
+    /// X2, valve SV-1.
+    Drain,
+    /// X3, valve SV-2.
+    Fill,
 }
 
 /// A fault of values inside good answers.
@@ -161,7 +176,8 @@ impl InjectedFault {
             | InjectedFault::ValveStuck(..)
             | InjectedFault::Leak(_)
             | InjectedFault::PumpFailed
-            | InjectedFault::AgitatorFailed => None,
+            | InjectedFault::AgitatorFailed
+            | InjectedFault::Switch(_) => None,
         }
     }
 
@@ -182,7 +198,8 @@ impl InjectedFault {
             | InjectedFault::HeaterBurnout
             | InjectedFault::ValveStuck(..)
             | InjectedFault::PumpFailed
-            | InjectedFault::AgitatorFailed => None,
+            | InjectedFault::AgitatorFailed
+            | InjectedFault::Switch(_) => None,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::{mem::discriminant, time::Duration};
 
-use super::syntax::{InjectedFault, Parameter, Position, TargetKind, Valve};
+use super::syntax::{InjectedFault, PanelSwitch, Parameter, Position, TargetKind, Valve};
 
 /// What is known of a fault.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +43,7 @@ impl InjectedFault {
     /// Its row. Only the number may differ from it; a valve and its position are part of the fault.
     pub(crate) fn row(self) -> &'static Row {
         let is_same = |row: &&Row| match self {
-            InjectedFault::ValveStuck(..) => row.fault == self,
+            InjectedFault::ValveStuck(..) | InjectedFault::Switch(_) => row.fault == self,
             _ => discriminant(&row.fault) == discriminant(&self),
         };
         ROWS.iter().find(is_same).expect("every fault has a row")
@@ -51,7 +51,7 @@ impl InjectedFault {
 }
 
 /// In the order of the page.
-pub(super) const ROWS: [Row; 18] = [
+pub(super) const ROWS: [Row; 22] = [
     row(
         InjectedFault::Noise(10),
         "noise",
@@ -212,5 +212,37 @@ pub(super) const ROWS: [Row; 18] = [
         "M-1 does not turn: the water forms layers.",
         "Nothing measures the agitator: the PLC shows ON. The temperature follows the heater late and swings more.",
         "Inspect the tank when the control swings without a change of settings.",
+    ),
+    row(
+        InjectedFault::Switch(PanelSwitch::Pump),
+        "switch X0 on",
+        TargetKind::Process,
+        "The switch X0 on the panel is on: pump P-1 by hand.",
+        "In MANUAL the output is ON though its command is OFF. The lamps of the PLC show the input.",
+        "Look at the lamps of the PLC, then at the panel.",
+    ),
+    row(
+        InjectedFault::Switch(PanelSwitch::Agitator),
+        "switch X1 on",
+        TargetKind::Process,
+        "The switch X1 on the panel is on: agitator M-1 by hand.",
+        "In MANUAL the output is ON though its command is OFF. The lamps of the PLC show the input.",
+        "Look at the lamps of the PLC, then at the panel.",
+    ),
+    row(
+        InjectedFault::Switch(PanelSwitch::Drain),
+        "switch X2 on",
+        TargetKind::Process,
+        "The switch X2 on the panel is on: valve SV-1 by hand.",
+        "In MANUAL the output is ON though its command is OFF. The lamps of the PLC show the input.",
+        "Look at the lamps of the PLC, then at the panel.",
+    ),
+    row(
+        InjectedFault::Switch(PanelSwitch::Fill),
+        "switch X3 on",
+        TargetKind::Process,
+        "The switch X3 on the panel is on: valve SV-2 by hand.",
+        "In MANUAL the output is ON though its command is OFF. The lamps of the PLC show the input.",
+        "Look at the lamps of the PLC, then at the panel.",
     ),
 ];

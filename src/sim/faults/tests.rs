@@ -102,6 +102,22 @@ fn noise_corrupts_its_share_of_messages_reproducibly() {
     }
 }
 
+/// X0 to X3 of the PLC, which no command turns.
+#[test]
+fn a_panel_switch_is_an_input_of_the_plc_until_it_is_cleared() {
+    let (mut simulator, mut faults) = simulator();
+    let inputs = |simulator: &mut Simulator| simulator.respond(LineId(0), 2, &[2, 0x08, 0x00, 0, 4]).map(|pdu| pdu[2]);
+    for (fault, on) in [("switch X0 on", 0b0001), ("switch X3 on", 0b1001)] {
+        let fault = fault.parse().expect("a fault");
+        faults.inject(&mut simulator, FaultTarget::Process, fault, SINCE);
+        assert_eq!(inputs(&mut simulator), Some(on), "{fault}");
+    }
+    faults.clear(&mut simulator, FaultTarget::Process, "switch X0 on".parse().expect("a fault"));
+    assert_eq!(inputs(&mut simulator), Some(0b1000));
+    faults.clear_all(&mut simulator);
+    assert_eq!(inputs(&mut simulator), Some(0));
+}
+
 #[test]
 fn a_later_fault_takes_the_place_of_one_that_it_excludes() {
     let (mut simulator, mut faults) = simulator();

@@ -23,6 +23,7 @@ use crate::plant::number::to_i16;
 use alarm::{Alarm, Setup};
 use control::{Control, Law, Settings};
 use program::{Mode, Plan, Program, ProgramCommand, Segment};
+pub use registers::DECIMALS_AT;
 use rule::PidSettings;
 use selftune::SelfTuner;
 use tuning::{Tuner, TuningStatus};

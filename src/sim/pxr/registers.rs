@@ -65,7 +65,25 @@ impl Registers for Pxr {
     }
 }
 
+/// Where the decimals of every temperature stand: 41020.
+#[expect(clippy::cast_possible_truncation, reason = "a constant of two digits")]
+pub const DECIMALS_AT: (Table, u16) = (Table::Holding, 1_000 + map::DECIMALS as u16);
+
 impl Pxr {
+    /// Begins with other decimals, which are saved: numbers change, temperatures do not.
+    pub fn start_with_decimals(&mut self, decimals: u8) {
+        let to = Display::new(self.settings[map::UNIT], i16::from(decimals));
+        if self.show_as(to).is_ok() {
+            self.settings[map::DECIMALS] = i16::from(to.decimals);
+            self.saved = self.settings;
+        }
+    }
+
+    /// The decimals of every temperature.
+    pub fn decimals(&self) -> u8 {
+        self.display().decimals
+    }
+
     /// How temperatures stand in the registers now.
     pub(super) fn display(&self) -> Display {
         Display::new(self.settings[map::UNIT], self.settings[map::DECIMALS])

@@ -167,7 +167,7 @@ fn what_text(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
         Subject::Line(line) => line_state_text(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
-    (format!("{} {}", subject(cx, alarm.id), def.message), now)
+    (format!("{} {}", subject(cx, alarm.id), translate(&def.message)), now)
 }
 
 /// `UNACK 00:41`: the state and how long it lasts.

@@ -102,7 +102,7 @@ impl Entry {
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
         let notes = notes.chain(interlock::unlock_text(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
-        let missing = rights::missing(cx, &CommandKind::Write { tag: self.tag, value: 0.0 });
+        let missing = rights::lacks(cx, rights::to_write(cx, [self.tag]));
         let notes = self.problem.clone().or_else(|| self.expected.news(cx)).or(missing);
         let problem = wrap(&notes.map_or(String::new(), |words| theme.enter(&words)), room);
         let inner = rows

@@ -13,7 +13,9 @@ use super::{
     window,
 };
 use crate::{
+    access::right,
     plant::{
+        command::CommandKind,
         def::TagId,
         event::LineState,
         snapshot::DeviceState,
@@ -23,6 +25,7 @@ use crate::{
     ui::{
         ViewContext, interlock, keys,
         keys::Hint,
+        rights,
         tabs::mimic,
         widgets::{
             text::{age, clock, fit, pad, width},
@@ -55,12 +58,14 @@ impl Faceplate {
             _ if cx.is_past() => {}
             (Some((tag, value)), _) => {
                 let words = format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(self.tag()).short);
-                hints.insert(0, Hint::in_window("t", &words));
+                let role = right::needs(cx.def(), &CommandKind::Write { tag, value });
+                hints.insert(0, Hint::in_window("t", &words).needs(role));
             }
             (None, Some(tag)) if tag != self.tag() => {
-                hints.push(Hint::in_window("⏎", &t!("write {short}", short = cx.def().tag(tag).short)));
+                let words = t!("write {short}", short = cx.def().tag(tag).short);
+                hints.push(Hint::in_window("⏎", words).needs(rights::to_write(cx, [tag])));
             }
-            (None, Some(_)) => hints.push(Hint::in_window("⏎", t!("write"))),
+            (None, Some(tag)) => hints.push(Hint::in_window("⏎", t!("write")).needs(rights::to_write(cx, [tag]))),
             (None, None) => {}
         }
         hints.push(Hint::in_window("w", t!("why")));
@@ -208,7 +213,8 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     ]);
     for alarm in cx.snapshot.alarms_of(tag) {
         let def = cx.def().alarm(alarm.id);
-        let text = format!("{} {} {}", theme.priority_mark(def.priority), def.message, translate(alarm.state.word()));
+        let [message, state] = [&*def.message, alarm.state.word()].map(translate);
+        let text = format!("{} {message} {state}", theme.priority_mark(def.priority));
         rows.push((t!("alarm"), text, theme.alarm(def.priority, alarm.state, cx.flash())));
     }
     if !def.meaning.is_empty() {

@@ -11,6 +11,7 @@ use super::{
 use crate::{
     plant::{alarm::AlarmCommand, command::CommandKind, def::AlarmId},
     t,
+    text::translate,
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint},
@@ -121,7 +122,7 @@ impl Guidance {
         let def = cx.def().alarm(self.alarm);
         let condition = guidance::condition_text(cx, def.id);
         let tag = cx.theme.priority_tag(def.priority);
-        let title = format!("{tag} {} {} {condition}", subject(cx, def.id), def.message);
+        let title = format!("{tag} {} {} {condition}", subject(cx, def.id), translate(&def.message));
         let mut canvas = window(cx, frame, body, title.trim_end(), (columns(body), sheet.len() + 2));
         let (width, rows) = (canvas.width(), canvas.height().saturating_sub(2));
         let first = self.scroll.first(sheet.len(), usize::from(rows));

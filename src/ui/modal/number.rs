@@ -8,6 +8,7 @@ use crate::{
         def::{Condition, Level, Subject, TagId},
         scale,
     },
+    text::translate,
     ui::{ViewContext, modal::confirm::subject},
 };
 
@@ -119,7 +120,7 @@ pub fn warnings(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
                 "! {place} the alarm limit of {subject} {message} ({text})",
                 place,
                 subject = subject(cx, alarm.id),
-                message = alarm.message,
+                message = translate(&alarm.message),
                 text = text(limit)
             )
         })

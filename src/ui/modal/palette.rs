@@ -255,7 +255,12 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let tabs = Tab::offered(cx).into_iter();
     let tabs = tabs.map(|tab| Row::new(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
     let alarm = |id: AlarmId, state: &str| {
-        Row::new(Target::Alarm(id), t!("alarm"), &subject(cx, id), &format!("{}  {state}", def.alarm(id).message))
+        Row::new(
+            Target::Alarm(id),
+            t!("alarm"),
+            &subject(cx, id),
+            &format!("{}  {state}", translate(&def.alarm(id).message)),
+        )
     };
     let active = cx.snapshot.alarms.iter().map(|active| alarm(active.id, translate(active.state.word())));
     let is_active = |id: AlarmId| cx.snapshot.alarms.iter().any(|active| active.id == id);

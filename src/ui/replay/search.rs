@@ -182,6 +182,7 @@ impl Replay {
             | Answer::Past(_)
             | Answer::SampleTime(_)
             | Answer::Reports(_)
+            | Answer::Samples(_)
             | Answer::Unarchived(_)
             | Answer::Overview(_)
             | Answer::Registers(_) => Vec::new(),

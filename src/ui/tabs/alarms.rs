@@ -117,6 +117,7 @@ impl TabView for Alarms {
             Action::Sort => self.sort = self.sort.next(),
             Action::Priority => self.filter.next_priority(),
             Action::State => self.filter.next_state(),
+            Action::Area if self.page == Page::Journal => self.journal.next_area(cx),
             Action::Area => self.filter.next_area(cx.def()),
             Action::Words => return self.ask_text(),
             Action::Shift(by) => self.shift(cx, by),

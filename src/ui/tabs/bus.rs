@@ -22,7 +22,7 @@ pub use request::ask_sweep;
 pub use window::Window;
 
 use self::keys::{Action, table};
-use super::registers::Registers;
+use super::{line_switch, registers::Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{event::LineState, line_minute::LineMinute, line_report::LineReport, snapshot::LineStatus},
@@ -136,9 +136,10 @@ impl TabView for Bus {
             Action::Filter => return vec![self.frames.ask_filter()],
             Action::Save => return self.frames.save(cx, &at),
             Action::Try(tried) => return self.test.open(cx, &at, tried),
-            Action::Again => return test::again(&at),
+            Action::Again => return test::again(cx, &at),
             Action::Stop => return test::stop(&at),
             Action::Retry => return retry(cx, Some(self.line)),
+            Action::Line => return vec![UiAction::Open(Modal::Confirm(line_switch::confirm(cx, self.line)))],
             Action::Settings => {
                 let kind = CommandKind::Configure(Box::new(at.settings.clone()));
                 let window = Modal::Settings(Box::new(Settings::new(cx, self.line)));

@@ -7,6 +7,7 @@ mod actions;
 mod device;
 mod guide;
 mod keys;
+mod lamps;
 pub(super) mod list;
 mod faceplate;
 pub(super) mod program;
@@ -24,7 +25,7 @@ pub use keys::Action;
 use self::{
     actions::{notice, write},
     compare::Compare,
-    keys::page_keys,
+    keys::{needing, page_keys},
     program::Cell,
     runs::Runs,
     sets::Source,
@@ -52,6 +53,8 @@ pub enum Page {
     List,
     /// One device.
     Device,
+    /// Its bits as lamps.
+    Lamps,
     /// Its ramp/soak program.
     Program,
     /// Its parameter sets.
@@ -101,7 +104,7 @@ impl TabView for Controllers {
             Page::Device => self.table.tag(cx, device.id).map(|tag| tag.id),
             Page::List => device.faceplate.as_ref().map(|faceplate| faceplate.pv),
             Page::Program => device.program.as_ref().and_then(|program| self.cell.tag(program)),
-            Page::Sets | Page::Compare(..) | Page::Runs | Page::Overlay | Page::Guide(..) => None,
+            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Runs | Page::Overlay | Page::Guide(..) => None,
         });
         tag.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
@@ -124,6 +127,7 @@ impl TabView for Controllers {
                     *page = page.saturating_add_signed(by).min(guide::count() - 1);
                 }
             }
+            Action::Device(by) if self.page == Page::Lamps => self.show_lamps(cx, by),
             Action::Device(by) => self.show(DeviceId(to_u16(around(device.id.index(), by, cx.def().devices.len())))),
             Action::Move(motion) => self.move_by(cx, device, motion),
             Action::Wall => self.wall = Some(!self.is_wall(cx)),
@@ -133,6 +137,8 @@ impl TabView for Controllers {
             }
             Action::Column(by) => self.cell.column = self.cell.column.saturating_add_signed(by).min(2),
             Action::Open => return self.open_selected(cx, device),
+            Action::Lamps if lamps::has_any(cx, device) => self.page = Page::Lamps,
+            Action::Lamps => return notice(device, t!("this device has no bits to show as lamps")),
             Action::Program if device.program.is_some() => self.page = Page::Program,
             Action::Program => return notice(device, t!("this device has no ramp/soak program")),
             Action::Sets if cx.is_past() => return notice(device, t!("parameter sets are shown in the present only")),
@@ -144,7 +150,7 @@ impl TabView for Controllers {
             Action::Trend => return self.runs.trend(cx, device.id).into_iter().collect(),
             Action::Mark => self.runs.mark(),
             Action::Overlay => self.swap_overlay(cx, device.id),
-            Action::Tag(by) => self.runs.overlay.iter_mut().for_each(|overlay| overlay.act(by)),
+            Action::Tag(by) => self.runs.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by)),
             Action::Find => {
                 self.asked_for = Asked::Filter;
                 let (title, hint) = (t!("find a parameter"), t!("words in name or meaning; empty shows all"));
@@ -182,6 +188,7 @@ impl TabView for Controllers {
             let lacking = [
                 (Action::Tune, faceplate.is_none_or(|faceplate| faceplate.tune.is_none())),
                 (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
+                (Action::Lamps, !lamps::has_any(cx, device)),
                 (Action::Program, program.is_none()),
                 (Action::Runs, !cx.snapshot.has_runs(device.id)),
                 (Action::Actions, device.actions.is_empty()),
@@ -191,6 +198,7 @@ impl TabView for Controllers {
                 (Action::SwapDirection, !copies),
             ];
             hide(&mut keys, &lacking);
+            keys = needing(keys, |action| self.role_for(cx, device, action));
         }
         let mut hints = hints(&keys);
         // On the page of a device there is no room left for a key that every operator tries anyway; in the past there is.
@@ -198,7 +206,7 @@ impl TabView for Controllers {
             Page::List => false,
             Page::Device => cx.is_past() && 1 < cx.def().devices.len(),
             Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
-            Page::Runs | Page::Overlay => true,
+            Page::Lamps | Page::Runs | Page::Overlay => true,
         };
         if leads_back {
             let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
@@ -221,7 +229,7 @@ impl TabView for Controllers {
                 self.table = Table { defaults: self.table.defaults, ..Table::default() };
                 Page::List
             }
-            Page::Program | Page::Sets | Page::Runs => Page::Device,
+            Page::Lamps | Page::Program | Page::Sets | Page::Runs => Page::Device,
             Page::Overlay => {
                 self.runs.overlay = None;
                 Page::Runs
@@ -242,7 +250,7 @@ impl TabView for Controllers {
                 Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
             }
             (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_), _)
-            | (Page::Runs | Page::Overlay | Page::Guide(..), _) => Rows::default(),
+            | (Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..), _) => Rows::default(),
         }
     }
 
@@ -259,7 +267,7 @@ impl TabView for Controllers {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
             Page::List if self.is_wall(cx) => wall::tags(cx, self.device.index()),
             Page::List | Page::Program | Page::Sets | Page::Compare(_) => Vec::new(),
-            Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
+            Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
         };
         if tags.is_empty() {
             return Vec::new();
@@ -322,6 +330,7 @@ impl TabView for Controllers {
                 wall::view(cx, &mut canvas, self.device.index(), &self.trend);
             }
             (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
+            (Page::Lamps, _) => lamps::view(cx, &mut canvas, device),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
             (Page::Device | Page::Program, _) => {
                 let trend = self.trend.value.as_ref().and_then(|series| series.first());
@@ -338,8 +347,10 @@ impl TabView for Controllers {
     fn chords() -> crate::ui::keys::PageChords {
         let compare = Page::Compare(Compare::new(Source::Set(String::new())));
         let guide = Page::Guide(0, Box::new(Page::List));
-        let pages = [Page::List, Page::Device, Page::Program, Page::Sets, compare, Page::Runs, Page::Overlay, guide];
-        pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).to_vec()
+        let runs = [Page::Runs, Page::Overlay];
+        let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare, guide];
+        let pages = pages.into_iter().chain(runs);
+        pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).collect()
     }
 }
 
@@ -353,6 +364,19 @@ impl Controllers {
     /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.
     fn is_wall(&self, cx: &ViewContext) -> bool {
         self.wall.unwrap_or(Size::Wide <= cx.size)
+    }
+
+    /// The lamps of the next device that has any.
+    fn show_lamps(&mut self, cx: &ViewContext, by: isize) {
+        let devices = &cx.def().devices;
+        let mut place = self.device.index();
+        for _ in devices {
+            place = around(place, by, devices.len());
+            if lamps::has_any(cx, &devices[place]) {
+                self.device = devices[place].id;
+                return;
+            }
+        }
     }
 
     /// Shows a device.

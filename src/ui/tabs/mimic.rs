@@ -1,5 +1,6 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
+mod actions;
 mod attention;
 mod cards;
 mod command;
@@ -16,6 +17,7 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
+pub use actions::{Action, KEYS};
 pub use command::command_of;
 use companions::{Companions, Parts, parts};
 use neighbour::neighbour;
@@ -26,47 +28,16 @@ use shift::Shift;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
+    access::right,
     history::Series,
     plant::def::{MimicItem, Picture},
     ui::{
         layout::Size,
+        rights,
+        tabs::line_switch,
         widgets::mimic::{CanvasScale, bar, list, panel, pipe, tags, title, trend, unit, vessel},
     },
 };
-
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Select the next item in a direction (columns, rows).
-    Move(i32, i32),
-    /// Open the faceplate of the selected item.
-    Open,
-    /// Say why a value of the selected item is what it is.
-    Why,
-    /// Open all actuators in one window.
-    Actuators,
-    /// Stop or start the motion of agitators and arrows.
-    Motion,
-    /// Show a page so many further on.
-    Page(isize),
-    /// Show the overview, or the mimic.
-    Overview,
-}
-
-/// Keys of this tab; the plant file adds its own, and [`Mimic::hints`] lists the four arrows as one.
-pub const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "", Action::Move(-1, 0)),
-    Key::new(code(KeyCode::Right), "", "", Action::Move(1, 0)),
-    Key::new(code(KeyCode::Up), "", "", Action::Move(0, -1)),
-    Key::new(code(KeyCode::Down), "", "", Action::Move(0, 1)),
-    Key::new(code(KeyCode::Enter), "open", "faceplate of the selected item", Action::Open),
-    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
-    Key::new(char('C'), "commands", "all valves, pumps and heaters with their commands", Action::Actuators),
-    Key::new(char('v'), "overview", "all devices at a glance, or the mimic", Action::Overview),
-    Key::new(char('M'), "", "animation of agitators and arrows on or off", Action::Motion),
-    Key::new(code(KeyCode::PageUp), "", "the page before", Action::Page(-1)),
-    Key::new(code(KeyCode::PageDown), "page", "the next page of the mimic", Action::Page(1)),
-];
 
 /// The small trends are asked again after so many seconds (real time).
 const EVERY_S: f64 = 10.0;
@@ -101,8 +72,12 @@ impl TabView for Mimic {
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let commands = cx.def().mimic.commands.iter();
         let commands = commands.map(|command| {
-            Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label))
-                .needs(Role::Technician)
+            Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label)).needs(
+                match command.value {
+                    Some(value) => right::needs(cx.def(), &CommandKind::Write { tag: command.tag, value }),
+                    None => rights::to_write(cx, [command.tag]),
+                },
+            )
         });
         let mut table = KEYS.to_vec();
         let pages = cx.def().mimic.pages.len();
@@ -288,6 +263,9 @@ impl Mimic {
                 return if pages > 1 { self.show_page(cx, around(self.page, by, pages)) } else { Vec::new() };
             }
             Action::Actuators => return command::actuators(cx),
+            Action::Line => {
+                return line_switch::open(cx, self.selected.and_then(|n| items.get(n)).map(|item| tags(cx, item)));
+            }
             Action::Why => {
                 self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
                 let item = self.selected.and_then(|n| items.get(n));
@@ -309,6 +287,7 @@ impl Mimic {
             Action::Move(dx, dy) => self.overview.on_move(cx, &self.shift, (dx, dy)),
             Action::Motion | Action::Page(_) => {}
             Action::Actuators => return command::actuators(cx),
+            Action::Line => return line_switch::open(cx, self.overview.card(cx).map(|card| card.tags)),
             Action::Overview => {
                 self.at_a_glance = false;
                 return self.on_snapshot(cx);

@@ -4,6 +4,7 @@ pub(crate) mod alarms;
 pub(crate) mod bus;
 pub(crate) mod controllers;
 pub(super) mod draw;
+mod line_switch;
 mod overlay;
 mod periodic_query;
 mod prelude;

@@ -1,121 +1,144 @@
-//! Several batches or control runs over each other: the curves of one tag, each from its own begin on.
+//! Batches, control runs or periods over each other: the curves of one tag, each from the begin of its stretch of time on.
 
 use ratatui::widgets::Widget;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::number::to_usize,
+    plant::{
+        batch::Batch,
+        control_run::{ControlRun, RunDef},
+        def::BatchDef,
+        number::to_usize,
+    },
     ui::widgets::chart::{self, Chart, Curve, mark, trace::Trace},
 };
 
 /// Curves over each other at most: a pen has one of so many marks.
-const CURVES_MAX: usize = 8;
-/// Those that are shown where none is marked: the selected one and those before it.
+pub const CURVES_MAX: usize = 8;
+/// Batches that are shown where none is marked: the selected one and those before it.
 pub const UNMARKED: usize = 3;
 /// How often the curve of what still runs is read again, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 10.0;
 const TIMEOUT_S: f64 = 20.0;
+/// The history has a period whole so long after its end (real time).
+const STORED_S: f64 = 3.0;
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Another tag.
-    Tag(isize),
-    /// The list.
-    Back,
+/// A stretch of time whose curve lies over the others.
+#[derive(Debug)]
+struct Laid {
+    /// What it is called in the legend.
+    label: String,
+    from: Timestamp,
+    /// `None` while it runs.
+    to: Option<Timestamp>,
+    /// Its own figures, for the legend; of a batch or a period it has those of the tag.
+    figures: Option<[String; 5]>,
+    /// Its curve was asked for after it had ended.
+    is_whole: bool,
 }
 
-/// Keys of this page.
-pub const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "previous tag", Action::Tag(-1)),
-    Key::new(code(KeyCode::Right), "tag", "next tag", Action::Tag(1)),
-    Key::new(char('o'), "list", "back to the list", Action::Back),
-];
+impl Laid {
+    fn new(label: String, from: Timestamp, to: Option<Timestamp>) -> Laid {
+        Laid { label, from, to, figures: None, is_whole: false }
+    }
 
-/// What is laid over each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// Batches, with the figures of the tag.
-    Batches,
-    /// Control runs, with their own figures.
-    Runs,
-}
-
-/// One of them.
-#[derive(Debug, Clone)]
-pub struct Item {
-    /// `hot-water-17`.
-    pub label: String,
-    /// Its begin.
-    pub from: Timestamp,
-    /// Its end; `None` while it runs.
-    pub to: Option<Timestamp>,
-    /// The figures below the chart; empty for those of the tag.
-    pub figures: [String; 5],
-}
-
-impl Item {
     fn until(&self, now: Timestamp) -> Timestamp {
         self.to.unwrap_or(now)
     }
 }
 
+/// What lies over each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Batches,
+    Runs,
+    Periods,
+}
+
 /// State of the page.
 #[derive(Debug)]
 pub struct Overlay {
+    tab: Tab,
     kind: Kind,
-    /// Each of them with the curve of the tag.
-    items: Vec<(Item, Answered<Vec<Series>>)>,
+    /// Each with the curve of the tag.
+    curves: Vec<(Laid, Answered<Vec<Series>>)>,
     tags: Vec<TagId>,
     tag: usize,
 }
 
 impl Overlay {
-    /// Of the curves of these tags; `None` without any.
-    pub fn new(kind: Kind, tags: Vec<TagId>, items: impl IntoIterator<Item = Item>) -> Option<Overlay> {
-        let items = items.into_iter().take(CURVES_MAX).map(|item| (item, Answered::default())).collect();
-        (!tags.is_empty()).then_some(Overlay { kind, items, tags, tag: 0 })
+    /// Of batches of one rule; `None` where it names no tag that has a curve.
+    pub fn of_batches(rule: &BatchDef, batches: impl IntoIterator<Item = Batch>) -> Option<Overlay> {
+        let tags = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
+        let laid = |batch: Batch| Laid::new(batch.label(), batch.from, batch.to);
+        Overlay::new((Tab::Reports, Kind::Batches), batches.into_iter().map(laid), (tags, 0))
     }
 
-    pub fn act(&mut self, by: isize) {
+    /// Of control runs with their figures; `None` where they have no tag that has a curve.
+    pub fn of_runs(rule: &RunDef, runs: impl Iterator<Item = (ControlRun, [String; 5])>) -> Option<Overlay> {
+        let laid = |(run, figures): (ControlRun, _)| {
+            let to = (!run.is_running()).then_some(run.until);
+            Laid { figures: Some(figures), ..Laid::new(run.label(), run.from, to) }
+        };
+        Overlay::new((Tab::Controllers, Kind::Runs), runs.map(laid), (rule.tags.clone(), 0))
+    }
+
+    /// Of periods, named by letters; `None` where there is no tag that has a curve.
+    pub fn of_periods(spans: Vec<(Timestamp, Timestamp)>, tags: (Vec<TagId>, usize)) -> Option<Overlay> {
+        let laid = |(letter, (from, to)): (char, _)| Laid::new(letter.to_string(), from, Some(to));
+        Overlay::new((Tab::Trends, Kind::Periods), ('A'..).zip(spans).map(laid), tags)
+    }
+
+    fn new(
+        (tab, kind): (Tab, Kind),
+        laid: impl Iterator<Item = Laid>,
+        (tags, tag): (Vec<TagId>, usize),
+    ) -> Option<Overlay> {
+        let curves = laid.take(CURVES_MAX).map(|laid| (laid, Answered::default())).collect();
+        (!tags.is_empty()).then_some(Overlay { tab, kind, curves, tags, tag })
+    }
+
+    /// Shows another tag.
+    pub fn next_tag(&mut self, by: isize) {
         self.tag = around(self.tag, by, self.tags.len());
-        self.items.iter_mut().for_each(|(_, curve)| *curve = Answered::default());
+        for (laid, curve) in &mut self.curves {
+            (laid.is_whole, *curve) = (false, Answered::default());
+        }
     }
 
     /// The longest of them.
     fn span(&self, now: Timestamp) -> SignedDuration {
-        let lasted = self.items.iter().map(|(item, _)| item.until(now).duration_since(item.from));
+        let lasted = self.curves.iter().map(|(laid, _)| laid.until(now).duration_since(laid.from));
         lasted.max().unwrap_or_default().max(SignedDuration::from_secs(60))
     }
 
     /// Asks for the curves: of what has ended once.
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
-        let (span, tag, columns) = (self.span(cx.now), self.tags[self.tag], chart::dots(cx.theme, cx.area.width, 1));
-        let tab = match self.kind {
-            Kind::Batches => Tab::Reports,
-            Kind::Runs => Tab::Controllers,
-        };
-        let ask = |(item, curve): &mut (Item, Answered<Vec<Series>>)| {
+        let now = cx.now;
+        let (span, tag, columns) = (self.span(now), self.tags[self.tag], chart::dots(cx.theme, cx.area.width, 1));
+        let ask = |(laid, curve): &mut (Laid, Answered<Vec<Series>>)| {
             // The past stays as it is.
-            let known = item.to.is_some() && curve.trouble.is_none();
-            let every = if known { SignedDuration::MAX } else { real(cx, EVERY_S) };
+            let is_known = laid.is_whole && curve.trouble.is_none();
+            let every = if is_known { SignedDuration::MAX } else { real(cx, EVERY_S) };
             // Its own figures, and columns as wide as those of the longest.
-            let to = item.until(cx.now).max(item.from + SignedDuration::from_secs(1));
-            let share = to.duration_since(item.from).as_secs_f64() / span.as_secs_f64();
+            let to = laid.until(now).max(laid.from + SignedDuration::from_secs(1));
+            let share = to.duration_since(laid.from).as_secs_f64() / span.as_secs_f64();
             let buckets = to_usize(columns as f64 * share).max(2);
-            let query = Query::Series { tags: vec![tag], from: item.from, to, buckets };
-            curve.ask(cx, (tab, number), every, real(cx, TIMEOUT_S), query)
+            let query = Query::Series { tags: vec![tag], from: laid.from, to, buckets };
+            let asked = curve.ask(cx, (self.tab, number), every, real(cx, TIMEOUT_S), query)?;
+            laid.is_whole = laid.to.is_some_and(|to| cx.present().duration_since(to) > real(cx, STORED_S));
+            Some(asked)
         };
-        self.items.iter_mut().filter_map(ask).collect()
+        self.curves.iter_mut().filter_map(ask).collect()
     }
 
     pub fn awaits(&self, number: u32) -> bool {
-        self.items.iter().any(|(_, curve)| curve.query.awaits(number))
+        self.curves.iter().any(|(_, curve)| curve.query.awaits(number))
     }
 
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.items.iter_mut().for_each(|(_, curve)| curve.on_answer(cx, number, answer));
+        self.curves.iter_mut().for_each(|(_, curve)| curve.on_answer(cx, number, answer));
     }
 
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
@@ -123,69 +146,85 @@ impl Overlay {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let (width, height) = (canvas.width(), canvas.height());
         let def = cx.def().tag(tag);
-        let count = self.items.len();
-        let words = match self.kind {
-            Kind::Batches => t!("{tag} of {count} batches", tag = def.name, count),
-            Kind::Runs => t!("{tag} of {count} runs", tag = def.name, count),
+        let (name, count) = (&def.name, self.curves.len());
+        let heading = match self.kind {
+            Kind::Batches => t!("{tag} of {count} batches", tag = name, count),
+            Kind::Runs => t!("{tag} of {count} runs", tag = name, count),
+            Kind::Periods => t!("{tag} in {count} periods", tag = name, count),
         };
-        let x = canvas.text(1, 0, &words, theme.strong());
-        let trouble = self.items.iter().find_map(|(_, curve)| curve.trouble.as_deref());
+        let x = canvas.text(1, 0, &heading, theme.strong());
+        let trouble = self.curves.iter().find_map(|(_, curve)| curve.trouble.as_deref());
         match trouble {
             Some(trouble) => canvas.text(x + 2, 0, &fit(trouble, width.saturating_sub(x + 3)), theme.trouble()),
             None => canvas.text(x + 2, 0, &fit(&def.label, width.saturating_sub(x + 3)), theme.normal()),
         };
-        let legend = to_u16(self.items.len()) + 1;
-        let traces: Vec<Trace> = self.items.iter().map(|(item, curve)| from_begin(item, curve)).collect();
+        let legend = to_u16(self.curves.len()) + 1;
+        self.draw_chart(cx, &mut canvas.part(0, 1, width, height.saturating_sub(legend + 1)), tag);
+        let y = height.saturating_sub(legend);
+        let values = |first| [first, t!("begin"), t!("minutes"), t!("min"), t!("mean"), t!("max"), t!("good")];
+        let head = match self.kind {
+            Kind::Batches => values(t!("batch")),
+            Kind::Periods => values(t!("period")),
+            Kind::Runs => [t!("run"), t!("begin"), t!("at SV"), t!("steady"), t!("over"), t!("offset"), t!("IAE")],
+        };
+        canvas.text(3, y, &fit(&self.columns(head), width.saturating_sub(3)), theme.dim());
+        for (n, (laid, curve)) in self.curves.iter().enumerate() {
+            let y = y + 1 + to_u16(n);
+            canvas.text(1, y, mark(theme, n), theme.pen(n));
+            canvas.text(3, y, &fit(&self.row(cx, tag, laid, curve), width.saturating_sub(3)), theme.normal());
+        }
+    }
+
+    /// The curves, from a common begin: that of the first period, by its local time, or zero.
+    fn draw_chart(&self, cx: &ViewContext, canvas: &mut Canvas, tag: TagId) {
+        let (begin, zone) = match (self.kind, self.curves.first()) {
+            (Kind::Periods, Some((first, _))) => (first.from, Some(&cx.def().time_zone)),
+            (Kind::Periods, None) | (Kind::Batches | Kind::Runs, _) => (Timestamp::UNIX_EPOCH, None),
+        };
+        let traces: Vec<Trace> = self.curves.iter().map(|(laid, curve)| moved_to(begin, laid, curve)).collect();
         let decimals = cx.snapshot.decimals[tag.index()];
         let curve = |(pen, trace)| Curve::new(trace, pen, cx.snapshot.unit(tag), decimals);
         let curves = traces.iter().enumerate().map(curve).collect();
-        let end = BEGIN.checked_add(self.span(cx.now)).unwrap_or(BEGIN);
-        let chart = Chart::new(theme, (BEGIN, end, end), curves);
-        let plot = canvas.part(0, 1, width, height.saturating_sub(legend + 1)).area();
-        chart.render(plot, canvas.buffer());
-        let y = height.saturating_sub(legend);
-        let head = match self.kind {
-            Kind::Batches => [t!("batch"), t!("begin"), t!("minutes"), t!("min"), t!("mean"), t!("max"), t!("good")],
-            Kind::Runs => [t!("run"), t!("begin"), t!("at SV"), t!("steady"), t!("over"), t!("offset"), t!("IAE")],
+        let end = begin.checked_add(self.span(cx.now)).unwrap_or(begin);
+        let chart = Chart { zone, ..Chart::new(cx.theme, (begin, end, end), curves) };
+        chart.render(canvas.area(), canvas.buffer());
+    }
+
+    /// A row of the legend.
+    fn columns(&self, cells: [&str; 7]) -> String {
+        // A period has a date where a batch has a number.
+        let (label, begin) = if self.kind == Kind::Periods { (7, 20) } else { (15, 12) };
+        draw::columns([label, begin, -7, -9, -9, -9, -8], cells)
+    }
+
+    /// The figures of one of them.
+    fn row(&self, cx: &ViewContext, tag: TagId, laid: &Laid, curve: &Answered<Vec<Series>>) -> String {
+        let begin = match self.kind {
+            Kind::Batches | Kind::Runs => moment(laid.from, cx.now, &cx.def().time_zone),
+            Kind::Periods => draw::local(cx, laid.from, "%Y-%m-%d %H:%M:%S"),
         };
-        canvas.text(3, y, &fit(&draw::columns(WIDTHS, head), width.saturating_sub(3)), theme.dim());
-        for (n, (item, curve)) in self.items.iter().enumerate() {
-            let y = y + 1 + to_u16(n);
-            canvas.text(1, y, mark(theme, n), theme.pen(n));
-            canvas.text(3, y, &fit(&row(cx, tag, item, curve), width.saturating_sub(3)), theme.normal());
+        if let Some([a, b, c, d, e]) = &laid.figures {
+            return self.columns([&laid.label, &begin, a, b, c, d, e]);
         }
+        let lasted = format!("{:.1}", laid.until(cx.now).duration_since(laid.from).as_secs_f64() / 60.0);
+        let series = curve.value.iter().flatten().next();
+        let value = |value: Option<f64>| value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
+        let summary = series.and_then(|series| series.summary);
+        let good = series.map_or("–".to_owned(), |series| format!("{:.1} %", (series.good * 1_000.0).floor() / 10.0));
+        let [min, mean, max] = match summary {
+            Some((min, mean, max)) => [Some(min), Some(mean), Some(max)],
+            None => [None; 3],
+        };
+        self.columns([&laid.label, &begin, &lasted, &value(min), &value(mean), &value(max), &good])
     }
 }
 
-/// The begin of each on the common axis.
-const BEGIN: Timestamp = Timestamp::UNIX_EPOCH;
-const WIDTHS: [i16; 7] = [15, 12, -7, -9, -9, -9, -8];
-
-/// The curve of one, moved to the common begin.
-fn from_begin(item: &Item, curve: &Answered<Vec<Series>>) -> Trace {
+/// A curve, moved to the common begin.
+fn moved_to(begin: Timestamp, laid: &Laid, curve: &Answered<Vec<Series>>) -> Trace {
     let mut trace = Trace::default();
     if let Some(series) = curve.value.iter().flatten().next() {
-        let from = BEGIN.checked_add(series.from.duration_since(item.from)).unwrap_or(BEGIN);
+        let from = begin.checked_add(series.from.duration_since(laid.from)).unwrap_or(begin);
         trace.set_past(Series { from, ..series.clone() }, Timestamp::MAX);
     }
     trace
-}
-
-/// The figures of one.
-fn row(cx: &ViewContext, tag: TagId, item: &Item, curve: &Answered<Vec<Series>>) -> String {
-    let begin = moment(item.from, cx.now, &cx.def().time_zone);
-    if item.figures.iter().any(|figure| !figure.is_empty()) {
-        let [a, b, c, d, e] = item.figures.each_ref();
-        return draw::columns(WIDTHS, [&item.label, &begin, a, b, c, d, e]);
-    }
-    let lasted = format!("{:.1}", item.until(cx.now).duration_since(item.from).as_secs_f64() / 60.0);
-    let series = curve.value.iter().flatten().next();
-    let value = |value: Option<f64>| value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
-    let summary = series.and_then(|series| series.summary);
-    let good = series.map_or("–".to_owned(), |series| format!("{:.1} %", (series.good * 1_000.0).floor() / 10.0));
-    let [min, mean, max] = match summary {
-        Some((min, mean, max)) => [Some(min), Some(mean), Some(max)],
-        None => [None; 3],
-    };
-    draw::columns(WIDTHS, [&item.label, &begin, &lasted, &value(min), &value(mean), &value(max), &good])
 }

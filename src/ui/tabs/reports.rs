@@ -19,10 +19,7 @@ use crate::{
     plant::def::{CsvDialect, Pen},
     report::{self, Period, ReportFormat, ShiftReport},
     text::file,
-    ui::{
-        tabs::{overlay, trends::span::View},
-        widgets::chart,
-    },
+    ui::{tabs::trends::span::View, widgets::chart},
 };
 
 /// What a key means here.
@@ -203,7 +200,7 @@ impl TabView for Reports {
             return self.ask(cx);
         }
         match (self.batches.shown, &self.batches.overlay) {
-            (true, Some(_)) => keys::find(overlay::KEYS, event).map(|action| self.act_on_overlay(cx, action)),
+            (true, Some(_)) => keys::find(batches::OVERLAY_KEYS, event).map(|action| self.act_on_overlay(cx, action)),
             (true, None) => keys::find(&batches::keys(), event).map(|action| self.act_on_batches(cx, action)),
             (false, _) => keys::find(&table(cx), event).map(|action| self.act(cx, action)),
         }
@@ -231,7 +228,7 @@ impl TabView for Reports {
             return keys::hints(&self.made.keys());
         }
         match (self.batches.shown, &self.batches.overlay) {
-            (true, Some(_)) => keys::hints(overlay::KEYS),
+            (true, Some(_)) => keys::hints(batches::OVERLAY_KEYS),
             (true, None) => keys::hints(&batches::keys()),
             (false, _) => keys::hints(&table(cx)),
         }
@@ -240,7 +237,8 @@ impl TabView for Reports {
     #[cfg(test)]
     fn chords() -> keys::PageChords {
         let report = [KEYS, BATCHES, &motions!("", Action::Move)].concat();
-        let pages = [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(overlay::KEYS))];
+        let pages =
+            [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(batches::OVERLAY_KEYS))];
         let made = [("made", keys::chords_of(&made::list_keys())), ("text", keys::chords_of(&made::text_keys()))];
         [("reports", keys::chords_of(&report))].into_iter().chain(pages).chain(made).collect()
     }
@@ -296,11 +294,11 @@ impl Reports {
         self.ask(cx)
     }
 
-    fn act_on_overlay(&mut self, cx: &ViewContext, action: overlay::Action) -> Vec<UiAction> {
+    fn act_on_overlay(&mut self, cx: &ViewContext, action: batches::OverlayAction) -> Vec<UiAction> {
         match (action, &mut self.batches.overlay) {
-            (overlay::Action::Tag(by), Some(overlay)) => overlay.act(by),
-            (overlay::Action::Tag(_), None) => {}
-            (overlay::Action::Back, _) => self.batches.overlay = None,
+            (batches::OverlayAction::Tag(by), Some(overlay)) => overlay.next_tag(by),
+            (batches::OverlayAction::Tag(_), None) => {}
+            (batches::OverlayAction::Back, _) => self.batches.overlay = None,
         }
         self.ask(cx)
     }

@@ -9,6 +9,7 @@ mod keys;
 mod lanes;
 mod legend;
 mod numbers;
+mod overlay;
 mod pens;
 mod picture;
 mod plots;
@@ -33,13 +34,14 @@ use self::{
     cursors::Between,
     events::Events,
     export::Export,
+    overlay::OVERLAY,
     pens::PenScale,
     plots::Plot,
     response::Response,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
     window::Visited,
 };
-use crate::ui::tabs::{prelude::*, reports::period};
+use crate::ui::tabs::{overlay::Overlay, prelude::*, reports::period};
 use crate::{
     history::Series,
     plant::{
@@ -75,6 +77,9 @@ pub struct Trends {
     strokes: BTreeMap<TagId, Stroke>,
     plot: Plot,
     response: Response,
+    /// Periods over each other in place of the curves, and what was typed for them last.
+    overlay: Option<Overlay>,
+    typed_overlay: Option<String>,
     export: Export,
     /// What the text of the open window is for.
     asking: Asking,
@@ -130,6 +135,8 @@ enum Asking {
     Filter,
     /// The scale of a pen.
     Scale(TagId),
+    /// The periods that lie over each other.
+    Overlay,
 }
 
 type Figures = (Option<(f64, f64, f64)>, f64);
@@ -158,7 +165,8 @@ impl TabView for Trends {
     fn awaits(&self, number: u32) -> bool {
         let queries = [&self.curves, &self.hours.query].into_iter().chain(self.events.queries());
         let queries = queries.chain([self.export.query(), self.response.query()]);
-        queries.chain(self.between.queries()).any(|query| query.awaits(number))
+        let overlay = self.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number));
+        overlay || queries.chain(self.between.queries()).any(|query| query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
@@ -166,6 +174,7 @@ impl TabView for Trends {
         self.events.on_answer(cx, number, &answer);
         self.between.on_answer(cx, number, &answer);
         self.response.on_answer(cx, number, &answer);
+        self.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
         let exported = self.accept_export(cx, number, &answer);
         if let Some(asked) = self.curves.answered(number, cx.steady()) {
             self.trouble = answer.as_ref().err().map(HistoryError::to_string);
@@ -193,6 +202,9 @@ impl TabView for Trends {
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
+        if self.overlay.take().is_some() {
+            return true;
+        }
         let cancelled = [&mut self.curves, &mut self.hours.query].map(|query| query.cancel(cx));
         cancelled.contains(&true) || self.values.is_some() && self.leave_values()
     }
@@ -203,6 +215,9 @@ impl TabView for Trends {
 
     fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
         self.export.said = None;
+        if self.overlay.is_some() {
+            return find(OVERLAY, event).map(|action| self.act_on_overlay(cx, action)).unwrap_or_default();
+        }
         find(if self.values.is_some() { LIST } else { KEYS }, event)
             .map(|action| self.act(cx, action))
             .unwrap_or_default()
@@ -221,11 +236,15 @@ impl TabView for Trends {
             Asking::Time => self.go_to(cx, text)?,
             Asking::Filter => self.filter_values(text),
             Asking::Scale(tag) => self.set_scale(tag, text)?,
+            Asking::Overlay => self.lay_over(cx, text)?,
         }
         Ok(self.ask(cx))
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        if self.overlay.is_some() {
+            return hints(OVERLAY);
+        }
         if self.values.is_some() {
             // In a replay Esc leads back here before it ends the past.
             let back = cx.is_past().then(|| Hint::new("Esc", t!("back"), t!("previous page")));
@@ -237,7 +256,8 @@ impl TabView for Trends {
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        [KEYS, LIST].map(|keys| ("trends", crate::ui::keys::chords_of(keys))).to_vec()
+        let overlay = ("overlay", crate::ui::keys::chords_of(OVERLAY));
+        [KEYS, LIST].map(|keys| ("trends", crate::ui::keys::chords_of(keys))).into_iter().chain([overlay]).collect()
     }
 }
 
@@ -294,6 +314,7 @@ impl Trends {
             }
             (None, Action::Stroke) => self.next_stroke(cx),
             (None, Action::Scale) => return self.ask_scale(cx),
+            (None, Action::Overlay) => return self.ask_overlay(),
             (None, Action::GoTo) => {
                 self.asking = Asking::Time;
                 let prompt = Prompt::new(t!("Go to a time"), t!("03:12   2026-11-20   2026-11-20 22:00-06:00"), "");

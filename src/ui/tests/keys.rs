@@ -161,6 +161,21 @@ fn closing_a_line_is_asked_and_opening_it_too() {
     }
 }
 
+fn write_action() -> ActionRecord {
+    ActionRecord {
+        at: fixture::now() - SignedDuration::from_secs(700),
+        by: "tech1".into(),
+        action: "write".into(),
+        target: "TIC-1.SV".into(),
+        old: Some("60.0 °C".into()),
+        new: Some("70.0 °C".into()),
+        outcome: "verified".into(),
+        from: "".into(),
+        note: None,
+        chain_hash: None,
+    }
+}
+
 #[test]
 fn the_journal_lists_alarms_and_actions_in_one_order() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
@@ -179,18 +194,6 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
         until: None,
         first_out: None,
     };
-    let action = ActionRecord {
-        at: ago(700),
-        by: "tech1".into(),
-        action: "write".into(),
-        target: "TIC-1.SV".into(),
-        old: Some("60.0 °C".into()),
-        new: Some("70.0 °C".into()),
-        outcome: "verified".into(),
-        from: "".into(),
-        note: None,
-        chain_hash: None,
-    };
     for effect in effects {
         let Effect::Query(id, query) = effect else { continue };
         let answer = match query {
@@ -199,7 +202,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
                 step(800, AlarmEvent::Raised, None),
                 step(90_000, AlarmEvent::Raised, None),
             ]),
-            Query::Actions { .. } => Answer::Actions(vec![action.clone()]),
+            Query::Actions { .. } => Answer::Actions(vec![write_action()]),
             Query::Series { .. }
             | Query::Audit { .. }
             | Query::LineMinutes { .. }
@@ -211,6 +214,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
             | Query::SampleTime { .. }
             | Query::Reports { .. }
             | Query::Past { .. }
+            | Query::Samples { .. }
             | Query::Unarchived { .. }
             | Query::Overview
             | Query::Registers(_) => continue,

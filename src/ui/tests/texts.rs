@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{LANGUAGES, model, replay::replayed, screen, type_keys};
 use crate::{
+    plant::{def::AlarmId, station::StationFault},
     text::{Language, Locale, translate},
     ui::{
         Msg,
@@ -230,4 +231,16 @@ fn thai_of_a_plant_file_is_shown_and_found() {
     type_keys(&mut model, ":นํา");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("TIC-1.PV") && shown.contains(&*cells("อุณหภูมิน้ำในถัง")), "{shown}");
+}
+
+#[test]
+fn alarms_of_the_station_are_in_the_language_of_the_screen() {
+    for fault in StationFault::ALL {
+        let def = fault.alarm(AlarmId(0));
+        let texts = [&def.message, &def.guidance.cause, &def.guidance.effect, &def.guidance.action];
+        for part in texts.into_iter().flat_map(|text| text.split("; ")) {
+            let thai = Language::THAI.locale().within(|| translate(part));
+            assert_ne!(thai, part, "{fault:?}");
+        }
+    }
 }

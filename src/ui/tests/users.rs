@@ -173,6 +173,29 @@ fn what_a_role_may_not_is_reported_before_it_is_tried() {
     assert!(!screen(&mut model, 80, 24).contains("needs"));
 }
 
+#[test]
+fn a_key_that_tunes_shows_the_supervisor_that_it_needs() {
+    let mut fixture = Fixture::normal();
+    for name in ["P", "AT", "FIX"] {
+        let tag = fixture.tag(&format!("TIC-1.{name}"));
+        fixture.def.tags[tag.index()].role = Role::Supervisor;
+    }
+    let at = |role: Role, keys: &str| {
+        let mut model = with(&fixture, person("anna", role));
+        type_keys(&mut model, keys);
+        screen(&mut model, 80, 24)
+    };
+    let p = "4⏎/proportional⏎";
+    let shown = at(Role::Technician, p);
+    assert!(shown.contains("Supervisor: ⏎ T f") && shown.contains("needs Supervisor; "), "{shown}");
+    let shown = at(Role::Technician, &format!("{p}⏎5"));
+    assert!(shown.contains("needs Supervisor; anna is Technician"), "{shown}");
+    let shown = at(Role::Technician, "4⏎/setpoint⏎");
+    assert!(shown.contains("⏎ edit") && !shown.contains("needs Supervisor; "), "{shown}");
+    let shown = at(Role::Supervisor, p);
+    assert!(shown.contains("⏎ edit") && !shown.contains("needs"), "{shown}");
+}
+
 fn reauthenticated(kind: Reauthentication) -> Fixture {
     let mut fixture = Fixture::normal();
     let sv = fixture.tag("TIC-1.SV");

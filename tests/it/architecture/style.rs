@@ -15,6 +15,7 @@ const WALL_CLOCK: &[&str] = &[
     "src/ui/io/tests.rs",
     "tests/it/endings.rs",
     "tests/it/masters.rs",
+    "tests/it/mqtt.rs",
     "tests/it/outstanding.rs",
     "tests/it/pty.rs",
     "tests/it/reports.rs",

@@ -54,7 +54,7 @@ fn a_stop_is_never_one_request_too_many() {
     let mut def = PlantDef::clone(&bench.access.def);
     let device = def.tag(fixture::RUN).device.index();
     let (name, confirm, settle) = ("STOP".into(), String::new(), Duration::ZERO);
-    let stop = ActionDef { name, confirm, settle, tag: fixture::RUN, value: 0.0, stop: true, saves: false };
+    let stop = ActionDef { name, confirm, settle, tag: fixture::RUN, value: 0.0, stop: true, saves: false, role: None };
     def.devices[device].actions.push(stop);
     bench.access.def = Arc::new(def);
     bench.open(1, "a");
@@ -91,4 +91,20 @@ fn a_tag_with_second_user_is_written_only_with_one() {
     }
     let (command, refused) = bench.send_command(1, SV, credentials(Some("BOSS"), BOSS)).unwrap();
     assert_eq!((refused, command.command.note.as_deref()), (None, Some("why; approved by boss")));
+}
+
+#[test]
+fn the_station_refuses_a_setting_that_needs_a_supervisor() {
+    let mut bench = Bench::new(AccessDef::default());
+    let mut def = PlantDef::clone(&bench.access.def);
+    def.tags[fixture::RUN.index()].role = Role::Supervisor;
+    bench.access.def = Arc::new(def);
+    for (user, password, refused) in [("tech", TECH, true), ("boss", BOSS, false)] {
+        bench.open(1, "10.0.0.1");
+        bench.login(1, user, password).unwrap();
+        let why = bench.send_command(1, RUN, None).unwrap().1;
+        let not_permitted = Refusal::NotPermitted("this is for a supervisor, you are technician".into());
+        assert_eq!(why, refused.then_some(not_permitted), "{user}");
+        bench.access.close(1, bench.now);
+    }
 }

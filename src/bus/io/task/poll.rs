@@ -222,9 +222,14 @@ impl Task<'_> {
             self.bisection.reset();
         }
         if wrong || self.bisection.conclude(&mut self.unreadable) {
-            let blocks = plan::blocks(&self.def, self.line, &self.unreadable);
-            self.use_plan(link, schedule, blocks, at);
+            self.plan_again(link, schedule, at);
         }
+    }
+
+    /// Plans with what is known of unreadable ranges and with what operators have asked for.
+    pub(super) fn plan_again(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp) {
+        let blocks = plan::blocks_with_unpolled(&self.def, self.line, &self.unreadable, &self.requested);
+        self.use_plan(link, schedule, blocks, at);
     }
 
     fn use_plan(&mut self, link: &mut Link, schedule: &mut Schedule, blocks: Vec<Block>, at: Timestamp) {

@@ -58,7 +58,8 @@ fn station(db: &Path, def: &Arc<PlantDef>, seconds: std::ops::Range<i64>, stops:
 }
 
 fn runs(store: &Store, from: i64, to: i64, limit: usize) -> Vec<ControlRun> {
-    match store.answer(&Query::ControlRuns { controller: None, from: sec(from), to: sec(to), limit }, sec(to)).unwrap() {
+    match store.answer(&Query::ControlRuns { controller: None, from: sec(from), to: sec(to), limit }, sec(to)).unwrap()
+    {
         Answer::ControlRuns(runs) => runs,
         other => panic!("{other:?}"),
     }

@@ -6,7 +6,8 @@ use super::*;
 fn with_stop() -> Plant {
     let mut def = fixture::plant();
     let (settle, confirm) = (Duration::ZERO, String::new());
-    let stop = ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true, saves: false };
+    let stop =
+        ActionDef { name: "STOP".into(), tag: RUN, value: 0.0, settle, confirm, stop: true, saves: false, role: None };
     def.devices[PLC.index()].actions = vec![stop];
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(RUN, 0.0)]));

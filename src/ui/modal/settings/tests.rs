@@ -49,7 +49,8 @@ fn serial(serial: Serial) -> Option<LineDef> {
 #[test]
 fn what_is_chosen_is_what_is_sent() {
     let usual = Serial::USUAL;
-    assert_eq!(tried("→"), serial(Serial { baud: 19_200, ..usual }));
+    assert_eq!(tried("→"), serial(Serial { baud: 14_400, ..usual }));
+    assert_eq!(tried("→→"), serial(Serial { baud: 19_200, ..usual }));
     assert_eq!(tried("←"), serial(Serial { baud: 4_800, ..usual }));
     assert_eq!(tried("↓↓→"), serial(Serial { parity: Parity::Even, ..usual }));
     assert_eq!(tried("↓↓↓→"), serial(Serial { stop_bits: 2, ..usual }));
@@ -89,7 +90,7 @@ fn what_cannot_be_is_reported_before_anything_is_sent() {
 fn nothing_is_done_that_was_not_asked_twice() {
     let mut model = open(&Fixture::normal());
     assert_eq!(sent_kind(&type_keys(&mut model, "→⏎n")), None);
-    assert!(screen(&mut model, 80, 24).contains("19200"), "the form stays as it was");
+    assert!(screen(&mut model, 80, 24).contains("14400"), "the form stays as it was");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎⎋")), None);
     assert!(model.modal.is_none());
 }

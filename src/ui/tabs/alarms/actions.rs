@@ -166,13 +166,13 @@ fn names(cx: &ViewContext, alarms: impl ExactSizeIterator<Item = AlarmId>) -> Ve
 /// The same with the mark as wide as all others, for lists.
 fn marked(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
-    format!("{} {} {}", cx.theme.priority_mark(def.priority), subject(cx, alarm), def.message)
+    format!("{} {} {}", cx.theme.priority_mark(def.priority), subject(cx, alarm), translate(&def.message))
 }
 
 /// `‹2›! TIC-1.PV temperature high`.
 fn name(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
-    format!("{} {} {}", cx.theme.priority_tag(def.priority), subject(cx, alarm), def.message)
+    format!("{} {} {}", cx.theme.priority_tag(def.priority), subject(cx, alarm), translate(&def.message))
 }
 
 /// Priority, subject, message, state, value and time of an alarm, separated by tabs.
@@ -182,7 +182,12 @@ pub fn line(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
         (Subject::Tag(tag), Some(value)) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
         (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => String::new(),
     };
-    let words = [translate(def.priority.word()), &subject(cx, alarm.id), &def.message, translate(alarm.state.word())];
+    let words = [
+        translate(def.priority.word()),
+        &subject(cx, alarm.id),
+        translate(&def.message),
+        translate(alarm.state.word()),
+    ];
     let at = text::stamp(alarm.raised_at, &cx.def().time_zone);
     [words.join("\t"), value.trim_end().to_owned(), at].join("\t")
 }

@@ -123,7 +123,7 @@ fn what_text(cx: &ViewContext, row: &Row, room: u16) -> String {
     let unrecorded = row.alarm.acknowledged.as_ref().is_some_and(|note| !note.recorded);
     let unrecorded = if unrecorded { t!(" NOT RECORDED") } else { "" };
     let (long, short) = (long + unrecorded, short + unrecorded);
-    let name = format!("{mark}{}", cx.def().alarm(row.alarm.id).message);
+    let name = format!("{mark}{}", translate(&cx.def().alarm(row.alarm.id).message));
     let text = format!("{name} {}", guidance::condition_text(cx, row.alarm.id));
     let text = text.trim_end();
     let choices = [(text, &long), (text, &short), (&name, &short)];

@@ -98,7 +98,7 @@ impl Filter {
     }
     /// The next area of the plant, and all of them after the last.
     pub fn next_area(&mut self, def: &PlantDef) {
-        self.area = after(&areas(def), self.area.as_ref());
+        self.area = area_after(def, self.area.as_ref());
     }
 
     /// Does it let this alarm through?
@@ -134,10 +134,20 @@ pub fn areas(def: &PlantDef) -> Vec<String> {
     areas
 }
 
+/// The next area, and all of them after the last.
+pub fn area_after(def: &PlantDef, area: Option<&String>) -> Option<String> {
+    after(&areas(def), area)
+}
+
 /// All that is looked through for words: what the view shows, nothing that is hidden.
 fn text_of(cx: &ViewContext, alarm: &ActiveAlarm, def: &AlarmDef) -> String {
     let by = alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default();
-    format!("{} {} {} {by}", subject_name(cx.def(), def.subject), def.message, translate(alarm.state.word()))
+    format!(
+        "{} {} {} {by}",
+        subject_name(cx.def(), def.subject),
+        translate(&def.message),
+        translate(alarm.state.word())
+    )
 }
 
 /// The one after `now`, nothing after the last one.

@@ -36,24 +36,27 @@ pub fn rows_of_any(
     listed: Option<&ActiveAlarm>,
 ) -> Vec<(&'static str, String)> {
     let guidance = &cx.def().alarm(alarm).guidance;
-    let mut rows = vec![
-        (t!("now"), now),
-        (t!("cause"), or_dash(&guidance.cause).to_owned()),
-        (t!("effect"), or_dash(&guidance.effect).to_owned()),
-    ];
+    let mut rows =
+        vec![(t!("now"), now), (t!("cause"), words(&guidance.cause)), (t!("effect"), words(&guidance.effect))];
     let steps = listed.into_iter().flat_map(|listed| guidance.steps().map(|step| step_text(cx, listed, step)));
     let labels = std::iter::once(t!("action")).chain(std::iter::repeat(""));
     let steps: Vec<_> = labels.zip(steps).collect();
     if steps.is_empty() {
-        rows.push((t!("action"), or_dash(&guidance.action).to_owned()));
+        rows.push((t!("action"), words(&guidance.action)));
     }
     rows.extend(steps);
     rows
 }
 
+/// A text of the plant file, or one of the station's own, whose parts are translated.
+fn words(text: &str) -> String {
+    or_dash(&text.split("; ").map(translate).collect::<Vec<_>>().join("; ")).to_owned()
+}
+
 /// `[x] lower SV (anna 14:02:31)`, `[_] check SSR lamp`.
 fn step_text(cx: &ViewContext, alarm: &ActiveAlarm, step: &str) -> String {
-    let Some(done) = alarm.step(step) else { return format!("[_] {step}") };
+    let (done, step) = (alarm.step(step), translate(step));
+    let Some(done) = done else { return format!("[_] {step}") };
     let by = done.by.as_deref().unwrap_or(t!("the station"));
     let at = moment(done.at, cx.now, &cx.def().time_zone);
     let lost = if done.recorded { "" } else { t!(" (NOT RECORDED)") };
@@ -99,7 +102,8 @@ fn title(
         alarm.state.needs_acknowledgement() && rights::missing(cx, &alarm.acknowledge()).is_none()
     });
     let ack = if mine { t!("a ack ") } else { "" };
-    let name = format!(" {ack}{} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), def.message);
+    let name =
+        format!(" {ack}{} {} {}", theme.priority_tag(def.priority), subject(cx, def.id), translate(&def.message));
     let whole = format!("{name} {}", condition_text(cx, def.id));
     let room = end.saturating_sub(text::width(&words) + 3);
     let shown =

@@ -205,7 +205,7 @@ pub fn suppressed_words(cx: &ViewContext, suppressed: &SuppressedAlarm) -> Strin
         state = translate(suppressed.state.word()),
         mark,
         name,
-        message = def.message,
+        message = translate(&def.message),
         active,
         left,
         by,
@@ -272,7 +272,7 @@ fn doubtful(cx: &ViewContext) -> Vec<String> {
         t!(
             "{subject} {message} active for {lasts}",
             subject = subject(cx, alarm.id),
-            message = cx.def().alarm(alarm.id).message,
+            message = translate(&cx.def().alarm(alarm.id).message),
             lasts
         )
     });

@@ -1,9 +1,14 @@
 //! The journal: alarm events and actions of operators in one list, searched by words and by time.
 
-use super::span;
+use super::{filter, span};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::record::{ActionRecord, AlarmRecord},
+    plant::{
+        PlantDef,
+        alarm::manager::subject_name,
+        def::AlarmDef,
+        record::{ActionRecord, AlarmRecord},
+    },
     report::Period,
     ui::layout::Size,
 };
@@ -27,6 +32,8 @@ pub struct Journal {
     scroll: Scroll,
     /// Words that must all be found in a row.
     words: Words,
+    /// Alarms of this area, and actions on the devices that have them.
+    area: Option<String>,
     /// The chosen period; `None` is the last 24 hours.
     period: Option<Period>,
 }
@@ -59,9 +66,14 @@ impl Journal {
     /// So many shifts later; `0` is everything of the last 24 hours.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
         if by == 0 {
-            self.words = Words::default();
+            (self.words, self.area) = (Words::default(), None);
         }
         self.show(period::step(cx, self.period.as_ref(), by));
+    }
+
+    /// Shows the next area, and all of them after the last.
+    pub fn next_area(&mut self, cx: &ViewContext) {
+        (self.area, self.scroll) = (filter::area_after(cx.def(), self.area.as_ref()), Scroll::default());
     }
 
     /// Scrolls.
@@ -77,7 +89,8 @@ impl Journal {
 
     /// Other rows are wanted; those of before must not stand under their heading.
     fn show(&mut self, period: Option<Period>) {
-        *self = Journal { words: std::mem::take(&mut self.words), period, ..Journal::default() };
+        let (words, area) = (std::mem::take(&mut self.words), self.area.take());
+        *self = Journal { words, area, period, ..Journal::default() };
     }
 
     fn limit(&self) -> usize {
@@ -105,6 +118,7 @@ impl Journal {
         let all = alarms.len() + actions.len();
         let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| period::words(cx, period));
         let mut what = vec![period];
+        what.extend(self.area.as_ref().map(|area| t!("area {area}", area)));
         if !self.words.is_empty() {
             what.push(t!("\"{typed}\": {count} of {all}, / changes it", typed = self.typed(), count = rows.len(), all));
         }
@@ -121,7 +135,7 @@ impl Journal {
         }
         if rows.is_empty() {
             let answered = self.alarms.value.is_some() || self.actions.value.is_some();
-            let words = match (answered, self.words.is_empty()) {
+            let words = match (answered, self.words.is_empty() && self.area.is_none()) {
                 (false, _) => t!("collecting data"),
                 (true, true) => t!("No entries."),
                 (true, false) => t!("No matching entries."),
@@ -144,11 +158,41 @@ impl Journal {
     /// Alarms and operator actions in one list, newest first.
     fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
         let (alarms, actions) = self.records();
-        let alarms = alarms.iter().map(|row| (row.at, alarm_text(cx, row), cx.theme.normal()));
-        let actions = actions.iter().map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
+        let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
+        let alarms = alarms.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_alarm(row)));
+        let actions = actions.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_action(row)));
+        let alarms = alarms.map(|row| (row.at, alarm_text(cx, row), cx.theme.normal()));
+        let actions = actions.map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
         let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.words.fit(text)).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.0));
         rows
+    }
+}
+
+/// What belongs to an area.
+struct InArea<'a> {
+    def: &'a PlantDef,
+    alarms: Vec<&'a AlarmDef>,
+}
+
+impl<'a> InArea<'a> {
+    fn new(def: &'a PlantDef, area: &str) -> InArea<'a> {
+        InArea { def, alarms: def.alarms.iter().filter(|alarm| *area == alarm.area).collect() }
+    }
+
+    fn has_alarm(&self, row: &AlarmRecord) -> bool {
+        let name = (&*row.subject, &*row.message);
+        self.alarms.iter().any(|alarm| (subject_name(self.def, alarm.subject), &*alarm.message) == name)
+    }
+
+    /// An action on a device that has alarms of the area.
+    fn has_action(&self, row: &ActionRecord) -> bool {
+        let device_of = |name: &str| {
+            let of_tag = self.def.tag_named(name).map(|tag| self.def.tag(tag).device);
+            of_tag.or_else(|| self.def.devices.iter().find(|device| *device.name == *name).map(|device| device.id))
+        };
+        let device = device_of(&row.target);
+        device.is_some() && self.alarms.iter().any(|alarm| device_of(subject_name(self.def, alarm.subject)) == device)
     }
 }
 
@@ -167,7 +211,7 @@ fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     format!(
         "{mark} {} {} {}{number}{by}{reason}",
         pad(&row.subject, 12),
-        pad(&row.message, message),
+        pad(translate(&row.message), message),
         pad(translate(row.event.word()), event)
     )
 }
@@ -176,7 +220,7 @@ fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
 pub fn event_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     let by = row.by.as_ref().map(|by| t!(" by {by}", by)).unwrap_or_default();
     let (mark, event) = (cx.theme.priority_mark(row.priority), translate(row.event.word()));
-    format!("{mark} {} {}  {event}{by}", row.subject, row.message)
+    format!("{mark} {} {}  {event}{by}", row.subject, translate(&row.message))
 }
 
 /// An action in one line: `TIC-1.SV write 60.0 → 70.0 °C  verified by anna`.

@@ -138,7 +138,7 @@ pub fn table(page: Page) -> Vec<Row> {
     let parts: &[&[Row]] = match page {
         Page::Active | Page::System => &[&RESET, &VIEWS, &OPEN, &ACTIONS, &AREA, &MOVE, &GO],
         Page::Suppressed => &[&BACK, &VIEWS, &OPEN, &MOVE, &GO],
-        Page::Journal => &[&SEARCH, &VIEWS, &SHIFT, &MOVE],
+        Page::Journal => &[&SEARCH, &VIEWS, &AREA, &SHIFT, &MOVE],
         Page::Metrics => &[&VIEWS, &SHIFT, &MOVE],
         Page::Handover => &[&HANDOVER, &VIEWS, &SHIFT, &MOVE],
     };

@@ -140,7 +140,11 @@ impl Metrics {
         if self.period.is_none() {
             lines.extend(stale(cx).map(|alarm| {
                 let (since, name) = (running(elapsed(alarm.raised_at, cx.now)), subject(cx, alarm.id));
-                let text = format!("{} {since:11}  {name}  {}", pad(t!("stale"), 10), cx.def().alarm(alarm.id).message);
+                let text = format!(
+                    "{} {since:11}  {name}  {}",
+                    pad(t!("stale"), 10),
+                    translate(&cx.def().alarm(alarm.id).message)
+                );
                 (fit_words(&text, TABLE), style)
             }));
         }

@@ -45,7 +45,7 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
     let ack = if alarm.state.needs_acknowledgement() && may && !cx.is_past() { t!("a ack ") } else { "" };
     let condition = guidance::condition_text(cx, def.id);
     let tag = theme.priority_tag(def.priority);
-    let title = format!("{ack}{tag} {} {} {condition}", subject(cx, def.id), def.message);
+    let title = format!("{ack}{tag} {} {} {condition}", subject(cx, def.id), translate(&def.message));
     let mut y = 0;
     for line in wrap(title.trim_end(), width) {
         canvas.text(0, y, &line, theme.strong());

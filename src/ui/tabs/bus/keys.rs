@@ -33,6 +33,8 @@ pub enum Action {
     Settings,
     /// Asks the devices that do not answer at once.
     Retry,
+    /// Closes the line, or opens it again.
+    Line,
 }
 
 /// Keys of every page.
@@ -48,6 +50,8 @@ const KEYS: &[Key<Action>] = &[
 /// Keys of the first page.
 const LINE_KEYS: &[Key<Action>] = &[
     Key::new(char('r'), "retry", "retry devices that do not respond, now", Action::Retry).needs(Role::Technician),
+    Key::new(char('D'), "connect", "disconnect the line, or connect it again (asks first)", Action::Line)
+        .needs(Role::Technician),
     Key::new(char('c'), "settings", "communication settings of the line", Action::Settings),
 ];
 const PLAN_KEYS: &[Key<Action>] = &[

@@ -21,7 +21,7 @@ use crate::{
     bus::{
         dissect::{self, Direction},
         frame::{self, hex},
-        names, request_lint,
+        meaning, names, request_lint,
     },
     plant::{
         def::{Framing, Parity, Serial},
@@ -166,7 +166,7 @@ impl Form {
             return Err(t!("the text was cut; Ctrl-U clears a field").to_owned());
         }
         let diagnostic = self.build(at.settings)?.0;
-        Ok(vec![test::start(&at, diagnostic)?])
+        Ok(vec![test::start(cx, &at, diagnostic)?])
     }
 
     fn text(&self, n: usize) -> String {
@@ -243,7 +243,10 @@ impl Form {
         let room = body.width.saturating_sub(8).min(72);
         let wrapped = |words: &str, style| wrap(words, room).into_iter().map(move |line| (line, style));
         let mut notes: Vec<(String, Style)> = match self.build(at.settings) {
-            Ok((_, words)) => words.iter().flat_map(|words| wrapped(words, theme.normal())).collect(),
+            Ok((diagnostic, mut words)) => {
+                words.extend(means(cx, &at, &diagnostic));
+                words.iter().flat_map(|words| wrapped(words, theme.normal())).collect()
+            }
             Err(why) => wrapped(&format!("! {why}"), theme.trouble()).collect(),
         };
         let problem = self.problem.clone().or_else(|| test::closed(&at));
@@ -297,6 +300,13 @@ impl Form {
             Tried::Sweep => t!("map of addresses"),
         }
     }
+}
+
+/// What a request means for the tags of the plant.
+fn means(cx: &ViewContext, at: &LineView, diagnostic: &Diagnostic) -> Vec<String> {
+    let Diagnostic::Send(bytes) = diagnostic else { return Vec::new() };
+    let message = dissect::message_of(bytes, at.settings.transport.framing());
+    message.map_or(Vec::new(), |message| meaning::of_request(cx.snapshot, at.id, &message))
 }
 
 /// The tables, by the first digit of their Modicon numbers.

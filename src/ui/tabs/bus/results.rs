@@ -9,7 +9,10 @@ use super::{
 };
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
 use crate::{
-    bus::dissect::{self, Direction},
+    bus::{
+        dissect::{self, Direction},
+        meaning,
+    },
     plant::{
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
         event::Fault,
@@ -179,6 +182,8 @@ fn came_back(
         (Some(wrong), _) => (format!("✗ {wrong}"), theme.trouble()),
     };
     rows.push(plain(format!("{mark}{reply}"), style));
+    let means = asked.map(|asked| meaning::of_answer(cx.snapshot, at.id, &asked, &dissection.message));
+    rows.extend(means.iter().flatten().flat_map(|means| wrap(means, room)).map(|line| plain(line, theme.strong())));
     rows.extend(dissection_rows(cx, &dissection, room));
     rows
 }

@@ -18,7 +18,7 @@ use crate::{
         ascii,
         dissect::{self, Direction, Dissection},
         frame::{self, Mbap, hex},
-        hex_input, names, request_lint,
+        hex_input, meaning, names, request_lint,
     },
     plant::{def::Framing, diagnostics::Diagnostic, event::LineState},
     ui::modal::{Next, line::Line},
@@ -166,17 +166,17 @@ pub fn closed(at: &LineView) -> Option<String> {
         LineState::Connected | LineState::Testing => None,
         LineState::Connecting => Some(t!("line {name} is connecting: nothing can be sent yet", name)),
         LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why)),
-        LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (tab 4, D)", name)),
+        LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (page Line, D)", name)),
     }
 }
 
 /// Starts a test, or asks first; `Err` says why it cannot be started.
-pub fn start(at: &LineView, diagnostic: Diagnostic) -> Result<UiAction, String> {
+pub fn start(cx: &ViewContext, at: &LineView, diagnostic: Diagnostic) -> Result<UiAction, String> {
     let alone = matches!(&diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty());
     if let Some(why) = closed(at).filter(|_| !alone) {
         return Err(why);
     }
-    let query = danger(at, &diagnostic);
+    let query = danger(cx, at, &diagnostic);
     let command = CommandKind::Test(at.id, diagnostic);
     let Some(words) = query else { return Ok(UiAction::Command(command)) };
     let title = t!("test of {name}", name = at.settings.name);
@@ -184,7 +184,7 @@ pub fn start(at: &LineView, diagnostic: Diagnostic) -> Result<UiAction, String> 
 }
 
 /// What must be asked before a test; `None` for one that only reads.
-fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
+fn danger(cx: &ViewContext, at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
     match diagnostic {
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Some(t!(
             "Polling of {name} pauses while other settings are tested, and its alarms are not evaluated. Start the scan?",
@@ -204,19 +204,20 @@ fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
             let lint = || request_lint::check_request(&dissection.message, framing).first().map(ToString::to_string);
             let wrong = dissection.wrong.clone().or_else(lint);
             let broadcast = dissection.message.first() == Some(&0) && framing != Framing::Mbap;
+            let means = meaning::of_request(cx.snapshot, at.id, &dissection.message);
+            let summary = [vec![dissection.summary], means].concat().join(". ");
             match (wrong, broadcast, request_lint::only_reads(&dissection.message)) {
                 (None, false, true) => None,
-                (None, true, _) => Some(t!(
-                    "{summary}. Broadcast: every device executes it, none responds. Send it?",
-                    summary = dissection.summary
-                )),
+                (None, true, _) => {
+                    Some(t!("{summary}. Broadcast: every device executes it, none responds. Send it?", summary))
+                }
                 (None, false, false) => Some(match names::effect(&dissection.message) {
                     Some(effect) => {
-                        t!("{summary}: {effect}. Send it?", summary = dissection.summary, effect = translate(effect))
+                        t!("{summary}: {effect}. Send it?", summary, effect = translate(effect))
                     }
                     None => t!(
                         "{summary}. This bypasses all limits of the plant file and is not read back. Send it?",
-                        summary = dissection.summary
+                        summary
                     ),
                 }),
                 (Some(wrong), ..) => Some(t!(
@@ -230,8 +231,8 @@ fn danger(at: &LineView, diagnostic: &Diagnostic) -> Option<String> {
 }
 
 /// The last test once more.
-pub fn again(at: &LineView) -> Vec<UiAction> {
-    at.status.test.iter().filter_map(|run| start(at, run.diagnostic.clone()).ok()).collect()
+pub fn again(cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
+    at.status.test.iter().filter_map(|run| start(cx, at, run.diagnostic.clone()).ok()).collect()
 }
 
 /// Stops the test at work.

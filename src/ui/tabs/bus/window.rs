@@ -11,7 +11,7 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::{dissect, frame::hex, names},
+    bus::{dissect, frame::hex, meaning, names},
     plant::{
         tag::Table,
         traffic::{Exchange, Frame, FrameResult},
@@ -147,7 +147,14 @@ impl TextWindow {
         let (title, rows) = match &self.shown {
             Shown::Frame { line, frame, before } => {
                 let dissection = dissect::in_traffic(frame, before.iter());
-                (t!("frame {number} on {line}", number = frame.number, line), frame_rows(cx, frame, &dissection, room))
+                let mut rows = frame_rows(cx, frame, &dissection, room);
+                rows.extend(
+                    means(cx, line, frame, before, &dissection.message)
+                        .into_iter()
+                        .flat_map(|means| wrap(&means, room))
+                        .map(|line| plain(line, cx.theme.strong())),
+                );
+                (t!("frame {number} on {line}", number = frame.number, line), rows)
             }
             Shown::Block { line, device, table, address } => {
                 let (name, modicon) = (&cx.def().device(*device).name, table.modicon(*address));
@@ -158,6 +165,16 @@ impl TextWindow {
         let wide = rows.iter().map(|row| row.iter().map(|(text, _)| width(text)).sum::<u16>()).max().unwrap_or(0);
         let mut canvas = window(cx, screen, body, &title, (wide.min(room).max(40) + 1, to_u16(rows.len())));
         rows::draw(cx, &mut canvas, &rows, self.first);
+    }
+}
+
+/// What a frame means for the tags of the plant.
+fn means(cx: &ViewContext, line: &str, frame: &Frame, before: &[Frame], message: &[u8]) -> Vec<String> {
+    let Some(line) = cx.def().lines.iter().find(|known| known.name == line) else { return Vec::new() };
+    match frame.sent {
+        true => meaning::of_request(cx.snapshot, line.id, message),
+        false => dissect::request_of(frame, before.iter())
+            .map_or(Vec::new(), |request| meaning::of_answer(cx.snapshot, line.id, &request, message)),
     }
 }
 

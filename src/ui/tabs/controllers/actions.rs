@@ -3,8 +3,12 @@
 use super::{Action, Controllers, Page, keys::ProgramCommand};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::event::LineState,
-    ui::modal::{Choice, Settings},
+    plant::interlock::role_to_write,
+    ui::{
+        modal::{Choice, Settings},
+        rights,
+        tabs::line_switch,
+    },
 };
 
 impl Controllers {
@@ -32,7 +36,7 @@ impl Controllers {
                 None => notice(device, t!("this device cannot be put in standby from here")),
             },
             Action::Settings => open(Modal::Settings(Box::new(Settings::new(cx, device.line)))),
-            Action::Line => open(Modal::Confirm(connect(cx, device.line))),
+            Action::Line => open(Modal::Confirm(line_switch::confirm(cx, device.line))),
             Action::Control(command) => control(cx, device, command),
             Action::Mode => write(cx, device.program.as_ref().and_then(|program| program.mode)),
             Action::Pattern => write(cx, device.program.as_ref().and_then(|program| program.pattern)),
@@ -44,6 +48,7 @@ impl Controllers {
             | Action::Column(_)
             | Action::Wall
             | Action::Open
+            | Action::Lamps
             | Action::Program
             | Action::Sets
             | Action::Find
@@ -59,6 +64,31 @@ impl Controllers {
             | Action::All
             | Action::SwapDirection => Vec::new(),
         }
+    }
+}
+
+impl Controllers {
+    /// The role that an action of a page needs because of what it writes; `None` where it writes nothing.
+    pub(super) fn role_for(&self, cx: &ViewContext, device: &DeviceDef, action: Action) -> Option<Role> {
+        let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
+        let written = match (action, &self.page) {
+            (Action::Open, Page::Device) => {
+                self.table.tag(cx, device.id).filter(|tag| tag.writable()).map(|tag| tag.id)
+            }
+            (Action::Open, Page::Program) => program.and_then(|program| self.cell.tag(program)),
+            (Action::Open, Page::Compare(compare)) => return compare.role_to_restore(cx, device),
+            (Action::Tune, _) => faceplate.and_then(|faceplate| faceplate.tune),
+            (Action::Run, _) => faceplate.and_then(|faceplate| faceplate.run),
+            (Action::Control(_), _) => program.map(|program| program.command),
+            (Action::Mode, _) => program.and_then(|program| program.mode),
+            (Action::Pattern, _) => program.and_then(|program| program.pattern),
+            (Action::Actions, _) => {
+                let roles = device.actions.iter().map(|action| role_to_write(cx.def(), action.tag, action.value));
+                return roles.min();
+            }
+            _ => None,
+        };
+        written.map(|tag| rights::to_write(cx, [tag]))
     }
 }
 
@@ -96,24 +126,4 @@ fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
 
 pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<UiAction> {
     open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))
-}
-
-/// Closing a line is asked with what it means for everything on it.
-fn connect(cx: &ViewContext, line: LineId) -> Confirm {
-    let name = &cx.def().line(line).name;
-    if cx.snapshot.line(line).state == LineState::Disconnected {
-        return Confirm::command(
-            t!("connect {name}", name),
-            t!("Connect line {name} and poll its devices again?", name),
-            CommandKind::Connect(line, true),
-        );
-    }
-    let devices: Vec<&str> =
-        cx.def().devices.iter().filter(|device| device.line == line).map(|device| device.name.as_str()).collect();
-    let words = t!(
-        "Disconnect line {name}? {join} will not be polled, and their alarms not evaluated.",
-        name,
-        join = devices.join(", ")
-    );
-    Confirm::command(t!("disconnect {name}", name), words, CommandKind::Connect(line, false))
 }

@@ -7,6 +7,7 @@ use super::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        interlock::role_to_write,
         parameter_set::{self, Compared, PlannedChange, Problem},
         restore::{Restore, State},
     },
@@ -67,6 +68,12 @@ impl Compare {
     /// Scrolls.
     pub fn scroll(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion, room: usize) {
         self.scroll.on(motion, self.rows(cx, device).len(), room);
+    }
+
+    /// The least role that may write all differences; `None` where there is nothing to write.
+    pub fn role_to_restore(&self, cx: &ViewContext, device: &DeviceDef) -> Option<Role> {
+        let changes = self.plan(cx, device)?.ok()?;
+        changes.iter().map(|change| role_to_write(cx.def(), change.tag, change.new)).max()
     }
 
     /// The confirmation to write the differences, or why they cannot be written.

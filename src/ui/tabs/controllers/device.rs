@@ -12,6 +12,7 @@ use crate::{
         chrome::{command_label, outcome_words},
         layout::Size,
         modal::faceplate::{device_text, retry_text},
+        rights,
     },
 };
 
@@ -48,7 +49,10 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Tabl
         // The default first: it must not be what a narrow screen cuts off.
         let default = default_text(cx, tag).map_or(String::new(), |default| t!("default {default}; ", default));
         let x = canvas.text(1, y, &tag.name, cx.theme.strong()) + 2;
-        let text = format!("{default}{meaning}");
+        let needs =
+            Some(rights::to_write(cx, [tag.id])).filter(|role| tag.writable() && rights::lacks(cx, *role).is_some());
+        let needs = needs.map_or(String::new(), |role| t!("needs {title}; ", title = rights::title(role)));
+        let text = format!("{needs}{default}{meaning}");
         let lines = wrap(&text, end.saturating_sub(x));
         for (n, line) in lines.iter().enumerate().take(usize::from(words)) {
             let cut = n + 1 == usize::from(words) && lines.len() > n + 1;

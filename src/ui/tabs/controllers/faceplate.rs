@@ -60,7 +60,7 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
         let def = cx.def().alarm(alarm.id);
         let style = cx.theme.alarm(def.priority, alarm.state, cx.flash());
         let x = canvas.text(0, y, cx.theme.priority_mark(def.priority), style) + 1;
-        let words = format!("{} {}", def.message, translate(alarm.state.word()));
+        let words = format!("{} {}", translate(&def.message), translate(alarm.state.word()));
         canvas.text(x, y, &fit_words(&words, wide.saturating_sub(x)), style);
         y += 1;
     }
@@ -215,8 +215,12 @@ pub fn states(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, facepla
     let Some(alarm) = alarms.first() else { return };
     let def = cx.def().alarm(alarm.id);
     let more = if alarms.len() > 1 { t!(", {count} more", count = alarms.len() - 1) } else { String::new() };
-    let words =
-        format!("{} {} {}{more}", cx.theme.priority_tag(def.priority), def.message, translate(alarm.state.word()));
+    let words = format!(
+        "{} {} {}{more}",
+        cx.theme.priority_tag(def.priority),
+        translate(&def.message),
+        translate(alarm.state.word())
+    );
     let room = canvas.width().saturating_sub(x);
     canvas.text(x, 0, &fit_words(&words, room), cx.theme.alarm(def.priority, alarm.state, cx.flash()));
 }

@@ -30,6 +30,8 @@ pub enum Action {
     Line,
     /// Look at the communication settings of the device's line, and change them.
     Settings,
+    /// Its bits as lamps.
+    Lamps,
     /// The ramp/soak program.
     Program,
     /// The parameter sets.
@@ -123,6 +125,7 @@ const DEVICE_FIRST: &[Key<Action>] = &[
 const DEVICE: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "edit", "change the parameter, or view a read-only one", Action::Open)
         .needs(Role::Technician),
+    Key::new(char('i'), "lamps", "inputs, outputs and relays as lamps, if the device has them", Action::Lamps),
     Key::new(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
     Key::new(char('s'), "sets", "parameter sets: save, compare, restore, copy", Action::Sets),
     Key::new(char('r'), "runs", "control runs: what each change of SV led to, compared", Action::Runs),
@@ -137,6 +140,7 @@ const DEVICE: &[Key<Action>] = &[
     LINE,
     SETTINGS,
 ];
+const LAMPS: &[Key<Action>] = &[REFRESH, LINE];
 const PROGRAM_FIRST: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "the cell to the left", Action::Column(-1)),
     Key::new(code(KeyCode::Right), "cell", "the cell to the right", Action::Column(1)),
@@ -194,11 +198,18 @@ const READ: &[Key<Action>] = &[
     Key::new(code(KeyCode::Down), "", "next page", Action::Turn(1)),
 ];
 
+/// Gives the keys that write the role that what they write needs.
+pub fn needing(keys: Vec<Key<Action>>, role: impl Fn(Action) -> Option<Role>) -> Vec<Key<Action>> {
+    let needing = |key: Key<Action>| Key { needs: role(key.action).or(key.needs), ..key };
+    keys.into_iter().map(needing).collect()
+}
+
 /// The keys of a page.
 pub fn page_keys(page: &Page) -> Vec<Key<Action>> {
     match page {
         Page::List => [&SELECT, LIST].concat(),
         Page::Device => [DEVICE_FIRST, &SELECT, DEVICE].concat(),
+        Page::Lamps => [DEVICE_FIRST, LAMPS].concat(),
         Page::Program => [PROGRAM_FIRST, &SELECT, PROGRAM].concat(),
         Page::Sets => [&SELECT, SETS].concat(),
         Page::Compare(_) => [&SCROLL, COMPARE].concat(),

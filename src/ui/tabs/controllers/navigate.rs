@@ -24,7 +24,7 @@ impl Controllers {
             Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
             Page::Runs => self.runs.select(cx, motion),
-            Page::Overlay | Page::Guide(..) => {}
+            Page::Lamps | Page::Overlay | Page::Guide(..) => {}
         }
     }
 
@@ -62,7 +62,7 @@ impl Controllers {
                 Vec::new()
             }
             Page::Compare(compare) => open(compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm)),
-            Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
+            Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The control runs of a controller in a table to compare them, what is known of the selected one, and some over each other.
 
 use crate::ui::tabs::{
-    overlay::{Item, Kind, Overlay, UNMARKED},
+    overlay::{Overlay, UNMARKED},
     prelude::*,
 };
 use crate::{
@@ -70,8 +70,8 @@ impl Runs {
             [] => (place..place + UNMARKED).contains(n),
             marked => marked.contains(&run.number),
         });
-        let items: Vec<Item> = chosen.map(|(_, run)| item(run)).collect();
-        self.overlay = Overlay::new(Kind::Runs, rule.tags.clone(), items).filter(|_| !self.rows().is_empty());
+        let chosen: Vec<_> = chosen.map(|(_, run)| (run.clone(), figures(run))).collect();
+        self.overlay = Overlay::of_runs(rule, chosen.into_iter()).filter(|_| !self.rows().is_empty());
     }
 
     /// Asks the history when it is time to.
@@ -142,11 +142,6 @@ const WIDTHS: [i16; 8] = [-4, 11, 20, -8, -8, -7, -7, -7];
 
 fn rule<'a>(cx: &ViewContext<'a>, device: DeviceId) -> Option<&'a RunDef> {
     cx.def().runs.iter().find(|rule| rule.controller == device)
-}
-
-fn item(run: &ControlRun) -> Item {
-    let to = (!run.is_running()).then_some(run.until);
-    Item { label: run.label(), from: run.from, to, figures: figures(run) }
 }
 
 fn row(cx: &ViewContext, run: &ControlRun) -> String {

@@ -5,6 +5,7 @@ use crate::{
     plant::tag::{Access, Poll, TagDef},
     ui::{
         modal::number::range_text,
+        rights,
         widgets::text::{age, whole},
     },
 };
@@ -108,7 +109,8 @@ impl Table {
         let none = !tag.writable() && tag.enum_labels.is_empty() && cx.snapshot.range(tag.id).is_none();
         let range = if none { "–".to_owned() } else { range };
         let range = range.trim_start_matches(t!("range ")).trim_end_matches(&shown.unit).trim_end().to_owned();
-        let pen = match (self.defaults && differs(cx, tag), tag.writable()) {
+        let may = tag.writable() && rights::lacks(cx, rights::to_write(cx, [tag.id])).is_none();
+        let pen = match (self.defaults && differs(cx, tag), may) {
             (true, _) => theme.pick("≠", "#"),
             (false, true) => theme.pick("✎", "w"),
             (false, false) => " ",

@@ -1,6 +1,7 @@
 //! The controllers tab as an operator sees it and works with it.
 
 mod runs;
+mod lamps;
 mod sets;
 mod wall;
 

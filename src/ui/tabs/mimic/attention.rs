@@ -55,7 +55,7 @@ fn alarms(cx: &ViewContext) -> impl Iterator<Item = Row> {
     let row = |alarm: &ActiveAlarm| {
         let def = cx.def().alarm(alarm.id);
         let (mark, since) = (cx.theme.priority_mark(def.priority), running(elapsed(since(alarm), cx.now)));
-        let text = format!("{mark} {since}  {} {}", subject(cx, alarm.id), def.message);
+        let text = format!("{mark} {since}  {} {}", subject(cx, alarm.id), translate(&def.message));
         (text, cx.theme.alarm(def.priority, alarm.state, cx.flash()))
     };
     cx.snapshot.alarms.iter().map(row)

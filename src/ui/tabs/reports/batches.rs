@@ -1,7 +1,7 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
 use crate::ui::tabs::{
-    overlay::{Item, Kind, Overlay, UNMARKED},
+    overlay::{self, Overlay},
     prelude::*,
 };
 use crate::{
@@ -38,13 +38,25 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('b'), "shifts", "the reports of shifts", Action::Back),
 ];
 
+/// What a key means where batches lie over each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OverlayAction {
+    /// Another tag.
+    Tag(isize),
+    /// The list of batches.
+    Back,
+}
+
+/// Keys of that page.
+pub const OVERLAY_KEYS: &[Key<OverlayAction>] = &[
+    Key::new(code(KeyCode::Left), "", "previous tag", OverlayAction::Tag(-1)),
+    Key::new(code(KeyCode::Right), "tag", "next tag", OverlayAction::Tag(1)),
+    Key::new(char('o'), "list", "back to the list of batches", OverlayAction::Back),
+];
+
 /// All keys of the list.
 pub fn keys() -> Vec<Key<Action>> {
     [&motions!("select", Action::Move), KEYS].concat()
-}
-
-fn item(batch: &Batch) -> Item {
-    Item { label: batch.label(), from: batch.from, to: batch.to, figures: Default::default() }
 }
 
 /// Rows of one answer; the command `batches` has all of them.
@@ -115,10 +127,8 @@ impl Batches {
         let Some(rule) = cx.def().batches.iter().find(|rule| rule.name == selected.name) else { return };
         let alike = || self.rows().iter().map(|report| &report.batch).filter(|batch| batch.name == selected.name);
         let marked: Vec<Batch> = alike().filter(|batch| self.marked.contains(&batch.label())).cloned().collect();
-        let latest = || alike().filter(|batch| batch.from <= selected.from).take(UNMARKED).cloned().collect();
-        let tags = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
-        let chosen: Vec<Batch> = if marked.is_empty() { latest() } else { marked };
-        self.overlay = Overlay::new(Kind::Batches, tags, chosen.iter().map(item));
+        let latest = || alike().filter(|batch| batch.from <= selected.from).take(overlay::UNMARKED).cloned().collect();
+        self.overlay = Overlay::of_batches(rule, if marked.is_empty() { latest() } else { marked });
     }
 
     /// Asks the history when it is time to.

@@ -282,7 +282,10 @@ fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static>
     let active = t!("active {long}, raised {raised}", long = long(alarm.active), raised = alarm.raised);
     Line::from(vec![
         Span::styled(format!("  {}", theme.priority_mark(alarm.priority)), theme.dim()),
-        Span::styled(format!(" {} {} {active}", pad(&alarm.subject, 12), pad(&alarm.message, room)), theme.normal()),
+        Span::styled(
+            format!(" {} {} {active}", pad(&alarm.subject, 12), pad(translate(&alarm.message), room)),
+            theme.normal(),
+        ),
     ])
 }
 
@@ -301,8 +304,10 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
         (None, None) => String::new(),
     };
     let text = 21 + (cx.area.width.saturating_sub(68 + width(&time)) / 2).min(20);
-    let words =
-        draw::columns([12, text.cast_signed(), 13], [&alarm.subject, &alarm.message, translate(alarm.event.word())]);
+    let words = draw::columns(
+        [12, text.cast_signed(), 13],
+        [&alarm.subject, translate(&alarm.message), translate(alarm.event.word())],
+    );
     let mark = if active { theme.severity(alarm.priority) } else { theme.dim() };
     Line::from(vec![
         Span::styled(time, theme.dim()),

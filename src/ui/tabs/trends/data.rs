@@ -44,6 +44,9 @@ impl Trends {
 
     /// Asks what is due.
     pub(super) fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if let Some(overlay) = &mut self.overlay {
+            return overlay.ask(cx, &mut self.asked);
+        }
         let (now, timeout, view) = (cx.present(), real(cx, TIMEOUT_S), self.span(cx));
         let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         let rate = real(cx, RATES[self.rate] as f64 / 1_000.0);

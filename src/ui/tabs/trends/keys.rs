@@ -26,6 +26,8 @@ pub enum Action {
     Stroke,
     /// Ask for the scale of the selected pen.
     Scale,
+    /// Ask for periods to lay over each other.
+    Overlay,
     /// Show the curve of the selected value.
     Open,
     /// A window so many steps longer.
@@ -80,6 +82,7 @@ impl Action {
                 | Action::GoTo
                 | Action::Find
                 | Action::Scale
+                | Action::Overlay
                 | Action::Event(_)
                 | Action::Csv
                 | Action::Picture
@@ -115,6 +118,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('g'), "group", "next group of pens", Action::Group),
     Key::new(char(' '), "pen", "switch the selected pen on or off", Action::Toggle),
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Action::Scale),
+    Key::new(char('o'), "overlay", "lay periods over each other, as today over yesterday", Action::Overlay),
     Key::new(char('x'), "plot", "curves, x-y plot, histogram, step response, or large numbers", Action::Plot),
     Key::new(char('B'), "", "the pens as large numbers for the wall, or the curves", Action::Numbers),
     Key::new(char('k'), "", "look of the selected pen: steps, lines, dots, bars", Action::Stroke),

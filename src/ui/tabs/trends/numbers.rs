@@ -40,7 +40,7 @@ fn number(cx: &ViewContext, canvas: &mut Canvas, tag: TagId) {
     let of_tag = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).subject == Subject::Tag(tag));
     if let Some(alarm) = of_tag.min_by_key(|alarm| cx.def().alarm(alarm.id).priority) {
         let of = cx.def().alarm(alarm.id);
-        let words = format!("{} {}", theme.priority_tag(of.priority), of.message);
+        let words = format!("{} {}", theme.priority_tag(of.priority), translate(&of.message));
         let room = canvas.width().saturating_sub(end + 3);
         canvas.text(end + 2, 0, &fit_words(&words, room), theme.alarm(of.priority, alarm.state, cx.flash()));
     }

@@ -91,7 +91,7 @@ impl Trends {
     }
 
     pub(super) fn show_group(&mut self, cx: &ViewContext, group: usize, selected: usize) {
-        (self.group, self.selected, self.since) = (group, selected, None);
+        (self.group, self.selected, self.since, self.overlay) = (group, selected, None, None);
         let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         self.traces.retain(|tag, _| tags.contains(tag));
         self.moved();

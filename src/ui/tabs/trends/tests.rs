@@ -3,6 +3,7 @@
 mod cursors;
 mod events;
 mod export;
+mod overlay;
 mod pens;
 mod queries;
 mod window;

@@ -38,6 +38,9 @@ pub(super) static NO_TRACE: Trace = Trace::EMPTY;
 
 /// Draws the tab.
 pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+    if let Some(overlay) = &trends.overlay {
+        return overlay.view(cx, frame, area);
+    }
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     match trends.values {
         Some((first, row)) => draw_values(trends, cx, &mut canvas, first, row),
@@ -101,7 +104,8 @@ pub(super) fn placed_chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Opti
     let legend = legend_rows(trends, cx, cx.area.height);
     let (chart, _, height) = time_chart(trends, cx, cx.area.height, legend);
     let area = Rect { y: cx.area.y + 1, height, ..cx.area };
-    (trends.values.is_none() && matches!(trends.plot, Plot::Time)).then_some((chart, area))
+    let shown = trends.values.is_none() && trends.overlay.is_none() && trends.plot == Plot::Time;
+    shown.then_some((chart, area))
 }
 
 /// Rows under the chart: lanes of states, events, and the words of the event at the cursor.

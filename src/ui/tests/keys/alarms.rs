@@ -148,3 +148,38 @@ fn moved_rows_take_no_key_meant_for_another() {
         assert_eq!(model.modal, None, "{keys}");
     }
 }
+
+#[test]
+fn the_journal_of_an_area_has_its_alarms_and_what_was_done_there() {
+    let mut fixture = Fixture::normal();
+    let now = fixture::now();
+    fixture.def.alarms[0].area = "furnace".to_owned();
+    fixture.def.alarms[2].area = "tank".to_owned();
+    let alarm = |n: usize, subject| {
+        let def = &fixture.def.alarms[n];
+        AlarmRecord::new(now, subject, &def.message, def.priority, AlarmEvent::Raised)
+    };
+    let alarms = vec![alarm(0, "TIC-1.PV"), alarm(1, "TIC-1.PV"), alarm(2, "PLC-1.LT-1")];
+    let action = |target: &str| ActionRecord { target: target.into(), ..write_action() };
+    let actions = vec![action("TIC-1.SV"), action("PLC-1.P-1"), action("station")];
+    let mut model = model(&fixture, Theme::FULL);
+    for effect in type_keys(&mut model, "3j") {
+        let Effect::Query(id, query) = effect else { continue };
+        let answer = match query {
+            Query::Journal { .. } => Answer::Journal(alarms.clone()),
+            _ => Answer::Actions(actions.clone()),
+        };
+        update(&mut model, Msg::Answer(id, Ok(answer)));
+    }
+    let names = ["temperature high", "temperature very high", "level low", "TIC-1.SV", "PLC-1.P-1", "station "];
+    let mut shown = |keys: &str| {
+        type_keys(&mut model, keys);
+        let shown = screen(&mut model, 80, 24);
+        let rows = shown.lines().skip(4).collect::<String>();
+        names.map(|name| rows.contains(name))
+    };
+    assert_eq!(shown(""), [true; 6]);
+    assert_eq!(shown("g"), [true, false, false, true, false, false], "the furnace");
+    assert_eq!(shown("g"), [false, false, true, false, true, false], "the tank");
+    assert_eq!(shown("g"), [true; 6], "all areas again");
+}

@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Functions that the form offers, the most used first.
-pub const FUNCTIONS: [u8; 14] = [3, 4, 1, 2, 6, 5, 16, 15, 22, 23, 8, 11, 17, 43];
+pub const FUNCTIONS: [u8; 16] = [3, 4, 1, 2, 6, 5, 16, 15, 22, 23, 7, 8, 11, 12, 17, 43];
 /// Sub-functions of 08.
 const SUB_FUNCTIONS: [u16; 15] = [0, 2, 11, 12, 13, 14, 15, 16, 17, 18, 1, 3, 4, 10, 20];
 /// Read device identification codes of 43/14.

@@ -54,7 +54,7 @@ impl Send {
         if self.text.missed() {
             return Err(t!("the text was cut; Ctrl-U clears the line").to_owned());
         }
-        start(&at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
+        start(cx, &at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
     }
 
     fn ready(&self, framing: Framing) -> Result<Ready, String> {
@@ -92,7 +92,7 @@ impl Send {
             ]
         } else {
             match self.ready(framing) {
-                Ok(ready) => ready.rows(cx, self.bare, width),
+                Ok(ready) => ready.rows(cx, self.line, self.bare, width),
                 Err(why) => wrap(&why, width).into_iter().map(|line| plain(line, theme.trouble())).collect(),
             }
         };
@@ -118,7 +118,7 @@ impl Send {
 }
 
 impl Ready {
-    fn rows(&self, cx: &ViewContext, bare: bool, width: u16) -> Vec<Row> {
+    fn rows(&self, cx: &ViewContext, line: LineId, bare: bool, width: u16) -> Vec<Row> {
         let theme = cx.theme;
         let added = match (bare, self.added.is_empty()) {
             (true, _) => t!("as typed, nothing added").to_owned(),
@@ -128,6 +128,8 @@ impl Ready {
         let mut rows = vec![plain(fit_words(&added, width), theme.normal())];
         let lines = wrap(&self.dissection.summary, width);
         rows.extend(lines.into_iter().map(|line| plain(line, theme.strong())));
+        let means = meaning::of_request(cx.snapshot, line, &self.dissection.message);
+        rows.extend(means.iter().flat_map(|means| wrap(means, width)).map(|line| plain(line, theme.strong())));
         for error in &self.errors {
             rows.extend(wrap(&format!("! {error}"), width).into_iter().map(|line| plain(line, theme.trouble())));
         }

@@ -160,3 +160,19 @@ fn a_wide_screen_shows_line_devices_and_frames_together() {
         assert!(is_seen == frames && shown.contains("TIC-1") && shown.contains("settings"), "{shown}");
     }
 }
+
+#[test]
+fn a_line_is_disconnected_from_its_page_and_from_the_mimic() {
+    let mut fixture = Fixture::traffic();
+    for open in [true, false] {
+        fixture.line.state = if open { LineState::Connected } else { LineState::Disconnected };
+        let word = if open { "Disconnect line L1?" } else { "Connect line L1" };
+        for keys in ["6D", "1D"] {
+            let mut model = bus(&fixture, Theme::FULL, "");
+            type_keys(&mut model, keys);
+            let shown = screen(&mut model, 80, 24);
+            assert!(shown.contains(word), "{keys}:\n{shown}");
+            assert_eq!(sent_kind(&type_keys(&mut model, "y")), Some(&CommandKind::Connect(L1, !open)), "{keys}");
+        }
+    }
+}

@@ -19,6 +19,7 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
         | Query::SampleTime { .. }
         | Query::Reports { .. }
         | Query::Past { .. }
+        | Query::Samples { .. }
         | Query::Unarchived { .. }
         | Query::Overview
         | Query::Registers(_) => "other",
