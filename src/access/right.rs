@@ -115,6 +115,7 @@ pub fn needs_for_query(query: &Query) -> Role {
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
         | Query::Batches { .. }
+        | Query::ControlRuns { .. }
         | Query::SampleTime { .. }
         | Query::Reports { .. }
         | Query::Past { .. }

@@ -41,7 +41,8 @@ impl Assembly {
         let by_device = [snapshot.devices.len(), snapshot.tunings.len(), snapshot.programs.len()];
         let fits = by_tag == [def.tags.len(); 4]
             && by_device == [def.devices.len(); 3]
-            && snapshot.lines.len() == def.lines.len();
+            && snapshot.lines.len() == def.lines.len()
+            && snapshot.runs.len() == def.runs.len();
         if !fits {
             return Err(OtherPlant);
         }

@@ -138,6 +138,7 @@ pub fn query(def: &PlantDef, query: &Query) -> Result<(), String> {
         | Query::Actions { limit, .. }
         | Query::Audit { limit, .. }
         | Query::Batches { limit, .. }
+        | Query::ControlRuns { limit, .. }
         | Query::Reports { limit } => rows(*limit),
         Query::Report { period } if REPORT_MAX < period.to.duration_since(period.from) => {
             let days = |time: SignedDuration| time.as_hours() / 24;

@@ -3,6 +3,7 @@
 mod act;
 mod attach;
 mod batches;
+mod runs;
 mod audit;
 mod alarms;
 mod check;
@@ -133,6 +134,8 @@ enum Command {
     Alarms(alarms::Args),
     /// List the batches of a period: number, begin, end, phases, energy, figures
     Batches(batches::Args),
+    /// List the control runs of a period: when SV was reached, overshoot, offset, rise, energy
+    Runs(runs::Args),
     /// Decode a Modbus frame: every field, its checksum, and what is wrong with it
     Decode(decode::Args),
     /// Scan a line for units: addresses, baud rates, parities
@@ -290,6 +293,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::History(args)) => history::main(args),
         Some(Command::Alarms(args)) => alarms::main(args),
         Some(Command::Batches(args)) => batches::main(args),
+        Some(Command::Runs(args)) => runs::main(args),
         Some(Command::Decode(args)) => decode::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),
         Some(Command::Probe(args)) => tools::probe::main(args),

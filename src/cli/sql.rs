@@ -23,6 +23,7 @@ use crate::{
     plant::{
         PlantDef,
         batch::Batch,
+        control_run::ControlRun,
         def::{CsvDialect, TagId},
         record::{ActionRecord, AlarmRecord},
         sample::Sample,
@@ -48,6 +49,8 @@ Views (times are UTC):
   action   utc, by_whom, from_where, action, target, old_value, new_value, outcome, note
   batch    utc (begin), until (NULL while it runs), batch, number, minutes, begin_seen, end_seen
   phase    utc (begin of the batch), batch, number, phase ('unknown' as well), minutes
+  run      control runs: utc (begin), until, controller, number, state, cause, detail, sv_before, sv, pv, unit, band, settings,
+           at_sv_s, steady_s, rise_s (NULL not come to, -1 unknown), overshoot, final_offset, iae, kwh, kwh_good, good
   report   automatic reports: utc (of event, the last one), period, name, begin, until, format, file, sha256, event,
            attempts, error
 
@@ -130,6 +133,7 @@ impl HistoryTables {
             tables.add_alarms(journal(source).await?)?;
             tables.add_actions(actions(source).await?)?;
             tables.add_batches(batches(source).await?)?;
+            tables.add_runs(&control_runs(source).await?)?;
             let Answer::Reports(made) = source.query(Query::Reports { limit: REPORTS_MAX }).await? else {
                 return Err(unexpected());
             };
@@ -272,6 +276,17 @@ async fn batches(source: &Source) -> Result<Vec<Batch>, CliError> {
             Some(next) => to = next,
             None => return Ok(all),
         }
+    }
+}
+
+/// All control runs, newest first, page by page; those that began at the begin of the last one of a page come again.
+async fn control_runs(source: &Source) -> Result<Vec<ControlRun>, CliError> {
+    let (mut all, mut to) = (Vec::new(), end(source));
+    loop {
+        let query = Query::ControlRuns { controller: None, from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
+        let Answer::ControlRuns(page) = source.query(query).await? else { return Err(unexpected()) };
+        let Some(next) = add_page(&mut all, page, |run| run.from) else { return Ok(all) };
+        to = next;
     }
 }
 

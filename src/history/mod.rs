@@ -25,6 +25,7 @@ pub use crate::report::curve::{Bucket, Series};
 use crate::{
     plant::{
         alarm::PeriodMetrics,
+        control_run::ControlRun,
         def::{HistoryDef, LineId, TagId},
         line_minute::LineMinute,
         live::{LiveRead, LiveReading},
@@ -132,6 +133,17 @@ pub enum Query {
         /// At most so many.
         limit: usize,
     },
+    /// The control runs in a span, newest first.
+    ControlRuns {
+        /// Of this controller only.
+        controller: Option<String>,
+        /// From.
+        from: Timestamp,
+        /// To.
+        to: Timestamp,
+        /// At most so many.
+        limit: usize,
+    },
     /// When the first value of some tags was stored in a span, or the latest.
     SampleTime {
         /// Which tags.
@@ -192,6 +204,8 @@ pub enum Answer {
     Values(Vec<Vec<Option<HeldValue>>>),
     /// The batches.
     Batches(Vec<BatchReport>),
+    /// The control runs, each as it stood last.
+    ControlRuns(Vec<ControlRun>),
     /// The time; `None` where nothing is stored in the span.
     SampleTime(Option<Timestamp>),
     /// The last event of each report.

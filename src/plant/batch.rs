@@ -56,6 +56,13 @@ pub struct BatchRecord {
     pub phase: Option<Arc<str>>,
 }
 
+impl BatchRecord {
+    /// Number and name of the batch as one word: `water-17`.
+    pub fn label(&self) -> String {
+        format!("{}-{}", self.batch, self.number)
+    }
+}
+
 keyword_enum! {
     /// What happens to a batch. The words are what the history and CSV hold.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

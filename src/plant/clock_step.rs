@@ -10,12 +10,23 @@ use jiff::{SignedDuration, Timestamp};
 use super::{
     alarm::{AlarmCommand, state::OperatorNote},
     command::CommandKind,
+    control_run::ControlRun,
     event::LineState,
     record::{AlarmRecord, FirstOut, Record},
     restore::Restore,
     snapshot::{ActiveAlarm, DeviceState, DeviceStatus, LineStatus, Snapshot, SuppressedAlarm},
     tuning::Tuning,
 };
+
+impl ControlRun {
+    fn move_by(&mut self, by: SignedDuration) {
+        [&mut self.from, &mut self.until].into_iter().for_each(|at| move_by(at, by));
+    }
+    /// The same in the plant's own time, of which UTC is so much ahead.
+    pub fn move_from_utc(&mut self, by: SignedDuration) {
+        self.move_by(-by);
+    }
+}
 
 /// Moves an instant; one that would leave the calendar stays.
 fn move_by(at: &mut Timestamp, by: SignedDuration) {
@@ -31,6 +42,7 @@ impl Record {
             Record::Action(action) => move_by(&mut action.at, by),
             Record::Line(minute) => move_by(&mut minute.at, by),
             Record::Batch(batch) => move_by(&mut batch.at, by),
+            Record::Run(run) => run.move_by(by),
             Record::Report(report) => move_by(&mut report.at, by),
             Record::ClockSet => {}
         }
@@ -105,6 +117,7 @@ impl Snapshot {
             let tuning: &mut Tuning = Arc::make_mut(tuning);
             tuning.times().for_each(|at| move_by(at, by));
         });
+        self.runs.iter_mut().flatten().for_each(|run| Arc::make_mut(run).move_by(by));
     }
 }
 

@@ -10,6 +10,7 @@ use super::tag::{Table, TagDef};
 pub use super::{
     alarm::def::Priority,
     batch::BatchDef,
+    control_run::RunDef,
     history_def::{HistoryDef, ParquetVersion},
     id::{AlarmId, DeviceId, LineId, TagId},
     line::{Framing, LineDef, Serial, Transport},
@@ -57,6 +58,8 @@ pub struct PlantDef {
     pub trends: Vec<TrendGroup>,
     /// What its batches are, if it makes any.
     pub batches: Vec<BatchDef>,
+    /// The control runs of each controller.
+    pub runs: Vec<RunDef>,
     /// Shifts in order of their start; may be empty (then only free periods are reported).
     pub shifts: Vec<ShiftDef>,
     /// What reports contain and where they go.
@@ -88,6 +91,7 @@ impl Default for PlantDef {
             mimic: MimicDef::default(),
             trends: Vec::new(),
             batches: Vec::new(),
+            runs: Vec::new(),
             shifts: Vec::new(),
             report: ReportDef::default(),
             history: HistoryDef::default(),

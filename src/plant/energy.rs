@@ -1,10 +1,12 @@
 //! Energy from power or from a counter of energy.
 
+use serde::{Deserialize, Serialize};
+
 /// The units that it can be computed from.
 pub const UNITS: [&str; 7] = ["W", "kW", "MW", "Wh", "kWh", "MWh", "GWh"];
 
 /// What a tag measures.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Measures {
     /// Power; kilowatts in one of its unit.
     Power(f64),

@@ -98,6 +98,7 @@ pub fn plant() -> PlantDef {
         mimic: MimicDef::default(),
         trends: Vec::new(),
         batches: Vec::new(),
+        runs: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
         north: Default::default(),

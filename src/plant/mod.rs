@@ -43,6 +43,7 @@ pub mod live;
 pub mod command;
 pub(crate) mod energy;
 pub mod batch;
+pub mod control_run;
 pub mod report;
 pub mod record;
 pub(crate) mod interlock;

@@ -1,4 +1,4 @@
-//! What the plant leaves behind for the history: samples, alarm events, operator actions, minutes of lines, batches.
+//! What the plant leaves behind for the history: samples, alarm events, operator actions, minutes of lines, batches, runs.
 
 use std::{fmt, sync::Arc};
 
@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     batch::BatchRecord,
+    control_run::ControlRun,
     def::{Priority, TagId},
     keyword::keyword_enum,
     line_minute::LineMinute,
@@ -27,6 +28,8 @@ pub enum Record {
     Line(LineMinute),
     /// A change of a batch.
     Batch(BatchRecord),
+    /// A control run as it stands.
+    Run(Box<ControlRun>),
     /// An event of an automatic report.
     Report(ReportRecord),
     /// The system clock was set: what follows is of the next epoch, whatever its times say.

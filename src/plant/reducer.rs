@@ -20,6 +20,7 @@ use super::{
     batch::BatchTracker,
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::CommandTracker,
+    control_run::RunTracker,
     def::{LineDef, LineId, PlantDef, TagId},
     event::{Event, LineState, WriteResult},
     interlock::ActuatorTracker,
@@ -81,6 +82,8 @@ pub struct Plant {
     actuators: ActuatorTracker,
     /// By place in [`PlantDef::batches`].
     batches: Vec<BatchTracker>,
+    /// By place in [`PlantDef::runs`].
+    runs: Vec<RunTracker>,
     lines: Vec<LineStatus>,
     /// Earlier reports, by [`LineId`].
     line_minutes: Vec<LineMinuteTracker>,
@@ -114,6 +117,7 @@ impl Plant {
             commands: CommandTracker::new(def.clone()),
             actuators: ActuatorTracker::default(),
             batches: vec![BatchTracker::default(); def.batches.len()],
+            runs: vec![RunTracker::default(); def.runs.len()],
             lines: vec![LineStatus::default(); def.lines.len()],
             line_minutes: vec![LineMinuteTracker::default(); def.lines.len()],
             devices: vec![DeviceStatus::default(); def.devices.len()],
@@ -259,9 +263,11 @@ impl Plant {
         self.commands.write_requested_record(request, &self.image)
     }
 
-    /// The station stops: ends all pending commands.
+    /// The station stops: ends all pending commands and the runs at work.
     pub fn on_stop(&mut self) -> Effects {
-        Effects::of_actions(self.commands.stop(&self.image, self.at))
+        let mut effects = Effects::of_actions(self.commands.stop(&self.image, self.at));
+        effects.records.extend(self.stop_runs());
+        effects
     }
 
     /// The queue to a line was full: the request was not sent.
@@ -320,6 +326,7 @@ impl Plant {
             restores: self.restores.clone(),
             tunings: self.tunings.iter().map(|tracker| tracker.tuning.clone()).collect(),
             programs: self.programs.iter().map(ProgramWatch::elapsed).collect(),
+            runs: self.runs.iter().map(RunTracker::shown).collect(),
             north: self.north.clone(),
             speed: self.speed,
         }
@@ -372,6 +379,7 @@ impl Plant {
         let mut records = self.image.records(self.at);
         records.extend(events.into_iter().map(Record::Alarm));
         records.extend(self.follow_batches());
+        records.extend(self.follow_runs(&records));
         Effects { bus: asked, records, ..Effects::default() }
     }
 }

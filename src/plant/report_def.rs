@@ -80,6 +80,8 @@ keyword_enum! {
         Curves => "curves",
         /// Batches.
         Batches => "batches",
+        /// Control runs.
+        ControlRuns => "control runs",
         /// Where values are missing, and why.
         Gaps => "gaps",
         /// Alarms by priority.

@@ -13,6 +13,7 @@ use super::{
         state::{AlarmState, OperatorNote},
     },
     command::{CommandKind, CommandStatus},
+    control_run::ControlRun,
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
     diagnostics::DiagnosticRun,
     event::{Fault, LineCounters, LineState},
@@ -83,6 +84,8 @@ pub struct Snapshot {
     pub tunings: Vec<Option<Arc<Tuning>>>,
     /// How long the program of each device has been where it is, by [`DeviceId`], and whether its beginning was seen.
     pub programs: Vec<Option<(Duration, bool)>>,
+    /// The control run at work, or the last one, by place in [`PlantDef::runs`]; `None` before the first.
+    pub runs: Vec<Option<Arc<ControlRun>>>,
     /// How far the data out has come; `None` for a plant that sends nothing.
     pub north: Option<Arc<NorthStatus>>,
     /// Plant seconds per real second; 1 except in demonstrations.
@@ -115,6 +118,7 @@ impl Snapshot {
             restores: Vec::new(),
             tunings: vec![None; devices],
             programs: vec![None; devices],
+            runs: vec![None; def.runs.len()],
             north: None,
             speed: 1.0,
             def,
@@ -186,6 +190,15 @@ impl Snapshot {
     /// The auto-tuning of a device, at work or the last one.
     pub fn tuning(&self, id: DeviceId) -> Option<&Tuning> {
         self.tunings.get(id.index())?.as_deref()
+    }
+    /// Does a device have control runs?
+    pub fn has_runs(&self, id: DeviceId) -> bool {
+        self.def.runs.iter().any(|def| def.controller == id)
+    }
+    /// The control run of a device, at work or the last one.
+    pub fn control_run(&self, id: DeviceId) -> Option<&ControlRun> {
+        let place = self.def.runs.iter().position(|def| def.controller == id)?;
+        self.runs.get(place)?.as_deref()
     }
     /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
     pub fn acknowledge_all(&self) -> Option<CommandKind> {

@@ -18,6 +18,7 @@ mod address;
 mod alarm;
 mod automatic_report;
 mod batch;
+mod run;
 mod calculated;
 mod condition;
 mod device;

@@ -14,7 +14,7 @@ use super::{
     names::{Defs, Names, Scope, Unique, check_name},
     north, program, reader,
     reader::{At, Node, OptionalKey, Raw, text},
-    report,
+    report, run,
     schema::{DeviceTable, PlantFile, ProfileFile},
     sets,
     tag::{self, DeviceContext},
@@ -91,6 +91,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let logic = interlock::logic(file, &defs, problems);
     let trends = mimic::trends(&file.trends, &defs, problems);
     let batches = batch::batches(&file.batches, &defs, problems);
+    let runs = run::runs(&file.runs, &batches, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let rules = Rules { shifts: !shifts.is_empty(), is_program: library.is_program };
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, &rules, problems);
@@ -110,6 +111,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         mimic,
         trends,
         batches,
+        runs,
         shifts,
         report,
         history,
@@ -305,7 +307,7 @@ fn define_device<'a>(
 /// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.
 const TAGS_MAX: usize = 20_000;
 /// Most tables of each kind in a plant file.
-const MOST: [(&str, usize); 8] = [
+const MOST: [(&str, usize); 9] = [
     ("line", 64),
     ("device", 2_000),
     ("alarm", 10_000),
@@ -313,6 +315,7 @@ const MOST: [(&str, usize); 8] = [
     ("expect", 10_000),
     ("trend", 1_000),
     ("batch", 100),
+    ("run", 2_000),
     ("shift", 100),
 ];
 /// Most bytes of a plant file and its profiles together.

@@ -36,6 +36,7 @@ toml_tables! {
         opt "mimic" mimic: MimicTable,
         list "trend" trends: TrendTable,
         list "batch" batches: BatchTable,
+        list "run" runs: RunTable,
         list "shift" shifts: ShiftTable,
         opt "report" report: ReportTable,
         opt "history" history: HistoryTable,
@@ -186,6 +187,17 @@ toml_tables! {
         need "end" end: String,
         opt "phase" phase: String,
         opt "energy" energy: String,
+        list "tags" tags: String,
+    }
+
+    /// A `[[run]]`.
+    RunTable, "a run" {
+        need "controller" controller: String,
+        opt "band" band: f64,
+        opt "steady_for" steady_for: Duration,
+        opt "duration_max" duration_max: Duration,
+        opt "energy" energy: String,
+        list "batches" batches: String,
         list "tags" tags: String,
     }
 

@@ -10,6 +10,7 @@ use jiff::{Timestamp, civil, tz::TimeZone};
 use super::{
     Compared, Gap, Outage, Period, PeriodName, RunFigures, ShiftReport, TagFigures, alarm_metrics,
     batch::{self, BatchReport},
+    control_runs,
     csv::floor_percent,
     document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, Times, plain},
     raised,
@@ -96,6 +97,7 @@ fn content(kind: Kind, report: &ShiftReport, def: &PlantDef) -> Option<Content> 
         Kind::Runs => table(runs(&report.runs)),
         Kind::Curves => (!report.charts.is_empty()).then(|| Content::Charts(report.charts.clone())),
         Kind::Batches => table(batches(&report.batches)),
+        Kind::ControlRuns => table(control_runs::table(&report.control_runs)),
         Kind::Gaps => table(gaps(report)),
         Kind::AlarmCounts => table(alarms::alarm_counts(report)),
         Kind::Suppressed => table(alarms::suppressed(&report.suppressed)),

@@ -6,6 +6,7 @@ pub mod period_parser;
 pub mod step_series;
 pub(crate) mod figures;
 pub mod batch;
+pub mod control_runs;
 pub(crate) mod alarm_metrics;
 pub mod curve;
 pub(crate) mod chart;
@@ -39,6 +40,7 @@ use self::{chart::Chart, document::Document};
 use crate::{
     plant::{
         alarm::PeriodMetrics,
+        control_run::ControlRun,
         def::{CsvDialect, Paper, PlantDef, Priority},
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
         report::PeriodKind,
@@ -275,6 +277,8 @@ pub struct ShiftReport {
     pub charts: Vec<Chart>,
     /// The batches that ran in the period, newest first.
     pub batches: Vec<batch::BatchReport>,
+    /// The control runs in the period, newest first.
+    pub control_runs: Vec<ControlRun>,
     /// Alarms that were active while they were suppressed, shelved or out of service.
     pub suppressed: Vec<SuppressedSummary>,
     /// Alarm events in the period, oldest first.

@@ -94,6 +94,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
         mimic: MimicDef::default(),
         trends: Vec::new(),
         batches: Vec::new(),
+        runs: Vec::new(),
         shifts: shifts
             .iter()
             .map(|&(name, hour, minute)| ShiftDef { name: name.into(), start: time(hour, minute, 0, 0) })
@@ -143,6 +144,7 @@ pub fn shift_report() -> ShiftReport {
             why: "checksum".into(),
         }],
         batches: Vec::new(),
+        control_runs: Vec::new(),
         compared: vec![Compared {
             period: Period {
                 name: named("night 2026-11-20"),

@@ -232,11 +232,15 @@ impl PlantTask {
     /// Restores alarm states and metrics from the history.
     fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
-        let Restored { events, recent, chain_hashes, batches, totals, off } = past.join(restored);
-        let off = off.map(|off| off.checked_sub(self.clock.behind_utc()).unwrap_or(off));
+        let Restored { events, recent, chain_hashes, batches, mut runs, totals, off } = past.join(restored);
+        let behind = self.clock.behind_utc();
+        let off = off.map(|off| off.checked_sub(behind).unwrap_or(off));
+        runs.iter_mut().for_each(|run| run.move_from_utc(behind));
         self.plant.restore_totals(&totals);
         let resumed = self.plant.restore_batches(&batches, off);
         self.dispatch(resumed);
+        let interrupted = self.plant.restore_runs(&runs);
+        self.dispatch(interrupted);
         if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
             audit.compare(chain_hashes);
         }
@@ -331,9 +335,12 @@ impl PlantTask {
                     events.push(event.clone());
                     others.push(Record::Alarm(event));
                 }
-                Record::Sample(..) | Record::Line(_) | Record::Batch(_) | Record::Report(_) | Record::ClockSet => {
-                    others.push(record)
-                }
+                Record::Sample(..)
+                | Record::Line(_)
+                | Record::Batch(_)
+                | Record::Run(_)
+                | Record::Report(_)
+                | Record::ClockSet => others.push(record),
             }
         }
         self.send_to_audit_log(actions, events);

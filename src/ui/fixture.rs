@@ -13,6 +13,7 @@ pub use traffic::more_frames;
 use super::{ViewContext, preferences::Preferences, theme::Theme};
 use crate::plant::{
     alarm::{AlarmMetrics, AlarmState},
+    control_run::ControlRun,
     def::*,
     event::{Fault, LineCounters, LineState},
     parameter_set::StoredSet,
@@ -57,6 +58,8 @@ pub struct Fixture {
     pub restores: Vec<Restore>,
     /// Auto-tunings, by device.
     pub tunings: Vec<Option<Tuning>>,
+    /// Control runs, by place in [`PlantDef::runs`].
+    pub runs: Vec<Option<Arc<ControlRun>>>,
     /// How long every program has been where it is.
     pub into: Option<(Duration, bool)>,
 }
@@ -88,6 +91,7 @@ impl Fixture {
             station: BTreeMap::new(),
             restores: Vec::new(),
             tunings: vec![None; def.devices.len()],
+            runs: vec![None; def.runs.len()],
             into: None,
             def,
             samples,
@@ -187,6 +191,7 @@ impl Fixture {
             restores: self.restores.iter().cloned().map(Arc::new).collect(),
             tunings: self.tunings.iter().cloned().map(|tuning| tuning.map(Arc::new)).collect(),
             programs: vec![self.into; self.def.devices.len()],
+            runs: self.runs.clone(),
             history: HistoryStatus { rows: 5_000, committed_at: Some(now()), ..HistoryStatus::default() },
             station: Arc::new(self.station.clone()),
             north: None,

@@ -49,6 +49,7 @@ fn tag(id: u16) -> TagDef {
 
 fn tank() -> Arc<PlantDef> {
     Arc::new(PlantDef {
+        runs: Vec::new(),
         access: Default::default(),
         name: "tank".into(),
         title: "Water tank".into(),

@@ -227,9 +227,8 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
             let line = guarded.written(written, &said, |entry| &*entry.action == action).await;
             let refused = answer.as_ref().err().map(|why| format!("refused: {why}"));
             assert_eq!(line.outcome.starts_with("refused"), answer.is_err(), "{said}: {line:?}");
-            if let Some(refused) = refused {
-                assert!(is_by(&line, person) && *line.outcome == refused, "{said}: {line:?}");
-            }
+            let is_right = refused.is_none_or(|refused| is_by(&line, person) && *line.outcome == refused);
+            assert!(is_right, "{said}: {line:?}");
             assert!(line.from.contains("user "), "{}", line.from);
         }
     }

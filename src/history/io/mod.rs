@@ -66,6 +66,7 @@ pub mod report;
 mod reports;
 pub mod alarm_metrics;
 pub mod batches;
+mod runs;
 pub mod chain;
 pub mod writer;
 pub mod reader;

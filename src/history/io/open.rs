@@ -20,6 +20,7 @@ use crate::{
     },
     plant::{
         batch::BatchRecord,
+        control_run::ControlRun,
         def::{PlantDef, TagId},
         number::to_u32,
         record::{AlarmRecord, ChainHash},
@@ -48,6 +49,8 @@ pub struct Restored {
     pub chain_hashes: Option<Vec<ChainHash>>,
     /// The last record of the batches of each name.
     pub batches: Vec<BatchRecord>,
+    /// The latest control run of each controller.
+    pub runs: Vec<ControlRun>,
     /// The last values of the tags that are totals.
     pub totals: Vec<(TagId, f64)>,
     /// When the station before this one ended.
@@ -73,10 +76,10 @@ impl Store {
                 .chain_hashes()
                 .inspect_err(|error| tracing::warn!(%error, "not compared with the audit log"))
                 .ok();
-            let batches = store.latest_batches()?;
+            let (batches, runs) = (store.latest_batches()?, store.latest_runs()?);
             let off = store.extent().map(|(_, last)| last);
             let totals = store.last_totals()?;
-            Ok(Restored { events, recent, chain_hashes, batches, totals, off })
+            Ok(Restored { events, recent, chain_hashes, batches, runs, totals, off })
         })
     }
 

@@ -59,6 +59,9 @@ impl Store {
                 self.values(tags, *from, *every, *count, now).map(Answer::Values)
             }
             Query::Batches { from, to, limit } => self.batches((*from, *to, *limit as u64), now).map(Answer::Batches),
+            Query::ControlRuns { controller, from, to, limit } => {
+                self.control_runs(controller.as_deref(), (*from, *to, *limit as u64)).map(Answer::ControlRuns)
+            }
             Query::SampleTime { tags, from, to, latest } => {
                 self.sample_time(tags, (*from, *to), *latest).map(Answer::SampleTime)
             }

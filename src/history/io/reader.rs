@@ -177,7 +177,11 @@ fn next<'a, T>(waiting: &mut VecDeque<(u32, T)>, answered: impl Iterator<Item = 
 /// Does a figure of the answer lack what is not committed yet?
 fn counts_a_period(query: &Query) -> bool {
     match query {
-        Query::Report { .. } | Query::AlarmMetrics { .. } | Query::Batches { .. } | Query::Reports { .. } => true,
+        Query::Report { .. }
+        | Query::AlarmMetrics { .. }
+        | Query::Batches { .. }
+        | Query::ControlRuns { .. }
+        | Query::Reports { .. } => true,
         Query::Series { .. }
         | Query::Values { .. }
         | Query::Journal { .. }

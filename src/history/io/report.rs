@@ -136,7 +136,9 @@ impl Store {
         let tags = gathered.rows(def, &reported, active.iter().chain(&alarms));
         let runs = gathered.runs(def);
         let charts = self.charts((from, until), &gathered.latest)?;
-        let unreadable = gathered.unreadable;
+        let (control_runs, left_out) = self.control_runs_of(from, until)?;
+        let mut unreadable = gathered.unreadable;
+        unreadable.extend(left_out);
         let compared = self.compared(&reported, period, until)?;
         let outages = self.outages((from, until), &active, &alarms)?;
         let alarm_metrics = self.alarm_metrics(from, until, now)?;
@@ -156,6 +158,7 @@ impl Store {
             outages,
             charts,
             batches,
+            control_runs,
             suppressed,
             alarms,
             alarm_metrics,

@@ -18,6 +18,7 @@ use super::{
     disk, files,
     last::{self, LastCommit},
     reports::append_report,
+    runs::append_run,
     samples::PIECE,
     sql,
 };
@@ -92,7 +93,12 @@ impl Store {
         let stored = records.iter().filter_map(|record| match record {
             Record::Sample(_, sample) => Some(sample.at),
             Record::Alarm(alarm) => Some(alarm.at),
-            Record::Action(_) | Record::Line(_) | Record::Batch(_) | Record::Report(_) | Record::ClockSet => None,
+            Record::Action(_)
+            | Record::Line(_)
+            | Record::Batch(_)
+            | Record::Run(_)
+            | Record::Report(_)
+            | Record::ClockSet => None,
         });
         let begun = records.iter().filter(|record| is_clock_set(record)).count();
         let epoch = |passed: usize| self.epoch.get().saturating_add(u16::try_from(passed).unwrap_or(u16::MAX));
@@ -260,7 +266,7 @@ impl Store {
     /// Appends records of one epoch.
     fn append_epoch(&self, records: &[Record], epoch: u16) -> duckdb::Result<()> {
         let (mut samples, mut alarms, mut actions) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut lines, mut batches, mut reports) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut lines, mut batches, mut runs, mut reports) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for record in records {
             match record {
                 Record::Sample(tag, sample) => samples.extend(self.id(*tag).map(|id| (id, sample))),
@@ -268,6 +274,7 @@ impl Store {
                 Record::Action(action) => actions.push(action),
                 Record::Line(minute) => lines.push(minute),
                 Record::Batch(batch) => batches.push(batch),
+                Record::Run(run) => runs.push(run),
                 Record::Report(report) => reports.push(report),
                 Record::ClockSet => {}
             }
@@ -282,6 +289,7 @@ impl Store {
         self.append_rows("batch", batches, |to, BatchRecord { at, batch, number, place, event, phase }| {
             to.append_row(params![utc(*at), batch, number, place, event.word(), phase, epoch])
         })?;
+        self.append_rows("control_run", runs, |to, run| append_run(to, run, epoch))?;
         self.append_rows("report", reports, |to, report| append_report(to, report, epoch))
     }
 }

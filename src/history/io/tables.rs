@@ -8,6 +8,7 @@
 //! | `alarm` | `utc`, `subject`, `message`, `priority` (1–4), `event`, `value`, `limit_value`, `by_whom`, `reason` |
 //! | `batch` | `utc` (begin), `until` (NULL while it runs), `batch`, `number`, `minutes`, `begin_seen`, `end_seen` |
 //! | `phase` | `utc` (begin of the batch), `batch`, `number`, `phase` (`unknown` as well), `minutes` |
+//! | `run` | control runs: `utc` (begin), `until`, `controller`, `number`, `state`, `cause`, `detail`, `sv_before`, `sv`, `pv`, `unit`, `band`, `settings`, `at_sv_s`, `steady_s`, `rise_s` (NULL not come to, -1 unknown), `overshoot`, `final_offset`, `iae`, `kwh`, `kwh_good`, `good` |
 //! | `report` | automatic reports: `utc` (of `event`, its last one), `period`, `name`, `begin`, `until`, `format`, `file`, `sha256`, `event`, `attempts`, `error` |
 //! | `action` | `utc`, `by_whom`, `from_where`, `action`, `target`, `old_value`, `new_value`, `outcome`, `note` |
 
@@ -17,6 +18,7 @@ use duckdb::{Connection, InterruptHandle, params};
 
 use super::{
     archive::quoted,
+    runs::seconds,
     store::{engine, utc},
 };
 use crate::{
@@ -24,6 +26,7 @@ use crate::{
     plant::{
         PlantDef,
         batch::Batch,
+        control_run::ControlRun,
         def::{CsvDialect, TagId},
         record::{ActionRecord, AlarmRecord},
         report::ReportRecord,
@@ -74,6 +77,10 @@ impl Tables {
              CREATE TABLE batch (utc TIMESTAMP, until TIMESTAMP, batch VARCHAR, number UINTEGER, minutes DOUBLE,
                 begin_seen BOOLEAN, end_seen BOOLEAN);
              CREATE TABLE phase (utc TIMESTAMP, batch VARCHAR, number UINTEGER, phase VARCHAR, minutes DOUBLE);
+             CREATE TABLE run (utc TIMESTAMP, until TIMESTAMP, controller VARCHAR, number UINTEGER, state VARCHAR,
+                cause VARCHAR, detail VARCHAR, sv_before DOUBLE, sv DOUBLE, pv DOUBLE, unit VARCHAR, band DOUBLE,
+                settings VARCHAR, at_sv_s DOUBLE, steady_s DOUBLE, rise_s DOUBLE, overshoot DOUBLE, final_offset DOUBLE,
+                iae DOUBLE, kwh DOUBLE, kwh_good DOUBLE, good DOUBLE);
              CREATE TABLE report (utc TIMESTAMP, period VARCHAR, name VARCHAR, begin TIMESTAMP, until TIMESTAMP,
                 format VARCHAR, file VARCHAR, sha256 VARCHAR, event VARCHAR, attempts UINTEGER, error VARCHAR);",
             folder = quoted(&folder.join("")),
@@ -131,6 +138,39 @@ impl Tables {
         })?;
         self.fill("batch", batches.iter(), |to, Batch { name, number, from, to: end, seen, lasted, .. }| {
             to.append_row(params![utc(*from), end.map(utc), name, number, minutes(*lasted), seen.0, seen.1])
+        })
+    }
+
+    /// Adds control runs.
+    pub fn add_runs(&self, runs: &[ControlRun]) -> Result<(), HistoryError> {
+        self.fill("run", runs.iter(), |to, run| {
+            let (kwh, kwh_good) = run.energy.unzip();
+            let (begin, until, state, cause) = (utc(run.from), utc(run.until), run.state.word(), run.cause.word());
+            let [at_sv, steady, rise] = [run.at_sv, run.steady, run.rise].map(seconds);
+            to.append_row(params![
+                begin,
+                until,
+                run.controller,
+                run.number,
+                state,
+                cause,
+                run.detail,
+                run.sv_before,
+                run.sv,
+                run.pv,
+                run.unit,
+                run.band,
+                run.settings,
+                at_sv,
+                steady,
+                rise,
+                run.overshoot,
+                run.offset,
+                run.iae,
+                kwh,
+                kwh_good,
+                run.good
+            ])
         })
     }
 

@@ -38,6 +38,7 @@ impl Plant {
                 | Record::Action(_)
                 | Record::Line(_)
                 | Record::Batch(_)
+                | Record::Run(_)
                 | Record::Report(_)
                 | Record::ClockSet => {}
             }
@@ -71,6 +72,7 @@ mod tests {
             | Record::Action(_)
             | Record::Line(_)
             | Record::Batch(_)
+            | Record::Run(_)
             | Record::Report(_)
             | Record::ClockSet => None,
         });

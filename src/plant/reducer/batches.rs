@@ -1,9 +1,15 @@
-//! Batches and totals in the reducer: each rule is followed with every change of the plant, and goes on after a restart.
+//! Batches, control runs and totals in the reducer: each is followed with every change of the plant, and goes on after a restart.
 
 use jiff::Timestamp;
 
 use super::Plant;
-use crate::plant::{batch::BatchRecord, id::TagId, record::Record};
+use crate::plant::{
+    PlantDef,
+    batch::{BatchEvent, BatchRecord},
+    control_run::{ControlRun, View},
+    id::TagId,
+    record::Record,
+};
 
 impl Plant {
     /// Lets the totals go on from their last stored values, or from 0. Without a call of this they have no value.
@@ -21,6 +27,18 @@ impl Plant {
         resumed.map(Record::Batch).collect()
     }
 
+    /// Goes on counting the runs of each controller after its latest one, and interrupts those that the station before this
+    /// one left at work. Without a call of this no run is recorded.
+    pub fn restore_runs(&mut self, latest: &[ControlRun]) -> Vec<Record> {
+        let plant = &self.def;
+        let of_each = plant.runs.iter().zip(&mut self.runs);
+        let interrupted = of_each.filter_map(|(def, tracker)| {
+            let name = plant.device(def.controller).name.as_str();
+            tracker.restore(latest.iter().find(|run| &*run.controller == name).cloned())
+        });
+        interrupted.map(|run| Record::Run(Box::new(run))).collect()
+    }
+
     pub(super) fn follow_batches(&mut self) -> Vec<Record> {
         let (image, plant, at) = (&self.image, &self.def, self.at);
         let of_each = plant.batches.iter().zip(&mut self.batches);
@@ -30,4 +48,33 @@ impl Plant {
         });
         changes.map(Record::Batch).collect()
     }
+
+    /// Follows the runs; `records` are those of now, among which a batch may start.
+    pub(super) fn follow_runs(&mut self, records: &[Record]) -> Vec<Record> {
+        let (image, plant) = (&self.image, &self.def);
+        let started: Vec<(usize, String)> = records.iter().filter_map(|record| started(plant, record)).collect();
+        let view = View {
+            plant,
+            sample: &|tag| image.sample(tag),
+            decimals: &|tag| image.shown_decimals(plant.tag(tag)),
+            started: &started,
+            at: self.at,
+        };
+        let of_each = plant.runs.iter().zip(&mut self.runs);
+        of_each.flat_map(|(def, tracker)| tracker.update(def, &view)).map(|run| Record::Run(Box::new(run))).collect()
+    }
+
+    /// Ends the runs at work: the station stops.
+    pub(super) fn stop_runs(&mut self) -> Vec<Record> {
+        let at = self.at;
+        let stopped = self.runs.iter_mut().filter_map(|tracker| tracker.stop(at));
+        stopped.map(|run| Record::Run(Box::new(run))).collect()
+    }
+}
+
+/// The place and the label of a batch whose start was seen.
+fn started(plant: &PlantDef, record: &Record) -> Option<(usize, String)> {
+    let Record::Batch(record) = record else { return None };
+    let place = plant.batches.iter().position(|rule| rule.name == record.batch)?;
+    (record.event == BatchEvent::Started).then(|| (place, record.label()))
 }

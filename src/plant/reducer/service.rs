@@ -145,6 +145,7 @@ mod tests {
             | Record::Alarm(_)
             | Record::Line(_)
             | Record::Batch(_)
+            | Record::Run(_)
             | Record::Report(_)
             | Record::ClockSet => None,
         };

@@ -65,6 +65,7 @@ mod tests {
             | Record::Action(_)
             | Record::Line(_)
             | Record::Batch(_)
+            | Record::Run(_)
             | Record::Report(_)
             | Record::ClockSet => None,
         });

@@ -1,6 +1,9 @@
-//! Batches of a plant file.
+//! Batches and control runs of a plant file.
+
+use std::time::Duration;
 
 use super::*;
+use crate::plant::control_run::{DURATION_MAX, STEADY_FOR};
 
 #[test]
 fn a_batch_is_read_and_its_mistakes_are_named() {
@@ -24,4 +27,40 @@ fn a_batch_is_read_and_its_mistakes_are_named() {
     }
     let text = load(&format!("{table}{table}")).expect_err("twice").to_string();
     assert!(text.contains("duplicate batch `soup`"), "{text}");
+}
+
+/// The meter as a controller.
+fn controller(table: &str) -> Result<PlantDef, Errors> {
+    let meter = format!("{METER}\n[faceplate]\npv = \"T\"\nsv = \"MODE\"\n");
+    let batch = "[[batch]]\nname = \"soup\"\nstart = \"D1.MODE = on\"\nend = \"D1.MODE = off\"\ntags = [\"D1.T\"]\n";
+    load(PLANT.replace("[mimic]", &format!("{batch}{table}\n[mimic]")).as_bytes(), &meter, PLC)
+}
+
+#[test]
+fn a_controller_has_runs_and_the_plant_file_refines_them() {
+    let plant = controller("").unwrap();
+    let [run] = plant.runs.as_slice() else { panic!("{:?}", plant.runs) };
+    assert_eq!((run.band, run.steady_for, run.duration_max), (None, STEADY_FOR, DURATION_MAX));
+    assert_eq!((run.batches.as_slice(), run.energy), (&[0][..], None), "the batch is about its tag");
+    assert_eq!(run.tags, [plant.tag_named("D1.T").unwrap(), plant.tag_named("D1.MODE").unwrap()]);
+    let table = "[[run]]\ncontroller = \"D1\"\nband = 0.5\nsteady_for = \"2min\"\nduration_max = \"1h\"\nbatches = [\"soup\"]\ntags = [\"D1.T\"]\n";
+    let plant = controller(table).unwrap();
+    let run = &plant.runs[0];
+    assert_eq!((run.band, run.steady_for), (Some(0.5), Duration::from_secs(120)));
+    assert_eq!((run.duration_max, run.tags.len()), (Duration::from_secs(3_600), 1));
+    for (from, to, expect) in [
+        ("\"D1\"", "\"D2\"", "unknown device `D2`"),
+        ("\"D1\"", "\"PLC\"", "PLC has no SV and PV"),
+        ("0.5", "0", "PV is never exactly at SV"),
+        ("2min", "2h", "a run ends before it can be steady"),
+        ("2min", "5s", "this is not the time of a run"),
+        ("[\"soup\"]", "[\"soap\"]", "unknown batch `soap`"),
+        ("tags = [\"D1.T\"]", "energy = \"D1.T\"", "D1.T has the unit `°C`"),
+        ("band", "bandwidth", "unknown key `bandwidth`"),
+    ] {
+        let text = controller(&table.replace(from, to)).expect_err(to).to_string();
+        assert!(text.contains(expect), "{to}: {text}");
+    }
+    let text = controller(&format!("{table}{table}")).expect_err("twice").to_string();
+    assert!(text.contains("duplicate run of `D1`"), "{text}");
 }

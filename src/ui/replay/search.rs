@@ -174,6 +174,7 @@ impl Replay {
                 rows.iter().flat_map(|report| of_batch(&report.batch)).collect::<Vec<_>>()
             }
             Answer::Series(_)
+            | Answer::ControlRuns(_)
             | Answer::LineMinutes(_)
             | Answer::Report(_)
             | Answer::AlarmMetrics(_)

@@ -11,6 +11,7 @@ mod lamps;
 pub(super) mod list;
 mod faceplate;
 pub(super) mod program;
+mod runs;
 mod sets;
 mod table;
 mod wall;
@@ -26,6 +27,7 @@ use self::{
     compare::Compare,
     keys::{needing, page_keys},
     program::Cell,
+    runs::Runs,
     sets::Source,
     table::Table,
 };
@@ -59,6 +61,10 @@ pub enum Page {
     Sets,
     /// A set against it.
     Compare(Compare),
+    /// Its control runs.
+    Runs,
+    /// Some of them over each other.
+    Overlay,
     /// Words to read, and the page to go back to.
     Guide(usize, Box<Page>),
 }
@@ -80,6 +86,7 @@ pub struct Controllers {
     cell: Cell,
     /// The devices as faceplates or as a table; `None` as there is room.
     wall: Option<bool>,
+    runs: Runs,
     /// The selected row of the sets.
     set: usize,
     asked_for: Asked,
@@ -97,7 +104,7 @@ impl TabView for Controllers {
             Page::Device => self.table.tag(cx, device.id).map(|tag| tag.id),
             Page::List => device.faceplate.as_ref().map(|faceplate| faceplate.pv),
             Page::Program => device.program.as_ref().and_then(|program| self.cell.tag(program)),
-            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Guide(..) => None,
+            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Runs | Page::Overlay | Page::Guide(..) => None,
         });
         tag.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
@@ -136,6 +143,14 @@ impl TabView for Controllers {
             Action::Program => return notice(device, t!("this device has no ramp/soak program")),
             Action::Sets if cx.is_past() => return notice(device, t!("parameter sets are shown in the present only")),
             Action::Sets => (self.page, self.set) = (Page::Sets, 0),
+            Action::Runs if cx.snapshot.has_runs(device.id) => {
+                (self.page, self.runs) = (Page::Runs, Runs::default());
+            }
+            Action::Runs => return notice(device, t!("this device has no SV and PV")),
+            Action::Trend => return self.runs.trend(cx, device.id).into_iter().collect(),
+            Action::Mark => self.runs.mark(),
+            Action::Overlay => self.swap_overlay(cx, device.id),
+            Action::Tag(by) => self.runs.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by)),
             Action::Find => {
                 self.asked_for = Asked::Filter;
                 let (title, hint) = (t!("find a parameter"), t!("words in name or meaning; empty shows all"));
@@ -175,6 +190,7 @@ impl TabView for Controllers {
                 (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
                 (Action::Lamps, !lamps::has_any(cx, device)),
                 (Action::Program, program.is_none()),
+                (Action::Runs, !cx.snapshot.has_runs(device.id)),
                 (Action::Actions, device.actions.is_empty()),
                 (Action::Defaults, cx.def().tags_of(device.id).all(|tag| tag.default.is_none())),
                 (Action::Control(keys::ProgramCommand::Hold), program.is_none_or(|program| program.halt.is_none())),
@@ -189,7 +205,8 @@ impl TabView for Controllers {
         let leads_back = match self.page {
             Page::List => false,
             Page::Device => cx.is_past() && 1 < cx.def().devices.len(),
-            Page::Lamps | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
+            Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
+            Page::Lamps | Page::Runs | Page::Overlay => true,
         };
         if leads_back {
             let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
@@ -212,7 +229,11 @@ impl TabView for Controllers {
                 self.table = Table { defaults: self.table.defaults, ..Table::default() };
                 Page::List
             }
-            Page::Lamps | Page::Program | Page::Sets => Page::Device,
+            Page::Lamps | Page::Program | Page::Sets | Page::Runs => Page::Device,
+            Page::Overlay => {
+                self.runs.overlay = None;
+                Page::Runs
+            }
             Page::Compare(_) => Page::Sets,
             Page::Guide(_, before) => *before,
             page @ (Page::List | Page::Device) => {
@@ -228,16 +249,8 @@ impl TabView for Controllers {
             (Page::Sets, Some(device)) => {
                 Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
             }
-            (
-                Page::List
-                | Page::Device
-                | Page::Lamps
-                | Page::Program
-                | Page::Sets
-                | Page::Compare(_)
-                | Page::Guide(..),
-                _,
-            ) => Rows::default(),
+            (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_), _)
+            | (Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..), _) => Rows::default(),
         }
     }
 
@@ -245,11 +258,16 @@ impl TabView for Controllers {
         if cx.is_past() && matches!(self.page, Page::Sets | Page::Compare(_)) {
             self.page = Page::Device;
         }
-        let faceplate = cx.def().devices.get(self.device.index()).and_then(|device| device.faceplate.as_ref());
+        let device = cx.def().devices.get(self.device.index());
+        if let (Page::Runs | Page::Overlay, Some(device)) = (&self.page, device) {
+            return self.runs.ask(cx, device, &mut self.asked);
+        }
+        let faceplate = device.and_then(|device| device.faceplate.as_ref());
         let tags = match &self.page {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
             Page::List if self.is_wall(cx) => wall::tags(cx, self.device.index()),
-            Page::List | Page::Lamps | Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => Vec::new(),
+            Page::List | Page::Program | Page::Sets | Page::Compare(_) => Vec::new(),
+            Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
         };
         if tags.is_empty() {
             return Vec::new();
@@ -265,11 +283,12 @@ impl TabView for Controllers {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.trend.query.awaits(number)
+        self.trend.query.awaits(number) || self.runs.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.trend.on_answer(cx, number, &answer);
+        self.runs.on_answer(cx, number, &answer);
         Vec::new()
     }
 
@@ -298,6 +317,9 @@ impl TabView for Controllers {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        if let (Page::Overlay, Some(overlay)) = (&self.page, &self.runs.overlay) {
+            return overlay.view(cx, frame, area);
+        }
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         let Some(device) = cx.def().devices.get(self.device.index()) else {
             canvas.text(1, 1, t!("this plant has no devices"), cx.theme.normal());
@@ -314,6 +336,7 @@ impl TabView for Controllers {
                 let trend = self.trend.value.as_ref().and_then(|series| series.first());
                 device::view(cx, &mut canvas, device, &self.table, trend)
             }
+            (Page::Runs | Page::Overlay, _) => self.runs.view(cx, &mut canvas, device),
             (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
             (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
             (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
@@ -323,23 +346,19 @@ impl TabView for Controllers {
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
         let compare = Page::Compare(Compare::new(Source::Set(String::new())));
-        let pages = [
-            Page::List,
-            Page::Device,
-            Page::Lamps,
-            Page::Program,
-            Page::Sets,
-            compare,
-            Page::Guide(0, Box::new(Page::List)),
-        ];
-        pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).to_vec()
+        let guide = Page::Guide(0, Box::new(Page::List));
+        let runs = [Page::Runs, Page::Overlay];
+        let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare, guide];
+        let pages = pages.into_iter().chain(runs);
+        pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).collect()
     }
 }
 
 impl Controllers {
     fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
         let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
-        Controllers { page, device, table, cell, wall: None, set: 0, asked_for, trend, curves: Vec::new(), asked: 0 }
+        let (runs, curves) = (Runs::default(), Vec::new());
+        Controllers { page, device, table, cell, wall: None, runs, set: 0, asked_for, trend, curves, asked: 0 }
     }
 
     /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.

@@ -1,11 +1,16 @@
-//! Batches or periods over each other: the curves of one tag, each from the begin of its stretch of time on.
+//! Batches, control runs or periods over each other: the curves of one tag, each from the begin of its stretch of time on.
 
 use ratatui::widgets::Widget;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::{batch::Batch, def::BatchDef, number::to_usize},
+    plant::{
+        batch::Batch,
+        control_run::{ControlRun, RunDef},
+        def::BatchDef,
+        number::to_usize,
+    },
     ui::widgets::chart::{self, Chart, Curve, mark, trace::Trace},
 };
 
@@ -27,13 +32,15 @@ struct Laid {
     from: Timestamp,
     /// `None` while it runs.
     to: Option<Timestamp>,
+    /// Its own figures, for the legend; of a batch or a period it has those of the tag.
+    figures: Option<[String; 5]>,
     /// Its curve was asked for after it had ended.
     is_whole: bool,
 }
 
 impl Laid {
     fn new(label: String, from: Timestamp, to: Option<Timestamp>) -> Laid {
-        Laid { label, from, to, is_whole: false }
+        Laid { label, from, to, figures: None, is_whole: false }
     }
 
     fn until(&self, now: Timestamp) -> Timestamp {
@@ -45,6 +52,7 @@ impl Laid {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Batches,
+    Runs,
     Periods,
 }
 
@@ -65,6 +73,15 @@ impl Overlay {
         let tags = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
         let laid = |batch: Batch| Laid::new(batch.label(), batch.from, batch.to);
         Overlay::new((Tab::Reports, Kind::Batches), batches.into_iter().map(laid), (tags, 0))
+    }
+
+    /// Of control runs with their figures; `None` where they have no tag that has a curve.
+    pub fn of_runs(rule: &RunDef, runs: impl Iterator<Item = (ControlRun, [String; 5])>) -> Option<Overlay> {
+        let laid = |(run, figures): (ControlRun, _)| {
+            let to = (!run.is_running()).then_some(run.until);
+            Laid { figures: Some(figures), ..Laid::new(run.label(), run.from, to) }
+        };
+        Overlay::new((Tab::Controllers, Kind::Runs), runs.map(laid), (rule.tags.clone(), 0))
     }
 
     /// Of periods, named by letters; `None` where there is no tag that has a curve.
@@ -132,6 +149,7 @@ impl Overlay {
         let (name, count) = (&def.name, self.curves.len());
         let heading = match self.kind {
             Kind::Batches => t!("{tag} of {count} batches", tag = name, count),
+            Kind::Runs => t!("{tag} of {count} runs", tag = name, count),
             Kind::Periods => t!("{tag} in {count} periods", tag = name, count),
         };
         let x = canvas.text(1, 0, &heading, theme.strong());
@@ -143,11 +161,12 @@ impl Overlay {
         let legend = to_u16(self.curves.len()) + 1;
         self.draw_chart(cx, &mut canvas.part(0, 1, width, height.saturating_sub(legend + 1)), tag);
         let y = height.saturating_sub(legend);
-        let first = match self.kind {
-            Kind::Batches => t!("batch"),
-            Kind::Periods => t!("period"),
+        let values = |first| [first, t!("begin"), t!("minutes"), t!("min"), t!("mean"), t!("max"), t!("good")];
+        let head = match self.kind {
+            Kind::Batches => values(t!("batch")),
+            Kind::Periods => values(t!("period")),
+            Kind::Runs => [t!("run"), t!("begin"), t!("at SV"), t!("steady"), t!("over"), t!("offset"), t!("IAE")],
         };
-        let head = [first, t!("begin"), t!("minutes"), t!("min"), t!("mean"), t!("max"), t!("good")];
         canvas.text(3, y, &fit(&self.columns(head), width.saturating_sub(3)), theme.dim());
         for (n, (laid, curve)) in self.curves.iter().enumerate() {
             let y = y + 1 + to_u16(n);
@@ -160,7 +179,7 @@ impl Overlay {
     fn draw_chart(&self, cx: &ViewContext, canvas: &mut Canvas, tag: TagId) {
         let (begin, zone) = match (self.kind, self.curves.first()) {
             (Kind::Periods, Some((first, _))) => (first.from, Some(&cx.def().time_zone)),
-            (Kind::Periods, None) | (Kind::Batches, _) => (Timestamp::UNIX_EPOCH, None),
+            (Kind::Periods, None) | (Kind::Batches | Kind::Runs, _) => (Timestamp::UNIX_EPOCH, None),
         };
         let traces: Vec<Trace> = self.curves.iter().map(|(laid, curve)| moved_to(begin, laid, curve)).collect();
         let decimals = cx.snapshot.decimals[tag.index()];
@@ -174,16 +193,19 @@ impl Overlay {
     /// A row of the legend.
     fn columns(&self, cells: [&str; 7]) -> String {
         // A period has a date where a batch has a number.
-        let (label, begin) = if self.kind == Kind::Batches { (15, 12) } else { (7, 20) };
+        let (label, begin) = if self.kind == Kind::Periods { (7, 20) } else { (15, 12) };
         draw::columns([label, begin, -7, -9, -9, -9, -8], cells)
     }
 
     /// The figures of one of them.
     fn row(&self, cx: &ViewContext, tag: TagId, laid: &Laid, curve: &Answered<Vec<Series>>) -> String {
         let begin = match self.kind {
-            Kind::Batches => moment(laid.from, cx.now, &cx.def().time_zone),
+            Kind::Batches | Kind::Runs => moment(laid.from, cx.now, &cx.def().time_zone),
             Kind::Periods => draw::local(cx, laid.from, "%Y-%m-%d %H:%M:%S"),
         };
+        if let Some([a, b, c, d, e]) = &laid.figures {
+            return self.columns([&laid.label, &begin, a, b, c, d, e]);
+        }
         let lasted = format!("{:.1}", laid.until(cx.now).duration_since(laid.from).as_secs_f64() / 60.0);
         let series = curve.value.iter().flatten().next();
         let value = |value: Option<f64>| value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));

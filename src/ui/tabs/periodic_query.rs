@@ -7,6 +7,7 @@ use crate::{
     history::{Answer, HistoryError, MadeReports, QUERY_TIME_MAX, Query, Series},
     plant::{
         alarm::PeriodMetrics,
+        control_run::ControlRun,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
     },
@@ -210,6 +211,7 @@ from_answer! {
     Report: Box<ShiftReport>;
     AlarmMetrics: Box<PeriodMetrics>;
     Batches: Vec<BatchReport>;
+    ControlRuns: Vec<ControlRun>;
     Reports: MadeReports;
     Values: Vec<Vec<Option<HeldValue>>>;
 }

@@ -210,6 +210,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
             | Query::AlarmMetrics { .. }
             | Query::Values { .. }
             | Query::Batches { .. }
+            | Query::ControlRuns { .. }
             | Query::SampleTime { .. }
             | Query::Reports { .. }
             | Query::Past { .. }

@@ -9,7 +9,7 @@ fn of_query(query: &Query) -> Row {
         Query::LineMinutes { .. } | Query::Values { .. } | Query::SampleTime { .. } => look("", "-VTSL-"),
         Query::Past { .. } | Query::Batches { .. } | Query::Unarchived { .. } | Query::Overview => look("", "-VTSL-"),
         Query::AlarmMetrics { .. } | Query::Report { .. } | Query::Reports { .. } => look("", "-VTSL-"),
-        Query::Samples { .. } => look("", "-VTSL-"),
+        Query::Samples { .. } | Query::ControlRuns { .. } => look("", "-VTSL-"),
         Query::Registers(_) => look("", "--TS--"),
         Query::Audit { .. } => look("read audit log", "---S--"),
     }
@@ -34,6 +34,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::SampleTime { tags: vec![def.tags[0].id], from, to, latest: true },
         Query::Past { at: to },
         Query::Batches { from, to, limit },
+        Query::ControlRuns { controller: None, from, to, limit },
         Query::Reports { limit },
         Query::Samples { from, to },
         Query::Unarchived { from, to },

@@ -16,6 +16,7 @@ mod import;
 mod alarm_metrics;
 mod pieces;
 mod reading;
+mod runs;
 mod steps;
 mod totals;
 

@@ -127,6 +127,7 @@ fn actions(effects: &Effects) -> Vec<String> {
         | Record::Alarm(_)
         | Record::Line(_)
         | Record::Batch(_)
+        | Record::Run(_)
         | Record::Report(_)
         | Record::ClockSet => None,
     };

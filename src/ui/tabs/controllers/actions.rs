@@ -56,6 +56,11 @@ impl Controllers {
             | Action::Guide
             | Action::Turn(_)
             | Action::Save
+            | Action::Runs
+            | Action::Trend
+            | Action::Mark
+            | Action::Overlay
+            | Action::Tag(_)
             | Action::All
             | Action::SwapDirection => Vec::new(),
         }

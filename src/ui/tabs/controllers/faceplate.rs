@@ -7,9 +7,11 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::{
+        control_run::ControlRun,
         def::{Faceplate, Subject},
         tuning::Tuning,
     },
+    report::control_runs,
     ui::widgets::mimic::{Bounds, panel::sv_difference, trend},
 };
 
@@ -21,7 +23,8 @@ const TREND: u16 = 22;
 /// Rows that [`strip`] takes.
 pub fn strip_height(cx: &ViewContext, device: &DeviceDef) -> u16 {
     let Some(faceplate) = &device.faceplate else { return 0 };
-    3 + u16::from(faceplate.mv.is_some()) + u16::from(cx.snapshot.tuning(device.id).is_some())
+    let shown = [cx.snapshot.tuning(device.id).is_some(), cx.snapshot.control_run(device.id).is_some()];
+    3 + u16::from(faceplate.mv.is_some()) + shown.map(u16::from).iter().sum::<u16>()
 }
 
 /// Three bars over each other, with their ranges, the trend beside them, and a row of states and alarms.
@@ -34,8 +37,14 @@ pub fn strip(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     let at = Bounds { x: bars + 1, y: 0, width: TREND, height: rows };
     trend::view(cx, canvas, at, faceplate.pv, WINDOW, series, false);
     states(cx, &mut canvas.part(0, rows, wide, 1), device, faceplate);
+    let mut y = rows + 1;
     if let Some(tuning) = cx.snapshot.tuning(device.id) {
-        tuning_row(cx, &mut canvas.part(0, rows + 1, wide, 1), faceplate, tuning);
+        tuning_row(cx, &mut canvas.part(0, y, wide, 1), faceplate, tuning);
+        y += 1;
+    }
+    if let Some(run) = cx.snapshot.control_run(device.id) {
+        let words = format!("{}: {}", run_label(run), control_runs::figures(run).join(", "));
+        canvas.text(1, y, &fit_words(&words, wide.saturating_sub(2)), run_style(cx, run));
     }
 }
 
@@ -67,6 +76,13 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
                 canvas.text(0, y, &line, style);
                 y += 1;
             }
+        }
+        y += 1;
+    }
+    if let Some(run) = cx.snapshot.control_run(device.id) {
+        for line in run_text(run).iter().flat_map(|words| wrap(words, wide)) {
+            canvas.text(0, y, &line, run_style(cx, run));
+            y += 1;
         }
         y += 1;
     }
@@ -214,6 +230,21 @@ fn tuning_row(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, tuni
     let room = canvas.width().saturating_sub(2);
     let style = if tuning.ended.is_none() { cx.theme.strong() } else { cx.theme.normal() };
     canvas.text(1, 0, &pad(&fit_words(&words, room), room), style);
+}
+
+fn run_style(cx: &ViewContext, run: &ControlRun) -> Style {
+    if run.is_running() { cx.theme.strong() } else { cx.theme.dim() }
+}
+
+/// How a control run goes, or has gone: what it is, and its figures.
+fn run_text(run: &ControlRun) -> [String; 2] {
+    let head = format!("{}: {}, {}", run_label(run), control_runs::setpoint(run), translate(run.state.word()));
+    [head, control_runs::figures(run).join(", ")]
+}
+
+/// `Run 17 12:45`.
+fn run_label(run: &ControlRun) -> String {
+    t!("Run {number} {lasted}", number = run.number, lasted = control_runs::clock(run.lasted()))
 }
 
 /// How a tuning goes, or what it has found.

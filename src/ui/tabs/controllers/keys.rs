@@ -36,6 +36,16 @@ pub enum Action {
     Program,
     /// The parameter sets.
     Sets,
+    /// The control runs.
+    Runs,
+    /// The curves of the time of the selected run.
+    Trend,
+    /// Mark it for the overlay, or no longer.
+    Mark,
+    /// The marked ones over each other, or the list again.
+    Overlay,
+    /// The curves of another tag.
+    Tag(isize),
     /// Only parameters with some words.
     Find,
     /// Mark what differs from the maker's default.
@@ -118,6 +128,7 @@ const DEVICE: &[Key<Action>] = &[
     Key::new(char('i'), "lamps", "inputs, outputs and relays as lamps, if the device has them", Action::Lamps),
     Key::new(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
     Key::new(char('s'), "sets", "parameter sets: save, compare, restore, copy", Action::Sets),
+    Key::new(char('r'), "runs", "control runs: what each change of SV led to, compared", Action::Runs),
     GUIDE,
     Key::new(char('T'), "tune", "auto-tuning on, or off while it is on", Action::Tune).needs(Role::Technician),
     ACTIONS,
@@ -169,6 +180,17 @@ const COMPARE: &[Key<Action>] = &[
     REFRESH,
     GUIDE,
 ];
+const RUNS: &[Key<Action>] = &[
+    Key::new(char('o'), "overlay", "the curves of the marked runs over each other", Action::Overlay),
+    Key::new(char(' '), "mark", "mark the run for the overlay", Action::Mark),
+    Key::new(char('t'), "trend", "the curves of its time", Action::Trend),
+    GUIDE,
+];
+const OVERLAY: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Left), "", "previous tag", Action::Tag(-1)),
+    Key::new(code(KeyCode::Right), "tag", "next tag", Action::Tag(1)),
+    Key::new(char('o'), "list", "back to the list", Action::Overlay),
+];
 const READ: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "previous page", Action::Turn(-1)),
     Key::new(code(KeyCode::Right), "page", "next page", Action::Turn(1)),
@@ -191,6 +213,8 @@ pub fn page_keys(page: &Page) -> Vec<Key<Action>> {
         Page::Program => [PROGRAM_FIRST, &SELECT, PROGRAM].concat(),
         Page::Sets => [&SELECT, SETS].concat(),
         Page::Compare(_) => [&SCROLL, COMPARE].concat(),
+        Page::Runs => [&SELECT, RUNS].concat(),
+        Page::Overlay => OVERLAY.to_vec(),
         Page::Guide(..) => READ.to_vec(),
     }
 }

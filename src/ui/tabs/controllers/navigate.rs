@@ -23,7 +23,20 @@ impl Controllers {
             }
             Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
-            Page::Lamps | Page::Guide(..) => {}
+            Page::Runs => self.runs.select(cx, motion),
+            Page::Lamps | Page::Overlay | Page::Guide(..) => {}
+        }
+    }
+
+    /// Lays the marked runs over each other, or goes back to their list.
+    pub(super) fn swap_overlay(&mut self, cx: &ViewContext, device: DeviceId) {
+        if self.page == Page::Overlay {
+            (self.page, self.runs.overlay) = (Page::Runs, None);
+            return;
+        }
+        self.runs.lay_over(cx, device);
+        if self.runs.overlay.is_some() {
+            self.page = Page::Overlay;
         }
     }
 
@@ -49,7 +62,7 @@ impl Controllers {
                 Vec::new()
             }
             Page::Compare(compare) => open(compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm)),
-            Page::Lamps | Page::Guide(..) => Vec::new(),
+            Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
         }
     }
 

@@ -1,5 +1,6 @@
 //! The controllers tab as an operator sees it and works with it.
 
+mod runs;
 mod lamps;
 mod sets;
 mod wall;
@@ -12,6 +13,7 @@ use crate::{
     plant::{
         alarm::AlarmState,
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+        control_run::RunState,
         def::{ActionDef, AlarmId, DeviceId},
         ne107::Reason,
         parameter_set::StoredSet,
@@ -25,7 +27,7 @@ use crate::{
         Effect, Model, Msg,
         fixture::{
             self, Fixture,
-            controllers::{many, set},
+            controllers::{control_run, many, set},
         },
         tests::{model, screen, sent_kind, type_keys},
         theme::Theme,
@@ -132,6 +134,15 @@ fn a_tuning_shows_how_it_goes_and_what_it_has_found() {
     fixture.set("TIC-1.AT", 0.0);
     fixture.tunings[0] = Some(tuning(&fixture, true));
     assert_seen("tuned", &fixture, Theme::FULL, "4⏎");
+}
+
+#[test]
+fn a_run_shows_its_figures_as_they_come() {
+    let mut fixture = many(2);
+    fixture.runs[0] = Some(Arc::new(control_run(17, RunState::Running)));
+    assert_seen("run_running", &fixture, Theme::FULL, "4⏎");
+    fixture.runs[0] = Some(Arc::new(control_run(16, RunState::Ended)));
+    assert_seen("run_ended", &fixture, Theme::PLAIN, "4⏎");
 }
 
 #[test]

@@ -151,18 +151,12 @@ fn report(period: Period, full: bool) -> ShiftReport {
         alarm(95, high, "TIC-1.PV", "temperature high", AlarmEvent::Raised, None),
     ];
     let action = ActionRecord {
-        at: at(20),
-        by: "tech1".into(),
-        action: "write".into(),
-        target: "TIC-1.SV".into(),
         old: Some("60.0 °C".into()),
         new: Some("70.0 °C".into()),
-        outcome: "verified".into(),
-        from: "".into(),
-        note: None,
-        chain_hash: None,
+        ..ActionRecord::new(at(20), "tech1", "write", "TIC-1.SV", "verified")
     };
     ShiftReport {
+        control_runs: Vec::new(),
         period,
         until,
         audit: full.then_some(ChainHash { number: 1_042, hash: [0xA5; 32] }),

@@ -15,6 +15,7 @@ pub(super) fn kinds(asked: &[(QueryId, Query)]) -> String {
         | Query::Report { .. }
         | Query::AlarmMetrics { .. }
         | Query::Values { .. }
+        | Query::ControlRuns { .. }
         | Query::SampleTime { .. }
         | Query::Reports { .. }
         | Query::Past { .. }

@@ -1,0 +1,85 @@
+//! `sightglass runs`: the control runs of a period with their figures.
+
+use std::path::PathBuf;
+
+use jiff::SignedDuration;
+
+use crate::{
+    history::{Answer, Query},
+    report::control_runs,
+};
+
+use super::{
+    CliError, in_runtime, say,
+    source::{CsvArgs, HistoryArgs, unexpected},
+};
+
+/// What is shown where no period is asked for.
+const SPAN: SignedDuration = SignedDuration::from_hours(7 * 24);
+
+const DEFINITIONS: &str = "\
+Without --shift and --from: the last 7 days.
+
+A run of a controller begins when its setpoint is changed, a step of its program begins, or a batch starts; it ends with the
+next one, or after 4 h. Times count from its begin. PV is at SV within a band: 2 % of the way from PV to SV, 0.5 % of the range
+at least. A [[run]] of the plant file sets band, times, energy and tags.
+  first at SV  when PV was first at SV or beyond it
+  steady from  when PV came to SV to stay, five minutes at least
+  rise         from 10 % to 90 % of the way from PV to SV
+  overshoot    the most that PV was beyond SV
+  offset       SV less PV at the end
+  IAE          integral of the absolute error
+Only good values count: what happened in a gap of more than ten seconds is unknown, sums and extremes are then a least.";
+
+/// Arguments of `runs`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = DEFINITIONS)]
+pub struct Args {
+    #[command(flatten)]
+    history: HistoryArgs,
+    /// Only the runs of this controller
+    #[arg(long, value_name = "DEVICE")]
+    controller: Option<String>,
+    /// The latest so many
+    #[arg(long, value_name = "NUMBER", default_value_t = 100)]
+    limit: usize,
+    /// Print JSON instead of lines
+    #[arg(long)]
+    json: bool,
+    /// Write CSV to this file instead, `-` for standard output: a row for each run
+    #[arg(long, value_name = "FILE", conflicts_with = "json")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    csv: CsvArgs,
+}
+
+/// Prints or writes the runs.
+pub fn main(args: Args) -> Result<(), CliError> {
+    let def = args.history.load()?;
+    if def.runs.is_empty() {
+        return Err(CliError::Usage(format!("{} has no controller with SV and PV", def.title)));
+    }
+    if let Some(name) = &args.controller {
+        let known: Vec<&str> = def.runs.iter().map(|run| def.device(run.controller).name.as_str()).collect();
+        if !known.contains(&name.as_str()) {
+            return Err(CliError::Usage(format!("no controller `{name}`: expected one of {}", known.join(", "))));
+        }
+    }
+    if let Some(out) = &args.out {
+        args.history.refuse_own_file(&def, out)?;
+    }
+    in_runtime(async {
+        let (source, period) = args.history.open_latest(&def, SPAN).await?;
+        let query =
+            Query::ControlRuns { controller: args.controller, from: period.from, to: period.to, limit: args.limit };
+        let Answer::ControlRuns(runs) = source.query(query).await? else { return Err(unexpected()) };
+        match &args.out {
+            Some(out) => source.export(out, &control_runs::csv(&runs, &def, args.csv.dialect(&def))).await?,
+            None if args.json => {
+                say(&serde_json::to_string_pretty(&runs).expect("its keys are words and its numbers are finite"));
+            }
+            None => say(&control_runs::text(&runs, &def)),
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,121 @@
+//! Control runs, stored by a station that is killed now and then.
+
+use std::fs;
+
+use super::*;
+use crate::{
+    history::io::tables::Tables,
+    plant::{
+        Plant,
+        control_run::{ControlRun, DURATION_MAX, Figure, RunDef, RunState, STEADY_FOR},
+        event::Event,
+        fixture::{self, DP, FAULT, PV, SV, TIC},
+    },
+};
+
+/// The fixture with the runs of its controller.
+fn controlled() -> Arc<PlantDef> {
+    let mut def = fixture::plant();
+    def.runs = vec![RunDef {
+        controller: TIC,
+        sv: SV,
+        sv_used: None,
+        pv: PV,
+        band: Some(0.5),
+        steady_for: STEADY_FOR,
+        duration_max: DURATION_MAX,
+        energy: None,
+        batches: Vec::new(),
+        tags: vec![PV],
+    }];
+    Arc::new(def)
+}
+
+/// A station from one second to another, whose setpoint changes every 1000 s and whose PV is there after 20 s. It stops in
+/// good order, or is killed.
+fn station(db: &Path, def: &Arc<PlantDef>, seconds: std::ops::Range<i64>, stops: bool) {
+    let opened = Store::open_at_start(db, def, sec(seconds.start)).unwrap();
+    let mut plant = Plant::new(def.clone(), sec(seconds.start), 1.0);
+    let store = opened.store;
+    let mut records = plant.restore_runs(&opened.read.runs);
+    for second in seconds {
+        let (cycle, into) = (second / 1_000, second % 1_000);
+        let sv = [20.0, 60.0][(cycle % 2) as usize];
+        let pv = if into < 20 { 80.0 - sv } else { sv };
+        let values = vec![(DP, 0.0), (FAULT, 0.0), (SV, sv), (PV, pv)];
+        let response_time = Duration::from_millis(9);
+        let read =
+            Event::Read { at: sec(second), device: TIC, values, texts: Vec::new(), response_time, exchange: None };
+        records.extend(plant.on_event(read).records);
+        // What is of no run waits for the next one: a commit a second takes long.
+        if records.iter().any(|record| matches!(record, Record::Run(_))) {
+            store.append(&std::mem::take(&mut records)).unwrap();
+        }
+    }
+    if stops {
+        store.append(&plant.on_stop().records).unwrap();
+    }
+}
+
+fn runs(store: &Store, from: i64, to: i64, limit: usize) -> Vec<ControlRun> {
+    match store.answer(&Query::ControlRuns { controller: None, from: sec(from), to: sec(to), limit }, sec(to)).unwrap()
+    {
+        Answer::ControlRuns(runs) => runs,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_run_outlives_a_kill_and_no_number_comes_twice() {
+    let dir = tempfile::tempdir().unwrap();
+    let db = dir.path().join("h.duckdb");
+    let def = controlled();
+    station(&db, &def, 0..2_700, false);
+    station(&db, &def, 2_710..4_300, true);
+    let store = Store::open_at_start(&db, &def, sec(5_000)).unwrap().store;
+    let found = runs(&store, 0, 5_000, 10);
+    let words: Vec<String> = found
+        .iter()
+        .map(|run| format!("{} {} {}..{}", run.label(), run.state.word(), run.from.as_second(), run.until.as_second()))
+        .collect();
+    let expect = [
+        "TIC-1-4 interrupted 4000..4299",
+        "TIC-1-3 ended 3000..4000",
+        "TIC-1-2 interrupted 2000..2620",
+        "TIC-1-1 ended 1000..2000",
+    ];
+    assert_eq!(words, expect, "the second run was stored last at its second 620");
+    let first = found.last().unwrap();
+    assert_eq!((first.at_sv, first.steady), (Figure::After(Duration::from_secs(20)), first.at_sv));
+    assert_eq!((first.sv_before, first.sv, first.good), (Some(20.0), 60.0, 1.0));
+    assert!((first.iae - 40.0 * 20.0 / 60.0).abs() < 1e-9, "{}", first.iae);
+    assert_eq!(runs(&store, 2_500, 5_000, 2).len(), 2);
+    assert_eq!(runs(&store, 2_500, 2_600, 9).iter().map(|run| run.number).collect::<Vec<_>>(), [2]);
+    // What is read is what was written, to the last field.
+    let again = Record::Run(Box::new(ControlRun { number: 9, energy: Some((0.25, 0.5)), ..first.clone() }));
+    store.append(std::slice::from_ref(&again)).unwrap();
+    let back = runs(&store, 0, 5_000, 10).into_iter().find(|run| run.number == 9).unwrap();
+    assert_eq!(Record::Run(Box::new(back)), again);
+}
+
+#[test]
+fn sql_has_the_runs_and_a_report_those_of_its_period() {
+    let dir = tempfile::tempdir().unwrap();
+    let db = dir.path().join("h.duckdb");
+    let def = controlled();
+    station(&db, &def, 0..3_100, false);
+    let store = Store::open_at_start(&db, &def, sec(3_100)).unwrap().store;
+    let report = store.report(&crate::report::Period::free(sec(1_100), sec(2_900)), sec(3_100)).unwrap();
+    let numbers: Vec<u32> = report.control_runs.iter().map(|run| run.number).collect();
+    assert_eq!(numbers, [2, 1], "the third began later");
+    let Answer::Overview(overview) = store.answer(&Query::Overview, sec(3_100)).unwrap() else { panic!() };
+    let folder = dir.path().join("sql");
+    fs::create_dir(&folder).unwrap();
+    let tables = Tables::new(&def, &overview, &folder).unwrap();
+    tables.add_runs(&runs(&store, 0, 4_000, 10)).unwrap();
+    let sql = "SELECT controller, number, state, at_sv_s, steady_s FROM run ORDER BY number";
+    let (_, rows) = tables.rows(sql, 10).unwrap();
+    let row = |row: &Vec<Option<String>>| row.iter().map(|cell| cell.clone().unwrap_or("-".into())).collect::<Vec<_>>();
+    assert_eq!(row(&rows[0]), ["TIC-1", "1", "ended", "20.0", "20.0"]);
+    assert_eq!(row(&rows[2]), ["TIC-1", "3", RunState::Running.word(), "20.0", "-"]);
+}
