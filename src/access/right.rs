@@ -84,25 +84,8 @@ fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
 
 /// The least role that may give a command: what it writes may need more than its right.
 pub fn needs(def: &PlantDef, kind: &CommandKind) -> Role {
-    let written = match kind {
-        CommandKind::Write { tag, value } => Some(interlock::role_to_write(def, *tag, *value)),
-        CommandKind::Restore(request) => {
-            request.changes.iter().map(|change| interlock::role_to_write(def, change.tag, change.new)).max()
-        }
-        CommandKind::Alarm(_)
-        | CommandKind::Refresh(_)
-        | CommandKind::Connect(..)
-        | CommandKind::Configure(_)
-        | CommandKind::SaveSettings(_)
-        | CommandKind::Test(..)
-        | CommandKind::StopTest(_)
-        | CommandKind::ReadSets
-        | CommandKind::SaveSet { .. }
-        | CommandKind::StopRestore(_)
-        | CommandKind::HandOver
-        | CommandKind::TakeOver => None,
-    };
-    of_command(kind).role().max(written.unwrap_or(Role::Viewer))
+    let written = kind.writes().map(|(tag, value)| interlock::role_to_write(def, tag, value));
+    of_command(kind).role().max(written.max().unwrap_or(Role::Viewer))
 }
 
 /// The least role that may ask a query.

@@ -113,6 +113,15 @@ impl CommandKind {
             _ => None,
         }
     }
+
+    /// Each tag with the value that it gets: of a write one, of a restore all its changes.
+    pub fn writes(&self) -> impl Iterator<Item = (TagId, f64)> {
+        let changes = match self {
+            CommandKind::Restore(request) => &request.changes[..],
+            _ => &[],
+        };
+        self.written().into_iter().chain(changes.iter().map(|change| (change.tag, change.new)))
+    }
 }
 
 /// A command on its way to its outcome.

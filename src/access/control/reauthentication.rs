@@ -119,23 +119,6 @@ pub fn required(def: &PlantDef, kind: &CommandKind) -> Option<Reauthentication> 
         let kind = def.tags.get(tag.index())?.reauthenticate?;
         (!interlock::is_stop(def, tag, value)).then_some(kind)
     };
-    match kind {
-        CommandKind::Write { tag, value } => asks(*tag, *value),
-        CommandKind::Restore(request) => {
-            // The strictest of all.
-            request.changes.iter().filter_map(|change| asks(change.tag, change.new)).max()
-        }
-        CommandKind::Alarm(_)
-        | CommandKind::Refresh(_)
-        | CommandKind::Connect(..)
-        | CommandKind::Configure(_)
-        | CommandKind::SaveSettings(_)
-        | CommandKind::Test(..)
-        | CommandKind::StopTest(_)
-        | CommandKind::ReadSets
-        | CommandKind::SaveSet { .. }
-        | CommandKind::StopRestore(_)
-        | CommandKind::HandOver
-        | CommandKind::TakeOver => None,
-    }
+    // The strictest of all.
+    kind.writes().filter_map(|(tag, value)| asks(tag, value)).max()
 }
