@@ -45,6 +45,7 @@ mod schema;
 mod simulate;
 mod set_file;
 mod sets;
+mod size;
 mod tag;
 mod tag_keys;
 mod units;

@@ -13,10 +13,11 @@ use super::{
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
     north, program, reader,
-    reader::{At, Node, OptionalKey, Raw, text},
+    reader::{At, OptionalKey, text},
     report, run,
     schema::{DeviceTable, PlantFile, ProfileFile},
     sets,
+    size::is_of_size,
     tag::{self, DeviceContext},
 };
 use crate::plant::{
@@ -59,19 +60,6 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(Plan
         // A text that gave no plant always gave a problem; this keeps the promise without a panic.
         (None, _) => Err(Errors::unreadable(format!("{} is not a plant file", plant.file), String::new())),
     }
-}
-
-/// Looks how much a plant file asks for, before anything is made of it.
-fn is_of_size(raw: &Raw, problems: &mut Problems) -> bool {
-    for (key, most) in MOST {
-        let Some((_, At { value: Node::Array(rows), .. })) = raw.table.get(key) else { continue };
-        if let Some(first) = rows.get(most) {
-            let message = format!("{} times [[{key}]] is too much", rows.len());
-            problems.add(first.at, message).label(format!("expected at most {most}"));
-            return false;
-        }
-    }
-    true
 }
 
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> Option<PlantDef> {
@@ -306,18 +294,6 @@ fn define_device<'a>(
 
 /// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.
 const TAGS_MAX: usize = 20_000;
-/// Most tables of each kind in a plant file.
-const MOST: [(&str, usize); 9] = [
-    ("line", 64),
-    ("device", 2_000),
-    ("alarm", 10_000),
-    ("interlock", 10_000),
-    ("expect", 10_000),
-    ("trend", 1_000),
-    ("batch", 100),
-    ("run", 2_000),
-    ("shift", 100),
-];
 /// Most bytes of a plant file and its profiles together.
 const BYTES_MAX: usize = 16 << 20;
 
