@@ -181,6 +181,7 @@ fn a_history_of_an_older_version_is_read_after_one_start() {
     let old = duckdb::Connection::open(&path).unwrap();
     old.execute_batch(
         "DROP TABLE archive; DROP TABLE watched; DROP TABLE deleted; DROP TABLE import; DROP TABLE batch; DROP TABLE report;
+         DROP TABLE control_run;
          DELETE FROM schema_version WHERE version > 8; CHECKPOINT",
     )
     .unwrap();
@@ -191,7 +192,7 @@ fn a_history_of_an_older_version_is_read_after_one_start() {
     for (command, args) in commands {
         let (code, out, err) = run(command, &path, &[&period[..], args].concat());
         assert_eq!((code, &*out), (Some(1), ""), "{command}: {err}");
-        assert!(err.contains("older version of sightglass (schema 8, this one reads 13)"), "{command}: {err}");
+        assert!(err.contains("older version of sightglass (schema 8, this one reads 14)"), "{command}: {err}");
         assert!(err.contains(&start), "{command}: {err}");
     }
     let started = ["--for", "1s", "--port", "L1=/dev/none"];

@@ -150,7 +150,7 @@ fn moved_rows_take_no_key_meant_for_another() {
 }
 
 #[test]
-fn the_journal_of_an_area_has_its_alarms_and_what_was_done_there() {
+fn the_journal_of_an_area_has_its_alarms_and_actions() {
     let mut fixture = Fixture::normal();
     let now = fixture::now();
     fixture.def.alarms[0].area = "furnace".to_owned();
