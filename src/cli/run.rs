@@ -235,6 +235,11 @@ pub async fn follow(
     duration: Option<Duration>,
 ) -> Result<Arc<Snapshot>, CliError> {
     let mut before = snapshots.borrow_and_update().clone();
+    let print = |snapshot: &Snapshot, lines: Vec<String>| {
+        let time = local(snapshot.at, &snapshot.def);
+        lines.iter().for_each(|line| say(&format!("{time} {line}")));
+    };
+    print(&before, event_log::first(&before));
     let mut anchored = None;
     let mut watchdog = init::Watchdog::new();
     let end = over(clock, duration);
@@ -251,10 +256,7 @@ pub async fn follow(
                 }
                 let after = snapshots.borrow_and_update().clone();
                 watchdog.see(&after);
-                let time = local(after.at, &after.def);
-                for line in event_log::changes(&before, &after) {
-                    say(&format!("{time} {line}"));
-                }
+                print(&after, event_log::changes(&before, &after));
                 let hour = after.at.as_second().div_euclid(3_600);
                 if after.history.audit.is_some() && anchored.replace(hour) != Some(hour) {
                     say_anchor(after.history.audit);

@@ -7,7 +7,7 @@ use crate::plant::{
     alarm::{AlarmState, manager::subject_name},
     def::AlarmId,
     event::LineState,
-    snapshot::DeviceState,
+    snapshot::{DeviceState, HistoryStatus},
 };
 
 /// One line a change: lines, devices, alarms, commands, troubles of the store. Without time stamps.
@@ -27,6 +27,12 @@ pub fn changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
         lines.push(format!("history: {} records lost so far", after.history.lost));
     }
     lines
+}
+
+/// What is wrong with the history in the first snapshot that the log sees: the plant may have been faster than the log.
+pub fn first(snapshot: &Snapshot) -> Vec<String> {
+    let history = HistoryStatus { trouble: None, lost: 0, ..snapshot.history.clone() };
+    changes(&Snapshot { history, ..snapshot.clone() }, snapshot)
 }
 
 fn line_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
@@ -149,6 +155,16 @@ mod tests {
         event::{Event, Fault},
         fixture::{self, PV, TIC},
     };
+
+    #[test]
+    fn what_is_wrong_from_the_start_is_logged() {
+        let at = Timestamp::UNIX_EPOCH;
+        let mut plant = Plant::new(fixture::shared(), at, 1.0);
+        assert_eq!(first(&plant.snapshot()), [""; 0]);
+        let trouble = Some("audit log: the sealing key is missing".into());
+        plant.on_history(HistoryStatus { trouble, ..HistoryStatus::default() });
+        assert_eq!(first(&plant.snapshot()), ["history: audit log: the sealing key is missing"]);
+    }
 
     #[test]
     fn each_change_is_logged_once() {
