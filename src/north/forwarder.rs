@@ -36,7 +36,7 @@ pub struct Forwarder {
     cursor: Timestamp,
     span: Duration,
     overlap: Duration,
-    /// What was sent of the last [`OVERLAP`] before the cursor.
+    /// What was sent of the last `OVERLAP` before the cursor.
     sent: HashSet<Key>,
     deadband: Deadband,
 }
@@ -57,7 +57,7 @@ impl Forwarder {
         Forwarder { cursor, span: SPAN, overlap, sent: HashSet::new(), deadband: Deadband::new(tags) }
     }
 
-    /// What is read next begins [`OVERLAP`] before this instant.
+    /// What is read next begins `OVERLAP` before this instant.
     pub fn cursor(&self) -> Timestamp {
         self.cursor
     }
