@@ -213,7 +213,8 @@ async fn run(
                     outputs.publish(writer);
                 }
             }
-            Some(request) = jobs.recv() => archiver.take_up(request),
+            // One that comes while the store is being opened waits for it, as queries do.
+            Some(request) = jobs.recv(), if opening.is_none() => archiver.take_up(request),
             Some(request) = requests.recv() => match request {
                 WriterRequest::Commit(done) => {
                     writer.commit(clock.utc());

@@ -1,12 +1,17 @@
 //! Backups and what is restored from them: all of it or nothing, whatever ends the program in between.
 
-use std::{collections::BTreeSet, fs, path::Path};
+use std::{collections::BTreeSet, fs, path::Path, sync::Arc, time::Duration};
+
+use tokio::sync::oneshot;
 
 use super::{
     archive::{HOUR_S, archive_all, content, filled, rows},
     *,
 };
-use crate::history::io::{archive::Steps, backup::read_manifest, restore};
+use crate::{
+    bus::io::clock::Clock,
+    history::io::{HistoryJob, JobRequest, archive::Steps, backup::read_manifest, restore, thread},
+};
 
 const HOURS: i64 = 30;
 
@@ -275,4 +280,17 @@ fn a_backup_while_records_come_is_of_one_instant() {
         commits
     });
     assert!(commits > 10, "{commits}");
+}
+
+#[test]
+fn a_backup_waits_until_the_history_is_open() {
+    let (folder, db) = folder();
+    let (commit_every, answer) = (Duration::from_millis(1), Arc::new(Store::answer));
+    let handle = thread::start_with(&db, def(), Clock::starting_at(sec(10), 1.0), commit_every, answer).unwrap();
+    let (reply, done) = oneshot::channel();
+    let job = HistoryJob::Backup { to: folder.path().join("backup"), companions: Vec::new() };
+    handle.jobs.blocking_send(JobRequest { job, reply }).unwrap();
+    let said = done.blocking_recv().unwrap();
+    assert!(said.is_ok(), "{said:?}");
+    handle.stop();
 }
