@@ -1,6 +1,6 @@
-//! Control runs, stored by a station that is killed now and then.
+//! Control runs, stored by a station that is killed now and then; a day of them against a computation of others.
 
-use std::fs;
+use std::{fs, process::Command};
 
 use super::*;
 use crate::{
@@ -8,10 +8,14 @@ use crate::{
     plant::{
         Plant,
         control_run::{ControlRun, DURATION_MAX, Figure, RunDef, RunState, STEADY_FOR},
-        event::Event,
+        event::{Event, Fault},
         fixture::{self, DP, FAULT, PV, SV, TIC},
     },
+    sim::{rig::Rig, slave::Unit},
 };
+
+/// Computes each figure from the stored samples alone, and compares it.
+const CHECK: &str = include_str!("runs.py");
 
 /// The fixture with the runs of its controller.
 fn controlled() -> Arc<PlantDef> {
@@ -118,4 +122,85 @@ fn sql_has_the_runs_and_a_report_those_of_its_period() {
     let row = |row: &Vec<Option<String>>| row.iter().map(|cell| cell.clone().unwrap_or("-".into())).collect::<Vec<_>>();
     assert_eq!(row(&rows[0]), ["TIC-1", "1", "ended", "20.0", "20.0"]);
     assert_eq!(row(&rows[2]), ["TIC-1", "3", RunState::Running.word(), "20.0", "-"]);
+}
+
+/// A day of the simulated tank: the setpoint changes every 80 minutes, requests fail for some seconds or minutes, and the station
+/// is killed at noon. Its PLC is not read.
+fn day_of_the_tank(db: &Path, def: &Arc<PlantDef>) {
+    let setpoints = [350.0, 450.0, 600.0, 580.0, 700.0, 650.0, 705.0, 720.0, 700.0];
+    // From, to: around a change of the setpoint, a way up, and a time at SV.
+    let silent =
+        [4_796..4_803, 10_000..10_040, 14_700..14_990, 15_500..15_507, 30_000..30_600, 43_190..43_240, 60_000..60_012];
+    let mut rig = Rig::filled(5.0);
+    // Running, in manual, agitator and heater on.
+    assert!(rig.plc().respond(&[15, 0x0C, 0, 0, 7, 1, 0b100_1001]).is_some());
+    let mut plant = None;
+    let mut written = 0.0;
+    for second in 0..86_400i64 {
+        if second % 43_200 == 0 {
+            // The one before it is gone before this one opens its file.
+            drop(plant.take());
+            let opened = Store::open_at_start(db, def, sec(second)).unwrap();
+            let mut fresh = Plant::new(def.clone(), sec(second), 1.0);
+            opened.store.append(&fresh.restore_runs(&opened.read.runs)).unwrap();
+            plant = Some((fresh, opened.store, Vec::new()));
+        }
+        let Some((plant, store, records)) = &mut plant else { panic!("it begins at 0") };
+        let sv = setpoints[usize::try_from(second / 4_800).unwrap() % setpoints.len()];
+        if sv != written {
+            let [a, b] = (sv as u16).to_be_bytes();
+            assert!(rig.controller().respond(&[6, 0x03, 0xEA, a, b]).is_some());
+            written = sv;
+        }
+        let pv = (rig.state().pv_c * 10.0).round();
+        let (at, device) = (sec(second), TIC);
+        let values = vec![(DP, 1.0), (FAULT, 0.0), (SV, sv), (PV, pv)];
+        let (texts, response_time) = (Vec::new(), Duration::from_millis(9));
+        let event = match silent.iter().any(|silent| silent.contains(&second)) {
+            true => {
+                let tags = vec![DP, FAULT, SV, PV];
+                Event::Failed { at, device, tags, fault: Fault::Timeout, exchange: None }
+            }
+            false => Event::Read { at, device, values, texts, response_time, exchange: None },
+        };
+        records.extend(plant.on_event(event).records);
+        records.extend(plant.on_tick(at).records);
+        if second % 600 == 599 {
+            store.append(&std::mem::take(records)).unwrap();
+        }
+        rig.advance(Duration::from_secs(1));
+    }
+}
+
+#[test]
+fn a_day_of_runs_is_what_others_compute_from_its_samples() {
+    let dir = tempfile::tempdir().unwrap();
+    let db = dir.path().join("h.duckdb");
+    let mut def = PlantDef::clone(&controlled());
+    def.tags.iter_mut().for_each(|tag| tag.deadband = Some(0.0));
+    let def = Arc::new(def);
+    day_of_the_tank(&db, &def);
+    let store = Store::open_at_start(&db, &def, sec(86_400)).unwrap().store;
+    let found = runs(&store, 0, 86_400, 100);
+    let mut csv = String::from("tag,second,value,quality\n");
+    for from in (0..86_400).step_by(1_800) {
+        let query = Query::Unarchived { from: sec(from), to: sec(from + 1_800) };
+        let Answer::Unarchived(samples) = store.answer(&query, sec(86_400)).unwrap() else { panic!() };
+        for (tag, sample) in samples.iter().filter(|(tag, _)| [SV, PV].contains(tag)) {
+            let value = sample.value.map_or(String::new(), |value| value.to_string());
+            let second = sample.at.as_millisecond() as f64 / 1e3;
+            csv += &format!("{},{second},{value},{}\n", def.tag(*tag).name, sample.quality.is_good());
+        }
+    }
+    let (samples, listed) = (dir.path().join("samples.csv"), dir.path().join("runs.json"));
+    fs::write(&samples, csv).unwrap();
+    fs::write(&listed, serde_json::to_string(&found).unwrap()).unwrap();
+    let output = match Command::new("python3").args(["-c", CHECK]).args([&samples, &listed]).output() {
+        Err(error) if std::env::var_os("CI").is_none() => return eprintln!("skipped: python3: {error}"),
+        output => output.unwrap(),
+    };
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(said.trim(), format!("{} runs", found.len()));
+    assert!(16 <= found.len(), "{said}");
 }
